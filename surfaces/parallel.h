@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The one way work is spread over threads: by index, each index writing only what it owns.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace semblance {
+
+// Calls body(i) once for each i in [0, count), on up to `threads` threads, in blocks of `block`
+// indices. The body must write only to what belongs to index i, so that the result does not depend
+// on the number of threads. An exception of a body is rethrown (the one of the lowest block).
+// threads >= 1, block >= 1.
+void ParallelFor(std::size_t count, int threads, std::size_t block,
+                 const std::function<void(std::size_t)>& body);
+
+}  // namespace semblance

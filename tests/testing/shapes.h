@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tiny named shapes and seeded random values for tests.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+
+#include "surfaces/tri_mesh.h"
+
+namespace semblance::testing {
+
+// The unit-square plate [0,size] x [0,size] at z = 0, normals up, in n x n squares of two triangles
+// each.
+inline TriMesh Plate(double size, int n) {
+  TriMesh mesh;
+  for (int j = 0; j <= n; ++j) {
+    for (int i = 0; i <= n; ++i) {
+      mesh.points.emplace_back(size * i / n, size * j / n, 0);
+    }
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      const int a = i + (n + 1) * j, b = a + 1, c = a + n + 1, d = c + 1;
+      mesh.triangles.push_back({a, b, d});
+      mesh.triangles.push_back({a, d, c});
+    }
+  }
+  return mesh;
+}
+
+// A closed sphere of latitude rings, outward normals.
+inline TriMesh SphereMesh(const Vec3& center, double radius, int rings) {
+  const int columns = 2 * rings;
+  TriMesh mesh;
+  mesh.points.push_back(center + Vec3(0, 0, radius));
+  for (int r = 1; r < rings; ++r) {
+    const double theta = std::numbers::pi * r / rings;
+    for (int c = 0; c < columns; ++c) {
+      const double phi = 2 * std::numbers::pi * c / columns;
+      mesh.points.push_back(center + radius * Vec3(std::sin(theta) * std::cos(phi),
+                                                   std::sin(theta) * std::sin(phi),
+                                                   std::cos(theta)));
+    }
+  }
+  mesh.points.push_back(center - Vec3(0, 0, radius));
+  const auto at = [&](int r, int c) { return 1 + (r - 1) * columns + (c % columns); };
+  const int last = static_cast<int>(mesh.points.size()) - 1;
+  for (int c = 0; c < columns; ++c) {
+    mesh.triangles.push_back({0, at(1, c), at(1, c + 1)});
+    mesh.triangles.push_back({last, at(rings - 1, c + 1), at(rings - 1, c)});
+    for (int r = 1; r + 1 < rings; ++r) {
+      mesh.triangles.push_back({at(r, c), at(r + 1, c), at(r + 1, c + 1)});
+      mesh.triangles.push_back({at(r, c), at(r + 1, c + 1), at(r, c + 1)});
+    }
+  }
+  return mesh;
+}
+
+// Uniform numbers from a fixed seed; the same on every machine.
+class Random {
+ public:
+  explicit Random(std::uint64_t random_seed) : engine_(random_seed) {}
+  double Uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
+  }
+  Vec3 InBox(double low, double high) {
+    return {Uniform(low, high), Uniform(low, high), Uniform(low, high)};
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+}  // namespace semblance::testing
