@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pictures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "problems/lettering.h"
+#include "problems/solids.h"
+#include "surfaces/error.h"
+
+namespace semblance {
+namespace {
+
+constexpr Colour kPaper = {1, 1, 1};
+constexpr int kMargin = 24, kGap = 16, kTitleHeight = 50, kCaptionHeight = 40, kLegendHeight = 84;
+
+void CheckSheet(std::span<const Image> pictures, const Sheet& sheet) {
+  if (pictures.empty()) {
+    throw InputError("contact sheet: it needs at least one picture");
+  }
+  if (!sheet.captions.empty() && sheet.captions.size() != pictures.size()) {
+    throw InputError(
+        fmt::format("contact sheet: {} captions for {} pictures; give one a picture or none",
+                    sheet.captions.size(), pictures.size()));
+  }
+}
+
+}  // namespace
+
+SceneObject SkullObject(TriMesh mesh) {
+  return {.mesh = std::move(mesh), .material = BoneMaterial()};
+}
+
+SceneObject SkinObject(TriMesh mesh, double opacity) {
+  return {.mesh = std::move(mesh), .material = SkinMaterial(), .opacity = opacity};
+}
+
+SceneObject DowelObject(std::span<const Dowel> dowels, double radius_mm) {
+  SceneObject object{.mesh = {}, .material = PlasticMaterial(HexColour(0xc8321f))};
+  for (const Dowel& dowel : dowels) {
+    const Vec3 tip = dowel.Tip();
+    if (tip.allFinite() && (tip - dowel.base).norm() > 0) {
+      Append(object.mesh, MakeCylinder(dowel.base, tip, radius_mm));
+      Append(object.mesh, MakeSphere(tip, 1.6 * radius_mm));
+    }
+  }
+  return object;
+}
+
+SceneObject MappedObject(TriMesh mesh, std::span<const double> values_mm, const ColourMap& map) {
+  if (values_mm.size() != mesh.points.size()) {
+    throw InputError(fmt::format("coloured surface: {} values for {} points; give one a point",
+                                 values_mm.size(), mesh.points.size()));
+  }
+  return {.mesh = std::move(mesh),
+          .material = MatteMaterial(),
+          .vertex_colours = ColoursAt(map, values_mm)};
+}
+
+Image ContactSheet(std::span<const Image> pictures, const Sheet& sheet) {
+  CheckSheet(pictures, sheet);
+  int width = 2 * kMargin - kGap, height = 0;
+  for (const Image& picture : pictures) {
+    width += picture.width + kGap;
+    height = std::max(height, picture.height);
+  }
+  const int top = kMargin + (sheet.title.empty() ? 0 : kTitleHeight);
+  const int below = top + height + (sheet.captions.empty() ? 0 : kCaptionHeight);
+  Image page = MakeImage(width, below + (sheet.legend ? kLegendHeight : 0) + kMargin, kPaper);
+  DrawText(page, kMargin, kMargin + 24, sheet.title, {.cap_height_px = 19, .stroke = 0.135});
+  int x = kMargin;
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    Paste(page, pictures[i], x, top);
+    if (!sheet.captions.empty()) {
+      DrawText(page, x + pictures[i].width / 2.0, top + height + 28, sheet.captions[i],
+               {.cap_height_px = 13, .anchor = Anchor::kCentre});
+    }
+    x += pictures[i].width + kGap;
+  }
+  if (sheet.legend) {
+    DrawLegend(page, *sheet.legend, 0, below, width, kLegendHeight);
+  }
+  return page;
+}
+
+Image RenderViews(const Scene& scene, const Box3& region, std::span<const View> views,
+                  const Sheet& sheet, const RenderOptions& options, int threads) {
+  const double aspect = static_cast<double>(options.width) / std::max(options.height, 1);
+  double height_mm = 0;
+  for (const View view : views) {
+    height_mm = std::max(height_mm, CameraFor(view, region, aspect).height_mm);
+  }
+  std::vector<Image> pictures;
+  for (const View view : views) {
+    Camera camera = CameraFor(view, region, aspect);
+    camera.height_mm = height_mm;
+    pictures.push_back(Render(scene, camera, options, threads));
+  }
+  return ContactSheet(pictures, sheet);
+}
+
+}  // namespace semblance
