@@ -82,7 +82,7 @@ std::vector<Light> LightsInView(Lighting lighting) {
               .strength = 0.55,
               .colour = {0.95F, 0.97F, 1.0F}},
              lights);
-  AddDome(26, 1.5, 1.0, 0.45, lights);
+  AddDome(26, 1.3, 1.0, 0.4, lights);
   return lights;
 }
 
@@ -184,8 +184,9 @@ std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world) {
   for (const Light& light : lights) {
     facing += static_cast<float>(std::max(0.0, light.to_light.z())) * light.irradiance;
   }
+  const float exposure = lighting == Lighting::kEven ? 1.0F : 0.86F;
   for (Light& light : lights) {
-    light.irradiance /= facing;
+    light.irradiance *= exposure / facing;
     light.to_light = view_from_world.transpose() * light.to_light;
   }
   return lights;

@@ -17,8 +17,8 @@ struct Light {
   bool is_key = false;           // its highlight is drawn
 };
 
-// Lights placed relative to the camera; without shadows a white surface that faces the viewer
-// receives 1.
+// Lights placed relative to the camera. Under kEven a surface that faces the viewer and lies in no
+// shadow receives exactly 1, under kStudio a little less, which leaves room for highlights.
 std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world);
 
 struct SceneVertex {

@@ -190,7 +190,7 @@ class Painter {
         const Shaded sheet = Shade(sheer.triangle[i], x, y);
         colour = sheet.alpha * sheet.colour + (1 - sheet.alpha) * colour;
       }
-      sum += options_.lighting == Lighting::kEven ? colour.min(1.0F) : Shoulder(colour);
+      sum += colour;
     }
     const Rgb mean = sum / static_cast<float>(s * s);
     BlendPixel(image, column, row,
@@ -228,6 +228,8 @@ class Painter {
     } else {
       shaded.colour = albedo * LightInside(normal);
     }
+    shaded.colour = options_.lighting == Lighting::kEven ? Rgb(shaded.colour.min(1.0F))
+                                                         : Shoulder(shaded.colour);
     const double cosine = std::clamp(std::abs(normal.dot(to_viewer_)), 0.05, 1.0);
     shaded.alpha =
         static_cast<float>(1 - std::pow(1 - scene_.objects[t.object].opacity, 1 / cosine));
@@ -289,7 +291,7 @@ Material SkinMaterial() {
 }
 
 Material BoneMaterial() {
-  return {.colour = HexColour(0xe3d8bf),
+  return {.colour = HexColour(0xe0d3b6),
           .wrap = 0.06,
           .scatter_mm = {1.0, 0.75, 0.6},
           .gloss = 0.09,
