@@ -50,24 +50,30 @@ std::string TickLabel(double value, double step) {
 
 struct Bar {
   int x, y, width, height;
+  double scale;  // 1: letters of about 11 pixels
 };
 
 void DrawTicks(Image& image, const ColourMap& map, const Bar& bar) {
-  const std::vector<double> ticks = Ticks(map, std::clamp(bar.width / 50, 2, 10));
+  const int wanted = static_cast<int>(bar.width / (50 * bar.scale));
+  const std::vector<double> ticks = Ticks(map, std::clamp(wanted, 2, 10));
   const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : map.high_mm - map.low_mm;
+  const int tick_width = std::max(1, static_cast<int>(bar.scale));
+  const int tick_height = static_cast<int>(5 * bar.scale);
   for (const double tick : ticks) {
     const double t = (tick - map.low_mm) / (map.high_mm - map.low_mm);
     const int x = bar.x + static_cast<int>(std::lround(t * (bar.width - 1)));
-    FillRectangle(image, x, bar.y + bar.height, 1, 5, HexColour(0x30343a));
-    DrawText(image, x + 0.5, bar.y + bar.height + 20, TickLabel(tick, step),
-             {.cap_height_px = 10.5, .anchor = Anchor::kCentre});
+    FillRectangle(image, x - tick_width / 2, bar.y + bar.height, tick_width, tick_height,
+                  HexColour(0x30343a));
+    DrawText(image, x + 0.5, bar.y + bar.height + 20 * bar.scale, TickLabel(tick, step),
+             {.cap_height_px = 10.5 * bar.scale, .anchor = Anchor::kCentre});
   }
 }
 
 void DrawNoData(Image& image, const Bar& bar) {
-  const int x = bar.x + bar.width + 34;
+  const int x = bar.x + bar.width + static_cast<int>(34 * bar.scale);
   FillRectangle(image, x, bar.y, bar.height, bar.height, kNoDataColour);
-  DrawText(image, x + bar.height + 8, bar.y + bar.height - 2, "no data", {.cap_height_px = 10.5});
+  DrawText(image, x + bar.height + 8 * bar.scale, bar.y + bar.height - 2 * bar.scale, "no data",
+           {.cap_height_px = 10.5 * bar.scale});
 }
 
 }  // namespace
@@ -132,15 +138,17 @@ std::vector<double> Ticks(const ColourMap& map, int wanted) {
 }
 
 void DrawLegend(Image& image, const Legend& legend, int x, int y, int width, int height) {
-  const int bar_width = std::min(560, width * 6 / 10);
-  const Bar bar{x + (width - bar_width) / 2, y + height / 2 - 6, bar_width, 15};
+  const double scale = height / 84.0;
+  const int bar_width = std::min(static_cast<int>(560 * scale), width * 6 / 10);
+  const Bar bar{x + (width - bar_width) / 2, y + height / 2 - static_cast<int>(6 * scale),
+                bar_width, static_cast<int>(15 * scale), scale};
   for (int i = 0; i < bar.width; ++i) {
     const double t = (i + 0.5) / bar.width;
     const double value = legend.map.low_mm + t * (legend.map.high_mm - legend.map.low_mm);
     FillRectangle(image, bar.x + i, bar.y, 1, bar.height, ColourAt(legend.map, value));
   }
-  DrawText(image, bar.x + bar.width / 2.0, bar.y - 10, legend.title + " (mm)",
-           {.cap_height_px = 11.5, .anchor = Anchor::kCentre});
+  DrawText(image, bar.x + bar.width / 2.0, bar.y - 10 * scale, legend.title + " (mm)",
+           {.cap_height_px = 11.5 * scale, .anchor = Anchor::kCentre});
   DrawTicks(image, legend.map, bar);
   if (legend.shows_no_data) {
     DrawNoData(image, bar);

@@ -43,8 +43,8 @@ struct Legend {
   bool shows_no_data = true;  // with a swatch for "no data"
 };
 
-// A horizontal colour bar with ticks, centred in columns [x, x + width), rows [y, y + height);
-// height >= 70 leaves room for all.
+// A horizontal colour bar with ticks, centred in columns [x, x + width), rows [y, y + height).
+// The lettering grows with the height; 84 gives small print.
 void DrawLegend(Image& image, const Legend& legend, int x, int y, int width, int height);
 
 }  // namespace semblance

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "problems/lettering.h"
@@ -14,7 +15,20 @@ namespace semblance {
 namespace {
 
 constexpr Colour kPaper = {1, 1, 1};
-constexpr int kMargin = 24, kGap = 16, kTitleHeight = 50, kCaptionHeight = 40, kLegendHeight = 84;
+
+// Wide sheets are shown smaller, so their lettering grows with them.
+struct Layout {
+  double scale = 1;
+  int margin = 24, gap = 16, title = 0, caption = 0, legend = 0;  // pixels
+
+  Layout(int pictures_width, const Sheet& sheet)
+      : scale(std::clamp(pictures_width / 1300.0, 1.0, 4.0)) {
+    title = sheet.title.empty() ? 0 : Pixels(46);
+    caption = sheet.captions.empty() ? 0 : Pixels(36);
+    legend = sheet.legend ? Pixels(84) : 0;
+  }
+  int Pixels(double at_scale_1) const { return static_cast<int>(std::lround(scale * at_scale_1)); }
+};
 
 void CheckSheet(std::span<const Image> pictures, const Sheet& sheet) {
   if (pictures.empty()) {
@@ -61,26 +75,28 @@ SceneObject MappedObject(TriMesh mesh, std::span<const double> values_mm, const 
 
 Image ContactSheet(std::span<const Image> pictures, const Sheet& sheet) {
   CheckSheet(pictures, sheet);
-  int width = 2 * kMargin - kGap, height = 0;
+  int pictures_width = 0, height = 0;
   for (const Image& picture : pictures) {
-    width += picture.width + kGap;
+    pictures_width += picture.width;
     height = std::max(height, picture.height);
   }
-  const int top = kMargin + (sheet.title.empty() ? 0 : kTitleHeight);
-  const int below = top + height + (sheet.captions.empty() ? 0 : kCaptionHeight);
-  Image page = MakeImage(width, below + (sheet.legend ? kLegendHeight : 0) + kMargin, kPaper);
-  DrawText(page, kMargin, kMargin + 24, sheet.title, {.cap_height_px = 19, .stroke = 0.135});
-  int x = kMargin;
+  const Layout l(pictures_width, sheet);
+  const int gaps = l.gap * (static_cast<int>(pictures.size()) - 1);
+  const int top = l.margin + l.title, below = top + height + l.caption;
+  Image page = MakeImage(2 * l.margin + pictures_width + gaps, below + l.legend + l.margin, kPaper);
+  DrawText(page, l.margin, l.margin + l.Pixels(22), sheet.title,
+           {.cap_height_px = l.scale * 17, .stroke = 0.135});
+  int x = l.margin;
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     Paste(page, pictures[i], x, top);
     if (!sheet.captions.empty()) {
-      DrawText(page, x + pictures[i].width / 2.0, top + height + 28, sheet.captions[i],
-               {.cap_height_px = 13, .anchor = Anchor::kCentre});
+      DrawText(page, x + pictures[i].width / 2.0, top + height + l.Pixels(26), sheet.captions[i],
+               {.cap_height_px = l.scale * 12, .anchor = Anchor::kCentre});
     }
-    x += pictures[i].width + kGap;
+    x += pictures[i].width + l.gap;
   }
   if (sheet.legend) {
-    DrawLegend(page, *sheet.legend, 0, below, width, kLegendHeight);
+    DrawLegend(page, *sheet.legend, 0, below, page.width, l.legend);
   }
   return page;
 }

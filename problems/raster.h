@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 
 #include "surfaces/geometry.h"
@@ -34,8 +33,8 @@ struct Projection {
  private:
   // Far beyond every grid a point is held back, which keeps the edge products within 64 bits.
   static std::int32_t Steps(double samples) {
-    return static_cast<std::int32_t>(
-        std::lround(std::clamp(samples * kSubsamples, -268435456.0, 268435456.0)));
+    const double steps = std::clamp(samples * kSubsamples, -268435456.0, 268435456.0);
+    return static_cast<std::int32_t>(steps + (steps < 0 ? -0.5 : 0.5));
   }
 };
 

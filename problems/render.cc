@@ -84,6 +84,13 @@ Rgb Shoulder(const Rgb& colour) {
   return colour.min(kBegin) + (1 - kBegin) * over / (1 + over);
 }
 
+void SetPixel(Image& image, int x, int y, const Rgb& linear) {
+  std::uint8_t* pixel = &image.rgb[3 * (static_cast<std::size_t>(y) * image.width + x)];
+  for (int channel = 0; channel < 3; ++channel) {
+    pixel[channel] = SrgbByte(linear[channel]);
+  }
+}
+
 struct Layer {
   std::vector<float> depth;
   std::vector<std::int32_t> triangle;  // -1: none
@@ -140,8 +147,9 @@ class Painter {
                    });
     }
     for (int row = first / s; row < end / s; ++row) {
+      const Rgb background = Background(row);
       for (int column = 0; column < options_.width; ++column) {
-        PaintPixel(opaque, sheer, first, column, row, image);
+        SetPixel(image, column, row, PixelLight(opaque, sheer, first, column, row, background));
       }
     }
   }
@@ -174,10 +182,10 @@ class Painter {
     half_way_ = (half_way_.normalized() + to_viewer_).normalized();
   }
 
-  void PaintPixel(const Layer& opaque, const Layer& sheer, int first_row, int column, int row,
-                  Image& image) const {
+  // The mean over the samples of a pixel.
+  Rgb PixelLight(const Layer& opaque, const Layer& sheer, int first_row, int column, int row,
+                 const Rgb& background) const {
     const int s = options_.supersampling, columns = s * options_.width;
-    const Rgb background = Background(row);
     Rgb sum = Rgb::Zero();
     for (int k = 0; k < s * s; ++k) {
       const int x = s * column + k % s, y = s * row + k / s;
@@ -192,9 +200,7 @@ class Painter {
       }
       sum += colour;
     }
-    const Rgb mean = sum / static_cast<float>(s * s);
-    BlendPixel(image, column, row,
-               {SrgbFromLinear(mean[0]), SrgbFromLinear(mean[1]), SrgbFromLinear(mean[2])}, 1);
+    return sum / static_cast<float>(s * s);
   }
 
   Rgb Background(int row) const {
@@ -230,9 +236,10 @@ class Painter {
     }
     shaded.colour = options_.lighting == Lighting::kEven ? Rgb(shaded.colour.min(1.0F))
                                                          : Shoulder(shaded.colour);
-    const double cosine = std::clamp(std::abs(normal.dot(to_viewer_)), 0.05, 1.0);
-    shaded.alpha =
-        static_cast<float>(1 - std::pow(1 - scene_.objects[t.object].opacity, 1 / cosine));
+    if (const double opacity = scene_.objects[t.object].opacity; opacity < 1) {
+      const double cosine = std::clamp(std::abs(normal.dot(to_viewer_)), 0.05, 1.0);
+      shaded.alpha = static_cast<float>(1 - std::pow(1 - opacity, 1 / cosine));
+    }
     return shaded;
   }
 

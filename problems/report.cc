@@ -46,6 +46,8 @@ figure img { display: block; max-width: 100%; height: auto; border: 1px solid va
   border-radius: .6rem; background: #fff; }
 figcaption { margin-top: .4rem; max-width: 46rem; color: var(--soft); font-size: .9rem; }
 .scroll { overflow-x: auto; margin: 1rem 0; }
+figure .scroll { margin: 0; }
+@media screen and (max-width: 44rem) { img.wide { width: 56rem; max-width: none; } }
 table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabular-nums; }
 caption { padding: 0 0 .4rem; text-align: left; color: var(--soft); font-size: .9rem; }
 th, td { padding: .32rem .9rem .32rem 0; border-bottom: 1px solid var(--line); text-align: left;
@@ -77,13 +79,31 @@ std::string MimeType(const ReportImage& image) {
       image.caption.empty() ? image.alt : image.caption, bytes.size()));
 }
 
+// " width=.. height=.." of a PNG, so that a page does not jump while it loads; empty for others.
+std::string SizeAttributes(const std::string& bytes) {
+  if (!bytes.starts_with('\x89') || bytes.size() < 24) {
+    return {};
+  }
+  const auto number = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    for (std::size_t i = at; i < at + 4; ++i) {
+      value = (value << 8) | static_cast<unsigned char>(bytes[i]);
+    }
+    return value;
+  };
+  const std::uint32_t width = number(16), height = number(20);
+  return fmt::format(" width=\"{}\" height=\"{}\"{}", width, height,
+                     width > 1.8 * height ? " class=\"wide\"" : "");
+}
+
 std::string ImageHtml(const ReportImage& image) {
   if (image.alt.empty()) {
     throw InputError(fmt::format(
         "report image '{}': it has no alt text; say in a few words what it shows", image.caption));
   }
-  std::string html = fmt::format("<figure><img alt=\"{}\" src=\"data:{};base64,{}\">",
-                                 EscapeHtml(image.alt), MimeType(image), Base64(image.bytes));
+  std::string html = fmt::format(
+      "<figure><div class=\"scroll\"><img alt=\"{}\"{} src=\"data:{};base64,{}\"></div>",
+      EscapeHtml(image.alt), SizeAttributes(image.bytes), MimeType(image), Base64(image.bytes));
   if (!image.caption.empty()) {
     html += fmt::format("<figcaption>{}</figcaption>", EscapeHtml(image.caption));
   }

@@ -72,7 +72,10 @@ TEST(Html, TextOfTheReportIsEscapedEverywhere) {
 TEST(Html, EveryImageIsInsideTheFileAndHasAltText) {
   const std::string html = ReportHtml(Full());
   EXPECT_EQ(Count(html, "<img"), 2);
-  EXPECT_EQ(Count(html, "<img alt=\"[^\"]+\" src=\"data:image/png;base64,[A-Za-z0-9+/=]+\">"), 2);
+  EXPECT_EQ(Count(html,
+                  "<img alt=\"[^\"]+\" width=\"8\" height=\"6\" "
+                  "src=\"data:image/png;base64,[A-Za-z0-9+/=]+\">"),
+            2);
   EXPECT_THAT(html, HasSubstr("alt=\"a &quot;quoted&quot; view\""));
 }
 
