@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "surfaces/fields.h"
+
 namespace semblance {
 
 // sRGB-encoded, each 0..1.
@@ -16,7 +18,14 @@ struct Colour {
   double b = 0;
 };
 
-// "#rrggbb".
+template <class Visitor>
+void Fields(Visitor& visit, Colour& o) {
+  visit(FieldInfo{.name = "r", .min = 0, .max = 1, .doc = "red"}, o.r);
+  visit(FieldInfo{.name = "g", .min = 0, .max = 1, .doc = "green"}, o.g);
+  visit(FieldInfo{.name = "b", .min = 0, .max = 1, .doc = "blue"}, o.b);
+}
+
+// 0xrrggbb.
 Colour HexColour(std::uint32_t rrggbb);
 
 struct Image {

@@ -39,6 +39,14 @@ void CheckObject(const SceneObject& object, std::size_t index) {
       throw InputError(fmt::format("scene object {}: point {} is not finite", index, i));
     }
   }
+  for (std::size_t t = 0; t < object.mesh.triangles.size(); ++t) {
+    for (const std::int32_t corner : object.mesh.triangles[t]) {
+      if (corner < 0 || static_cast<std::size_t>(corner) >= points) {
+        throw InputError(fmt::format("scene object {}: triangle {} names point {} of {}", index, t,
+                                     corner, points));
+      }
+    }
+  }
 }
 
 void CheckOptions(const Camera& camera, const RenderOptions& o) {
@@ -218,29 +226,32 @@ class Painter {
     Coverage at;
     VisitSamples(points_[t.corners[0]], points_[t.corners[1]], points_[t.corners[2]],
                  {x, x + 1, y, y + 1}, [&](const Coverage& sample) { at = sample; });
+    const SceneVertex surface = Interpolate(t, at);
+    const SceneObject& object = scene_.objects[t.object];
+    const Rgb light =
+        at.is_front ? Rgb(surface.albedo * surface.light +
+                          Highlight(object.material, surface.normal) * surface.key * key_light_)
+                    : Rgb(surface.albedo * LightInside(surface.normal));
+    Shaded shaded;
+    shaded.colour = options_.lighting == Lighting::kEven ? Rgb(light.min(1.0F)) : Shoulder(light);
+    if (object.opacity < 1) {
+      const double cosine = std::clamp(std::abs(surface.normal.dot(to_viewer_)), 0.05, 1.0);
+      shaded.alpha = static_cast<float>(1 - std::pow(1 - object.opacity, 1 / cosine));
+    }
+    return shaded;
+  }
+
+  SceneVertex Interpolate(const SceneTriangle& t, const Coverage& at) const {
     const SceneVertex& a = flat_.vertices[t.corners[0]];
     const SceneVertex& b = flat_.vertices[t.corners[1]];
     const SceneVertex& c = flat_.vertices[t.corners[2]];
-    const auto wa = static_cast<float>(at.a), wb = static_cast<float>(at.b),
-               wc = static_cast<float>(at.c);
-    const Vec3 normal = (at.a * a.normal + at.b * b.normal + at.c * c.normal).normalized();
-    const Material& material = scene_.objects[t.object].material;
-    const Rgb albedo = wa * a.albedo + wb * b.albedo + wc * c.albedo;
-    Shaded shaded;
-    if (at.is_front) {
-      const float key = wa * a.key + wb * b.key + wc * c.key;
-      shaded.colour = albedo * (wa * a.light + wb * b.light + wc * c.light) +
-                      Highlight(material, normal) * key * key_light_;
-    } else {
-      shaded.colour = albedo * LightInside(normal);
-    }
-    shaded.colour = options_.lighting == Lighting::kEven ? Rgb(shaded.colour.min(1.0F))
-                                                         : Shoulder(shaded.colour);
-    if (const double opacity = scene_.objects[t.object].opacity; opacity < 1) {
-      const double cosine = std::clamp(std::abs(normal.dot(to_viewer_)), 0.05, 1.0);
-      shaded.alpha = static_cast<float>(1 - std::pow(1 - opacity, 1 / cosine));
-    }
-    return shaded;
+    const auto wa = static_cast<float>(at.a), wb = static_cast<float>(at.b);
+    const auto wc = static_cast<float>(at.c);
+    return {.position = at.a * a.position + at.b * b.position + at.c * c.position,
+            .normal = (at.a * a.normal + at.b * b.normal + at.c * c.normal).normalized(),
+            .albedo = wa * a.albedo + wb * b.albedo + wc * c.albedo,
+            .light = wa * a.light + wb * b.light + wc * c.light,
+            .key = wa * a.key + wb * b.key + wc * c.key};
   }
 
   float Highlight(const Material& material, const Vec3& normal) const {

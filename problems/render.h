@@ -83,11 +83,15 @@ void Fields(Visitor& visit, RenderOptions& o) {
         o.supersampling);
   visit(FieldInfo{.name = "lighting", .doc = "studio, or even for colours that stand for numbers"},
         o.lighting);
+  visit(FieldInfo{.name = "background_top", .doc = "sRGB; blends into background_bottom"},
+        o.background_top);
+  visit(FieldInfo{.name = "background_bottom", .doc = "sRGB"}, o.background_bottom);
 }
 
 // Throws InputError for options out of range, a camera without height, a point that is not finite,
-// an opacity outside 0..1 or colours that are not one a vertex. An empty scene shows the
-// background. threads >= 1; the picture does not depend on it.
+// a triangle that names a point which is not there, an opacity outside 0..1 or colours that are not
+// one a vertex. An empty scene shows the background. threads >= 1; the picture does not depend on
+// it.
 Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads);
 
 }  // namespace semblance

@@ -230,6 +230,9 @@ TEST(Render, WrongInputIsOneClearError) {
   object.mesh.points[2].x() = kNaN;
   EXPECT_THROW(Render({{object}}, FrontCamera(10), {}, 1), InputError);
   object.mesh.points[2].x() = 0;
+  object.mesh.triangles[1][2] = 4;
+  EXPECT_THROW(Render({{object}}, FrontCamera(10), {}, 1), InputError);
+  object.mesh.triangles[1][2] = 3;
   object.vertex_colours.pop_back();
   EXPECT_THROW(Render({{object}}, FrontCamera(10), {}, 1), InputError);
 }
