@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A report as one HTML file that needs nothing else: no network, no script, no font file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace semblance {
+
+// All text is plain: it is escaped on the way out.
+struct ReportTile {
+  std::string label;  // e.g. "mean error"
+  std::string value;  // e.g. "1.84"
+  std::string unit;   // e.g. "mm"; may be empty
+  std::string note;   // small print below; may be empty
+};
+
+struct ReportTable {
+  std::string caption;
+  std::vector<std::string> header;             // with units, e.g. "depth (mm)"
+  std::vector<std::vector<std::string>> rows;  // as many cells each as the header; a column of
+                                               // numbers is aligned right; empty: a dash
+};
+
+struct ReportImage {
+  std::string bytes;    // of a PNG or SVG file
+  std::string caption;  // below it; may be empty
+  std::string alt;      // what it shows, for those who do not see it; not empty
+};
+
+struct ReportSection {
+  std::string heading;
+  std::vector<std::string> paragraphs = {};
+  std::vector<ReportImage> images = {};
+  std::vector<ReportTable> tables = {};
+  std::string preformatted = {};  // e.g. the configuration; may be empty
+};
+
+struct Report {
+  std::string title;
+  std::string subtitle;
+  std::vector<ReportTile> tiles;         // the key numbers, on the first screen
+  std::vector<ReportImage> main_images;  // the first picture people see, usually one
+  std::vector<ReportSection> sections;
+  std::string footer;  // e.g. the version; no time, so that the same run gives the same bytes
+};
+
+// Throws IoError if the file cannot be read.
+ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,
+                                std::string alt);
+
+// HTML5 with the pictures inside; the same report gives the same bytes. Throws InputError for an
+// image that is neither PNG nor SVG or has no alt text, and for a table row that is not as long as
+// the header.
+std::string ReportHtml(const Report& report);
+
+// & < > " ' as entities; control characters that HTML forbids as a replacement character.
+std::string EscapeHtml(std::string_view text);
+
+std::string Base64(std::string_view bytes);  // RFC 4648, with padding
+
+}  // namespace semblance
