@@ -16,7 +16,6 @@
 #include <sstream>
 
 #include "problems/config_bytes.h"
-#include "surfaces/error.h"
 
 namespace semblance {
 namespace {

@@ -32,6 +32,7 @@
 #include "problems/config_tree.h"
 #include "problems/config_writer.h"
 #include "problems/options_reference.h"
+#include "surfaces/error.h"
 
 namespace semblance {
 

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "problems/config.h"
-#include "surfaces/error.h"
 #include "tests/testing/config_samples.h"
 #include "tests/testing/shapes.h"
 

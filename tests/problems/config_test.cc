@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "problems/nearest_word.h"
-#include "surfaces/error.h"
 #include "tests/testing/config_samples.h"
 
 namespace semblance {
