@@ -293,7 +293,7 @@ ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
     // The parser has no place for what ends too soon.
     const bool is_at_end = error.msg.starts_with("end of ");
     errors.Add(is_at_end ? EndOf(text, shared_source) : PlaceAt(shared_source, error.mark), "",
-               "this is not YAML: " + error.msg);
+               fmt::format("this is not YAML: {}", error.msg));
     return ConfigNode::Map();
   }
   return builder.TakeRoot();

@@ -276,7 +276,7 @@ void RefuseUnknownKeys(ConfigErrors& errors, const ConfigItem& item,
     }
     if (!is_known) {
       errors.Add(entry.key_place, JoinPath(item.path, entry.key),
-                 "unknown key" + Suggestion(entry.key, known));
+                 fmt::format("unknown key{}", Suggestion(entry.key, known)));
     }
   }
 }

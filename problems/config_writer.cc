@@ -62,12 +62,12 @@ bool IsInline(const ConfigNode& node) {
 void AddBlock(const ConfigNode& node, std::size_t indent, std::string& out) {
   const std::string margin(indent, ' ');
   if (IsInline(node)) {
-    out += margin + ToFlowYaml(node) + "\n";
+    out += fmt::format("{}{}\n", margin, ToFlowYaml(node));
   } else if (node.IsMap()) {
     for (const ConfigNode::Entry& entry : node.entries) {
-      out += margin + TextOf(entry.key) + ":";
+      out += fmt::format("{}{}:", margin, TextOf(entry.key));
       if (IsInline(entry.value)) {
-        out += " " + ToFlowYaml(entry.value) + "\n";
+        out += fmt::format(" {}\n", ToFlowYaml(entry.value));
       } else {
         out += "\n";
         AddBlock(entry.value, indent + 2, out);
@@ -107,12 +107,13 @@ std::string ToFlowYaml(const ConfigNode& tree) {
   }
   std::string inside;
   for (const ConfigNode::Entry& entry : tree.entries) {
-    inside += (inside.empty() ? "" : ", ") + TextOf(entry.key) + ": " + ToFlowYaml(entry.value);
+    inside += fmt::format("{}{}: {}", inside.empty() ? "" : ", ", TextOf(entry.key),
+                          ToFlowYaml(entry.value));
   }
   for (const ConfigNode& item : tree.items) {
-    inside += (inside.empty() ? "" : ", ") + ToFlowYaml(item);
+    inside += fmt::format("{}{}", inside.empty() ? "" : ", ", ToFlowYaml(item));
   }
-  return tree.IsMap() ? "{" + inside + "}" : "[" + inside + "]";
+  return tree.IsMap() ? fmt::format("{{{}}}", inside) : fmt::format("[{}]", inside);
 }
 
 std::string ToYaml(const ConfigNode& tree) {

@@ -41,9 +41,9 @@ std::string TypeText(const ConfigType& type) {
     case Kind::kArray:
       return fmt::format("list of {}: {}", type.size, TypeText(type.inner.front()));
     case Kind::kList:
-      return "list: " + TypeText(type.inner.front());
+      return fmt::format("list: {}", TypeText(type.inner.front()));
     case Kind::kMap:
-      return "map by name: " + TypeText(type.inner.front());
+      return fmt::format("map by name: {}", TypeText(type.inner.front()));
     case Kind::kStruct:
       return "map";
     case Kind::kVariant:
@@ -59,7 +59,7 @@ std::string DefaultText(const ConfigField& field) {
   }
   const ConfigNode* type =
       field.type.kind == Kind::kVariant ? field.default_value.Find("type") : nullptr;
-  return ", default " + ToFlowYaml(type ? *type : field.default_value);
+  return fmt::format(", default {}", ToFlowYaml(type ? *type : field.default_value));
 }
 
 std::string LimitText(const ConfigField& field) {
@@ -74,7 +74,7 @@ std::string LimitText(const ConfigField& field) {
   }
   const std::string range = RangeText(info);
   const std::string alone = info.unit.empty() ? "" : fmt::format(", in {}", info.unit);
-  return text + (range.empty() ? alone : ", " + range);
+  return text + (range.empty() ? alone : fmt::format(", {}", range));
 }
 
 void AddFields(const std::vector<ConfigField>& fields, const std::string& path,

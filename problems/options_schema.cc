@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -73,7 +75,7 @@ Json ObjectSchema(const std::vector<ConfigField>& fields) {
     Json schema = TypeSchema(field.type, field.info);
     std::string doc(field.info.doc);
     if (!field.info.unit.empty()) {
-      doc += (doc.empty() ? "" : " ") + ("[" + std::string(field.info.unit) + "]");
+      doc += fmt::format("{}[{}]", doc.empty() ? "" : " ", field.info.unit);
     }
     if (!doc.empty()) {
       schema["description"] = doc;
