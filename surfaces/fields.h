@@ -17,8 +17,10 @@
 //
 // A field may be: bool, int, std::uint64_t, double, std::string, std::filesystem::path (relative to
 // the config file), std::array<double, N>, an enum with EnumNames, std::optional<T>,
-// std::vector<T>, another struct with Fields, or a std::variant of structs with kName (written as a
-// map with `type:`, or as the bare name when all its options keep their defaults).
+// std::vector<T>, std::map<std::string, T>, another struct with Fields, or a std::variant of
+// structs with kName (written as a map with `type:`, or as the bare name when all its options keep
+// their defaults). No field may be named `type`. `min` is the least size of a std::vector; else min
+// and max bound the numbers inside.
 #pragma once
 
 #include <limits>

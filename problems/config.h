@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Strict configuration: YAML to structs with a `Fields` list (surfaces/fields.h), and back. Also
+// for data files (tissue tables, landmarks, networks), which are YAML read with the same
+// strictness.
+//
+// Every field may be left out and then keeps its default; an empty file is all defaults. Everything
+// else that is not exactly right is an error: unknown and repeated keys, null where the field is
+// not optional, quoted numbers, whole numbers written 1e3 or 1.0, numbers with a leading zero or
+// in another base, nan and inf, yes/no/on/off, values out of range, anchors, aliases, tags, merge
+// keys, tabs, a second document. All errors are reported at once, one a line, as
+//     file:line:column: path: what; did you mean 'x'?
+//
+// `base: other.yaml` at the top lays the file over another one: maps merge key by key, lists and
+// scalars replace, a variant of another `type` replaces wholly. Bases may have bases. Paths are
+// relative to the file they are written in.
+//
+// Overrides ("a.b[0].c=v", v in YAML) come last and name themselves in errors: `--set a.b=c: ...`.
+// Paths in them are relative to the current folder. They reach into default lists and variants too.
+//
+// A variant is written as a map with `type`, or as the bare name of a type for its defaults. A map
+// without `type` sets options of the field's default type; in a list, `type` must be there.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "problems/config_binder.h"
+#include "problems/config_describe.h"
+#include "problems/config_errors.h"
+#include "problems/config_tree.h"
+#include "problems/config_writer.h"
+#include "problems/options_reference.h"
+#include "surfaces/error.h"
+
+namespace semblance {
+
+// The tree of one YAML text; what a tree cannot tell apart (repeated keys, anchors, tags ...) is
+// complained about here. Null for an empty text; an empty map after a syntax error.
+ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source, ConfigErrors& errors);
+
+// The tree of a file (or of a text that pretends to be one) with its bases below and the overrides
+// above it. `defaults` is the tree of the default values, for overrides. Throws IoError if the file
+// itself cannot be read; a base that cannot is among the errors.
+ConfigNode LoadConfigTree(const std::filesystem::path& file, std::span<const std::string> overrides,
+                          const ConfigNode& defaults, ConfigErrors& errors);
+ConfigNode LoadConfigTextTree(std::string_view text, const std::filesystem::path& pretend_file,
+                              std::span<const std::string> overrides, const ConfigNode& defaults,
+                              ConfigErrors& errors);
+
+// One override laid over `tree`. `order` places its errors among those of other sources.
+void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
+                   ConfigNode& tree, ConfigErrors& errors);
+
+// The tree of all fields, defaults for a default value.
+template <class T>
+ConfigNode ConfigTreeOf(const T& value) {
+  return config_internal::ToTree(value);
+}
+
+// The value of a tree; entries that are wrong are added to `errors` and keep their defaults.
+template <class T>
+T ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors) {
+  T value{};
+  config_internal::ReadValue(errors, {tree, "", FieldInfo{}}, value);
+  return value;
+}
+
+// Throws ConfigError with all errors, IoError if the file cannot be read.
+template <class T>
+T ReadConfig(const std::filesystem::path& file, std::span<const std::string> overrides = {}) {
+  ConfigErrors errors;
+  const ConfigNode tree = LoadConfigTree(file, overrides, ConfigTreeOf(T{}), errors);
+  T value = ReadConfigTree<T>(tree, errors);
+  errors.ThrowIfAny();
+  return value;
+}
+
+// The same for a text, as if it stood in `pretend_file`, which need not exist.
+template <class T>
+T ReadConfigText(std::string_view text, const std::filesystem::path& pretend_file,
+                 std::span<const std::string> overrides = {}) {
+  ConfigErrors errors;
+  const ConfigNode tree =
+      LoadConfigTextTree(text, pretend_file, overrides, ConfigTreeOf(T{}), errors);
+  T value = ReadConfigTree<T>(tree, errors);
+  errors.ThrowIfAny();
+  return value;
+}
+
+// Resolved YAML: every field, explicit; reading it gives the same value bit for bit. Paths are
+// written absolute. Throws InputError if a number is not finite.
+template <class T>
+std::string WriteConfig(const T& value) {
+  return ToYaml(ConfigTreeOf(value));
+}
+
+// For people: each path with its type, default, range, unit and meaning.
+template <class T>
+std::string OptionsReference() {
+  return ReferenceText(config_internal::DescribeType<T>());
+}
+
+// For editors: a JSON Schema (draft 2020-12).
+template <class T>
+std::string OptionsSchema() {
+  return SchemaText(config_internal::DescribeType<T>());
+}
+
+}  // namespace semblance
