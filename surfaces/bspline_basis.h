@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The uniform cubic B-spline: its four weights on a patch and their derivatives.
+// The uniform cubic B-spline along one direction: its four weights on a patch, their derivatives,
+// and the dyadic refinement rule.
 #pragma once
 
 #include <array>
@@ -19,6 +20,23 @@ constexpr std::array<double, 4> CubicWeights(double t, int order) {
     default:
       return {s, 3 * t - 2, 3 * s - 2, t};
   }
+}
+
+// The vertices of the coarser level, along one direction, that make one vertex of the finer level:
+// knot insertion at every midpoint. Index may stand twice, then with weight 0.
+struct RefinementRow {
+  std::array<int, 3> index;
+  std::array<double, 3> weight;  // sum 1
+};
+
+// Vertex i lies on knot i - 1 of its level. The finer vertex i is made of three coarser ones with
+// 1/8 6/8 1/8 where it lies on one (i odd), else of its two neighbours with 1/2 each. i >= 0.
+constexpr RefinementRow RefineRow(int i) {
+  if (i % 2 != 0) {
+    const int c = (i + 1) / 2;
+    return {{c - 1, c, c + 1}, {0.125, 0.75, 0.125}};
+  }
+  return {{i / 2, i / 2 + 1, i / 2}, {0.5, 0.5, 0}};
 }
 
 }  // namespace semblance

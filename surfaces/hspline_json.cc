@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -59,20 +60,42 @@ void RequireSize(const Json& row, std::size_t size) {
   }
 }
 
+int IntFromJson(const Json& number) {
+  constexpr int kMost = 1'000'000;  // far above all that is allowed anywhere, safe to reckon with
+  if (!number.is_number_integer() || number < -kMost || number > kMost) {
+    throw IoError(fmt::format("{} is not a whole number of a sensible size", number.dump()));
+  }
+  return number.get<int>();
+}
+
+double DoubleFromJson(const Json& number) {
+  if (!number.is_number()) {
+    throw IoError(fmt::format("{} is not a number", number.dump()));
+  }
+  return number.get<double>();
+}
+
+const Json& ListFromJson(const Json& json, const char* key) {
+  if (!json.at(key).is_array()) {
+    throw IoError(fmt::format("'{}' is not a list", key));
+  }
+  return json.at(key);
+}
+
 HSplineShape ShapeFromJson(const Json& json) {
   RequireSize(json.at("patches"), 2);
   HSplineShape shape;
-  shape.patches_u = json.at("patches")[0].get<int>();
-  shape.patches_v = json.at("patches")[1].get<int>();
-  shape.max_level = json.at("max_level").get<int>();
+  shape.patches_u = IntFromJson(json.at("patches")[0]);
+  shape.patches_v = IntFromJson(json.at("patches")[1]);
+  shape.max_level = IntFromJson(json.at("max_level"));
   shape.closure = EnumFromName<Closure>(json.at("closure").get<std::string>());
   shape.reference = EnumFromName<OffsetReference>(json.at("offset_reference").get<std::string>());
   return shape;
 }
 
 Vec3 VecFromJson(const Json& row, std::size_t first) {
-  return {row.at(first).get<double>(), row.at(first + 1).get<double>(),
-          row.at(first + 2).get<double>()};
+  return {DoubleFromJson(row.at(first)), DoubleFromJson(row.at(first + 1)),
+          DoubleFromJson(row.at(first + 2))};
 }
 
 HSplineSurface SurfaceFromJson(const Json& json) {
@@ -80,14 +103,14 @@ HSplineSurface SurfaceFromJson(const Json& json) {
   RequireFormat(json);
   const HSplineShape shape = ShapeFromJson(json);
   ControlNet net{shape.Columns(0), shape.Rows(0), {}};
-  for (const Json& row : json.at("level0")) {
+  for (const Json& row : ListFromJson(json, "level0")) {
     RequireSize(row, 3);
     net.vertices.push_back(VecFromJson(row, 0));
   }
   std::map<VertexId, std::optional<Vec3>> offsets;
-  for (const Json& row : json.at("offsets")) {
+  for (const Json& row : ListFromJson(json, "offsets")) {
     RequireSize(row, 6);
-    const VertexId vertex{row[0].get<int>(), row[1].get<int>(), row[2].get<int>()};
+    const VertexId vertex{IntFromJson(row[0]), IntFromJson(row[1]), IntFromJson(row[2])};
     if (!offsets.emplace(vertex, VecFromJson(row, 3)).second) {
       throw IoError(fmt::format("vertex ({}, {}) of level {} has two offsets", vertex.i, vertex.j,
                                 vertex.level));
@@ -96,6 +119,18 @@ HSplineSurface SurfaceFromJson(const Json& json) {
   HSplineSurface surface(shape, std::move(net));
   surface.SetOffsets(offsets);
   return surface;
+}
+
+// The JSON library keeps one of several entries of the same name, silently.
+Json ParseWithoutRepeats(std::string_view text) {
+  std::set<std::string> seen;
+  return Json::parse(text, [&seen](int depth, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::key && depth == 1 &&
+        !seen.insert(parsed.get<std::string>()).second) {
+      throw IoError(fmt::format("entry '{}' stands twice", parsed.get<std::string>()));
+    }
+    return true;  // keep it
+  });
 }
 
 }  // namespace
@@ -123,7 +158,7 @@ std::string HSplineToJson(const HSplineSurface& surface) {
 
 HSplineSurface HSplineFromJson(std::string_view text, const std::string& name) {
   try {
-    return SurfaceFromJson(Json::parse(text));
+    return SurfaceFromJson(ParseWithoutRepeats(text));
   } catch (const nlohmann::json::exception& e) {
     throw IoError(fmt::format("{}: not an H-spline that can be read: {}", name, e.what()));
   } catch (const Error& e) {

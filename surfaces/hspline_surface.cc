@@ -28,19 +28,21 @@ int WrapColumn(const HSplineShape& shape, int level, int i) {
   return shape.closure == Closure::kOpen ? i : (i + shape.Columns(level)) % shape.Columns(level);
 }
 
-// The vertices of the coarser level, along one direction, of which the finer vertex i is made:
-// three with 1/8 6/8 1/8 where i lies on a coarse vertex, else two with 1/2 each.
-struct RefinementRow {
-  std::array<int, 3> index;
-  std::array<double, 3> weight;
-};
+double Power(double x, int order) { return order == 0 ? 1 : order == 1 ? x : x * x; }
 
-RefinementRow RefineRow(int i) {
-  if (i % 2 != 0) {
-    const int c = (i + 1) / 2;
-    return {{c - 1, c, c + 1}, {0.125, 0.75, 0.125}};
+void CheckLevel(const HSplineShape& shape, int level) {
+  if (level < 0 || level > shape.max_level) {
+    throw InputError(
+        fmt::format("H-spline: there is no level {}; levels are 0..{}", level, shape.max_level));
   }
-  return {{i / 2, i / 2 + 1, i / 2}, {0.5, 0.5, 0}};
+}
+
+void CheckPlace(const HSplineShape& shape, int level, const Vec2& uv) {
+  CheckLevel(shape, level);
+  if (!uv.allFinite()) {
+    throw InputError(fmt::format(
+        "H-spline: (u,v) = ({}, {}) is not finite; the domain is [0,1] x [0,1]", uv.x(), uv.y()));
+  }
 }
 
 ControlNet EmptyNet(const HSplineShape& shape, int level) {
@@ -50,21 +52,23 @@ ControlNet EmptyNet(const HSplineShape& shape, int level) {
 }
 
 void CheckShape(const HSplineShape& shape) {
+  constexpr int kMostLevels = 8, kMostPatches = 8192;  // a side of the finest level
   const int least_u = shape.closure == Closure::kPeriodicU ? 4 : 1;
-  if (shape.patches_u < least_u || shape.patches_v < 1 || shape.max_level < 0 ||
-      shape.max_level > 8) {
-    throw InputError(
-        fmt::format("H-spline: {} x {} patches with levels 0..{} are not allowed; at least {} x 1 "
-                    "patches, and a finest level of 0..8",
-                    shape.patches_u, shape.patches_v, shape.max_level, least_u));
+  if (shape.max_level < 0 || shape.max_level > kMostLevels) {
+    throw InputError(fmt::format("H-spline: the finest level is {}; it must be in 0..{}",
+                                 shape.max_level, kMostLevels));
+  }
+  const int most = kMostPatches >> shape.max_level;
+  if (shape.patches_u < least_u || shape.patches_v < 1 || shape.patches_u > most ||
+      shape.patches_v > most) {
+    throw InputError(fmt::format(
+        "H-spline: {} x {} patches are not allowed; with finest level {}, use {}..{} x 1..{}",
+        shape.patches_u, shape.patches_v, shape.max_level, least_u, most, most));
   }
 }
 
 void CheckNet(const HSplineShape& shape, int level, const ControlNet& net) {
-  if (level < 0 || level > shape.max_level) {
-    throw InputError(
-        fmt::format("H-spline: there is no level {}; levels are 0..{}", level, shape.max_level));
-  }
+  CheckLevel(shape, level);
   const std::size_t expected = static_cast<std::size_t>(shape.Columns(level)) * shape.Rows(level);
   if (net.columns != shape.Columns(level) || net.rows != shape.Rows(level) ||
       net.vertices.size() != expected) {
@@ -136,16 +140,17 @@ Reference ReferenceOf(const HSplineShape& shape, const ControlNet& coarser,
 }  // namespace
 
 Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order) {
+  CheckPlace(shape, level, uv);
   const Place u = Locate(uv.x(), shape.PatchesU(level), shape.closure);
   const Place v = Locate(uv.y(), shape.PatchesV(level), Closure::kOpen);
   const std::array<double, 4> wu = CubicWeights(u.t, order.u), wv = CubicWeights(v.t, order.v);
   const double scale =
-      std::pow(shape.PatchesU(level), order.u) * std::pow(shape.PatchesV(level), order.v);
+      Power(shape.PatchesU(level), order.u) * Power(shape.PatchesV(level), order.v);
   Stencil stencil;
-  for (int b = 0; b < 4; ++b) {
-    for (int a = 0; a < 4; ++a) {
-      stencil.index[a + 4 * b] =
-          WrapColumn(shape, level, u.patch + a) + shape.Columns(level) * (v.patch + b);
+  for (int a = 0; a < 4; ++a) {
+    const int column = WrapColumn(shape, level, u.patch + a);
+    for (int b = 0; b < 4; ++b) {
+      stencil.index[a + 4 * b] = column + shape.Columns(level) * (v.patch + b);
       stencil.weight[a + 4 * b] = scale * wu[a] * wv[b];
     }
   }
@@ -193,6 +198,10 @@ Vec3 HSplineSurface::Derivative(const Vec2& uv, DerivativeOrder order) const {
   return StencilAt(shape_.max_level, uv, order).Apply(nets_.back());
 }
 
+SecondDerivatives HSplineSurface::Second(const Vec2& uv) const {
+  return {Derivative(uv, {2, 0}), Derivative(uv, {1, 1}), Derivative(uv, {0, 2})};
+}
+
 SurfaceFrame HSplineSurface::Frame(const Vec2& uv) const {
   return FrameOf(shape_, shape_.max_level, nets_.back(), uv);
 }
@@ -222,6 +231,10 @@ std::map<VertexId, Vec3> HSplineSurface::OffsetsThatGive(int level, const Contro
     }
   }
   return edits;
+}
+
+std::map<VertexId, Vec3> HSplineSurface::Offsets(int level) const {
+  return {offsets_.lower_bound({level, 0, 0}), offsets_.lower_bound({level + 1, 0, 0})};
 }
 
 std::optional<Vec3> HSplineSurface::Offset(const VertexId& vertex) const {

@@ -27,8 +27,8 @@ constexpr auto EnumNames(OffsetReference) {
 
 // The domain is [0,1] x [0,1]; level L has patches_u 2^L x patches_v 2^L patches.
 struct HSplineShape {
-  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (periodic)
-  int patches_v = 8;  // of level 0; >= 1
+  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (periodic); at most 8192 on the finest level
+  int patches_v = 8;  // of level 0; >= 1; likewise
   int max_level = 3;  // finest level that may hold detail; 0..8
   Closure closure = Closure::kOpen;
   OffsetReference reference = OffsetReference::kFrame;
@@ -57,6 +57,12 @@ struct SurfaceFrame {
   Vec3 Normal() const { return axes.col(2); }
 };
 
+struct SecondDerivatives {  // with respect to u and v in [0,1], mm
+  Vec3 duu = Vec3::Constant(kNaN);
+  Vec3 duv = Vec3::Constant(kNaN);
+  Vec3 dvv = Vec3::Constant(kNaN);
+};
+
 // Orders of derivation along u and v.
 struct DerivativeOrder {
   int u = 0;  // 0, 1 or 2
@@ -65,7 +71,8 @@ struct DerivativeOrder {
 
 // The sixteen vertices of `level` that make the point of the plain B-spline at uv, or its
 // derivative with respect to u, v in [0,1]. uv: u is clamped (open) or wrapped (periodic), v is
-// clamped to [0,1]. level: 0..shape.max_level.
+// clamped to [0,1]. level: 0..shape.max_level. Throws InputError for a level that is not there or a
+// (u,v) that is not finite.
 Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order = {});
 
 // Where a control vertex has the greatest influence, clamped (open) or wrapped (periodic) into the
@@ -75,6 +82,8 @@ Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex);
 // The net of the same surface one level finer (knot insertion at every midpoint).
 ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level);
 
+// Stored are the vertices of level 0 and the offsets of edited ones; the nets of all levels are
+// derived at each change, so that const calls may run at the same time.
 class HSplineSurface {
  public:
   // level0: Columns(0) x Rows(0) finite vertices, else InputError.
@@ -91,7 +100,9 @@ class HSplineSurface {
   // The finest surface; all levels' detail included.
   Vec3 Point(const Vec2& uv) const;
   Vec3 Derivative(const Vec2& uv, DerivativeOrder order) const;
+  SecondDerivatives Second(const Vec2& uv) const;
   SurfaceFrame Frame(const Vec2& uv) const;
+  Vec3 Normal(const Vec2& uv) const { return Frame(uv).Normal(); }  // unit; NaN where degenerate
 
   // The absolute control vertices of one level; a plain B-spline that holds the detail of levels
   // 0..level.
@@ -108,11 +119,15 @@ class HSplineSurface {
   // coarser surface at the vertex's (u,v); F: its frame's axes, or the identity with
   // OffsetReference::kWorld. mm.
   const std::map<VertexId, Vec3>& Offsets() const { return offsets_; }
+  std::map<VertexId, Vec3> Offsets(int level) const;  // those of one level
   std::optional<Vec3> Offset(const VertexId& vertex) const;
   // Sets the offsets of some vertices, or removes them (nullopt: the vertex follows the coarser
   // level again). All or, where one cannot be set (no such vertex, not finite, no frame:
-  // InputError), none.
+  // InputError), none. One call for many vertices is much faster than many calls: each rebuilds the
+  // nets from the coarsest level that it changes.
   void SetOffsets(const std::map<VertexId, std::optional<Vec3>>& offsets);
+  void SetOffset(const VertexId& vertex, const Vec3& offset) { SetOffsets({{vertex, offset}}); }
+  void RemoveOffset(const VertexId& vertex) { SetOffsets({{vertex, std::nullopt}}); }
 
  private:
   std::map<VertexId, Vec3> OffsetsThatGive(int level, const ControlNet& net) const;

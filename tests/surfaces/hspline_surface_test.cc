@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/hspline_surface.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "surfaces/error.h"
+#include "surfaces/parallel.h"
 #include "surfaces/tessellate.h"
 #include "tests/testing/splines.h"
 
@@ -55,19 +60,54 @@ TEST_P(HSplineLaws, PointIsTheBSplineOfTheFinestNet) {
   }
 }
 
-TEST_P(HSplineLaws, WeightsArePartitionsOfUnityAndReproduceLinearFunctions) {
+// The derivative of x^n of the given order.
+double Monomial(double x, int n, int order) {
+  return order == 0 ? std::pow(x, n) : (n == 0 ? 0 : n * Monomial(x, n - 1, order - 1));
+}
+
+// The control value of x^n at a knot t of spacing h: its blossom at (t - h, t, t + h).
+double MonomialVertex(double t, double h, int n) {
+  return n == 0 ? 1 : n == 1 ? t : n == 2 ? t * t - h * h / 3 : t * (t * t - h * h);
+}
+
+TEST_P(HSplineLaws, StencilsReproduceCubicsAndTheirDerivatives) {
+  if (shape().closure == Closure::kPeriodicU) {
+    GTEST_SKIP() << "a power of u is not periodic; the open shapes cover it";
+  }
   Random random(3);
-  for (int level = 0; level <= shape().max_level; ++level) {
+  for (int trial = 0; trial < 300; ++trial) {
+    const int level = trial % (shape().max_level + 1), m = trial % 4, n = trial / 4 % 4;
+    const DerivativeOrder order{trial % 3, trial / 3 % 3};
+    const double hu = 1.0 / shape().PatchesU(level), hv = 1.0 / shape().PatchesV(level);
     const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
-    const Stencil point = StencilAt(shape(), level, uv);
-    double sum = 0, linear = 0;
+    const Stencil stencil = StencilAt(shape(), level, uv, order);
+    double value = 0, size = 1;
     for (int k = 0; k < 16; ++k) {
-      sum += point.weight[k];
-      const int j = point.index[k] / shape().Columns(level);
-      linear += point.weight[k] * (j - 1.0) / shape().PatchesV(level);
+      const int i = stencil.index[k] % shape().Columns(level),
+                j = stencil.index[k] / shape().Columns(level);
+      value += stencil.weight[k] * MonomialVertex((i - 1) * hu, hu, m) *
+               MonomialVertex((j - 1) * hv, hv, n);
+      size += std::abs(stencil.weight[k]);
     }
-    EXPECT_NEAR(sum, 1, 1e-14);
-    EXPECT_NEAR(linear, uv.y(), 1e-14);
+    EXPECT_NEAR(value, Monomial(uv.x(), m, order.u) * Monomial(uv.y(), n, order.v), 1e-13 * size)
+        << "u^" << m << " v^" << n << " level " << level;
+  }
+}
+
+TEST_P(HSplineLaws, WeightsSumToOneAndTheirDerivativesToZero) {
+  Random random(3);
+  for (int trial = 0; trial < 100; ++trial) {
+    const int level = trial % (shape().max_level + 1);
+    const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
+    for (const DerivativeOrder order :
+         {DerivativeOrder{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}}) {
+      double sum = 0, size = 0;
+      for (const double weight : StencilAt(shape(), level, uv, order).weight) {
+        sum += weight;
+        size += std::abs(weight);
+      }
+      EXPECT_NEAR(sum, order.u + order.v == 0 ? 1 : 0, 1e-14 * size);
+    }
   }
 }
 
@@ -144,12 +184,15 @@ TEST_P(HSplineLaws, DerivativesAgreeWithCentralDifferences) {
               1e-4 * frame.du.norm());
     EXPECT_LT(((surface.Point(uv + ev) - surface.Point(uv - ev)) / (2 * h) - frame.dv).norm(),
               1e-4 * frame.dv.norm());
-    const Vec3 duv = surface.Derivative(uv, {1, 1});
+    const SecondDerivatives second = surface.Second(uv);
+    const SurfaceFrame after = surface.Frame(uv + eu), before = surface.Frame(uv - eu);
+    EXPECT_LT(((after.du - before.du) / (2 * h) - second.duu).norm(),
+              1e-3 * (1 + second.duu.norm()));
+    EXPECT_LT(((after.dv - before.dv) / (2 * h) - second.duv).norm(),
+              1e-3 * (1 + second.duv.norm()));
     EXPECT_LT(
-        ((surface.Derivative(uv + ev, {1, 0}) - surface.Derivative(uv - ev, {1, 0})) / (2 * h) -
-         duv)
-            .norm(),
-        1e-3 * (1 + duv.norm()));
+        ((surface.Frame(uv + ev).dv - surface.Frame(uv - ev).dv) / (2 * h) - second.dvv).norm(),
+        1e-3 * (1 + second.dvv.norm()));
     EXPECT_LT((frame.axes.transpose() * frame.axes - Mat3::Identity()).norm(), 1e-12);
     EXPECT_NEAR(frame.axes.determinant(), 1, 1e-12);
   }
@@ -253,6 +296,82 @@ TEST(HSpline, ADegenerateFrameIsReportedAndNothingChanges) {
   EXPECT_TRUE(surface.Offsets().empty());
 }
 
+TEST(HSpline, OneOffsetIsSetReadAndRemoved) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
+  HSplineSurface surface = SmoothSurface(shape, 1);
+  const ControlNet untouched = surface.Net(2);
+  surface.SetOffset({1, 4, 5}, Vec3(1, 2, 3));
+  surface.SetOffset({2, 4, 5}, Vec3(4, 5, 6));
+  EXPECT_EQ(surface.Offset({1, 4, 5}), Vec3(1, 2, 3));
+  EXPECT_EQ(surface.Offsets(2), (std::map<VertexId, Vec3>{{{2, 4, 5}, Vec3(4, 5, 6)}}));
+  EXPECT_EQ(surface.Offset({2, 5, 5}), std::nullopt);
+  surface.RemoveOffset({1, 4, 5});
+  surface.RemoveOffset({2, 4, 5});
+  EXPECT_TRUE(surface.Offsets().empty());
+  EXPECT_EQ(surface.Net(2).vertices, untouched.vertices);
+}
+
+TEST(HSpline, AnOffsetIsKeptInTheFrameOfTheCoarserSurface) {
+  HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
+  for (const OffsetReference reference : {OffsetReference::kFrame, OffsetReference::kWorld}) {
+    shape.reference = reference;
+    HSplineSurface surface = SmoothSurface(shape, 2);
+    const VertexId vertex{1, 5, 6};
+    const Vec3 offset(0.5, -2, 3);
+    const SurfaceFrame frame = surface.Frame(surface.ParameterOf(vertex));
+    surface.SetOffset(vertex, offset);
+    const Vec3 expected = reference == OffsetReference::kWorld
+                              ? Vec3(frame.point + offset)
+                              : Vec3(frame.point + frame.du.normalized() * offset.x() +
+                                     frame.Normal().cross(frame.du.normalized()) * offset.y() +
+                                     frame.du.cross(frame.dv).normalized() * offset.z());
+    EXPECT_LT((surface.Net(1).At(5, 6) - expected).norm(), 1e-12);
+  }
+}
+
+TEST(HSpline, AVertexInfluencesMostItsParameter) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+    const HSplineShape shape{.patches_u = 4, .patches_v = 5, .max_level = 1, .closure = closure};
+    for (int j = 1; j + 1 < shape.Rows(1); ++j) {
+      for (int i = closure == Closure::kOpen ? 1 : 0; i < 9; ++i) {
+        const int column = i % shape.Columns(1);
+        const Stencil stencil = StencilAt(shape, 1, ParameterOf(shape, {1, column, j}));
+        const int most =
+            static_cast<int>(std::max_element(stencil.weight.begin(), stencil.weight.end()) -
+                             stencil.weight.begin());
+        EXPECT_EQ(stencil.index[most], column + shape.Columns(1) * j);
+      }
+    }
+  }
+}
+
+TEST(HSpline, ADegenerateLevelZeroUnderDetailIsReportedWithItsPlace) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
+  HSplineSurface surface = SmoothSurface(shape, 1);
+  surface.SetOffset({1, 5, 5}, Vec3(0, 0, 1));
+  const HSplineSurface before = surface;
+  ControlNet flat = surface.Net(0);
+  flat.vertices.assign(flat.vertices.size(), Vec3(1, 2, 3));
+  try {
+    surface.SetNet(0, flat);
+    ADD_FAILURE() << "accepted";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("(u,v) = (0.5, 0.5)"));
+  }
+  EXPECT_EQ(surface.Net(1).vertices, before.Net(1).vertices);
+}
+
+TEST(HSpline, ConstantCallsMayRunAtTheSameTime) {
+  const HSplineSurface surface = RandomSurface({.patches_u = 4, .patches_v = 4, .max_level = 2}, 3);
+  std::vector<Vec3> alone(400), together(400);
+  const auto uv = [](std::size_t k) { return Vec2((k % 20) / 19.0, (k / 20) / 19.0); };
+  for (std::size_t k = 0; k < alone.size(); ++k) {
+    alone[k] = surface.Point(uv(k));
+  }
+  ParallelFor(together.size(), 4, 7, [&](std::size_t k) { together[k] = surface.Point(uv(k)); });
+  EXPECT_EQ(alone, together);
+}
+
 TEST(HSpline, RefusesWhatDoesNotFit) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
   EXPECT_THROW(HSplineSurface(shape, ControlNet{6, 7, std::vector<Vec3>(42)}), InputError);
@@ -261,6 +380,9 @@ TEST(HSpline, RefusesWhatDoesNotFit) {
   HSplineSurface surface = SmoothSurface(shape, 1);
   EXPECT_THROW(surface.SetOffsets({{{0, 1, 1}, Vec3(0, 0, 1)}}), InputError);
   EXPECT_THROW(surface.SetOffsets({{{1, 11, 1}, Vec3(0, 0, 1)}}), InputError);
+  EXPECT_THROW(surface.Point({kNaN, 0.5}), InputError);
+  EXPECT_THROW(surface.StencilAt(2, {0.5, 0.5}), InputError);
+  EXPECT_THROW(HSplineSurface({.patches_u = 40, .max_level = 8}, ControlNet{}), InputError);
   ControlNet net = surface.Net(0);
   net.vertices[3].y() = kNaN;
   EXPECT_THROW(surface.SetNet(0, net), InputError);
