@@ -201,13 +201,15 @@ double LipHeight(double x, double z) {
 }
 
 // The line between the closed lids, and the crease over the upper lid.
-double LidHeight(double x, double z) {
+double LeftLidHeight(double x, double z) {
   const double d = x - 31.5;
   const double line = -8.5 + 0.012 * d * d + 0.06 * d;
   const double crease = 2.0 - 0.022 * d * d;
   return -2.2 * Plateau(d, 12.5) * Bell(z - line, 1.9) -
          1.2 * Plateau(d, 13) * Bell(z - crease, 2.0);
 }
+
+double LidHeight(double x, double z) { return LeftLidHeight(x, z) + LeftLidHeight(-x, z); }
 
 // The nose drawn in profile over the base: how far each height of the midline goes forward and
 // down, and how wide it is there.
@@ -237,12 +239,17 @@ Vec3 NoseOffset(double x, double z) {
   return {0, -profile * forward(z), -profile * down(z)};
 }
 
-// The wings of the nose, the groove behind them and a hint of the nostrils.
-Vec3 AlaOffset(double x, double z) {
+// The wing of the nose, the groove behind it and a hint of the nostril, of the left side.
+Vec3 LeftAlaOffset(double x, double z) {
   const double wing = Bell(x - 13, 4.2) * Bell(z + 43, 4.2);
   const double groove = Bell(x - 20, 3) * Bell(z + 44, 6);
   const double nostril = Bell(x - 7, 2.8) * Bell(z + 46, 2.2);
   return {2.0 * wing, -7 * wing + 1.0 * groove + 3 * nostril, -1.5 * wing + 2 * nostril};
+}
+
+Vec3 AlaOffset(double x, double z) {
+  const Vec3 left = LeftAlaOffset(x, z), right = LeftAlaOffset(-x, z);
+  return {left.x() - right.x(), left.y() + right.y(), left.z() + right.z()};
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -266,7 +273,10 @@ constexpr SideBump kSideBumps[] = {
 double SideHeight(double azimuth_deg, double z) {
   double sum = 0;
   for (const SideBump& b : kSideBumps) {
-    sum += b.height * Bell(azimuth_deg - b.azimuth_deg, b.sigma_deg) * Bell(z - b.z, b.sigma_z);
+    sum += b.height *
+           (Bell(azimuth_deg - b.azimuth_deg, b.sigma_deg) +
+            Bell(azimuth_deg + b.azimuth_deg, b.sigma_deg)) *
+           Bell(z - b.z, b.sigma_z);
   }
   return sum;
 }
