@@ -264,7 +264,7 @@ struct SideBump {
 
 constexpr SideBump kSideBumps[] = {
     {58, 24, 11, 14, -4.5},   // temple
-    {72, -12, 14, 7, 2.5},    // zygomatic arch
+    {72, -24, 14, 8, 3.5},    // zygomatic arch
     {48, -55, 12, 14, -2.5},  // cheek
     {70, -76, 10, 10, 3.5},   // angle of the jaw
     {100, -85, 14, 14, -4},   // neck
