@@ -92,10 +92,10 @@ constexpr Rib kRibs[] = {
     {0.34, -2, -74, 68, 0.05, 38},     // mouth
     {0.45, 1, -49, 69.5, 0.01, 30},    // base of the nose
     {0.52, 4, -37, 70, -0.01, 28},     //
-    {0.68, 3, 0, 72, -0.03, 14},       // nasion
-    {0.76, -2.5, 25, 73.5, -0.04, 3},  //
-    {0.84, 4, 52, 72.5, -0.03, -12},   // forehead
-    {0.92, 19, 74, 68, -0.02, -22},    //
+    {0.692, 3, 0, 72, -0.03, 14},       // nasion
+    {0.77, -2.5, 25, 73.5, -0.04, 3},  //
+    {0.848, 4, 52, 72.5, -0.03, -12},   // forehead
+    {0.924, 19, 74, 68, -0.02, -22},    //
     {1.00, 45, 89, 58, 0.00, -28},     // front of the crown
 };
 
@@ -155,7 +155,7 @@ struct FrontBump {
 constexpr FrontBump kFrontBumps[] = {
     // orbit, eyeball below its lids, the inner corner of the eye
     {30, 0, 15.5, 9, -10, 0},
-    {31.5, -4, 10.5, 7.5, 9.5, 0},
+    {31.5, -4, 11.5, 7.5, 9.5, 0},
     {17, -3, 5.5, 6, -3, 0},
     // brow ridges, their outer ends, glabella
     {22, 13, 11, 5.5, 2, 8},
@@ -205,8 +205,8 @@ double LeftLidHeight(double x, double z) {
   const double d = x - 31.5;
   const double line = -8.5 + 0.012 * d * d + 0.06 * d;
   const double crease = 2.0 - 0.022 * d * d;
-  return -2.2 * Plateau(d, 12.5) * Bell(z - line, 1.9) -
-         1.2 * Plateau(d, 13) * Bell(z - crease, 2.0);
+  return -2.4 * Plateau(d, 12.5) * Bell(z - line, 2.2) -
+         1.4 * Plateau(d, 13) * Bell(z - crease, 2.4);
 }
 
 double LidHeight(double x, double z) { return LeftLidHeight(x, z) + LeftLidHeight(-x, z); }
