@@ -4,10 +4,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
+#include <utility>
 
 #include "problems/head_formula.h"
 #include "problems/template_sites.h"
@@ -24,61 +23,69 @@ constexpr int kSamplesPerPatch = 6;
 
 using Matrix = Eigen::MatrixXd;
 
-// The four uniform cubic B-splines over a patch, t in [0,1] along it.
-std::array<double, 4> CubicWeights(double t) {
-  const double s = 1 - t;
-  return {s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6,
-          t * t * t / 6};
+enum class Axis { kU, kV };
+
+int Patches(const HSplineShape& shape, int level, Axis axis) {
+  return (axis == Axis::kU ? shape.patches_u : shape.patches_v) << level;
 }
 
 double SampleAt(int sample, int patches) {
   return static_cast<double>(sample) / (kSamplesPerPatch * patches);
 }
 
-// Row s: the weights of the patches + 3 vertices of a line at its sample s.
-Matrix Collocation(int patches) {
-  const int samples = kSamplesPerPatch * patches + 1;
-  Matrix rows = Matrix::Zero(samples, patches + 3);
-  for (int s = 0; s < samples; ++s) {
-    const int patch = std::min(s / kSamplesPerPatch, patches - 1);
-    const auto weights =
-        CubicWeights(static_cast<double>(s - patch * kSamplesPerPatch) / kSamplesPerPatch);
-    for (int k = 0; k < 4; ++k) {
-      rows(s, patch + k) = weights[k];
+// Row s: the weights of the patches + 3 vertices of a line of the net at its sample s. The weights
+// of a stencil summed over the other direction are those of the line.
+Matrix Collocation(const HSplineShape& shape, int level, Axis axis) {
+  const int patches = Patches(shape, level, axis);
+  const int columns = Patches(shape, level, Axis::kU) + 3;
+  Matrix rows = Matrix::Zero(kSamplesPerPatch * patches + 1, patches + 3);
+  for (int s = 0; s < rows.rows(); ++s) {
+    const double t = SampleAt(s, patches);
+    const Stencil stencil = StencilAt(shape, level, axis == Axis::kU ? Vec2(t, 0) : Vec2(0, t));
+    for (int k = 0; k < 16; ++k) {
+      const int vertex = stencil.index[k];
+      rows(s, axis == Axis::kU ? vertex % columns : vertex / columns) += stencil.weight[k];
     }
   }
   return rows;
 }
 
 // (A^T A)^-1 A^T: from the samples of a line to its vertices.
-Matrix LeastSquares(int patches) {
-  const Matrix a = Collocation(patches);
+Matrix LeastSquares(const HSplineShape& shape, int level, Axis axis) {
+  const Matrix a = Collocation(shape, level, axis);
   return (a.transpose() * a).ldlt().solve(a.transpose());
 }
 
-// The plain B-spline of patches_u x patches_v patches that is closest to the formula over a grid of
-// samples. On such a grid the least squares of the surface is that of its columns, then its rows.
-ControlNet FitFormula(int patches_u, int patches_v) {
-  const Matrix along_u = LeastSquares(patches_u), along_v = LeastSquares(patches_v);
-  ControlNet net;
-  net.columns = patches_u + 3;
-  net.rows = patches_v + 3;
-  net.vertices.assign(static_cast<std::size_t>(net.columns) * net.rows, Vec3::Zero());
+std::array<Matrix, 3> SampleFormula(int patches_u, int patches_v) {
   std::array<Matrix, 3> samples;
-  samples.fill(Matrix(along_u.cols(), along_v.cols()));
-  for (int j = 0; j < along_v.cols(); ++j) {
-    for (int i = 0; i < along_u.cols(); ++i) {
+  samples.fill(Matrix(kSamplesPerPatch * patches_u + 1, kSamplesPerPatch * patches_v + 1));
+  for (int j = 0; j < samples[0].cols(); ++j) {
+    for (int i = 0; i < samples[0].rows(); ++i) {
       const Vec3 p = HeadPoint(SampleAt(i, patches_u), SampleAt(j, patches_v));
-      for (int axis = 0; axis < 3; ++axis) {
-        samples[axis](i, j) = p[axis];
+      for (int k = 0; k < 3; ++k) {
+        samples[k](i, j) = p[k];
       }
     }
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    const Matrix vertices = along_u * samples[axis] * along_v.transpose();
+  return samples;
+}
+
+// The plain B-spline of one level that is closest to the formula over a grid of samples. On such a
+// grid the least squares of the surface is that of its columns, then its rows.
+ControlNet FitFormula(const HSplineShape& shape, int level) {
+  const Matrix along_u = LeastSquares(shape, level, Axis::kU);
+  const Matrix along_v = LeastSquares(shape, level, Axis::kV);
+  const auto samples =
+      SampleFormula(Patches(shape, level, Axis::kU), Patches(shape, level, Axis::kV));
+  ControlNet net{.columns = static_cast<int>(along_u.rows()),
+                 .rows = static_cast<int>(along_v.rows()),
+                 .vertices = {}};
+  net.vertices.resize(static_cast<std::size_t>(net.columns) * net.rows);
+  for (int k = 0; k < 3; ++k) {
+    const Matrix vertices = along_u * samples[k] * along_v.transpose();
     for (int j = 0; j < net.rows; ++j) {
       for (int i = 0; i < net.columns; ++i) {
-        net.At(i, j)[axis] = vertices(i, j);
+        net.At(i, j)[k] = vertices(i, j);
       }
     }
   }
@@ -105,8 +112,7 @@ void MakeSymmetric(ControlNet& net) {
 // Moves to the level's own least-squares fit each vertex that this moves by more than the
 // tolerance.
 void AddDetail(HSplineSurface& surface, int level, double tolerance_mm) {
-  const HSplineShape& shape = surface.Shape();
-  ControlNet target = FitFormula(shape.patches_u << level, shape.patches_v << level);
+  ControlNet target = FitFormula(surface.shape(), level);
   MakeSymmetric(target);
   ControlNet net = surface.Net(level);
   for (std::size_t k = 0; k < net.vertices.size(); ++k) {
@@ -131,28 +137,27 @@ const FeatureRegion kRegions[] = {
 
 // The vertices of levels >= 1 whose own (u,v) lies on the surface inside the region.
 std::vector<VertexId> VerticesInside(const HSplineSurface& surface, const Sphere& region) {
-  const HSplineShape& shape = surface.Shape();
+  const HSplineShape& shape = surface.shape();
   std::vector<VertexId> inside;
   for (int level = 1; level <= shape.max_level; ++level) {
-    const int patches_u = shape.patches_u << level, patches_v = shape.patches_v << level;
-    for (int j = 1; j <= patches_v + 1; ++j) {
-      for (int i = 1; i <= patches_u + 1; ++i) {
-        const Vec2 uv((i - 1.0) / patches_u, (j - 1.0) / patches_v);
-        if (region.Contains(surface.Point(uv))) {
-          inside.push_back({level, i, j});
+    const ControlNet& net = surface.Net(level);
+    for (int i = 0; i < net.columns; ++i) {
+      for (int j = 0; j < net.rows; ++j) {
+        const VertexId id{level, i, j};
+        if (region.Contains(surface.Point(ParameterOf(shape, id)))) {
+          inside.push_back(id);
         }
       }
     }
   }
-  std::sort(inside.begin(), inside.end());
   return inside;
 }
 
 void CheckOptions(const TemplateOptions& o) {
   const auto check = [](const char* name, double value, double least, double most) {
     if (!(value >= least && value <= most)) {
-      throw InputError(fmt::format("template: {} is {}; it must lie in [{}, {}]", name, value,
-                                   least, most));
+      throw InputError(
+          fmt::format("template: {} is {}; it must lie in [{}, {}]", name, value, least, most));
     }
   };
   check("patches_u", o.patches_u, 4, 32);
@@ -165,11 +170,12 @@ void CheckOptions(const TemplateOptions& o) {
 
 TemplateFace MakeTemplateFace(const TemplateOptions& options) {
   CheckOptions(options);
-  ControlNet coarse = FitFormula(options.patches_u, options.patches_v);
+  const HSplineShape shape{.patches_u = options.patches_u,
+                           .patches_v = options.patches_v,
+                           .max_level = options.max_level};
+  ControlNet coarse = FitFormula(shape, 0);
   MakeSymmetric(coarse);
-  HSplineSurface surface(
-      {.patches_u = options.patches_u, .patches_v = options.patches_v, .max_level = options.max_level},
-      coarse);
+  HSplineSurface surface(shape, coarse);
   for (int level = 1; level <= options.max_level; ++level) {
     AddDetail(surface, level, options.detail_tolerance_mm);
   }

@@ -14,9 +14,9 @@
 namespace semblance {
 
 struct TemplateOptions {
-  int patches_u = 8;               // of level 0, from ear to ear
-  int patches_v = 8;               // of level 0, from throat to crown
-  int max_level = 3;               // finest level that holds detail
+  int patches_u = 8;                 // of level 0, from ear to ear
+  int patches_v = 8;                 // of level 0, from throat to crown
+  int max_level = 3;                 // finest level that holds detail
   double detail_tolerance_mm = 0.1;  // a level keeps a vertex that moves by more than this
 };
 
