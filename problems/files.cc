@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/files.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+#include "surfaces/error.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Reason(int error_number) { return std::generic_category().message(error_number); }
+
+// A file descriptor that is closed, and a temporary file that is removed, whatever happens.
+class TemporaryFile {
+ public:
+  TemporaryFile(const fs::path& target, fs::path temporary)
+      : target_(target), temporary_(std::move(temporary)) {
+    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (descriptor_ < 0) {
+      Fail();
+    }
+  }
+  ~TemporaryFile() {
+    if (descriptor_ >= 0) {
+      ::close(descriptor_);
+    }
+    if (!renamed_) {
+      ::unlink(temporary_.c_str());
+    }
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  void Write(std::string_view bytes) {
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+      if (written < 0 && errno != EINTR) {
+        Fail();
+      }
+      bytes.remove_prefix(written > 0 ? static_cast<std::size_t>(written) : 0);
+    }
+  }
+
+  // The last step: from here on the target holds the new bytes.
+  void Rename() {
+    if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0 ||
+        ::rename(temporary_.c_str(), target_.c_str()) != 0) {
+      Fail();
+    }
+    renamed_ = true;
+  }
+
+ private:
+  [[noreturn]] void Fail() const {
+    const int error_number = errno;
+    throw IoError(fmt::format(
+        "{}: cannot be written: {}; check that the folder exists and may be written to, and that "
+        "the disk has room",
+        target_.string(), Reason(error_number)));
+  }
+
+  const fs::path& target_;
+  fs::path temporary_;
+  int descriptor_ = -1;
+  bool renamed_ = false;
+};
+
+fs::path TemporaryBeside(const fs::path& path) {
+  static std::atomic<int> count{0};
+  return path.parent_path() /
+         fmt::format(".{}.{}-{}.tmp", path.filename().string(), ::getpid(), count++);
+}
+
+// Makes the rename itself last over a power failure, where the file system can.
+void SyncFolder(const fs::path& folder) {
+  const int descriptor =
+      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor >= 0) {
+    ::fsync(descriptor);
+    ::close(descriptor);
+  }
+}
+
+void CreateFolders(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) {
+    throw IoError(fmt::format("{}: the folder cannot be created: {}; choose another one",
+                              folder.string(),
+                              error ? error.message() : std::string("a file of this name exists")));
+  }
+}
+
+void RefuseIfNotEmpty(const fs::path& folder) {
+  std::error_code error;
+  const bool is_empty = fs::is_empty(folder, error);
+  if (error) {
+    throw IoError(fmt::format("{}: the folder cannot be read: {}; choose another one",
+                              folder.string(), error.message()));
+  }
+  if (!is_empty) {
+    throw IoError(fmt::format(
+        "{}: the output folder exists and is not empty, and nothing is overwritten unless asked; "
+        "choose another folder, or say --force to replace files in it",
+        folder.string()));
+  }
+}
+
+void TryToWrite(const fs::path& folder) {
+  const fs::path probe = folder / fmt::format(".semblance-probe-{}.tmp", ::getpid());
+  const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    throw IoError(fmt::format(
+        "{}: the output folder cannot be written to: {}; change its permissions or choose another "
+        "folder",
+        folder.string(), Reason(errno)));
+  }
+  ::close(descriptor);
+  ::unlink(probe.c_str());
+}
+
+bool StaysInside(const fs::path& name) {
+  const fs::path normal = name.lexically_normal();
+  return !normal.empty() && normal.is_relative() && *normal.begin() != ".." &&
+         normal.has_filename() && normal != ".";
+}
+
+}  // namespace
+
+void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
+  TemporaryFile file(path, TemporaryBeside(path));
+  file.Write(bytes);
+  file.Rename();
+  SyncFolder(path.parent_path());
+}
+
+std::string ReadFileBytes(const fs::path& path) {
+  const std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  if (file && !fs::is_directory(path)) {
+    bytes << file.rdbuf();  // sets the fail bit for an empty file, which is none
+  }
+  if (!file || bytes.bad() || fs::is_directory(path)) {
+    throw IoError(fmt::format("{}: cannot be read; check that the file exists and may be read",
+                              path.string()));
+  }
+  return std::move(bytes).str();
+}
+
+OutputFolder::OutputFolder(fs::path root, WhenNotEmpty when_not_empty) : root_(std::move(root)) {
+  CreateFolders(root_);
+  if (when_not_empty == WhenNotEmpty::kRefuse) {
+    RefuseIfNotEmpty(root_);
+  }
+  TryToWrite(root_);
+}
+
+fs::path OutputFolder::PathOf(std::string_view name) const {
+  if (!StaysInside(name)) {
+    throw InputError(fmt::format(
+        "'{}': not a file name inside the output folder {}; give a relative path without '..'",
+        name, root_.string()));
+  }
+  const fs::path path = root_ / name;
+  CreateFolders(path.parent_path());
+  return path;
+}
+
+void OutputFolder::Write(std::string_view name, std::string_view bytes) const {
+  WriteFileAtomically(PathOf(name), bytes);
+}
+
+}  // namespace semblance
