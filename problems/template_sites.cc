@@ -17,30 +17,30 @@ struct SitePlace {
 // Heights and widths after the definitions of the sites on the skull, moved out to the skin along
 // the direction in which the dowel of the site stands.
 const SitePlace kMidline[] = {
-    {"sg", {0, -3, 25}},     // the shallow above glabella
-    {"g", {0, -5, 13}},      // most forward point of the brow
-    {"n", {0, 1, 1}},        // the root of the nose
-    {"rhi", {0, -11, -22}},  // the bony end of the bridge
-    {"mp", {0, -6, -60}},    // the middle of the philtrum
-    {"pr", {0, -12, -69}},   // the middle of the upper lip
-    {"id", {0, -11, -80}},   // the middle of the lower lip
-    {"sm", {0, -1, -92}},    // the deepest of the chin-lip fold
-    {"pg", {0, -7, -105}},   // most forward point of the chin
-    {"me", {0, 14, -121}},   // the underside of the chin; its dowel points down
+    {"sg", {0, 0, 25}},       // the shallow above glabella
+    {"g", {0, -2, 13}},       // most forward point of the brow
+    {"n", {0, 1, 1}},         // the root of the nose
+    {"rhi", {0, -10, -16}},   // the bony end of the bridge
+    {"mp", {0, -6, -60}},     // the middle of the philtrum
+    {"pr", {0, -11, -69.5}},  // the middle of the upper lip
+    {"id", {0, -7, -85}},     // the middle of the lower lip
+    {"sm", {0, 3, -95}},      // the deepest of the chin-lip fold
+    {"pg", {0, 1, -107}},     // most forward point of the chin
+    {"me", {0, 19, -121}},    // the underside of the chin; its dowel points down
 };
 
 const SitePlace kLateral[] = {
-    {"fe", {34, 8, 47}},     // the forehead's fullest, over the middle of the brow
-    {"mso", {31, 8, 13}},    // the brow over the middle of the orbit
-    {"mio", {35, 13, -25}},  // below the middle of the orbit, on its rim
-    {"im", {41, 20, -45}},   // the lower border of the cheek bone, below mio
-    {"lo", {50, 26, -37}},   // below the lateral margin of the orbit, 10 mm under its floor
-    {"zy", {71, 66, -30}},   // halfway along the zygomatic arch
-    {"sgl", {72, 84, -29}},  // the root of the arch, before and above the ear opening
-    {"go", {60, 74, -84}},   // the angle of the jaw
-    {"sM2", {53, 38, -60}},  // the cheek over the second upper molar
-    {"mr", {64, 62, -71}},   // the ramus at the height of the mouth
-    {"iM2", {52, 39, -83}},  // the cheek over the second lower molar
+    {"fe", {34, 14, 47}},    // the forehead's fullest, over the middle of the brow
+    {"mso", {31, 8, 12}},    // the brow over the middle of the orbit
+    {"mio", {35, 9, -26}},   // below the middle of the orbit, on its rim
+    {"im", {42, 10, -45}},   // the lower border of the cheek bone, below mio
+    {"lo", {50, 14, -37}},   // below the lateral margin of the orbit, 10 mm under its floor
+    {"zy", {71, 62, -30}},   // halfway along the zygomatic arch
+    {"sgl", {72, 83, -29}},  // the root of the arch, before and above the ear opening
+    {"go", {61, 74, -84}},   // the angle of the jaw
+    {"sM2", {57, 39, -58}},  // the cheek over the second upper molar
+    {"mr", {65, 58, -70}},   // the ramus at the height of the mouth
+    {"iM2", {51, 33, -82}},  // the cheek over the second lower molar
 };
 
 double DistanceSquared(const Vec2& uv, const Vec3& place) {
