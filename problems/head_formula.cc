@@ -160,7 +160,7 @@ constexpr FrontBump kFrontBumps[] = {
     // brow ridges, their outer ends, glabella
     {22, 13, 11, 5.5, 2, 8},
     {43, 13, 11, 5.5, 3, -18},
-    {0, 12, 10, 7, 2.0, 0},
+    {0, 12, 10, 7, 2.8, 0},
     // cheek bone
     {46, -28, 13, 10, 3.0, 25},
     // muzzle, philtrum, corners of the mouth
@@ -168,8 +168,8 @@ constexpr FrontBump kFrontBumps[] = {
     {0, -60.5, 3, 6, -1.5, 0},
     {27, -75.5, 4.5, 4.5, -2.0, 0},
     // chin-lip fold, chin
-    {0, -92, 15, 5.5, -3, 0},
-    {0, -106, 14, 9, 2.5, 0},
+    {0, -92.5, 15, 5.5, -3.8, 0},
+    {0, -107, 14, 9, 3.2, 0},
     // nasolabial fold
     {25, -57, 3.5, 11, -1.5, 28},
 };

@@ -13,7 +13,7 @@
 #include "problems/files.h"
 #include "problems/template_sites.h"
 #include "surfaces/error.h"
-#include "surfaces/hspline_io.h"
+#include "surfaces/hspline_json.h"
 
 namespace semblance {
 namespace {
@@ -172,7 +172,7 @@ void WriteTemplate(const std::filesystem::path& path, const TemplateFace& face) 
     throw InputError(fmt::format("{}: not written: {}", path.string(), error.what()));
   }
   const std::filesystem::path surface = SurfaceName(path);
-  WriteHSpline(path.parent_path() / surface, face.surface);
+  WriteFileAtomically(path.parent_path() / surface, HSplineToJson(face.surface));
   WriteFileAtomically(path, ToJson(face, surface.string()).dump(1) + "\n");
 }
 
@@ -181,7 +181,8 @@ TemplateFace ReadTemplate(const std::filesystem::path& path) {
   try {
     const Json json = Json::parse(text);
     CheckFormat(json);
-    return FaceFrom(json, ReadHSpline(path.parent_path() / json.at("surface").get<std::string>()));
+    const auto surface = path.parent_path() / json.at("surface").get<std::string>();
+    return FaceFrom(json, HSplineFromJson(ReadFileBytes(surface), surface.string()));
   } catch (const nlohmann::json::exception& error) {
     throw InputError(fmt::format("{}: not a template file: {}", path.string(), error.what()));
   } catch (const InputError& error) {

@@ -24,7 +24,7 @@ const SitePlace kMidline[] = {
     {"mp", {0, -6, -60}},     // the middle of the philtrum
     {"pr", {0, -11, -69.5}},  // the middle of the upper lip
     {"id", {0, -7, -85}},     // the middle of the lower lip
-    {"sm", {0, 3, -95}},      // the deepest of the chin-lip fold
+    {"sm", {0, 4, -94}},      // the deepest of the chin-lip fold
     {"pg", {0, 1, -107}},     // most forward point of the chin
     {"me", {0, 19, -121}},    // the underside of the chin; its dowel points down
 };

@@ -122,12 +122,12 @@ TEST(HeadFormula, ProfileHasItsHillsAndHollows) {
   const double under_nose = MostHollow(-66, -54).y(), upper = MostForward(-72, -66).y();
   const double mouth = MostHollow(-78, -72).y(), lower = MostForward(-86, -78).y();
   const double fold = MostHollow(-98, -86).y(), chin = MostForward(-112, -100).y();
-  EXPECT_LT(glabella + 3, nasion);
+  EXPECT_LT(glabella + 2.5, nasion);
   EXPECT_LT(upper + 2, under_nose);
   EXPECT_LT(upper + 2, mouth);
   EXPECT_LT(lower + 2, mouth);
   EXPECT_LT(lower + 4, fold);
-  EXPECT_LT(chin + 3, fold);
+  EXPECT_LT(chin + 2.5, fold);
 }
 
 TEST(HeadFormula, PatchesAreEvenWithinAFactorOfFive) {
