@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "problems/head_formula.h"
@@ -160,9 +161,9 @@ void CheckOptions(const TemplateOptions& o) {
           fmt::format("template: {} is {}; it must lie in [{}, {}]", name, value, least, most));
     }
   };
-  check("patches_u", o.patches_u, 4, 32);
-  check("patches_v", o.patches_v, 4, 32);
-  check("max_level", o.max_level, 0, 5);
+  check("patches_u", o.patches_u, 4, 16);
+  check("patches_v", o.patches_v, 4, 16);
+  check("max_level", o.max_level, 0, 4);
   check("detail_tolerance_mm", o.detail_tolerance_mm, 0, 10);
 }
 
@@ -186,6 +187,14 @@ TemplateFace MakeTemplateFace(const TemplateOptions& options) {
   return face;
 }
 
+std::vector<VertexId> FeatureVertices(const TemplateFace& face) {
+  std::set<VertexId> vertices;
+  for (const Feature& feature : face.features) {
+    vertices.insert(feature.vertices.begin(), feature.vertices.end());
+  }
+  return {vertices.begin(), vertices.end()};
+}
+
 std::vector<Sphere> TemplateMasks(const TemplateFace& face) {
   std::vector<Sphere> masks;
   for (const Feature& feature : face.features) {
@@ -196,8 +205,8 @@ std::vector<Sphere> TemplateMasks(const TemplateFace& face) {
   return masks;
 }
 
-Sphere Placed(const Similarity& face_from_template, const Sphere& sphere) {
-  return {face_from_template * sphere.center, face_from_template.scale * sphere.radius_mm};
+Sphere Transformed(const Sphere& sphere, const Similarity& to_from) {
+  return {to_from * sphere.center, to_from.scale * sphere.radius_mm};
 }
 
 TemplateResidual ResidualToFormula(const HSplineSurface& surface, int samples_u, int samples_v) {

@@ -24,18 +24,18 @@ template <class Visitor>
 void Fields(Visitor& visit, TemplateOptions& o) {
   visit(FieldInfo{.name = "patches_u",
                   .min = 4,
-                  .max = 32,
+                  .max = 16,
                   .doc = "patches of level 0 from ear to ear; more follow the dowels more closely "
                          "and need more of them"},
         o.patches_u);
   visit(FieldInfo{.name = "patches_v",
                   .min = 4,
-                  .max = 32,
+                  .max = 16,
                   .doc = "patches of level 0 from throat to crown"},
         o.patches_v);
   visit(FieldInfo{.name = "max_level",
                   .min = 0,
-                  .max = 5,
+                  .max = 4,
                   .doc = "finest level of detail; 3 keeps eyes, nose and mouth, of which the "
                          "published schedule fits levels 0 to 2 (thesis 4.2)"},
         o.max_level);
@@ -67,11 +67,14 @@ struct TemplateFace {
 // option is out of range.
 TemplateFace MakeTemplateFace(const TemplateOptions& options);
 
-// The regions of the features, for seeding. Carry them with Placed().
+// The vertices of all features, each once, sorted: what a fit restores.
+std::vector<VertexId> FeatureVertices(const TemplateFace& face);
+
+// The regions of the features, for seeding, in the frame of the template.
 std::vector<Sphere> TemplateMasks(const TemplateFace& face);
 
 // The sphere that a similarity makes of a sphere.
-Sphere Placed(const Similarity& face_from_template, const Sphere& sphere);
+Sphere Transformed(const Sphere& sphere, const Similarity& to_from);
 
 // How far the surface is from HeadPoint at the same (u,v), over a grid of samples_u x samples_v
 // points (>= 2 each).

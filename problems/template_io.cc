@@ -43,14 +43,12 @@ void CheckSites(const TemplateFace& face) {
 }
 
 void CheckVertex(const Feature& feature, const VertexId& id, const HSplineShape& shape) {
-  const bool level_ok = id.level >= 0 && id.level <= shape.max_level;
-  const int columns =
-      level_ok ? (shape.patches_u << id.level) + (shape.closure == Closure::kOpen ? 3 : 0) : 0;
-  const int rows = level_ok ? (shape.patches_v << id.level) + 3 : 0;
-  if (id.i < 0 || id.i >= columns || id.j < 0 || id.j >= rows) {
-    throw InputError(fmt::format(
-        "feature '{}' names vertex [{}, {}, {}] (level, i, j), which the surface does not have",
-        feature.name, id.level, id.i, id.j));
+  if (id.level < 1 || id.level > shape.max_level || id.i < 0 || id.i >= shape.Columns(id.level) ||
+      id.j < 0 || id.j >= shape.Rows(id.level)) {
+    throw InputError(
+        fmt::format("feature '{}' names vertex [{}, {}, {}] (level, i, j), which is not one of the "
+                    "surface's levels 1 to {}",
+                    feature.name, id.level, id.i, id.j, shape.max_level));
   }
 }
 

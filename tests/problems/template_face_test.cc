@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "problems/head_formula.h"
 #include "problems/template_sites.h"
@@ -53,13 +54,14 @@ TEST(TemplateFace, IsMirrorSymmetric) {
   }
 }
 
+// Of each level alone, too: offsets live in the frames of the next coarser one.
 TEST(TemplateFace, NormalsPointOutwardEverywhere) {
   const Vec3 inside(0, 95, -30);
-  for (int j = 0; j <= 200; ++j) {
-    for (int i = 0; i <= 200; ++i) {
-      const SurfaceFrame frame = Face().surface.Frame({i / 200.0, j / 200.0});
-      const Vec3 normal = frame.du.cross(frame.dv).normalized();
-      ASSERT_GT(normal.dot((frame.point - inside).normalized()), 0.1) << i << " " << j;
+  for (int level = 0; level <= 3; ++level) {
+    const TemplateFace face = MakeTemplateFace({.max_level = level});
+    for (int k = 0; k <= 200 * 200; ++k) {
+      const SurfaceFrame frame = face.surface.Frame({k % 200 / 199.0, k / 200 / 200.0});
+      ASSERT_GT(frame.Normal().dot((frame.point - inside).normalized()), 0.1) << level << " " << k;
     }
   }
 }
@@ -136,6 +138,9 @@ TEST(TemplateFace, FeaturesHaveVerticesOfTheirRegion) {
       ASSERT_TRUE(id.i >= 0 && id.i < net.columns && id.j >= 0 && id.j < net.rows);
     }
   }
+  const std::vector<VertexId> all = FeatureVertices(Face());
+  EXPECT_EQ(std::set<VertexId>(all.begin(), all.end()).size(), all.size());
+  EXPECT_GT(all.size(), Face().features[0].vertices.size());
   EXPECT_THAT(names, ElementsAre("nose", "mouth", "eye_l", "eye_r"));
 }
 
@@ -158,7 +163,7 @@ TEST(TemplateFace, FeatureRegionsHoldTheirParts) {
 
 TEST(TemplateFace, ASphereIsCarriedBySimilarity) {
   const Similarity s{.scale = 2, .rotation = Mat3::Identity(), .translation = {1, 2, 3}};
-  const Sphere placed = Placed(s, {{1, 1, 1}, 4});
+  const Sphere placed = Transformed(Sphere{{1, 1, 1}, 4}, s);
   EXPECT_EQ(placed.center, Vec3(3, 4, 5));
   EXPECT_EQ(placed.radius_mm, 8);
 }
@@ -179,7 +184,7 @@ TEST(TemplateFace, OptionsOutOfRangeAreNamed) {
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("patches_u is 3"));
   }
-  EXPECT_THROW(MakeTemplateFace({.max_level = 6}), InputError);
+  EXPECT_THROW(MakeTemplateFace({.max_level = 5}), InputError);
   EXPECT_THROW(MakeTemplateFace({.detail_tolerance_mm = kNaN}), InputError);
 }
 

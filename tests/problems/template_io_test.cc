@@ -111,6 +111,10 @@ TEST_F(TemplateIo, NamesAVertexThatTheSurfaceDoesNotHave) {
                 json["features"][1]["vertices"][0] = {3, 1, 1};
               }),
               HasSubstr("[3, 1, 1]"));
+  EXPECT_THAT(MessageAfter([](auto& json) {
+                json["features"][1]["vertices"][0] = {0, 1, 1};
+              }),
+              HasSubstr("levels 1 to 2"));
 }
 
 TEST_F(TemplateIo, NamesARadiusThatIsNotPositive) {
