@@ -1,0 +1,416 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/level_fit.h"
+
+#include <ceres/crs_matrix.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "fitting/term_cost.h"
+#include "surfaces/error.h"
+#include "tests/testing/plain_bspline.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::PlainStencil;
+using testing::Random;
+
+// A wavy sheet of 80 x 60 mm with random vertices of +- roughness.
+ControlNet Sheet(int m, int n, double roughness_mm, std::uint64_t random_seed) {
+  Random random(random_seed);
+  ControlNet net{.columns = m + 3, .rows = n + 3, .vertices = {}};
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      net.vertices.push_back(Vec3(80.0 * (i - 1) / m, 60.0 * (j - 1) / n, 5 * std::sin(i)) +
+                             random.InBox(-roughness_mm, roughness_mm));
+    }
+  }
+  return net;
+}
+
+// `count` points of `truth` at random (u,v) with u <= u_max.
+std::vector<Observation> Observe(const ControlNet& truth, int count, std::uint64_t random_seed,
+                                 double noise_mm = 0, double u_max = 1) {
+  Random random(random_seed);
+  std::vector<Observation> observations;
+  for (int k = 0; k < count; ++k) {
+    const Vec2 uv(random.Uniform(0, u_max), random.Uniform(0, 1));
+    const Stencil s = PlainStencil(truth.columns - 3, truth.rows - 3, uv);
+    observations.push_back({.stencil = s,
+                            .position = s.Apply(truth) + random.InBox(-noise_mm, noise_mm),
+                            .weight = random.Uniform(0.5, 2)});
+  }
+  return observations;
+}
+
+LevelView View(const ControlNet& start, std::vector<Observation> observations) {
+  LevelView view{.grid = {.patches_u = start.columns - 3, .patches_v = start.rows - 3},
+                 .start = start,
+                 .rest = Sheet(start.columns - 3, start.rows - 3, 0, 0),
+                 .lengths_mm = {},
+                 .observations = std::move(observations)};
+  view.lengths_mm = MeanLengths(view.grid, view.rest);
+  return view;
+}
+
+double Distance(const ControlNet& a, const ControlNet& b) {
+  double largest = 0;
+  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
+    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
+  }
+  return largest;
+}
+
+bool SameBytes(const ControlNet& a, const ControlNet& b) {
+  return a.vertices.size() == b.vertices.size() &&
+         std::memcmp(a.vertices.data(), b.vertices.data(), a.vertices.size() * sizeof(Vec3)) == 0;
+}
+
+template <std::size_t... I>
+std::vector<Term> EveryTerm(std::index_sequence<I...>) {
+  return {Term(std::in_place_index<I>)...};
+}
+
+// One of each kind with its defaults, and the other choices of their options.
+std::vector<Term> AllTerms() {
+  std::vector<Term> terms = EveryTerm(std::make_index_sequence<std::variant_size_v<Term>>());
+  terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kHuber, .loss_width_mm = 1});
+  terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kCauchy, .loss_width_mm = 2});
+  terms.push_back(PriorTerm{.weight = 3, .towards = PriorTowards::kTemplate});
+  terms.push_back(SmoothnessTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
+  terms.push_back(MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
+  return terms;
+}
+
+// 150 points on 12 patches: some patches have enough points to be reduced.
+LevelView NoisyView() { return View(Sheet(4, 3, 2, 1), Observe(Sheet(4, 3, 3, 2), 320, 3, 1)); }
+
+// Residuals and gradient parts as Ceres sees them.
+struct Evaluated {
+  double cost = kNaN;
+  std::vector<double> residuals;
+  Eigen::MatrixXd jacobian;
+};
+
+Evaluated Evaluate(const Term& term, const LevelView& view, const ControlNet& at) {
+  ControlNet net = at;
+  ceres::Problem problem;
+  std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
+  ceres::Problem::EvaluateOptions options;
+  options.apply_loss_function = false;
+  for (Vec3& v : net.vertices) {
+    if (problem.HasParameterBlock(v.data())) {
+      options.parameter_blocks.push_back(v.data());
+    }
+  }
+  Evaluated result;
+  ceres::CRSMatrix crs;
+  problem.Evaluate(options, nullptr, &result.residuals, nullptr, &crs);
+  result.jacobian = Eigen::MatrixXd::Zero(crs.num_rows, crs.num_cols);
+  for (int row = 0; row < crs.num_rows; ++row) {
+    for (int k = crs.rows[row]; k < crs.rows[row + 1]; ++k) {
+      result.jacobian(row, crs.cols[k]) = crs.values[k];
+    }
+  }
+  options.apply_loss_function = true;
+  problem.Evaluate(options, &result.cost, nullptr, nullptr, nullptr);
+  return result;
+}
+
+TEST(Terms, JacobianEqualsItsNumericTwin) {
+  const LevelView view = NoisyView();
+  for (const Term& term : AllTerms()) {
+    SCOPED_TRACE(TermName(term));
+    const Evaluated here = Evaluate(term, view, view.start);
+    ASSERT_EQ(here.jacobian.cols(), 3 * static_cast<int>(view.start.vertices.size()));
+    for (int c = 0; c < here.jacobian.cols(); ++c) {
+      ControlNet plus = view.start, minus = view.start;
+      plus.vertices[c / 3][c % 3] += 0.5;  // exact: the residuals are linear
+      minus.vertices[c / 3][c % 3] -= 0.5;
+      const Evaluated a = Evaluate(term, view, plus), b = Evaluate(term, view, minus);
+      for (int r = 0; r < here.jacobian.rows(); ++r) {
+        ASSERT_NEAR(here.jacobian(r, c), a.residuals[r] - b.residuals[r], 1e-9);
+      }
+    }
+  }
+}
+
+TEST(Terms, ResidualsAddUpToTheDocumentedCost) {
+  const LevelView view = NoisyView();
+  for (const Term& term : AllTerms()) {
+    SCOPED_TRACE(TermName(term));
+    const ControlNet net = Sheet(4, 3, 7, 9);
+    const double cost = std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
+    EXPECT_GT(cost, 0);
+    EXPECT_NEAR(2 * Evaluate(term, view, net).cost, cost, 1e-11 * cost);
+  }
+}
+
+TEST(Terms, AreMeansThatDoNotGrowWithTheData) {
+  const LevelView view = NoisyView();
+  LevelView twice = view;
+  twice.observations.insert(twice.observations.end(), view.observations.begin(),
+                            view.observations.end());
+  const double once = TermCost(PointTerm{}, view, view.start);
+  EXPECT_NEAR(TermCost(PointTerm{}, twice, view.start), once, 1e-12 * once);
+  EXPECT_NEAR(TermCost(PointTerm{}, view, view.start),
+              std::pow(ObservationRms(view, view.start), 2), 1e-12 * once);
+}
+
+TEST(Terms, AffineMapsOfTheTemplateDoNotBend) {
+  LevelView view = NoisyView();
+  Mat3 map;
+  map << 1.1, 0.2, 0.3, -0.4, 0.9, 0, 0.1, 0.5, 1;
+  for (std::size_t k = 0; k < view.rest.vertices.size(); ++k) {
+    const int i = static_cast<int>(k) % view.rest.columns,
+              j = static_cast<int>(k) / view.rest.columns;
+    view.start.vertices[k] = view.rest.vertices[k] + map * Vec3(i, j, 40);
+  }
+  EXPECT_NEAR(TermCost(SmoothnessTerm{}, view, view.start), 0, 1e-20);
+  EXPECT_GT(TermCost(MembraneTerm{}, view, view.start), 1e-3);
+}
+
+TEST(LevelFit, ReproducesASurfaceOfTheSpace) {
+  const ControlNet truth = Sheet(6, 5, 3, 4);
+  const LevelView view = View(Sheet(6, 5, 0, 0), Observe(truth, 1500, 5));
+  const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
+  EXPECT_LT(Distance(solution.net, truth), 1e-9);
+  EXPECT_LT(solution.summary.rms_after_mm, 1e-10);
+  EXPECT_TRUE(solution.summary.usable) << solution.summary.termination;
+  EXPECT_EQ(solution.summary.uncovered_vertices, 0);
+  EXPECT_EQ(solution.summary.rank, static_cast<int>(truth.vertices.size()));
+}
+
+// The oracle: rows by the definitions of the terms (smoothness by quadrature of second
+// derivatives), dense least squares.
+struct DenseSystem {
+  Eigen::MatrixXd a, b;
+  void Add(const Stencil& s, double factor, const Vec3& value, int vertices) {
+    a.conservativeResize(a.rows() + 1, vertices);
+    b.conservativeResize(b.rows() + 1, 3);
+    a.row(a.rows() - 1).setZero();
+    for (int k = 0; k < 16; ++k) {
+      a(a.rows() - 1, s.index[k]) += factor * s.weight[k];
+    }
+    b.row(b.rows() - 1) = factor * value.transpose();
+  }
+};
+
+void AddPoints(const LevelView& view, DenseSystem& dense) {
+  double sum = 0;
+  for (const Observation& o : view.observations) {
+    sum += o.weight;
+  }
+  for (const Observation& o : view.observations) {
+    dense.Add(o.stencil, std::sqrt(o.weight / sum), o.position,
+              static_cast<int>(view.start.vertices.size()));
+  }
+}
+
+void AddThinPlate(const LevelView& view, const SmoothnessTerm& term, DenseSystem& dense) {
+  const double node[] = {0.5 - std::sqrt(3.0 / 7 + 2.0 / 7 * std::sqrt(1.2)) / 2,
+                         0.5 - std::sqrt(3.0 / 7 - 2.0 / 7 * std::sqrt(1.2)) / 2,
+                         0.5 + std::sqrt(3.0 / 7 - 2.0 / 7 * std::sqrt(1.2)) / 2,
+                         0.5 + std::sqrt(3.0 / 7 + 2.0 / 7 * std::sqrt(1.2)) / 2};
+  const double outer = (18 - std::sqrt(30)) / 72, inner = (18 + std::sqrt(30)) / 72;
+  const double weight[] = {outer, inner, inner, outer};
+  const int m = view.grid.patches_u, n = view.grid.patches_v;
+  const double lu = view.lengths_mm.x(), lv = view.lengths_mm.y();
+  const int count = static_cast<int>(view.start.vertices.size());
+  for (int q = 0; q < 16 * m * n; ++q) {
+    const int a = q % 4, b = q / 4 % 4, i = q / 16 % m, j = q / 16 / m;
+    const Vec2 uv((i + node[a]) / m, (j + node[b]) / n);
+    const double f =
+        std::pow(term.length_mm, 2) * std::sqrt(term.weight * weight[a] * weight[b] / (m * n));
+    for (const auto& [du, dv, factor] :
+         {std::tuple(2, 0, 1 / (lu * lu)), std::tuple(1, 1, std::sqrt(2.0) / (lu * lv)),
+          std::tuple(0, 2, 1 / (lv * lv))}) {
+      const Stencil s = PlainStencil(m, n, uv, du, dv);
+      dense.Add(s, f * factor, s.Apply(view.rest), count);
+    }
+  }
+}
+
+TEST(LevelFit, EqualsDenseLeastSquares) {
+  const LevelView view = NoisyView();
+  const SmoothnessTerm smoothness{.weight = 0.05};
+  const PriorTerm prior{.weight = 0.02};
+  DenseSystem dense;
+  AddPoints(view, dense);
+  AddThinPlate(view, smoothness, dense);
+  const int count = static_cast<int>(view.start.vertices.size());
+  for (int k = 0; k < count; ++k) {
+    Stencil s{};
+    s.index[0] = k;
+    s.weight[0] = 1;
+    dense.Add(s, std::sqrt(prior.weight / count), view.start.vertices[k], count);
+  }
+  const Eigen::MatrixXd x = dense.a.colPivHouseholderQr().solve(dense.b);
+  const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}, smoothness, prior});
+  for (int k = 0; k < count; ++k) {
+    EXPECT_LT((solution.net.vertices[k] - x.row(k).transpose()).norm(), 1e-8);
+  }
+}
+
+TEST(LevelFit, TakesTheNearestOfManySolutions) {
+  const ControlNet start = Sheet(6, 5, 0, 0);
+  const LevelView view = View(start, Observe(Sheet(6, 5, 4, 6), 9, 7));
+  DenseSystem dense;
+  AddPoints(view, dense);
+  Eigen::MatrixXd x0(start.vertices.size(), 3);
+  for (std::size_t k = 0; k < start.vertices.size(); ++k) {
+    x0.row(k) = start.vertices[k];
+  }
+  const Eigen::MatrixXd move =
+      dense.a.completeOrthogonalDecomposition().solve(dense.b - dense.a * x0);
+  const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
+  for (std::size_t k = 0; k < start.vertices.size(); ++k) {
+    EXPECT_LT((solution.net.vertices[k] - start.vertices[k] - move.row(k).transpose()).norm(),
+              1e-5);
+  }
+  EXPECT_EQ(solution.summary.rank, 9);
+  EXPECT_LT(solution.summary.rms_after_mm, 1e-7);
+}
+
+TEST(LevelFit, VerticesThatNoTermTouchesStayToTheBit) {
+  const ControlNet start = Sheet(8, 3, 1, 8);
+  const LevelView view = View(start, Observe(Sheet(8, 3, 4, 9), 60, 10, 0, 0.49));  // patches 0..3
+  const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
+  int moved = 0;
+  for (int j = 0; j < start.rows; ++j) {
+    for (int i = 0; i < start.columns; ++i) {
+      const bool touched = i < 7;
+      EXPECT_TRUE(touched || solution.net.At(i, j) == start.At(i, j));
+      moved += solution.net.At(i, j) == start.At(i, j) ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(moved, 7 * start.rows);
+  EXPECT_EQ(solution.summary.free_vertices, 7 * start.rows);
+  EXPECT_EQ(solution.summary.uncovered_vertices, 4 * start.rows);
+  // With a smoothness term they follow.
+  const LevelSolution smooth = FitLevel(view, std::vector<Term>{PointTerm{}, SmoothnessTerm{}});
+  EXPECT_EQ(smooth.summary.free_vertices, static_cast<int>(start.vertices.size()));
+  EXPECT_GT((smooth.net.At(10, 3) - start.At(10, 3)).norm(), 1e-3);
+}
+
+// Half of the surface without data: exact thin-plate smoothness stays bounded there however weak,
+// where sampled smoothness is known to run away.
+TEST(LevelFit, AHoleInTheDataStaysBounded) {
+  const int m = 24, n = 18;
+  const ControlNet rest = Sheet(m, n, 0, 0);
+  ControlNet truth = rest;
+  for (int j = 0; j < truth.rows; ++j) {
+    for (int i = 0; i < truth.columns; ++i) {
+      truth.At(i, j) += 8 * Vec3(0, 0, std::cos(0.4 * i) * std::cos(0.3 * j));
+    }
+  }
+  std::vector<Observation> observations;
+  for (const Observation& o : Observe(truth, 3000, 11, 0.5)) {
+    const Vec3 p = o.stencil.Apply(rest);
+    const bool hole = std::hypot(p.x() - 40, p.y() - 30) < 18;
+    if (!hole) {
+      observations.push_back(o);
+    }
+  }
+  for (const double weight : {1e-2, 1e-4, 1e-6}) {
+    const LevelSolution solution = FitLevel(
+        View(rest, observations), std::vector<Term>{PointTerm{}, SmoothnessTerm{.weight = weight}});
+    EXPECT_LT(Distance(solution.net, truth), 20) << weight;
+    EXPECT_GT(solution.summary.uncovered_vertices, 0);
+  }
+}
+
+TEST(LevelFit, OrderOfPointsChangesNoByte) {
+  LevelView view = NoisyView();
+  const std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}};
+  const LevelSolution a = FitLevel(view, terms);
+  std::reverse(view.observations.begin(), view.observations.end());
+  std::swap(view.observations[3], view.observations[77]);
+  const LevelSolution b = FitLevel(view, terms);
+  EXPECT_TRUE(SameBytes(a.net, b.net));
+  EXPECT_EQ(a.summary.rms_after_mm, b.summary.rms_after_mm);
+}
+
+TEST(LevelFit, TheCostFallsAndNoNeighbourIsBetter) {
+  const LevelView view = NoisyView();
+  const std::vector<Term> terms = AllTerms();
+  const auto cost = [&](const ControlNet& net) {
+    double sum = 0;
+    for (const Term& term : terms) {
+      sum += std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
+    }
+    return sum;
+  };
+  const LevelSolution solution = FitLevel(view, terms);
+  double before = 0, after = 0;
+  for (const TermCosts& t : solution.summary.terms) {
+    before += t.before;
+    after += t.after;
+  }
+  EXPECT_NEAR(before, cost(view.start), 1e-9 * before);
+  EXPECT_NEAR(after, cost(solution.net), 1e-9 * after);
+  EXPECT_LT(after, before);
+  Random random(12);
+  for (int trial = 0; trial < 50; ++trial) {
+    ControlNet other = solution.net;
+    for (Vec3& v : other.vertices) {
+      v += random.InBox(-1e-2, 1e-2);
+    }
+    EXPECT_GT(cost(other), after);
+  }
+}
+
+TEST(LevelFit, RobustLossesForgiveOutliers) {
+  const ControlNet truth = Sheet(4, 3, 3, 2);
+  std::vector<Observation> observations = Observe(truth, 300, 3);
+  for (int k = 0; k < 15; ++k) {
+    observations[20 * k].position += Vec3(0, 0, 40);
+  }
+  const LevelView view = View(Sheet(4, 3, 0, 0), observations);
+  const auto error = [&](RobustLoss loss) {
+    return Distance(
+        FitLevel(view, std::vector<Term>{PointTerm{.loss = loss, .loss_width_mm = 0.5}}).net,
+        truth);
+  };
+  const double plain = error(RobustLoss::kNone);
+  EXPECT_LT(error(RobustLoss::kHuber), 0.3 * plain);
+  EXPECT_LT(error(RobustLoss::kCauchy), 0.05 * plain);
+}
+
+TEST(LevelFit, NothingToSolveLeavesTheNet) {
+  const LevelView view = View(Sheet(4, 3, 1, 1), {});
+  const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
+  EXPECT_TRUE(SameBytes(solution.net, view.start));
+  EXPECT_EQ(solution.summary.termination, "nothing to solve");
+  EXPECT_EQ(solution.summary.free_vertices, 0);
+  EXPECT_EQ(solution.summary.rank, 0);
+}
+
+TEST(LevelFit, WrongInputIsNamed) {
+  LevelView view = NoisyView();
+  view.lengths_mm.x() = 0;
+  const std::vector<Term> smooth = {PointTerm{}, SmoothnessTerm{}}, points = {PointTerm{}};
+  const auto message = [](const LevelView& v, const std::vector<Term>& terms) -> std::string {
+    try {
+      FitLevel(v, terms);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(message(view, smooth), HasSubstr("more than a point or a line"));
+  EXPECT_EQ(message(view, points), "no error");
+  view.rest.vertices.pop_back();
+  EXPECT_THAT(message(view, points), HasSubstr("same shape"));
+}
+
+}  // namespace
+}  // namespace semblance
