@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The front door: sets up, builds, runs. All that it knows stands in .ci/packages.txt, CMakePresets.json and configs/.
+PACKAGES := $(shell sed 's/#.*//' .ci/packages.txt)
+SUDO     := $(if $(filter 0,$(shell id -u)),,sudo)
+PRESET   ?= release
+DEMO_OUT ?= out/demo
+
+.PHONY: all setup build demo test sanitize bench format check clean
+
+all: build
+
+setup:
+	@missing=""; for p in $(PACKAGES); do \
+	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; done; \
+	if [ -n "$$missing" ]; then echo "installing:$$missing"; \
+	  $(SUDO) apt-get update -qq && \
+	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing; fi
+
+build: setup
+	@cmake --preset $(PRESET) > build.log 2>&1 || { cat build.log; exit 1; }; rm -f build.log
+	@cmake --build --preset $(PRESET)
+
+demo: build
+	@build/problems/semblance run configs/demo.yaml --out $(DEMO_OUT) --force
+
+test: build
+	@ctest --preset $(PRESET)
+
+# The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
+sanitize:
+	@$(MAKE) --no-print-directory test PRESET=sanitize
+
+bench: build
+	@build/tests/bench/semblance_bench build/bench.json
+
+format:
+	@git ls-files '*.h' '*.cc' | xargs clang-format -i
+
+check: build
+	@git ls-files '*.h' '*.cc' | xargs clang-format --dry-run -Werror
+	@ctest --preset $(PRESET) -R architecture_test
+	@build/problems/semblance check configs/*.yaml
+
+clean:
+	@rm -rf build build-debug build-sanitize
