@@ -90,9 +90,9 @@ ceres::Solver::Options SolverOptions(double stiffness) {
   options.min_lm_diagonal = options.max_lm_diagonal = 1;
   options.initial_trust_region_radius = std::min(1e8 / stiffness, 1e16);
   options.max_trust_region_radius = options.initial_trust_region_radius;
-  options.max_num_iterations = 100;
+  options.max_num_iterations = 50;
   options.function_tolerance = 1e-15;
-  options.gradient_tolerance = 1e-13 * stiffness;
+  options.gradient_tolerance = 0;  // blind to weakly determined directions
   options.parameter_tolerance = 1e-13;
   return options;
 }
@@ -149,7 +149,7 @@ int UncoveredVertices(const SparseMatrix& matrix) {
   return uncovered;
 }
 
-// Pivots of the normal equations that stand out of a shift by 1e-11 of the largest diagonal entry.
+// Pivots of the normal equations that stand out of a shift, which keeps the others from being zero.
 int NumericalRank(const SparseMatrix& matrix) {
   SparseMatrix normal = matrix.transpose() * matrix;
   const double largest = normal.diagonal().size() > 0 ? normal.diagonal().maxCoeff() : 0;
@@ -157,9 +157,9 @@ int NumericalRank(const SparseMatrix& matrix) {
     return 0;
   }
   Eigen::SimplicialLDLT<SparseMatrix> factor;
-  factor.setShift(1e-11 * largest);
+  factor.setShift(1e-14 * largest);
   factor.compute(normal);
-  return static_cast<int>((factor.vectorD().array() > 1e-10 * largest).count());
+  return static_cast<int>((factor.vectorD().array() > 1e-9 * largest).count());
 }
 
 double MaxMove(const ControlNet& a, const ControlNet& b) {

@@ -45,7 +45,7 @@ struct LevelSummary {
   int free_vertices = -1;        // that some term touches; all others stay
   int uncovered_vertices = -1;   // that no observation touches
   int rank = -1;  // of the observations' matrix, vertices - rank are left to the other terms; a
-                  // numerical rank: pivots above 1e-10 of the largest count
+                  // numerical rank: pivots above 1e-9 of the largest count
   double max_move_mm = kNaN;  // of a vertex, at the solution; Fit: as written back
   std::string termination = "not run";
   bool usable = false;  // the solver's solution can be used; else the net is unchanged

@@ -5,7 +5,10 @@
 
 #include <Eigen/SVD>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "surfaces/error.h"
@@ -116,6 +119,21 @@ Similarity PlaceTemplate(std::span<const Vec3> on_template, std::span<const Vec3
       m.mean_subject -
       subject_from_template.scale * (subject_from_template.rotation * m.mean_template);
   return subject_from_template;
+}
+
+HSplineSurface Transformed(const HSplineSurface& surface, const Similarity& to_from) {
+  ControlNet net = surface.Net(0);
+  for (Vec3& vertex : net.vertices) {
+    vertex = to_from * vertex;
+  }
+  const bool world = surface.shape().reference == OffsetReference::kWorld;
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  for (const auto& [vertex, offset] : surface.Offsets()) {
+    offsets[vertex] = to_from.scale * (world ? Vec3(to_from.rotation * offset) : offset);
+  }
+  HSplineSurface result(surface.shape(), std::move(net));
+  result.SetOffsets(offsets);
+  return result;
 }
 
 }  // namespace semblance

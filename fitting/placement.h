@@ -6,6 +6,7 @@
 
 #include "surfaces/fields.h"
 #include "surfaces/geometry.h"
+#include "surfaces/hspline_surface.h"
 
 namespace semblance {
 
@@ -35,5 +36,9 @@ void Fields(Visitor& visit, PlacementOptions& o) {
 Similarity PlaceTemplate(std::span<const Vec3> on_template, std::span<const Vec3> on_subject,
                          std::span<const double> weights = {},
                          const PlacementOptions& options = {});
+
+// The whole surface under a similarity: level 0's vertices are mapped, offsets are scaled, and
+// turned where they are kept in world axes. Point(uv) of the result is to_from * Point(uv).
+HSplineSurface Transformed(const HSplineSurface& surface, const Similarity& to_from);
 
 }  // namespace semblance

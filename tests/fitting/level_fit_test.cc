@@ -174,7 +174,7 @@ TEST(Terms, AffineMapsOfTheTemplateDoNotBend) {
               j = static_cast<int>(k) / view.rest.columns;
     view.start.vertices[k] = view.rest.vertices[k] + map * Vec3(i, j, 40);
   }
-  EXPECT_NEAR(TermCost(SmoothnessTerm{}, view, view.start), 0, 1e-20);
+  EXPECT_NEAR(TermCost(SmoothnessTerm{}, view, view.start), 0, 1e-12);
   EXPECT_GT(TermCost(MembraneTerm{}, view, view.start), 1e-3);
 }
 
@@ -301,7 +301,18 @@ TEST(LevelFit, VerticesThatNoTermTouchesStayToTheBit) {
   EXPECT_GT((smooth.net.At(10, 3) - start.At(10, 3)).norm(), 1e-3);
 }
 
-// Half of the surface without data: exact thin-plate smoothness stays bounded there however weak,
+double SurfaceDistance(const ControlNet& a, const ControlNet& b) {
+  double largest = 0;
+  for (int j = 0; j <= 100; ++j) {
+    for (int i = 0; i <= 100; ++i) {
+      const Stencil s = PlainStencil(a.columns - 3, a.rows - 3, Vec2(i, j) / 100);
+      largest = std::max(largest, (s.Apply(a) - s.Apply(b)).norm());
+    }
+  }
+  return largest;
+}
+
+// A disc of 36 mm without data: exact thin-plate smoothness stays bounded there however weak,
 // where sampled smoothness is known to run away.
 TEST(LevelFit, AHoleInTheDataStaysBounded) {
   const int m = 24, n = 18;
@@ -323,7 +334,7 @@ TEST(LevelFit, AHoleInTheDataStaysBounded) {
   for (const double weight : {1e-2, 1e-4, 1e-6}) {
     const LevelSolution solution = FitLevel(
         View(rest, observations), std::vector<Term>{PointTerm{}, SmoothnessTerm{.weight = weight}});
-    EXPECT_LT(Distance(solution.net, truth), 20) << weight;
+    EXPECT_LT(SurfaceDistance(solution.net, truth), 20) << weight;
     EXPECT_GT(solution.summary.uncovered_vertices, 0);
   }
 }

@@ -8,6 +8,7 @@
 
 #include "surfaces/error.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
@@ -76,7 +77,9 @@ TEST(Placement, NeverReflects) {
 
 TEST(Placement, NoNearbySimilarityIsBetter) {
   const std::vector<Vec3> a = Cloud(9, 4);
-  std::vector<Vec3> b = Moved(Pose(), a);
+  Similarity pose = Pose();
+  pose.rotation = Eigen::AngleAxisd(0.4, Vec3::UnitY());
+  std::vector<Vec3> b = Moved(pose, a);
   std::vector<double> w;
   Random random(5);
   for (Vec3& p : b) {
@@ -106,6 +109,21 @@ TEST(Placement, WeightsActLikeRepetition) {
   a2.push_back(a[2]);
   b2.push_back(b[2]);
   ExpectNear(PlaceTemplate(a, b, std::vector<double>{1, 1, 2, 1, 1}), PlaceTemplate(a2, b2), 1e-12);
+}
+
+TEST(Placement, TransformedSurfacesMoveAtEveryPoint) {
+  for (const OffsetReference reference : {OffsetReference::kFrame, OffsetReference::kWorld}) {
+    for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+      const HSplineSurface surface = testing::RandomSurface(
+          {.patches_u = 5, .patches_v = 4, .closure = closure, .reference = reference}, 9);
+      const HSplineSurface moved = Transformed(surface, Pose());
+      Random random(10);
+      for (int k = 0; k < 100; ++k) {
+        const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
+        EXPECT_LT((moved.Point(uv) - Pose() * surface.Point(uv)).norm(), 1e-10);
+      }
+    }
+  }
 }
 
 TEST(Placement, ErrorsSayWhatToDo) {
