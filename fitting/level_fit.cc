@@ -149,17 +149,21 @@ int UncoveredVertices(const SparseMatrix& matrix) {
   return uncovered;
 }
 
-// Pivots of the normal equations that stand out of a shift, which keeps the others from being zero.
-int NumericalRank(const SparseMatrix& matrix) {
-  SparseMatrix normal = matrix.transpose() * matrix;
-  const double largest = normal.diagonal().size() > 0 ? normal.diagonal().maxCoeff() : 0;
-  if (!(largest > 0)) {
-    return 0;
+// Pivots of the normal equations of the matrix with its columns scaled to 1 (which leaves the rank)
+// that stand out of a shift, which keeps the others from being zero. A pivot just above the
+// threshold leaves shift / threshold in the next one, so the threshold is above the root of the
+// shift.
+int NumericalRank(SparseMatrix matrix) {
+  for (int column = 0; column < matrix.cols(); ++column) {
+    const double norm = matrix.col(column).norm();
+    matrix.col(column) *= norm > 0 ? 1 / norm : 0;
   }
+  const SparseMatrix normal = matrix.transpose() * matrix;
   Eigen::SimplicialLDLT<SparseMatrix> factor;
-  factor.setShift(1e-14 * largest);
+  factor.setShift(1e-13);
   factor.compute(normal);
-  return static_cast<int>((factor.vectorD().array() > 1e-9 * largest).count());
+  const auto pivots = static_cast<int>((factor.vectorD().array() > 1e-6).count());
+  return std::min(pivots, static_cast<int>(matrix.rows()));
 }
 
 double MaxMove(const ControlNet& a, const ControlNet& b) {

@@ -44,8 +44,8 @@ struct LevelSummary {
   int iterations = -1;           // of Ceres
   int free_vertices = -1;        // that some term touches; all others stay
   int uncovered_vertices = -1;   // that no observation touches
-  int rank = -1;  // of the observations' matrix, vertices - rank are left to the other terms; a
-                  // numerical rank: pivots above 1e-9 of the largest count
+  int rank = -1;  // estimated numerical rank of the observations' matrix; vertices - rank
+                  // directions are left to the other terms, or stay
   double max_move_mm = kNaN;  // of a vertex, at the solution; Fit: as written back
   std::string termination = "not run";
   bool usable = false;  // the solver's solution can be used; else the net is unchanged

@@ -25,7 +25,7 @@ using testing::SmoothSurface;
 const std::vector<Term> kPointsOnly = {PointTerm{}};
 
 HSplineShape Shape(Closure closure = Closure::kOpen) {
-  return {.patches_u = 5, .patches_v = 4, .max_level = 3, .closure = closure};
+  return {.patches_u = 4, .patches_v = 3, .max_level = 3, .closure = closure};
 }
 
 // Points of `surface` at random (u,v), moved by `shift` and a random vector of at most noise_mm.

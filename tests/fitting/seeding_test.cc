@@ -145,7 +145,7 @@ TEST(Seeding, NeighboursKeepTheirPlaces) {
   EXPECT_EQ(smooth.points.size(), 32u * 32u);
   EXPECT_EQ(smooth.folded, 0);
   const SeedResult own = SeedDowels(sheet, query, plate, {}, {.direction_level = 2});
-  EXPECT_GT(own.folded, 32);
+  EXPECT_GE(own.folded, 32);  // in each of the 32 rows across the trough
   for (std::size_t k = 1; k < own.points.size(); ++k) {
     const FitPoint &a = own.points[k - 1], &b = own.points[k];
     const bool neighbours = a.uv.y() == b.uv.y() && b.uv.x() - a.uv.x() < 1.5 / 32;
