@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/level_fit.h"
 
-#include <ceres/crs_matrix.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,53 +12,19 @@
 
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
-#include "tests/testing/plain_bspline.h"
-#include "tests/testing/shapes.h"
+#include "tests/testing/level_views.h"
 
 namespace semblance {
 namespace {
 
+using testing::AllTerms;
 using ::testing::HasSubstr;
+using testing::NoisyView;
+using testing::Observe;
 using testing::PlainStencil;
 using testing::Random;
-
-// A wavy sheet of 80 x 60 mm with random vertices of +- roughness.
-ControlNet Sheet(int m, int n, double roughness_mm, std::uint64_t random_seed) {
-  Random random(random_seed);
-  ControlNet net{.columns = m + 3, .rows = n + 3, .vertices = {}};
-  for (int j = 0; j < net.rows; ++j) {
-    for (int i = 0; i < net.columns; ++i) {
-      net.vertices.push_back(Vec3(80.0 * (i - 1) / m, 60.0 * (j - 1) / n, 5 * std::sin(i)) +
-                             random.InBox(-roughness_mm, roughness_mm));
-    }
-  }
-  return net;
-}
-
-// `count` points of `truth` at random (u,v) with u <= u_max.
-std::vector<Observation> Observe(const ControlNet& truth, int count, std::uint64_t random_seed,
-                                 double noise_mm = 0, double u_max = 1) {
-  Random random(random_seed);
-  std::vector<Observation> observations;
-  for (int k = 0; k < count; ++k) {
-    const Vec2 uv(random.Uniform(0, u_max), random.Uniform(0, 1));
-    const Stencil s = PlainStencil(truth.columns - 3, truth.rows - 3, uv);
-    observations.push_back({.stencil = s,
-                            .position = s.Apply(truth) + random.InBox(-noise_mm, noise_mm),
-                            .weight = random.Uniform(0.5, 2)});
-  }
-  return observations;
-}
-
-LevelView View(const ControlNet& start, std::vector<Observation> observations) {
-  LevelView view{.grid = {.patches_u = start.columns - 3, .patches_v = start.rows - 3},
-                 .start = start,
-                 .rest = Sheet(start.columns - 3, start.rows - 3, 0, 0),
-                 .lengths_mm = {},
-                 .observations = std::move(observations)};
-  view.lengths_mm = MeanLengths(view.grid, view.rest);
-  return view;
-}
+using testing::Sheet;
+using testing::View;
 
 double Distance(const ControlNet& a, const ControlNet& b) {
   double largest = 0;
@@ -72,119 +37,6 @@ double Distance(const ControlNet& a, const ControlNet& b) {
 bool SameBytes(const ControlNet& a, const ControlNet& b) {
   return a.vertices.size() == b.vertices.size() &&
          std::memcmp(a.vertices.data(), b.vertices.data(), a.vertices.size() * sizeof(Vec3)) == 0;
-}
-
-template <std::size_t... I>
-std::vector<Term> EveryTerm(std::index_sequence<I...>) {
-  return {Term(std::in_place_index<I>)...};
-}
-
-// One of each kind with its defaults, and the other choices of their options.
-std::vector<Term> AllTerms() {
-  std::vector<Term> terms = EveryTerm(std::make_index_sequence<std::variant_size_v<Term>>());
-  terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kHuber, .loss_width_mm = 1});
-  terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kCauchy, .loss_width_mm = 2});
-  terms.push_back(PriorTerm{.weight = 3, .towards = PriorTowards::kTemplate});
-  terms.push_back(SmoothnessTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
-  terms.push_back(MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
-  return terms;
-}
-
-// 150 points on 12 patches: some patches have enough points to be reduced.
-LevelView NoisyView() { return View(Sheet(4, 3, 2, 1), Observe(Sheet(4, 3, 3, 2), 320, 3, 1)); }
-
-// Half the cost, and the Jacobian, as Ceres sees them.
-struct Evaluated {
-  double cost = kNaN;
-  Eigen::MatrixXd jacobian;
-};
-
-std::vector<double> Residuals(const Term& term, const LevelView& view, ControlNet net) {
-  ceres::Problem problem;
-  std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
-  ceres::Problem::EvaluateOptions options;
-  options.apply_loss_function = false;
-  std::vector<double> residuals;
-  problem.Evaluate(options, nullptr, &residuals, nullptr, nullptr);
-  return residuals;
-}
-
-Evaluated Evaluate(const Term& term, const LevelView& view, const ControlNet& at) {
-  ControlNet net = at;
-  ceres::Problem problem;
-  std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
-  ceres::Problem::EvaluateOptions options;
-  options.apply_loss_function = false;
-  for (Vec3& v : net.vertices) {
-    if (problem.HasParameterBlock(v.data())) {
-      options.parameter_blocks.push_back(v.data());
-    }
-  }
-  Evaluated result;
-  ceres::CRSMatrix crs;
-  problem.Evaluate(options, nullptr, nullptr, nullptr, &crs);
-  result.jacobian = Eigen::MatrixXd::Zero(crs.num_rows, crs.num_cols);
-  for (int row = 0; row < crs.num_rows; ++row) {
-    for (int k = crs.rows[row]; k < crs.rows[row + 1]; ++k) {
-      result.jacobian(row, crs.cols[k]) = crs.values[k];
-    }
-  }
-  options.apply_loss_function = true;
-  problem.Evaluate(options, &result.cost, nullptr, nullptr, nullptr);
-  return result;
-}
-
-TEST(Terms, JacobianEqualsItsNumericTwin) {
-  const LevelView view = NoisyView();
-  for (const Term& term : AllTerms()) {
-    SCOPED_TRACE(TermName(term));
-    const Evaluated here = Evaluate(term, view, view.start);
-    ASSERT_EQ(here.jacobian.cols(), 3 * static_cast<int>(view.start.vertices.size()));
-    for (int c = 0; c < here.jacobian.cols(); ++c) {
-      ControlNet plus = view.start, minus = view.start;
-      plus.vertices[c / 3][c % 3] += 0.5;  // exact: the residuals are linear
-      minus.vertices[c / 3][c % 3] -= 0.5;
-      const std::vector<double> a = Residuals(term, view, plus), b = Residuals(term, view, minus);
-      for (int r = 0; r < here.jacobian.rows(); ++r) {
-        ASSERT_NEAR(here.jacobian(r, c), a[r] - b[r], 1e-9);
-      }
-    }
-  }
-}
-
-TEST(Terms, ResidualsAddUpToTheDocumentedCost) {
-  const LevelView view = NoisyView();
-  for (const Term& term : AllTerms()) {
-    SCOPED_TRACE(TermName(term));
-    const ControlNet net = Sheet(4, 3, 7, 9);
-    const double cost = std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
-    EXPECT_GT(cost, 0);
-    EXPECT_NEAR(2 * Evaluate(term, view, net).cost, cost, 1e-11 * cost);
-  }
-}
-
-TEST(Terms, AreMeansThatDoNotGrowWithTheData) {
-  const LevelView view = NoisyView();
-  LevelView twice = view;
-  twice.observations.insert(twice.observations.end(), view.observations.begin(),
-                            view.observations.end());
-  const double once = TermCost(PointTerm{}, view, view.start);
-  EXPECT_NEAR(TermCost(PointTerm{}, twice, view.start), once, 1e-12 * once);
-  EXPECT_NEAR(TermCost(PointTerm{}, view, view.start),
-              std::pow(ObservationRms(view, view.start), 2), 1e-12 * once);
-}
-
-TEST(Terms, AffineMapsOfTheTemplateDoNotBend) {
-  LevelView view = NoisyView();
-  Mat3 map;
-  map << 1.1, 0.2, 0.3, -0.4, 0.9, 0, 0.1, 0.5, 1;
-  for (std::size_t k = 0; k < view.rest.vertices.size(); ++k) {
-    const int i = static_cast<int>(k) % view.rest.columns,
-              j = static_cast<int>(k) / view.rest.columns;
-    view.start.vertices[k] = view.rest.vertices[k] + map * Vec3(i, j, 40);
-  }
-  EXPECT_NEAR(TermCost(SmoothnessTerm{}, view, view.start), 0, 1e-12);
-  EXPECT_GT(TermCost(MembraneTerm{}, view, view.start), 1e-3);
 }
 
 TEST(LevelFit, ReproducesASurfaceOfTheSpace) {
