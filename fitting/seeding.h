@@ -76,9 +76,12 @@ struct SeedResult {
 //   placed: normals (du x dv) point out of the face.
 //   implicit, implicit_mesh: the same mesh, triangles counter-clockwise seen from outside.
 //   masks: where no seed is wanted (nose, mouth, orbits), mm, in the common frame.
-// Can be called again on a partly fitted surface: as it approaches, more seeds are found and they
-// lie better. Throws InputError for options out of range, a direction level that the surface does
-// not have, or a mask that is not a sphere.
+// A seed fixes which (u,v) belongs to its place, and hundreds of them outvote the dowels. On a
+// template that was only placed they pin every tangential error of the placement; so fit the dowels
+// alone first (level 0 at fraction 1 is enough), seed on the result, and fit both with the placed
+// template as `rest`. It can be called again between the steps of a schedule in the same way.
+// Throws InputError for options out of range, a direction level that the surface does not have, or
+// a mask that is not a sphere.
 SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
                       const TriMesh& implicit_mesh, std::span<const Sphere> masks,
                       const SeedOptions& options);
