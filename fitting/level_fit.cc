@@ -2,6 +2,7 @@
 #include "fitting/level_fit.h"
 
 #include <ceres/solver.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <Eigen/SparseCholesky>
@@ -97,6 +98,21 @@ ceres::Solver::Options SolverOptions(double stiffness) {
   return options;
 }
 
+// OpenBLAS, where the sparse Cholesky uses it, sums in an order that depends on its number of
+// threads, and so on the machine. One thread gives the same bytes everywhere (and small blocks gain
+// nothing from more); looked up at run time, for other BLAS libraries have no such function.
+void UseOneBlasThread() {
+  static const bool done = [] {
+    using SetThreads = void (*)(int);
+    void* const symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
+    if (symbol != nullptr) {
+      reinterpret_cast<SetThreads>(symbol)(1);
+    }
+    return true;
+  }();
+  static_cast<void>(done);
+}
+
 std::string Lowercase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -113,6 +129,7 @@ void Solve(const LevelView& view, std::span<const Term> terms, LevelSolution& so
     solution.summary.usable = true;
     return;
   }
+  UseOneBlasThread();
   ceres::Solver::Summary summary;
   ceres::Solve(SolverOptions(TypicalStiffness(terms, solution.net.vertices.size())), &problem,
                &summary);
