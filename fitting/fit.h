@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The fit of an H-spline template to points, level by level (thesis 4.2, 4.3).
+#pragma once
+
+#include <array>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "fitting/fit_schedule.h"
+#include "fitting/fit_target.h"
+#include "fitting/level_fit.h"
+#include "fitting/term.h"
+#include "surfaces/hspline_surface.h"
+#include "surfaces/run_context.h"
+
+namespace semblance {
+
+enum class FeatureRule { kRestore, kFree };
+constexpr auto EnumNames(FeatureRule) {
+  return std::to_array<std::string_view>({"restore", "free"});
+}
+
+enum class FitAim { kSurface, kLevel };
+constexpr auto EnumNames(FitAim) { return std::to_array<std::string_view>({"surface", "level"}); }
+
+struct FitOptions {
+  std::vector<LevelFit> schedule = PublishedSchedule();
+  std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}};
+  FeatureRule features = FeatureRule::kRestore;
+  FitAim aim = FitAim::kSurface;
+};
+template <class Visitor>
+void Fields(Visitor& visit, FitOptions& o) {
+  visit(FieldInfo{.name = "schedule",
+                  .min = 1,
+                  .doc = "levels in the order in which they are fitted, each with the fraction of "
+                         "its solution to take (thesis 4.4)"},
+        o.schedule);
+  visit(FieldInfo{.name = "terms", .min = 1, .doc = "what each level's solve weighs"}, o.terms);
+  visit(FieldInfo{.name = "features",
+                  .doc = "feature vertices are fitted as free; restore: afterwards they get back "
+                         "the template's offsets (thesis 4.3); free: they keep what the fit gave"},
+        o.features);
+  visit(FieldInfo{.name = "aim",
+                  .doc = "surface: a level moves so that the whole surface, with the detail of its "
+                         "finer levels as it stands, meets the points; level: so that the level "
+                         "alone does, as the thesis may be read, which lets detail overshoot"},
+        o.aim);
+}
+
+struct FitResult {
+  HSplineSurface surface;
+  std::vector<LevelSummary> levels = {};  // one a step of the schedule
+  std::vector<double> residual_mm = {};   // one a point of the target, in its order: distance of
+                                          // the final surface at its (u,v)
+  double point_rms_mm = kNaN;             // of all points, weighted, after features were restored
+  double dowel_rms_mm = kNaN;  // of the points that were not seeded (seeding.h), weighted
+  int restored_features = -1;  // offsets that were given back
+  bool usable = false;         // every step's solution could be used
+};
+
+// Fits the levels of the schedule in turn: Net(level) is solved for as a plain B-spline (FitLevel)
+// and each vertex goes c + fraction (c' - c) of the way. Exactly the offsets of scheduled levels
+// change (and the vertices of level 0, if scheduled); finer detail rides along.
+//   start: the placed template, or a surface that is already partly fitted.
+//   rest: the placed template, from which displacement is measured and whose offsets features get
+//     back; same shape as start. The first overload takes start for it. With it a caller can fit
+//     part of a schedule, seed dowels anew on the result (seeding.h) and go on.
+//   features: vertices of levels >= 1 to protect; may be empty.
+// Throws InputError for a target without points or as CheckTarget does, an empty schedule, a level
+// that the surface does not have, a fraction outside [0,1], a feature of level 0, or a template
+// without extent; Cancelled between steps if asked to stop.
+FitResult Fit(const HSplineSurface& start, const FitTarget& target,
+              std::span<const VertexId> features, const FitOptions& options,
+              const RunContext& context);
+FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
+              std::span<const VertexId> features, const FitOptions& options,
+              const RunContext& context);
+
+}  // namespace semblance

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The least-squares fit of one level of an H-spline, seen as a plain B-spline.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fitting/patch_energy.h"
+#include "fitting/term.h"
+#include "surfaces/control_net.h"
+
+namespace semblance {
+
+// One point that the level should meet: stencil applied to the net is to be `position`.
+struct Observation {
+  Stencil stencil;
+  Vec3 position = Vec3::Constant(kNaN);  // mm
+  double weight = 1;                     // > 0, relative to the other points
+};
+
+// All that the terms may look at.
+struct LevelView {
+  PatchGrid grid;
+  ControlNet start;                        // before the solve
+  ControlNet rest;                         // the template's net of this level; same size
+  Vec2 lengths_mm = Vec2::Constant(kNaN);  // what [0,1] stands for along u and v, MeanLengths of
+                                           // the template; > 0
+  std::vector<Observation> observations;
+};
+
+struct TermCosts {
+  std::string term;      // its kName
+  double before = kNaN;  // mm^2, at LevelView::start
+  double after = kNaN;   // mm^2, at the solution, before any fraction is taken
+};
+
+struct LevelSummary {
+  int level = -1;                // set by Fit
+  double fraction = kNaN;        // set by Fit
+  std::vector<TermCosts> terms;  // in the order of the terms
+  double rms_before_mm = kNaN;   // of the observations, weighted
+  double rms_after_mm = kNaN;    // at the solution; Fit gives that of the surface it wrote back
+  int iterations = -1;           // of Ceres
+  int free_vertices = -1;        // that some term touches; all others stay
+  int uncovered_vertices = -1;   // that no observation touches
+  int rank = -1;  // estimated numerical rank of the observations' matrix; vertices - rank
+                  // directions are left to the other terms, or stay
+  double max_move_mm = kNaN;  // of a vertex, at the solution; Fit: as written back
+  std::string termination = "not run";
+  bool usable = false;  // the solver's solution can be used; else the net is unchanged
+};
+
+struct LevelSolution {
+  ControlNet net;
+  LevelSummary summary;
+};
+
+// Minimises the sum of the terms over the level's control vertices, 3 doubles a parameter block, by
+// Ceres (sparse Cholesky, one thread). Where the terms leave vertices undetermined, the solution
+// nearest to view.start is taken (thesis 4.2 has no word on it; the steps are damped by a multiple
+// of the identity, a proximal-point iteration, which converges to it). Observations are used in a
+// canonical order, so their order has no effect. Throws InputError if nothing can be solved: sizes
+// that disagree, or a template without extent for a term that needs it.
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms);
+
+// Weighted root mean square distance of the observations from the net, mm; NaN without any.
+double ObservationRms(const LevelView& view, const ControlNet& net);
+
+}  // namespace semblance

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Residuals that are linear in control vertices: A X - B, the one cost of this floor.
+#pragma once
+
+#include <ceres/cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+
+#include "surfaces/control_net.h"
+
+namespace semblance {
+
+// Residual A X - B, row by row, x y z. X (columns of A x 3) are the control vertices in mm, one
+// parameter block of 3 each; A is rows x vertices, without unit or as its term scales it; B is
+// rows x 3. The Jacobian is the Kronecker product of A and the 3 x 3 identity.
+class LinearCost final : public ceres::CostFunction {
+ public:
+  using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+  LinearCost(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  std::shared_ptr<const Eigen::MatrixXd> a_;
+  Rows3 b_;
+};
+
+// Adds a LinearCost over the vertices of `net` that `vertices` names, one a column of `a`. A vertex
+// named twice gets the sum of its columns; one whose columns are zero is left out.
+// `loss` may be empty.
+void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, LinearCost::Rows3 b,
+                       std::span<const int> vertices, std::unique_ptr<ceres::LossFunction> loss,
+                       ControlNet& net, ceres::Problem& problem);
+
+}  // namespace semblance

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The terms that are integrals over the surface: thin plate and membrane.
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include "fitting/linear_cost.h"
+#include "fitting/term_cost.h"
+
+namespace semblance {
+namespace {
+
+Vec2 PatchSize(const LevelView& view) {
+  return {view.lengths_mm.x() / view.grid.patches_u, view.lengths_mm.y() / view.grid.patches_v};
+}
+
+// weight * length^4 / area * energy of a patch.
+PatchForm ScaledForm(const SmoothnessTerm& term, const LevelView& view) {
+  const Vec2 size = PatchSize(view);
+  const double scale = term.weight * std::pow(term.length_mm, 4) / view.lengths_mm.prod();
+  return scale * ThinPlateForm(size.x(), size.y());
+}
+
+// weight * length^2 / area * energy of a patch.
+PatchForm ScaledForm(const MembraneTerm& term, const LevelView& view) {
+  const Vec2 size = PatchSize(view);
+  const double scale = term.weight * std::pow(term.length_mm, 2) / view.lengths_mm.prod();
+  return scale * MembraneForm(size.x(), size.y());
+}
+
+// The net at which the energy is zero: the template, or nothing.
+ControlNet Origin(SmoothnessOf of, const LevelView& view) {
+  ControlNet origin = view.rest;
+  if (of == SmoothnessOf::kSurface) {
+    origin.vertices.assign(origin.vertices.size(), Vec3::Zero());
+  }
+  return origin;
+}
+
+void AddForm(const PatchForm& form, const ControlNet& origin, const PatchGrid& grid,
+             ControlNet& net, ceres::Problem& problem) {
+  const auto root = std::make_shared<const Eigen::MatrixXd>(FormRoot(form));
+  for (int j = 0; j < grid.patches_v; ++j) {
+    for (int i = 0; i < grid.patches_u; ++i) {
+      const std::array<int, 16> vertices = grid.PatchVertices(i, j);
+      Eigen::Matrix<double, 16, 3> x0;
+      for (int k = 0; k < 16; ++k) {
+        x0.row(k) = origin.vertices[vertices[k]];
+      }
+      AddLinearResidual(root, *root * x0, vertices, nullptr, net, problem);
+    }
+  }
+}
+
+double Energy(const PatchForm& form, const ControlNet& origin, const PatchGrid& grid,
+              const ControlNet& net) {
+  ControlNet displacement = net;
+  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+    displacement.vertices[k] -= origin.vertices[k];
+  }
+  return FormEnergy(form, grid, displacement);
+}
+
+}  // namespace
+
+void AddResiduals(const SmoothnessTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem) {
+  AddForm(ScaledForm(term, view), Origin(term.of, view), view.grid, net, problem);
+}
+
+void AddResiduals(const MembraneTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem) {
+  AddForm(ScaledForm(term, view), Origin(term.of, view), view.grid, net, problem);
+}
+
+double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net) {
+  return Energy(ScaledForm(term, view), Origin(term.of, view), view.grid, net);
+}
+
+double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net) {
+  return Energy(ScaledForm(term, view), Origin(term.of, view), view.grid, net);
+}
+
+}  // namespace semblance

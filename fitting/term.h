@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a level's solve weighs against each other. Each term costs `weight * mean squared residual`,
+// in mm^2 times the weight, so that a weight means the same over levels, point counts and subjects.
+// A new term is one struct here, one entry of the variant, and its overloads of AddResiduals and
+// TermCost (term_cost.h).
+#pragma once
+
+#include <array>
+#include <string_view>
+#include <variant>
+
+#include "surfaces/fields.h"
+
+namespace semblance {
+
+// Every weight: 0 (the term is off) .. 1e6.
+template <class Visitor>
+void WeightField(Visitor& visit, double& weight) {
+  visit(FieldInfo{.name = "weight",
+                  .min = 0,
+                  .max = 1e6,
+                  .doc = "factor of the mean squared residual; 0 switches the term off"},
+        weight);
+}
+
+enum class RobustLoss { kNone, kHuber, kCauchy };
+constexpr auto EnumNames(RobustLoss) {
+  return std::to_array<std::string_view>({"none", "huber", "cauchy"});
+}
+
+// The surface meets the points: weight * sum_i w_i rho(|S(u_i,v_i) - p_i|^2) / sum_i w_i, the mean
+// over the points by their own weights w_i, mm^2. rho(s) = s without a loss; with a = loss_width_mm
+// Huber's is s for s <= a^2, else 2 a sqrt(s) - a^2, and Cauchy's a^2 log(1 + s / a^2).
+struct PointTerm {
+  static constexpr std::string_view kName = "points";
+  double weight = 1;
+  RobustLoss loss = RobustLoss::kNone;
+  double loss_width_mm = 5;
+};
+template <class Visitor>
+void Fields(Visitor& visit, PointTerm& o) {
+  WeightField(visit, o.weight);
+  visit(FieldInfo{.name = "loss", .doc = "how points far off are tamed: none, huber or cauchy"},
+        o.loss);
+  visit(FieldInfo{.name = "loss_width_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 1e3,
+                  .doc = "distance from which a robust loss counts a point less"},
+        o.loss_width_mm);
+}
+
+enum class PriorTowards { kStart, kTemplate };
+constexpr auto EnumNames(PriorTowards) {
+  return std::to_array<std::string_view>({"start", "template"});
+}
+
+// Control vertices stay where they were: weight * mean over all vertices of the level of
+// |c - c0|^2, mm^2; c0 is the vertex before this solve, or the template's.
+struct PriorTerm {
+  static constexpr std::string_view kName = "prior";
+  double weight = 1e-3;
+  PriorTowards towards = PriorTowards::kStart;
+};
+template <class Visitor>
+void Fields(Visitor& visit, PriorTerm& o) {
+  WeightField(visit, o.weight);
+  visit(FieldInfo{.name = "towards",
+                  .doc = "what a vertex is held to: its place at the start of the level's solve, "
+                         "or in the template"},
+        o.towards);
+}
+
+enum class SmoothnessOf { kDisplacement, kSurface };
+constexpr auto EnumNames(SmoothnessOf) {
+  return std::to_array<std::string_view>({"displacement", "surface"});
+}
+
+// Thin plate: weight * length_mm^4 * mean over the surface of |f_ss|^2 + 2 |f_st|^2 + |f_tt|^2,
+// integrated exactly; f is the displacement from the template (its features survive) or the surface
+// itself. s and t are u and v stretched to the template's mean lengths in mm (rms of |S_u| and of
+// |S_v| of its level 0), so the same f costs the same at every level, however the patches are
+// proportioned. Translations and all affine maps of the template are free of cost. Against
+// dense points of weight 1 it damps a wave of length x by 1 / (1 + weight (2 pi length_mm / x)^4):
+// the default keeps waves longer than about 20 mm.
+struct SmoothnessTerm {
+  static constexpr std::string_view kName = "smoothness";
+  double weight = 0.01;
+  SmoothnessOf of = SmoothnessOf::kDisplacement;
+  double length_mm = 10;
+};
+template <class Visitor>
+void Fields(Visitor& visit, SmoothnessTerm& o) {
+  WeightField(visit, o.weight);
+  visit(
+      FieldInfo{.name = "of", .doc = "what is smooth: displacement from the template, or surface"},
+      o.of);
+  visit(FieldInfo{.name = "length_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 1e3,
+                  .doc = "length over which bending is measured; enters by its fourth power"},
+        o.length_mm);
+}
+
+// Membrane: weight * length_mm^2 * mean over the surface of |f_s|^2 + |f_t|^2, integrated exactly;
+// f, s and t as for SmoothnessTerm. Resists stretching; only translations are free of cost.
+struct MembraneTerm {
+  static constexpr std::string_view kName = "membrane";
+  double weight = 0.01;
+  SmoothnessOf of = SmoothnessOf::kDisplacement;
+  double length_mm = 10;
+};
+template <class Visitor>
+void Fields(Visitor& visit, MembraneTerm& o) {
+  WeightField(visit, o.weight);
+  visit(FieldInfo{.name = "of",
+                  .doc = "what resists stretching: displacement from the template, or "
+                         "surface"},
+        o.of);
+  visit(FieldInfo{.name = "length_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 1e3,
+                  .doc = "length over which stretching is measured; enters by its square"},
+        o.length_mm);
+}
+
+using Term = std::variant<PointTerm, PriorTerm, SmoothnessTerm, MembraneTerm>;
+
+inline std::string_view TermName(const Term& term) {
+  return std::visit([](const auto& t) { return t.kName; }, term);
+}
+
+}  // namespace semblance

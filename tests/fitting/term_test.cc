@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Laws that every term obeys; a new entry of the variant is tested without being named here.
+#include "fitting/term.h"
+
+#include <ceres/crs_matrix.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <cmath>
+
+#include "fitting/term_cost.h"
+#include "tests/testing/level_views.h"
+
+namespace semblance {
+namespace {
+
+using testing::AllTerms;
+using testing::NoisyView;
+using testing::Sheet;
+
+// Half the cost, and the Jacobian, as Ceres sees them.
+struct Evaluated {
+  double cost = kNaN;
+  Eigen::MatrixXd jacobian;
+};
+
+std::vector<double> Residuals(const Term& term, const LevelView& view, ControlNet net) {
+  ceres::Problem problem;
+  std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
+  ceres::Problem::EvaluateOptions options;
+  options.apply_loss_function = false;
+  std::vector<double> residuals;
+  problem.Evaluate(options, nullptr, &residuals, nullptr, nullptr);
+  return residuals;
+}
+
+Evaluated Evaluate(const Term& term, const LevelView& view, const ControlNet& at) {
+  ControlNet net = at;
+  ceres::Problem problem;
+  std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
+  ceres::Problem::EvaluateOptions options;
+  options.apply_loss_function = false;
+  for (Vec3& v : net.vertices) {
+    if (problem.HasParameterBlock(v.data())) {
+      options.parameter_blocks.push_back(v.data());
+    }
+  }
+  Evaluated result;
+  ceres::CRSMatrix crs;
+  problem.Evaluate(options, nullptr, nullptr, nullptr, &crs);
+  result.jacobian = Eigen::MatrixXd::Zero(crs.num_rows, crs.num_cols);
+  for (int row = 0; row < crs.num_rows; ++row) {
+    for (int k = crs.rows[row]; k < crs.rows[row + 1]; ++k) {
+      result.jacobian(row, crs.cols[k]) = crs.values[k];
+    }
+  }
+  options.apply_loss_function = true;
+  problem.Evaluate(options, &result.cost, nullptr, nullptr, nullptr);
+  return result;
+}
+
+TEST(Terms, JacobianEqualsItsNumericTwin) {
+  const LevelView view = NoisyView();
+  for (const Term& term : AllTerms()) {
+    SCOPED_TRACE(TermName(term));
+    const Evaluated here = Evaluate(term, view, view.start);
+    ASSERT_EQ(here.jacobian.cols(), 3 * static_cast<int>(view.start.vertices.size()));
+    for (int c = 0; c < here.jacobian.cols(); ++c) {
+      ControlNet plus = view.start, minus = view.start;
+      plus.vertices[c / 3][c % 3] += 0.5;  // exact: the residuals are linear
+      minus.vertices[c / 3][c % 3] -= 0.5;
+      const std::vector<double> a = Residuals(term, view, plus), b = Residuals(term, view, minus);
+      for (int r = 0; r < here.jacobian.rows(); ++r) {
+        ASSERT_NEAR(here.jacobian(r, c), a[r] - b[r], 1e-9);
+      }
+    }
+  }
+}
+
+TEST(Terms, ResidualsAddUpToTheDocumentedCost) {
+  const LevelView view = NoisyView();
+  for (const Term& term : AllTerms()) {
+    SCOPED_TRACE(TermName(term));
+    const ControlNet net = Sheet(4, 3, 7, 9);
+    const double cost = std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
+    EXPECT_GT(cost, 0);
+    EXPECT_NEAR(2 * Evaluate(term, view, net).cost, cost, 1e-11 * cost);
+  }
+}
+
+TEST(Terms, AreMeansThatDoNotGrowWithTheData) {
+  const LevelView view = NoisyView();
+  LevelView twice = view;
+  twice.observations.insert(twice.observations.end(), view.observations.begin(),
+                            view.observations.end());
+  const double once = TermCost(PointTerm{}, view, view.start);
+  EXPECT_NEAR(TermCost(PointTerm{}, twice, view.start), once, 1e-12 * once);
+  EXPECT_NEAR(TermCost(PointTerm{}, view, view.start),
+              std::pow(ObservationRms(view, view.start), 2), 1e-12 * once);
+}
+
+TEST(Terms, AffineMapsOfTheTemplateDoNotBend) {
+  LevelView view = NoisyView();
+  Mat3 map;
+  map << 1.1, 0.2, 0.3, -0.4, 0.9, 0, 0.1, 0.5, 1;
+  for (std::size_t k = 0; k < view.rest.vertices.size(); ++k) {
+    const int i = static_cast<int>(k) % view.rest.columns,
+              j = static_cast<int>(k) / view.rest.columns;
+    view.start.vertices[k] = view.rest.vertices[k] + map * Vec3(i, j, 40);
+  }
+  EXPECT_NEAR(TermCost(SmoothnessTerm{}, view, view.start), 0, 1e-12);
+  EXPECT_GT(TermCost(MembraneTerm{}, view, view.start), 1e-3);
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One level's fit on a small open sheet, and one of each term, for law tests.
+#pragma once
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "fitting/level_fit.h"
+#include "tests/testing/plain_bspline.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance::testing {
+
+// A wavy sheet of 80 x 60 mm with random vertices of +- roughness.
+inline ControlNet Sheet(int m, int n, double roughness_mm, std::uint64_t random_seed) {
+  Random random(random_seed);
+  ControlNet net{.columns = m + 3, .rows = n + 3, .vertices = {}};
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      net.vertices.push_back(Vec3(80.0 * (i - 1) / m, 60.0 * (j - 1) / n, 5 * std::sin(i)) +
+                             random.InBox(-roughness_mm, roughness_mm));
+    }
+  }
+  return net;
+}
+
+// `count` points of `truth` at random (u,v) with u <= u_max.
+inline std::vector<Observation> Observe(const ControlNet& truth, int count,
+                                        std::uint64_t random_seed, double noise_mm = 0,
+                                        double u_max = 1) {
+  Random random(random_seed);
+  std::vector<Observation> observations;
+  for (int k = 0; k < count; ++k) {
+    const Vec2 uv(random.Uniform(0, u_max), random.Uniform(0, 1));
+    const Stencil s = PlainStencil(truth.columns - 3, truth.rows - 3, uv);
+    observations.push_back({.stencil = s,
+                            .position = s.Apply(truth) + random.InBox(-noise_mm, noise_mm),
+                            .weight = random.Uniform(0.5, 2)});
+  }
+  return observations;
+}
+
+inline LevelView View(const ControlNet& start, std::vector<Observation> observations) {
+  LevelView view{.grid = {.patches_u = start.columns - 3, .patches_v = start.rows - 3},
+                 .start = start,
+                 .rest = Sheet(start.columns - 3, start.rows - 3, 0, 0),
+                 .lengths_mm = {},
+                 .observations = std::move(observations)};
+  view.lengths_mm = MeanLengths(view.grid, view.rest);
+  return view;
+}
+
+template <std::size_t... I>
+std::vector<Term> EveryTerm(std::index_sequence<I...>) {
+  return {Term(std::in_place_index<I>)...};
+}
+
+// One of each kind with its defaults, and the other choices of their options.
+inline std::vector<Term> AllTerms() {
+  std::vector<Term> terms = EveryTerm(std::make_index_sequence<std::variant_size_v<Term>>());
+  terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kHuber, .loss_width_mm = 1});
+  terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kCauchy, .loss_width_mm = 2});
+  terms.push_back(PriorTerm{.weight = 3, .towards = PriorTowards::kTemplate});
+  terms.push_back(SmoothnessTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
+  terms.push_back(MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
+  return terms;
+}
+
+// 320 points on 12 patches, enough in each to be reduced.
+inline LevelView NoisyView() {
+  return View(Sheet(4, 3, 2, 1), Observe(Sheet(4, 3, 3, 2), 320, 3, 1));
+}
+
+}  // namespace semblance::testing
