@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a triangle of the skull emits (thesis ch. 3): three kinds, chosen by option. For a triangle
+// T with depth l, decay k and a point p at height h over T's plane; every emitter is 0 where h <=
+// 0.
+#pragma once
+
+#include <string_view>
+#include <variant>
+
+#include "surfaces/fields.h"
+
+namespace semblance {
+
+// Eq. 3.1: (l / d)^k, d the distance from p to T. The surface of a flat plate lies the further out
+// the finer its mesh (REFERENCE B12).
+struct ThesisEmitter {
+  static constexpr std::string_view kName = "thesis";
+  double decay = 6;
+};
+
+// Eq. 3.2: T moved out by t l emits with depth (1 - t) l; the prism under it is solid.
+struct SplitEmitter {
+  static constexpr std::string_view kName = "split";
+  double decay = 6;
+  double split = 0.5;
+};
+
+// (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the integral
+// is 2 pi h^(-k) / (k+1), so coplanar triangles of one depth sum to (l/h)^k: their surface is flat,
+// at exactly l, whatever the mesh.
+struct FlatEmitter {
+  static constexpr std::string_view kName = "flat";
+  double decay = 6;
+};
+
+using Emitter = std::variant<FlatEmitter, SplitEmitter, ThesisEmitter>;
+
+namespace emitter_internal {
+inline constexpr FieldInfo kDecay{.name = "decay",
+                                  .min = 1,
+                                  .max = 30,
+                                  .doc =
+                                      "k: how fast emission falls with distance; more blends less "
+                                      "and follows the skull's shape more (thesis: 3, 6, 15)"};
+}
+template <class Visitor>
+void Fields(Visitor& visit, ThesisEmitter& o) {
+  visit(emitter_internal::kDecay, o.decay);
+}
+template <class Visitor>
+void Fields(Visitor& visit, SplitEmitter& o) {
+  visit(emitter_internal::kDecay, o.decay);
+  visit(FieldInfo{.name = "split",
+                  .min = 0,
+                  .max = 0.99,
+                  .doc = "t: share of the depth by which the triangle is moved out before it "
+                         "emits; 0 is the thesis's first emitter"},
+        o.split);
+}
+template <class Visitor>
+void Fields(Visitor& visit, FlatEmitter& o) {
+  visit(emitter_internal::kDecay, o.decay);
+}
+
+}  // namespace semblance

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The implicit surface over a skull: the sum of its triangles' emissions, at threshold 1 (thesis
+// ch. 3).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "surfaces/emitter.h"
+#include "surfaces/tri_mesh.h"
+
+namespace semblance {
+
+struct ImplicitOptions {
+  Emitter emitter;
+  double tail_error = 1e-3;
+};
+template <class Visitor>
+void Fields(Visitor& visit, ImplicitOptions& o) {
+  visit(FieldInfo{.name = "emitter", .doc = "what a triangle of the skull emits"}, o.emitter);
+  visit(FieldInfo{.name = "tail_error",
+                  .min = 0,
+                  .max = 0.1,
+                  .doc = "bound on what all emitters together that are too far to be summed could "
+                         "add, where 1 is the surface; 0 sums all"},
+        o.tail_error);
+}
+
+// Value(p) = sum of emissions - 1: positive inside. Bounded: each emission is capped at
+// kMostEmission, and at distances below 5 % of the depth it is that at 5 %, so that it is finite on
+// vertices, edges and planes of emitters.
+class ImplicitSurface {
+ public:
+  static constexpr double kMostEmission = 1e12;
+
+  // depth_mm: one a vertex; a triangle emits with the mean of its three (thesis 3.1), and not at
+  // all where one is NaN. Throws InputError if nothing emits, if a depth is not positive, or if the
+  // sizes differ.
+  ImplicitSurface(const TriMesh& skull, std::span<const double> depth_mm,
+                  const ImplicitOptions& options);
+  ~ImplicitSurface();
+  ImplicitSurface(ImplicitSurface&&) noexcept;
+
+  double Value(const Vec3& p) const;  // safe from several threads at once
+
+  // Emitters that the tail bound makes Value(p) sum.
+  std::int64_t EmittersNear(const Vec3& p) const;
+  std::int64_t EmitterCount() const;
+  double CutoffDistance_mm() const;  // emitters further than this are left out
+  double MaxDepth_mm() const;
+
+  // Triangles on a square of side depth, the mean over the skull's area: what drives the surface of
+  // the thesis's emitters outward (REFERENCE B12). With `thesis`, k = 6: 1.3 l at about 1, 2.2 l at
+  // 12, 4.2 l at 200.
+  double EmittersPerSquareDepth() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace semblance
