@@ -13,7 +13,7 @@
 namespace semblance {
 
 struct ImplicitOptions {
-  Emitter emitter;
+  Emitter emitter = FlatEmitter{};
   double tail_error = 1e-3;
 };
 template <class Visitor>

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/implicit_face.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "surfaces/decimate.h"
+#include "surfaces/error.h"
+
+namespace semblance {
+namespace {
+
+// A cubic grid of `resolution` cells along the longest side of the shell with its depth, and
+// `margin` times the depth of room around.
+SampleGrid MakeGrid(const TriMesh& shell, double depth_mm, int resolution, double margin) {
+  const Box3 box = Bounds(shell);
+  SampleGrid grid;
+  grid.cell_mm = Vec3::Constant((box.sizes().maxCoeff() + 2 * depth_mm) / resolution);
+  grid.origin = box.min() - Vec3::Constant(margin * depth_mm) - 2 * grid.cell_mm;
+  for (int axis = 0; axis < 3; ++axis) {
+    grid.counts[axis] = static_cast<int>(std::ceil((box.sizes()[axis] + 2 * margin * depth_mm) /
+                                                   grid.cell_mm[axis])) +
+                        5;
+  }
+  return grid;
+}
+
+// The emitting point of the shell that lies furthest along a direction; -1 if none emits.
+int ExtremePoint(const TriMesh& shell, std::span<const double> depth_mm, const Vec3& direction) {
+  int extreme = -1;
+  for (int v = 0; v < static_cast<int>(shell.points.size()); ++v) {
+    const bool further =
+        extreme < 0 || shell.points[v].dot(direction) > shell.points[extreme].dot(direction);
+    extreme = std::isfinite(depth_mm[v]) && further ? v : extreme;
+  }
+  return extreme;
+}
+
+// The four cells around the last edge, going outward along an axis from a corner near `start`, on
+// which the field turns negative.
+void AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& start, int axis,
+                 int step, std::vector<std::int64_t>& seeds) {
+  std::array<int, 3> at;
+  for (int a = 0; a < 3; ++a) {
+    at[a] = std::clamp(static_cast<int>(std::lround((start[a] - grid.origin[a]) / grid.cell_mm[a])),
+                       1, grid.counts[a] - 2);
+  }
+  int crossing = -1;  // the lower corner, along the axis, of the outermost crossed edge
+  bool inside = false;
+  for (; at[axis] > 0 && at[axis] + 1 < grid.counts[axis]; at[axis] += step) {
+    const bool now_inside = field(grid.Corner(at[0], at[1], at[2])) > 0;
+    if (inside && !now_inside) {
+      crossing = step > 0 ? at[axis] - 1 : at[axis];
+    }
+    inside = now_inside;
+  }
+  if (crossing < 0) {
+    return;
+  }
+  at[axis] = crossing;
+  for (int n = 0; n < 4; ++n) {
+    std::array<int, 3> cell = at;
+    cell[(axis + 1) % 3] -= n & 1;
+    cell[(axis + 2) % 3] -= n >> 1;
+    seeds.push_back(grid.Index(cell[0], cell[1], cell[2]));
+  }
+}
+
+std::vector<std::int64_t> FindSeeds(const TriMesh& shell, std::span<const double> depth_mm,
+                                    const ScalarField& field, const SampleGrid& grid) {
+  std::vector<std::int64_t> seeds;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int step : {-1, 1}) {
+      const Vec3 direction = step * Vec3::Unit(axis);
+      const int extreme = ExtremePoint(shell, depth_mm, direction);
+      AppendSeeds(field, grid, shell.points[extreme] + 0.4 * depth_mm[extreme] * direction, axis,
+                  step, seeds);
+    }
+  }
+  return seeds;
+}
+
+// Polygonises in a grid that is made larger until the surface fits into it.
+PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_mm,
+                            const ImplicitSurface& surface, const ImplicitFaceOptions& options,
+                            const RunContext& context, double& cell_mm) {
+  const ScalarField field = [&surface](const Vec3& p) { return surface.Value(p); };
+  for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
+    const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
+    const std::vector<std::int64_t> seeds = FindSeeds(shell, depth_mm, field, grid);
+    PolygonizeResult result = PolygonizeFrom(field, grid, seeds, options.edges, context);
+    cell_mm = grid.cell_mm.x();
+    if (!result.touches_border && !result.mesh.triangles.empty()) {
+      return result;
+    }
+  }
+  throw InputError(
+      "implicit face: no closed surface was found around the shell; is it outward, and is the "
+      "resolution fine enough for its depths?");
+}
+
+void AppendNotes(const ImplicitFaceOptions& options, std::span<const double> depth_mm,
+                 ImplicitFace& face) {
+  if (!std::holds_alternative<FlatEmitter>(options.field.emitter) &&
+      face.emitters_per_square_depth > 1) {
+    face.notes.push_back(fmt::format(
+        "emitter density: {:.1f} triangles on a square of the depth; this emitter's surface lies "
+        "the further out the denser the mesh (use 'flat' for the exact depth)",
+        face.emitters_per_square_depth));
+  }
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (const double depth : depth_mm) {
+    thinnest = std::isfinite(depth) ? std::min(thinnest, depth) : thinnest;
+  }
+  if (face.cell_mm > thinnest) {
+    face.notes.push_back(
+        fmt::format("resolution: cells of {:.2f} mm are larger than the thinnest tissue, {:.2f} mm",
+                    face.cell_mm, thinnest));
+  }
+}
+
+}  // namespace
+
+TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
+  if (mesh.triangles.empty()) {
+    throw InputError("outermost surface: the mesh has no triangles");
+  }
+  const Components components = ConnectedComponents(mesh);
+  std::vector<double> volume(components.count, 0);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle& c = mesh.triangles[t];
+    volume[components.of_triangle[t]] +=
+        mesh.points[c[0]].dot(mesh.points[c[1]].cross(mesh.points[c[2]]));
+  }
+  const int largest =
+      static_cast<int>(std::max_element(volume.begin(), volume.end()) - volume.begin());
+  std::vector<bool> keep(mesh.triangles.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) {
+    keep[t] = components.of_triangle[t] == largest;
+  }
+  dropped = components.count - 1;
+  return Submesh(mesh, keep);
+}
+
+ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> depth_mm,
+                               const ImplicitFaceOptions& options, const RunContext& context) {
+  ImplicitFace face;
+  const ImplicitSurface surface(shell, depth_mm, options.field);
+  face.emitters = surface.EmitterCount();
+  face.emitters_per_square_depth = surface.EmittersPerSquareDepth();
+  const PolygonizeResult polygonized =
+      Polygonize(shell, depth_mm, surface, options, context, face.cell_mm);
+  face.counts = polygonized.summary;
+  face.dense = KeepOutermost(polygonized.mesh, face.dropped_components);
+  context.Report("decimate");
+  face.mesh = Decimate(face.dense, options.target_triangles);
+  AppendNotes(options, depth_mm, face);
+  return face;
+}
+
+}  // namespace semblance

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The implicit face: from a skull's shell and its depths to a closed mesh, in one call.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "surfaces/implicit_surface.h"
+#include "surfaces/polygonize.h"
+#include "surfaces/run_context.h"
+
+namespace semblance {
+
+struct ImplicitFaceOptions {
+  ImplicitOptions field = {};
+  int resolution = 150;
+  EdgeSearchOptions edges = {};
+  int target_triangles = 14000;
+};
+template <class Visitor>
+void Fields(Visitor& visit, ImplicitFaceOptions& o) {
+  Fields(visit, o.field);
+  visit(FieldInfo{.name = "resolution",
+                  .min = 8,
+                  .max = 600,
+                  .doc = "n: cells along the longest side of the shell with its depth; the "
+                         "thesis's runs use 150"},
+        o.resolution);
+  visit(FieldInfo{.name = "edges", .doc = "how crossings are found"}, o.edges);
+  visit(FieldInfo{.name = "target_triangles",
+                  .min = 100,
+                  .max = 10000000,
+                  .doc = "of the decimated face; the thesis: 14000"},
+        o.target_triangles);
+}
+
+struct ImplicitFace {
+  TriMesh dense;  // as polygonised: closed, manifold, outward
+  TriMesh mesh;   // decimated
+  double cell_mm = kNaN;
+  std::int64_t emitters = -1;
+  double emitters_per_square_depth = kNaN;  // see ImplicitSurface
+  int dropped_components = -1;  // sheets and fragments that are not the outermost surface
+  PolygonizeSummary counts;
+  std::vector<std::string> notes;  // what a reader should know, a line each
+};
+
+// shell: outward. depth_mm: one a vertex, NaN where it does not emit. Only the outermost surface is
+// followed: it is found by going outward from the shell's extreme points, and of what is connected
+// there the component with the largest volume is kept. Throws InputError as ImplicitSurface does.
+ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> depth_mm,
+                               const ImplicitFaceOptions& options, const RunContext& context);
+
+// The component with the largest enclosed volume; `dropped` counts the others. Throws InputError
+// for an empty mesh.
+TriMesh KeepOutermost(const TriMesh& mesh, int& dropped);
+
+}  // namespace semblance

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/implicit_face.h"
+
+#include <gtest/gtest.h>
+
+#include "surfaces/decimate.h"
+#include "surfaces/error.h"
+#include "surfaces/mesh_query.h"
+#include "surfaces/skull_fill.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using testing::Plate;
+using testing::SphereMesh;
+
+void ExpectClosedManifold(const TriMesh& mesh) {
+  const EdgeReport edges = CheckEdges(mesh);
+  EXPECT_EQ(edges.boundary, 0);
+  EXPECT_EQ(edges.non_manifold, 0);
+  EXPECT_EQ(edges.inconsistent, 0);
+  EXPECT_GT(SignedVolume(mesh), 0);
+}
+
+TriMesh Joined(TriMesh a, const TriMesh& b) {
+  const auto offset = static_cast<std::int32_t>(a.points.size());
+  a.points.insert(a.points.end(), b.points.begin(), b.points.end());
+  for (const Triangle& t : b.triangles) {
+    a.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  }
+  return a;
+}
+
+TEST(ImplicitFace, OverASphereItIsASphereClosedAndManifold) {
+  const TriMesh sphere = SphereMesh({3, 2, 1}, 80, 40);
+  const ImplicitFace face = BuildImplicitFace(sphere, std::vector<double>(sphere.points.size(), 8),
+                                              {.resolution = 60, .target_triangles = 2000}, {});
+  ExpectClosedManifold(face.dense);
+  ExpectClosedManifold(face.mesh);
+  EXPECT_LE(face.mesh.triangles.size(), 2000u);
+  for (const Vec3& p : face.dense.points) {
+    EXPECT_NEAR((p - Vec3(3, 2, 1)).norm(), 88, 0.6);
+  }
+  EXPECT_TRUE(face.notes.empty());
+  EXPECT_GT(face.counts.corner_evaluations, 0);
+}
+
+TEST(ImplicitFace, ThreadsChangeNoBit) {
+  const TriMesh sphere = SphereMesh({3, 2, 1}, 80, 20);
+  const std::vector<double> depth(sphere.points.size(), 8);
+  RunContext two;
+  two.threads = 2;
+  const ImplicitFace a = BuildImplicitFace(sphere, depth, {.resolution = 40}, {}),
+                     b = BuildImplicitFace(sphere, depth, {.resolution = 40}, two);
+  EXPECT_EQ(a.dense.points, b.dense.points);
+  EXPECT_EQ(a.mesh.points, b.mesh.points);
+  EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
+}
+
+TEST(ImplicitFace, AFarOutThesisSurfaceStillFitsAndItsDensityIsSaid) {
+  const TriMesh sphere = SphereMesh({0, 0, 0}, 60, 40);
+  ImplicitFaceOptions options{.resolution = 40};
+  options.field.emitter = ThesisEmitter{};
+  options.field.tail_error = 1e-2;
+  const ImplicitFace face =
+      BuildImplicitFace(sphere, std::vector<double>(sphere.points.size(), 10), options, {});
+  ExpectClosedManifold(face.dense);
+  EXPECT_GT((face.dense.points[0]).norm(), 72);
+  ASSERT_EQ(face.notes.size(), 1u);
+  EXPECT_NE(face.notes[0].find("emitter density"), std::string::npos);
+}
+
+TEST(ImplicitFace, AnOpenShellStillGivesAClosedFace) {
+  const TriMesh plate = Plate(60, 20);
+  const ImplicitFace face =
+      BuildImplicitFace(plate, std::vector<double>(plate.points.size(), 6), {.resolution = 60}, {});
+  ExpectClosedManifold(face.dense);
+}
+
+TEST(KeepOutermost, DropsInnerSheetsAndFragments) {
+  TriMesh inner = SphereMesh({0, 0, 0}, 5, 8);
+  for (Triangle& t : inner.triangles) {
+    std::swap(t[0], t[1]);  // an inner sheet faces inward
+  }
+  const TriMesh outer = SphereMesh({0, 0, 0}, 10, 8);
+  int dropped = -1;
+  const TriMesh kept =
+      KeepOutermost(Joined(Joined(inner, outer), SphereMesh({30, 0, 0}, 2, 6)), dropped);
+  EXPECT_EQ(dropped, 2);
+  EXPECT_EQ(kept.points, outer.points);
+  EXPECT_THROW(KeepOutermost(TriMesh{}, dropped), InputError);
+}
+
+TEST(Decimate, KeepsShapeAndTopology) {
+  const TriMesh sphere = SphereMesh({0, 0, 0}, 50, 60);
+  const TriMesh fewer = Decimate(sphere, 1500);
+  ExpectClosedManifold(fewer);
+  EXPECT_LE(fewer.triangles.size(), 1500u);
+  EXPECT_GT(fewer.triangles.size(), 1400u);
+  EXPECT_NEAR(SignedVolume(fewer) / SignedVolume(sphere), 1, 0.01);
+  EXPECT_EQ(Decimate(fewer, 5000).points, fewer.points);
+}
+
+TEST(Decimate, RefusesWhatIsNoManifold) {
+  TriMesh mesh = Plate(10, 1);
+  mesh.points.emplace_back(5, 5, 5);
+  mesh.triangles.push_back({0, 3, 4});
+  EXPECT_THROW(Decimate(mesh, 4 - 1), InputError);
+  mesh.triangles.push_back({3, 0, 4});
+  mesh.triangles.push_back({1, 0, 4});
+  EXPECT_THROW(Decimate(mesh, 4), InputError);
+}
+
+TEST(Remesh, MakesEdgesOfTheLengthAsked) {
+  const TriMesh even = Remesh(SphereMesh({0, 0, 0}, 50, 20), 4);
+  ExpectClosedManifold(even);
+  double sum = 0;
+  for (const Triangle& t : even.triangles) {
+    sum += (even.points[t[0]] - even.points[t[1]]).norm();
+  }
+  EXPECT_NEAR(sum / static_cast<double>(even.triangles.size()), 4, 0.6);
+}
+
+TEST(SkullFill, BridgesAHoleAndLeavesTheRestOnBone) {
+  TriMesh sphere = SphereMesh({0, 0, 0}, 70, 60);
+  std::vector<bool> keep;
+  for (const Triangle& t : sphere.triangles) {
+    keep.push_back(TriangleCentroid(sphere, t).z() < 69);  // a hole of about 23 mm at the top
+  }
+  const TriMesh holed = Submesh(sphere, keep);
+  const TriMesh shell = FillSkull(holed, WrapFill{.alpha_mm = 30}, {});
+  ExpectClosedManifold(shell);
+  for (const Vec3& p : shell.points) {
+    EXPECT_NEAR(p.norm(), 70, p.z() < 65 ? 0.3 : 3) << p.transpose();
+  }
+  EXPECT_EQ(FillSkull(holed, NoFill{}, {}).points, holed.points);
+}
+
+}  // namespace
+}  // namespace semblance
