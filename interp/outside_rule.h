@@ -42,7 +42,7 @@ void Fields(Visitor& visit, ExtendNetwork& o) {
 struct ConstantDepth {
   static constexpr std::string_view kName = "constant";
   std::string site = "sg";  // without a dowel there: the mean depth of all dowels, and reported
-  std::optional<double> depth_mm;  // used instead of the site's where given
+  std::optional<double> depth_mm = std::nullopt;  // used instead of the site's where given
 };
 template <class Visitor>
 void Fields(Visitor& visit, ConstantDepth& o) {
