@@ -6,6 +6,7 @@
 
 #include "interp/barycentric.h"
 #include "surfaces/error.h"
+#include "surfaces/point_triangle.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -73,6 +74,28 @@ TEST(OutsideRule, ExtendIsContinuousAtTheBorderOfTheNetwork) {
   for (std::size_t i = 0; i < points.size(); i += 2) {
     ASSERT_NE(status.status[i], status.status[i + 1]);
     ASSERT_NEAR(field.depth_mm[i], field.depth_mm[i + 1], 1e-4);
+  }
+}
+
+TEST(OutsideRule, ExtendTakesTheClosestOfAllTriangles) {
+  const DowelScene dome = DomeScene();
+  testing::Random random(11);
+  std::vector<Vec3> points(500);
+  std::ranges::generate(points, [&] { return random.InBox(-150, 150); });
+  const DowelScene scene = dome.At(points);
+  const DepthField field = ApplyOutsideRule(ExtendNetwork{.blend_mm = 1e9}, scene.Input(),
+                                            EmptyDepthField(points.size()), RunContext{});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    double nearest = 1e9, depth = kNaN;
+    for (const auto& [a, b, c] : dome.network.areas) {
+      const Dowel &da = dome.dowels[a], &db = dome.dowels[b], &dc = dome.dowels[c];
+      const TrianglePoint on = ClosestPointOnTriangle(points[i], da.base, db.base, dc.base);
+      if ((points[i] - on.position).norm() < nearest) {
+        nearest = (points[i] - on.position).norm();
+        depth = on.weights.dot(Vec3(da.depth_mm, db.depth_mm, dc.depth_mm));
+      }
+    }
+    ASSERT_NEAR(field.depth_mm[i], depth, 1e-9);
   }
 }
 
