@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From a few depths to a depth at every vertex of a skull. A new scheme is one options struct with
+// its overload of InterpolateDepth in a file of its own, and one entry of the variant.
+#pragma once
+
+#include <variant>
+
+#include "interp/barycentric.h"
+#include "interp/mean.h"
+#include "interp/nearest.h"
+
+namespace semblance {
+
+using DepthScheme = std::variant<Barycentric, Nearest, Mean>;
+
+// One entry a vertex. Where the status is kAssigned the depth is finite and within the range of the
+// dowels' depths; elsewhere it is NaN, for an OutsideRule to fill. The result does not depend on
+// run.threads nor on the order of the dowels (beyond rounding). Throws InputError where the scheme
+// cannot use the input, Cancelled if stopped.
+DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
+                            const RunContext& run);
+
+}  // namespace semblance

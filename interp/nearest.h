@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The depth of the nearest dowel: the plainest scheme that knows of place.
+#pragma once
+
+#include <string_view>
+
+#include "interp/depth_input.h"
+
+namespace semblance {
+
+struct Nearest {
+  static constexpr std::string_view kName = "nearest";
+  double max_angle_deg = 90;
+};
+template <class Visitor>
+void Fields(Visitor& visit, Nearest& o) {
+  MaxAngleField(visit, o.max_angle_deg);
+}
+
+// Depth and sd_mm of the dowel whose base is nearest in a straight line; of equally near ones, the
+// first by site name. kNotFacing, without depth, where the vertex turns away from that dowel.
+// Throws InputError as CheckDepthInput.
+DepthField InterpolateDepth(const Nearest& options, const DepthInput& input, const RunContext& run);
+
+}  // namespace semblance

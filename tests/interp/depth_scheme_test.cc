@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The laws of every scheme of the variant, and what nearest and mean add to them.
+#include "interp/depth_scheme.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "surfaces/error.h"
+#include "tests/testing/dowel_scenes.h"
+
+namespace semblance {
+namespace {
+
+using testing::Count;
+using testing::DomeScene;
+using testing::DowelScene;
+using testing::FlatScene;
+using testing::SameBytes;
+
+template <std::size_t... Index>
+std::vector<DepthScheme> EachOf(std::index_sequence<Index...>) {
+  return {std::variant_alternative_t<Index, DepthScheme>{}...};
+}
+
+class EveryScheme : public ::testing::TestWithParam<DepthScheme> {
+ protected:
+  DepthField FieldOf(const DowelScene& scene, int threads = 1) const {
+    return InterpolateDepth(GetParam(), scene.Input(), testing::OnThreads(threads));
+  }
+  std::string ErrorOf(const DowelScene& scene) const {
+    try {
+      FieldOf(scene);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "no error";
+  }
+};
+INSTANTIATE_TEST_SUITE_P(
+    DepthScheme, EveryScheme,
+    ::testing::ValuesIn(EachOf(std::make_index_sequence<std::variant_size_v<DepthScheme>>{})),
+    [](const auto& each) {
+      return std::visit([](const auto& o) { return std::string(o.kName); }, each.param);
+    });
+
+TEST_P(EveryScheme, DepthIsFiniteAndWithinTheDowelsWhereAssignedAndElsewhereNone) {
+  const DowelScene scene = DomeScene();
+  const DepthField field = FieldOf(scene);
+  ASSERT_EQ(field.depth_mm.size(), scene.skull.points.size());
+  ASSERT_EQ(field.status.size(), scene.skull.points.size());
+  ASSERT_EQ(field.sd_mm.size(), scene.skull.points.size());
+  EXPECT_GT(Count(field, DepthStatus::kAssigned), 100);
+  for (std::size_t i = 0; i < field.status.size(); ++i) {
+    if (field.status[i] == DepthStatus::kAssigned) {
+      ASSERT_GE(field.depth_mm[i], 4.5);
+      ASSERT_LE(field.depth_mm[i], 11);
+    } else {
+      ASSERT_TRUE(std::isnan(field.depth_mm[i]));
+    }
+  }
+}
+
+TEST_P(EveryScheme, TheOrderOfTheDowelsDoesNotMatter) {
+  const DowelScene scene = DomeScene();
+  DowelScene other = scene;
+  const std::vector<int> order = {3, 0, 4, 2, 1};  // other.dowels[i] is scene.dowels[order[i]]
+  std::vector<int> place(order.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    other.dowels[i] = scene.dowels[order[i]];
+    place[order[i]] = static_cast<int>(i);
+  }
+  for (auto& area : other.network.areas) {
+    area = {place[area[1]], place[area[2]], place[area[0]]};
+  }
+  const DepthField a = FieldOf(scene), b = FieldOf(other);
+  EXPECT_EQ(a.status, b.status);
+  for (std::size_t i = 0; i < a.status.size(); ++i) {
+    if (a.status[i] == DepthStatus::kAssigned) {
+      ASSERT_NEAR(a.depth_mm[i], b.depth_mm[i], 1e-9);
+    }
+  }
+}
+
+TEST_P(EveryScheme, TheNumberOfThreadsDoesNotMatter) {
+  const DowelScene scene = DomeScene();
+  EXPECT_TRUE(SameBytes(FieldOf(scene, 1), FieldOf(scene, 2)));
+}
+
+TEST_P(EveryScheme, EqualDepthsGiveThatDepth) {
+  DowelScene scene = DomeScene();
+  for (Dowel& dowel : scene.dowels) {
+    dowel.depth_mm = 6.25;
+  }
+  const DepthField field = FieldOf(scene);
+  for (std::size_t i = 0; i < field.status.size(); ++i) {
+    if (field.status[i] == DepthStatus::kAssigned) {
+      ASSERT_NEAR(field.depth_mm[i], 6.25, 1e-12);
+    }
+  }
+}
+
+TEST_P(EveryScheme, WorksWithThreeDowels) {
+  DowelScene scene = FlatScene();
+  scene.dowels.pop_back();
+  scene.network.areas = {{0, 1, 2}};
+  const DepthField field = FieldOf(scene);
+  EXPECT_GT(Count(field, DepthStatus::kAssigned), 50);
+  for (std::size_t i = 0; i < field.status.size(); ++i) {
+    EXPECT_EQ(std::isfinite(field.depth_mm[i]), field.status[i] == DepthStatus::kAssigned);
+  }
+}
+
+TEST_P(EveryScheme, StopsWhenAsked) {
+  const DowelScene scene = FlatScene();
+  std::stop_source stop;
+  stop.request_stop();
+  RunContext run;
+  run.stop_token = stop.get_token();
+  EXPECT_THROW(InterpolateDepth(GetParam(), scene.Input(), run), Cancelled);
+}
+
+TEST_P(EveryScheme, SaysWhatIsWrongWithADowel) {
+  DowelScene scene = FlatScene();
+  scene.dowels[1].base.x() = kNaN;
+  EXPECT_EQ(ErrorOf(scene), "dowel 'g': base (nan, 5, 0) is not finite; place it on the skull");
+  scene = FlatScene();
+  scene.dowels[1].direction *= 2;
+  EXPECT_EQ(ErrorOf(scene),
+            "dowel 'g': direction has length 2; it must be 1 (a unit vector out of the bone); "
+            "normalise it");
+  scene = FlatScene();
+  scene.dowels[1].direction = Dowel{}.direction;
+  EXPECT_THAT(ErrorOf(scene), ::testing::StartsWith("dowel 'g': direction has length nan; "));
+  for (const auto& [depth, word] : {std::pair(kNaN, "nan"), std::pair(0.0, "0"),
+                                    std::pair(-3.5, "-3.5"), std::pair(1 / 0.0, "inf")}) {
+    scene = FlatScene();
+    scene.dowels[1].depth_mm = depth;
+    EXPECT_EQ(ErrorOf(scene), fmt::format("dowel 'g': depth is {} mm; it must be finite and above "
+                                          "0; set it or leave the dowel out",
+                                          word));
+  }
+}
+
+TEST_P(EveryScheme, SaysWhatIsWrongWithTheRest) {
+  DowelScene scene = FlatScene();
+  scene.dowels.clear();
+  EXPECT_EQ(ErrorOf(scene), "dowels: there are none, but a depth needs at least one; place dowels");
+  scene = FlatScene();
+  scene.normals.pop_back();
+  EXPECT_EQ(ErrorOf(scene),
+            "skull: 440 normals for 441 vertices; there must be one a vertex; compute them from "
+            "this mesh");
+  scene = FlatScene();
+  scene.network.areas[1][2] = 4;
+  EXPECT_EQ(ErrorOf(scene),
+            "dowel network: area 1 names dowel 4, but there are 4 (0..3); build the network from "
+            "these dowels");
+  scene = FlatScene();
+  scene.skull.points[7].y() = kNaN;
+  EXPECT_EQ(ErrorOf(scene), "skull: vertex 7 or its normal is not finite; repair the mesh");
+}
+
+TEST(NearestDepth, IsTheNearestDowelsAndFirstByNameAmongEquals) {
+  const DowelScene scene = FlatScene().At({{8, 8, 3}, {33, 9, 0}, {20, 0, 0}, {20, 5, 0}});
+  const DepthField field = InterpolateDepth(Nearest{}, scene.Input(), RunContext{});
+  EXPECT_THAT(field.depth_mm, ::testing::ElementsAre(4, 7, 7, 7));
+  EXPECT_THAT(field.sd_mm, ::testing::ElementsAre(1, 2, 2, 2));
+}
+
+TEST(NearestDepth, NeedsNoNetworkButFacingBone) {
+  DowelScene scene = DomeScene();
+  scene.network.areas.clear();
+  const DepthField field = InterpolateDepth(Nearest{}, scene.Input(), RunContext{});
+  EXPECT_GT(Count(field, DepthStatus::kNotFacing), 0);
+  EXPECT_EQ(Count(field, DepthStatus::kOutside), 0);
+  const DepthField all =
+      InterpolateDepth(Nearest{.max_angle_deg = 180}, scene.Input(), RunContext{});
+  EXPECT_EQ(Count(all, DepthStatus::kNotFacing), 0);
+}
+
+TEST(MeanDepth, IsTheMeanEverywhere) {
+  const DepthField field = InterpolateDepth(Mean{}, FlatScene().Input(), RunContext{});
+  EXPECT_THAT(field.depth_mm, ::testing::Each(6.25));
+  EXPECT_EQ(Count(field, DepthStatus::kAssigned), 441);
+  EXPECT_TRUE(std::isnan(field.sd_mm[0]));
+}
+
+}  // namespace
+}  // namespace semblance
