@@ -56,10 +56,10 @@ void Fields(Visitor& visit, TissueOptions& o) {
 // that of "go"). Measured depths are those along the normal, else to the closest skin. Dowels of
 // landmarks without any measured depth are removed.
 //
-// Returns what people should know: suspect cells used, entries of set_mm used and unused,
-// depths to the closest skin, dowels removed. Throws InputError if a table is
-// needed and not given or lacks a depth (all such sites are named), if set_mm names an unknown
-// site, or if no dowel is left; IoError and ConfigError as ReadTissueTable.
+// Returns what people should know: suspect cells used, entries of set_mm used and unused, depths to
+// the closest skin, dowels removed. Throws InputError if a table is needed and not given or lacks a
+// depth (all such sites are named), if set_mm names an unknown site, or if no dowel is left;
+// IoError and ConfigError as ReadTissueTable.
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels);
 

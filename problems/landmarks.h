@@ -109,9 +109,10 @@ void Fields(Visitor& visit, PlaceOptions& o) {
         o.normal_radius_mm);
 }
 
-// Throws IoError if the file cannot be read; ConfigError, with a line for each fault, if its units
-// or axes are others, it has no landmark, a site is not one of StandardSiteCodes() or stands twice
-// (also once as absent), a point lacks, or a normal is not of length 1 within 1 %.
+// The one way to read such a file, as the checks are made here. Throws IoError if the file cannot
+// be read; ConfigError, with a line for each fault, if its units or axes are others, it has no
+// landmark, a site is not one of StandardSiteCodes() or stands twice (also once as absent), a point
+// lacks, or a normal is not of length 1 within 1 %.
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
 
 // One dowel a landmark, in the file's order, its depth still NaN. The base is the skull's point

@@ -121,9 +121,10 @@ void Fields(Visitor& visit, TissueTable& o) {
 // "emaciated_male" ... "obese_female".
 std::string StratumName(Sex sex, Build build);
 
-// Throws IoError if the file cannot be read; ConfigError if it is not such a table: units other
-// than mm, strata that are neither the six nor "adult", a site that stands twice or with a side, a
-// mean without need of it or the lack of one.
+// The one way to read a table, as the checks are made here. Throws IoError if the file cannot be
+// read; ConfigError if it is not such a table: units other than mm, strata that are neither the six
+// nor "adult", a site that stands twice or with a side, a mean in a missing cell or none in
+// another.
 TissueTable ReadTissueTable(const std::filesystem::path& path);
 
 // The depth at a site, with or without _l / _r; a pooled table ignores `sex` and `build`. Throws

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "problems/config.h"
 #include "surfaces/error.h"
 #include "tests/testing/scratch_file.h"
 
@@ -54,6 +55,21 @@ struct Subject {
     return depths;
   }
 };
+
+TEST(TissueOptions, AreReadFromAConfiguration) {
+  const auto options = ReadConfigText<TissueOptions>(
+      "depths: table\ntable: t/a.yaml\nsex: female\nbuild: obese\nset_mm: {me: 7, go_l: 12.5}\n",
+      "/study/run.yaml");
+  EXPECT_EQ(options.table, "/study/t/a.yaml");
+  EXPECT_EQ(options.sex, Sex::kFemale);
+  EXPECT_EQ(options.build, Build::kObese);
+  EXPECT_THAT(options.set_mm, ElementsAre(std::pair("go_l", 12.5), std::pair("me", 7.0)));
+  EXPECT_THROW(ReadConfigText<TissueOptions>("set_mm: {me: 0}\n", "x.yaml"), ConfigError);
+  EXPECT_THAT(OptionsReference<TissueOptions>(), HasSubstr("set_mm"));
+  const auto place = ReadConfigText<PlaceOptions>("{max_distance_mm: 4}", "x.yaml");
+  EXPECT_EQ(place.max_distance_mm, 4);
+  EXPECT_EQ(place.normal_radius_mm, 3);
+}
 
 TEST(FillDepths, TakesTheTablesCellsForBothSides) {
   Subject s({"sg", "go_l", "go_r"});

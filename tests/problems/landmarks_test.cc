@@ -193,6 +193,15 @@ TEST(PatchNormal, TheInnerSideOfAThinWallHasNoSay) {
   EXPECT_LT(DegreesBetween(dowel.direction, Vec3(0, 0, 1)), 1e-6);
 }
 
+TEST(PatchNormal, TheBackOfAThinWallHasNoSayNearItsRim) {
+  TriMesh disc = SphereMesh({0, 0, 0}, 50, 200);  // front and back hang together over the rim
+  for (Vec3& p : disc.points) {
+    p.z() *= 0.01;
+  }
+  const Dowel dowel = PlaceDowels(OneAt({48.5, 0, 0.2}), disc, {}).at(0);
+  EXPECT_LT(DegreesBetween(dowel.direction, Vec3(0, 0, 1)), 5);
+}
+
 TEST(PlaceDowels, RefusesToGuessADirection) {
   TriMesh line;
   line.points = {{0, 0, 0}, {10, 0, 0}, {5, 0, 0}};
