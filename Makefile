@@ -5,7 +5,7 @@ SUDO     := $(if $(filter 0,$(shell id -u)),,sudo)
 PRESET   ?= release
 DEMO_OUT ?= out/demo
 
-.PHONY: all setup build demo test sanitize bench format check clean
+.PHONY: all setup build demo test sanitize format check clean
 
 all: build
 
@@ -29,9 +29,6 @@ test: build
 # The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:
 	@$(MAKE) --no-print-directory test PRESET=sanitize
-
-bench: build
-	@build/tests/bench/semblance_bench build/bench.json
 
 format:
 	@git ls-files '*.h' '*.cc' | xargs clang-format -i

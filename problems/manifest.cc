@@ -43,4 +43,11 @@ std::string Sha256OfFile(const std::filesystem::path& path) {
   return Hex(digest.data(), length);
 }
 
+std::vector<std::pair<std::string, std::string>> LibraryVersions() {
+  return {{"ceres", SEMBLANCE_CERES_VERSION},
+          {"eigen", SEMBLANCE_EIGEN_VERSION},
+          {"cgal", SEMBLANCE_CGAL_VERSION},
+          {"compiler", "g++ " __VERSION__}};
+}
+
 }  // namespace semblance

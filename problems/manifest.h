@@ -4,10 +4,15 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace semblance {
 
 // Lower-case hexadecimal SHA-256 of a file's bytes. Throws IoError if it cannot be read.
 std::string Sha256OfFile(const std::filesystem::path& path);
+
+// Name and version of each library that has a part in a result, and of the compiler.
+std::vector<std::pair<std::string, std::string>> LibraryVersions();
 
 }  // namespace semblance

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/case.h"
+
+#include <fmt/format.h>
+
+#include "problems/network_file.h"
+#include "surfaces/mesh_check.h"
+#include "surfaces/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+void Append(std::vector<std::string>& notes, const std::vector<std::string>& more) {
+  notes.insert(notes.end(), more.begin(), more.end());
+}
+
+TriMesh ReadHeadMesh(const std::filesystem::path& path, const char* option, Case& subject) {
+  if (path.empty()) {
+    throw InputError(fmt::format(
+        "subject.{}: no file is named; give the path of a mesh (PLY, OBJ, STL or OFF)", option));
+  }
+  TriMesh mesh = ReadMesh(path);
+  Append(subject.notes, CheckHeadMesh(mesh, path.filename().string()));
+  subject.inputs.push_back(path);
+  return mesh;
+}
+
+LandmarkFile ReadLandmarks(const std::filesystem::path& path, Case& subject) {
+  if (path.empty()) {
+    throw InputError(
+        "subject.landmarks: no file is named; a skull needs landmarks (configs/landmarks/ shows "
+        "the form)");
+  }
+  subject.inputs.push_back(path);
+  return ReadLandmarkFile(path);
+}
+
+// Each Load fills subject.skull, skin, name, inputs and notes, and returns the landmarks.
+LandmarkFile Load(const PhantomOptions& options, Case& subject, const RunContext&) {
+  Phantom phantom = MakePhantom(options);
+  subject.skull = std::move(phantom.skull);
+  subject.skin = std::move(phantom.face);
+  LandmarkFile file;
+  file.subject = fmt::format("phantom {}", options.random_seed);
+  for (const PhantomSite& site : phantom.sites) {
+    Landmark landmark;
+    landmark.site = site.site;
+    landmark.point = {site.base.x(), site.base.y(), site.base.z()};
+    landmark.normal = {site.normal.x(), site.normal.y(), site.normal.z()};
+    landmark.depth_along_normal_mm = site.depth_mm;
+    file.landmarks.push_back(landmark);
+  }
+  return file;
+}
+
+LandmarkFile Load(const FileSubject& options, Case& subject, const RunContext&) {
+  LandmarkFile landmarks = ReadLandmarks(options.landmarks, subject);
+  subject.skull = ReadHeadMesh(options.skull, "skull", subject);
+  if (!options.skin.empty()) {
+    subject.skin = ReadHeadMesh(options.skin, "skin", subject);
+  }
+  return landmarks;
+}
+
+}  // namespace
+
+Case LoadCase(const Experiment& experiment, const RunContext& context) {
+  if (experiment.network.empty()) {
+    throw InputError(
+        "network: no file is named; give the path of a dowel network (configs/networks/ has the "
+        "standard one)");
+  }
+  Case subject;
+  const LandmarkFile landmarks = std::visit(
+      [&](const auto& options) { return Load(options, subject, context); }, experiment.subject);
+  subject.name = landmarks.subject;
+  subject.dowels = PlaceDowels(landmarks, subject.skull, experiment.landmarks);
+  Append(subject.notes, FillDepths(experiment.tissue, landmarks, subject.dowels));
+  subject.network = BuildNetwork(ReadNetworkPlan(experiment.network), subject.dowels);
+  if (subject.network.areas.empty()) {
+    throw InputError(fmt::format(
+        "{}: no area of the dowel network has all its three dowels; more landmarks are needed",
+        subject.name));
+  }
+  Append(subject.notes, subject.network.dropped);
+  subject.inputs.push_back(experiment.network);
+  if (experiment.tissue.depths == DepthSource::kTable) {
+    subject.inputs.push_back(experiment.tissue.table);
+  }
+  return subject;
+}
+
+}  // namespace semblance

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One experiment: every choice that leads from a skull to a face, as one struct. What its YAML file
+// says, and nothing else, decides the result.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "fitting/fit.h"
+#include "fitting/placement.h"
+#include "fitting/seeding.h"
+#include "interp/depth_scheme.h"
+#include "interp/outside_rule.h"
+#include "problems/dowel_depths.h"
+#include "problems/face_region.h"
+#include "problems/landmarks.h"
+#include "problems/phantom.h"
+#include "problems/template_face.h"
+#include "surfaces/implicit_face.h"
+#include "surfaces/skull_fill.h"
+
+namespace semblance {
+
+// A subject in files of meshes.
+struct FileSubject {
+  static constexpr std::string_view kName = "files";
+  std::filesystem::path skull;
+  std::filesystem::path skin;
+  std::filesystem::path landmarks;
+};
+template <class Visitor>
+void Fields(Visitor& visit, FileSubject& o) {
+  visit(FieldInfo{.name = "skull", .doc = "mesh of the skull: PLY, OBJ, STL or OFF; mm, LPS"},
+        o.skull);
+  visit(FieldInfo{.name = "skin",
+                  .doc = "mesh of the true skin in the skull's frame; empty where it is not known"},
+        o.skin);
+  visit(FieldInfo{.name = "landmarks", .doc = "YAML file of the landmarks on the skull"},
+        o.landmarks);
+}
+
+using Subject = std::variant<PhantomOptions, FileSubject>;
+
+struct Experiment {
+  std::string title = "untitled";
+  Subject subject;
+  PlaceOptions landmarks;
+  TissueOptions tissue;
+  std::filesystem::path network;
+  DepthScheme interp;
+  OutsideRule outside;
+  SkullFill fill;
+  ImplicitFaceOptions implicit;
+  TemplateOptions face_template;
+  PlacementOptions placement;
+  std::vector<LevelFit> first_fit = {{.level = 0, .fraction = 1}};
+  SeedOptions seeds;
+  int rounds = 1;
+  FitOptions fit;
+  FaceRegionOptions region;
+};
+template <class Visitor>
+void Fields(Visitor& visit, Experiment& o) {
+  visit(FieldInfo{.name = "title", .doc = "what the report is headed with"}, o.title);
+  visit(FieldInfo{.name = "subject", .doc = "whose skull, and the true face where it is known"},
+        o.subject);
+  visit(FieldInfo{.name = "landmarks", .doc = "how landmarks are laid onto bone"}, o.landmarks);
+  visit(FieldInfo{.name = "tissue", .doc = "where the dowels' depths come from"}, o.tissue);
+  visit(FieldInfo{.name = "network", .doc = "YAML file of the dowel network"}, o.network);
+  visit(FieldInfo{.name = "interp", .doc = "how depth is interpolated between the dowels"},
+        o.interp);
+  visit(FieldInfo{.name = "outside",
+                  .doc = "what bone outside the network, or turned away from it, gets"},
+        o.outside);
+  visit(FieldInfo{.name = "fill", .doc = "how temples, orbits and gaps are bridged"}, o.fill);
+  visit(FieldInfo{.name = "implicit", .doc = "the implicit surface and its polygons"}, o.implicit);
+  visit(FieldInfo{.name = "template", .doc = "the generic face"}, o.face_template);
+  visit(FieldInfo{.name = "placement", .doc = "how the generic face is brought to the dowels"},
+        o.placement);
+  visit(FieldInfo{.name = "first_fit",
+                  .doc = "levels fitted to the dowels alone before seeds are taken; may be empty"},
+        o.first_fit);
+  visit(FieldInfo{.name = "seeds", .doc = "extra dowels on the implicit face"}, o.seeds);
+  visit(FieldInfo{.name = "rounds",
+                  .min = 1,
+                  .max = 20,
+                  .doc = "how often seeds are taken anew and the schedule is run"},
+        o.rounds);
+  visit(FieldInfo{.name = "fit", .doc = "the level-by-level fit"}, o.fit);
+  visit(FieldInfo{.name = "region", .doc = "which part of the true skin is scored"}, o.region);
+}
+
+}  // namespace semblance

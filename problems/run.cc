@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/run.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "surfaces/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+// Runs one step, tells of it, and notes how long it took.
+class StepClock {
+ public:
+  explicit StepClock(const RunContext& context) : context_(context) {}
+
+  template <class Step>
+  auto operator()(const char* name, Step&& step) {
+    context_.ThrowIfStopped();
+    context_.Report(name);
+    const auto start = std::chrono::steady_clock::now();
+    auto value = step();
+    times_.push_back(
+        {name, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
+    return value;
+  }
+  std::vector<StepTime> Take() { return std::move(times_); }
+
+ private:
+  const RunContext& context_;
+  std::vector<StepTime> times_;
+};
+
+DepthField FindDepth(const Experiment& experiment, const Case& subject, const TriMesh& shell,
+                     const RunContext& context) {
+  const std::vector<Vec3> normals = VertexNormals(shell);
+  const DepthInput input{shell, normals, subject.dowels, subject.network};
+  return ApplyOutsideRule(experiment.outside, input,
+                          InterpolateDepth(experiment.interp, input, context), context);
+}
+
+// The dowel tips for which the generic face has a (u,v).
+FitTarget DowelTarget(const std::vector<Dowel>& dowels, const TemplateFace& face) {
+  FitTarget target;
+  for (const Dowel& dowel : dowels) {
+    const auto uv = face.site_uv.find(dowel.site);
+    if (uv != face.site_uv.end()) {
+      target.points.push_back({dowel.site, dowel.Tip(), uv->second, 1});
+    }
+  }
+  return target;
+}
+
+Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& dowels,
+                         const PlacementOptions& options) {
+  std::vector<Vec3> on_template, on_subject;
+  for (const FitPoint& point : dowels.points) {
+    on_template.push_back(generic.surface.Point(point.uv));
+    on_subject.push_back(point.position);
+  }
+  return PlaceTemplate(on_template, on_subject, {}, options);
+}
+
+// The generic face with its features' regions, in the subject's frame.
+TemplateFace Placed(const TemplateFace& generic, const Similarity& face_from_template) {
+  TemplateFace placed = generic;
+  placed.surface = Transformed(generic.surface, face_from_template);
+  for (Feature& feature : placed.features) {
+    if (feature.region) {
+      feature.region = Transformed(*feature.region, face_from_template);
+    }
+  }
+  return placed;
+}
+
+struct FaceFit {
+  SeedResult seeding;
+  FitTarget target;
+  FitResult fit;
+};
+
+// Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
+// both (see seeding.h for why).
+FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, const FitTarget& dowels,
+                const TriMesh& implicit, const RunContext& context) {
+  const std::vector<VertexId> features = FeatureVertices(placed);
+  const std::vector<Sphere> masks = TemplateMasks(placed);
+  const MeshQuery query(implicit);
+  HSplineSurface surface = placed.surface;
+  if (!experiment.first_fit.empty()) {
+    FitOptions first = experiment.fit;
+    first.schedule = experiment.first_fit;
+    surface = Fit(surface, placed.surface, dowels, features, first, context).surface;
+  }
+  std::optional<FaceFit> result;
+  for (int round = 0; round < experiment.rounds; ++round) {
+    context.Report("fit", fmt::format("round {} of {}", round + 1, experiment.rounds));
+    SeedResult seeding = SeedDowels(surface, query, implicit, masks, experiment.seeds);
+    FitTarget target = dowels;
+    target.points.insert(target.points.end(), seeding.points.begin(), seeding.points.end());
+    FitResult fit = Fit(surface, placed.surface, target, features, experiment.fit, context);
+    surface = fit.surface;
+    result.emplace(std::move(seeding), std::move(target), std::move(fit));
+  }
+  return std::move(*result);
+}
+
+std::optional<TruthComparison> Measure(const Experiment& experiment, const Case& subject,
+                                       const TriMesh& face, const TriMesh& implicit,
+                                       const RunContext& context) {
+  if (!subject.skin) {
+    return std::nullopt;
+  }
+  TruthComparison truth;
+  truth.region = FindFaceRegion(*subject.skin, subject.dowels, subject.network, experiment.region);
+  truth.face = CompareFaces(*subject.skin, truth.region, face, context);
+  truth.implicit = CompareFaces(*subject.skin, truth.region, implicit, context);
+  return truth;
+}
+
+}  // namespace
+
+RunResult Run(const Experiment& experiment, const RunContext& context) {
+  constexpr int kQuadsPerPatch = 4;
+  StepClock step(context);
+  Case subject = step("load subject", [&] { return LoadCase(experiment, context); });
+  TriMesh shell =
+      step("fill skull", [&] { return FillSkull(subject.skull, experiment.fill, context); });
+  DepthField depth =
+      step("interpolate depth", [&] { return FindDepth(experiment, subject, shell, context); });
+  ImplicitFace implicit = step("implicit face", [&] {
+    return BuildImplicitFace(shell, depth.depth_mm, experiment.implicit, context);
+  });
+  const TemplateFace generic =
+      step("make template", [&] { return MakeTemplateFace(experiment.face_template); });
+  const FitTarget dowels = DowelTarget(subject.dowels, generic);
+  const Similarity face_from_template = PlaceOnDowels(generic, dowels, experiment.placement);
+  TemplateFace placed = Placed(generic, face_from_template);
+  FaceFit fitted =
+      step("fit", [&] { return FitFace(experiment, placed, dowels, implicit.dense, context); });
+  Tessellation face =
+      step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
+  std::optional<TruthComparison> truth = step(
+      "measure", [&] { return Measure(experiment, subject, face.mesh, implicit.mesh, context); });
+  return {std::move(subject),        std::move(shell),         std::move(depth),
+          std::move(implicit),       face_from_template,       std::move(placed),
+          std::move(fitted.seeding), std::move(fitted.target), std::move(fitted.fit),
+          std::move(face),           std::move(truth),         step.Take()};
+}
+
+}  // namespace semblance

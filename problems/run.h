@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The main job: from an experiment to a face, as values.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/case.h"
+#include "problems/face_metrics.h"
+#include "surfaces/tessellate.h"
+
+namespace semblance {
+
+struct StepTime {
+  std::string step;
+  double wall_s = kNaN;
+};
+
+// Against the true skin, where it is known.
+struct TruthComparison {
+  FaceRegion region;  // of the skin's vertices
+  FaceMetrics face;
+  FaceMetrics implicit;
+};
+
+struct RunResult {
+  Case subject;
+  TriMesh shell;     // the outer shell of the skull, temples and gaps bridged: what emits
+  DepthField depth;  // of the shell's vertices
+  ImplicitFace implicit;
+  Similarity face_from_template;
+  TemplateFace placed;  // the generic face brought to the dowels
+  SeedResult seeding;   // of the last round
+  FitTarget target;     // of the last round: dowel tips at their (u,v), then seeds
+  FitResult fit;        // of the last round
+  Tessellation face;    // of fit.surface
+  std::optional<TruthComparison> truth;
+  std::vector<StepTime> times;  // not part of the result proper
+
+  bool usable() const { return fit.usable && face.mesh.points.size() > 0; }
+};
+
+// Loads the case, fills the skull, interpolates depth, lays the implicit face, places the generic
+// face, seeds, fits, measures. Throws as LoadCase does, and Cancelled.
+RunResult Run(const Experiment& experiment, const RunContext& context);
+
+}  // namespace semblance

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/run_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "fitting/seeding.h"
+#include "problems/config.h"
+#include "problems/face_metrics_json.h"
+#include "problems/manifest.h"
+#include "problems/run_pictures.h"
+#include "surfaces/hspline_json.h"
+#include "surfaces/mesh_io.h"
+#include "surfaces/mesh_query.h"
+#include "surfaces/parallel.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+int CountStatus(const DepthField& field, DepthStatus status) {
+  return static_cast<int>(std::count(field.status.begin(), field.status.end(), status));
+}
+
+Json DepthJson(const RunResult& result) {
+  std::vector<double> assigned;
+  for (std::size_t v = 0; v < result.depth.depth_mm.size(); ++v) {
+    if (result.depth.status[v] == DepthStatus::kAssigned) {
+      assigned.push_back(result.depth.depth_mm[v]);
+    }
+  }
+  Json json = {{"vertices", result.depth.depth_mm.size()},
+               {"assigned", CountStatus(result.depth, DepthStatus::kAssigned)},
+               {"outside", CountStatus(result.depth, DepthStatus::kOutside)},
+               {"not_facing", CountStatus(result.depth, DepthStatus::kNotFacing)},
+               {"min_mm", nullptr},
+               {"mean_mm", nullptr},
+               {"max_mm", nullptr},
+               {"dowels", result.subject.dowels.size()},
+               {"areas", result.subject.network.areas.size()}};
+  if (!assigned.empty()) {
+    json["min_mm"] = *std::min_element(assigned.begin(), assigned.end());
+    json["mean_mm"] = std::accumulate(assigned.begin(), assigned.end(), 0.0) /
+                      static_cast<double>(assigned.size());
+    json["max_mm"] = *std::max_element(assigned.begin(), assigned.end());
+  }
+  return json;
+}
+
+Json ImplicitJson(const ImplicitFace& face) {
+  return {{"cell_mm", face.cell_mm},
+          {"emitters", face.emitters},
+          {"emitters_per_square_depth", face.emitters_per_square_depth},
+          {"triangles_dense", face.dense.triangles.size()},
+          {"triangles", face.mesh.triangles.size()},
+          {"dropped_components", face.dropped_components},
+          {"crossed_cells", face.counts.active_cells},
+          {"corner_evaluations", face.counts.corner_evaluations},
+          {"edge_evaluations", face.counts.edge_evaluations}};
+}
+
+Json LevelJson(const LevelSummary& level) {
+  Json json = {{"level", level.level},
+               {"fraction", level.fraction},
+               {"rms_before_mm", level.rms_before_mm},
+               {"rms_after_mm", level.rms_after_mm},
+               {"max_move_mm", level.max_move_mm},
+               {"free_vertices", level.free_vertices},
+               {"uncovered_vertices", level.uncovered_vertices},
+               {"rank", level.rank},
+               {"iterations", level.iterations},
+               {"usable", level.usable},
+               {"terms", Json::array()}};
+  for (const TermCosts& term : level.terms) {
+    json["terms"].push_back({{"term", term.term}, {"before", term.before}, {"after", term.after}});
+  }
+  return json;
+}
+
+Json FitJson(const RunResult& result) {
+  Json json = {{"dowel_rms_mm", result.fit.dowel_rms_mm},
+               {"point_rms_mm", result.fit.point_rms_mm},
+               {"points", result.target.points.size()},
+               {"seeds", result.seeding.points.size()},
+               {"seeds_masked", result.seeding.masked},
+               {"seeds_missed", result.seeding.missed},
+               {"seeds_folded", result.seeding.folded},
+               {"template_scale", result.face_from_template.scale},
+               {"restored_features", result.fit.restored_features},
+               {"usable", result.fit.usable},
+               {"levels", Json::array()}};
+  for (const LevelSummary& level : result.fit.levels) {
+    json["levels"].push_back(LevelJson(level));
+  }
+  return json;
+}
+
+// Where a dowel stands in the fit's target; -1 if it is not fitted.
+int TargetIndex(const FitTarget& target, const std::string& site) {
+  const auto found = std::find_if(target.points.begin(), target.points.end(),
+                                  [&](const FitPoint& p) { return p.label == site; });
+  return found == target.points.end() ? -1 : static_cast<int>(found - target.points.begin());
+}
+
+// A number of a table, empty where there is none.
+std::string Cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+
+std::string DowelsCsv(const RunResult& result) {
+  std::string csv =
+      "site,base_x_mm,base_y_mm,base_z_mm,direction_x,direction_y,direction_z,depth_mm,sd_mm,tip_x_"
+      "mm,tip_y_mm,tip_z_mm,u,v,fit_residual_mm\n";
+  for (const Dowel& d : result.subject.dowels) {
+    const int index = TargetIndex(result.target, d.site);
+    const Vec3 tip = d.Tip();
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", d.site, d.base.x(),
+                       d.base.y(), d.base.z(), d.direction.x(), d.direction.y(), d.direction.z(),
+                       d.depth_mm, Cell(d.sd_mm), tip.x(), tip.y(), tip.z(),
+                       index < 0 ? "" : Cell(result.target.points[index].uv.x()),
+                       index < 0 ? "" : Cell(result.target.points[index].uv.y()),
+                       index < 0 ? "" : Cell(result.fit.residual_mm[index]));
+  }
+  return csv;
+}
+
+std::vector<std::array<std::uint8_t, 3>> Bytes(const std::vector<Colour>& colours) {
+  std::vector<std::array<std::uint8_t, 3>> bytes;
+  for (const Colour& c : colours) {
+    const auto byte = [](double x) {
+      return static_cast<std::uint8_t>(std::lround(255 * std::clamp(x, 0.0, 1.0)));
+    };
+    bytes.push_back({byte(c.r), byte(c.g), byte(c.b)});
+  }
+  return bytes;
+}
+
+// A mesh with one value a vertex: as colours for people's eyes, as `quality` for MeshLab, as
+// `scalar_...` for CloudCompare and Blender.
+std::string MappedPly(const TriMesh& mesh, const std::string& scalar,
+                      const std::vector<double>& values, const ColourMap& map) {
+  MeshAttributes attributes;
+  attributes.colors = Bytes(ColoursAt(map, values));
+  attributes.scalars = {{"quality", values}, {scalar, values}};
+  return EncodeMesh(mesh, ".ply", attributes);
+}
+
+// How far each vertex of a reconstructed mesh lies outside the true skin; distance to the skull
+// where the skin is not known.
+std::string ReconstructionPly(const TriMesh& mesh, const RunResult& result,
+                              const RunContext& context) {
+  if (!result.truth) {
+    std::vector<double> gap(mesh.points.size());
+    const MeshQuery skull(result.shell);
+    ParallelFor(gap.size(), context.threads, 256,
+                [&](std::size_t v) { gap[v] = skull.Closest(mesh.points[v]).distance_mm; });
+    return MappedPly(mesh, "scalar_depth_mm", gap, DepthMap());
+  }
+  return MappedPly(mesh, "scalar_error_mm", SignedErrorOf(mesh, result, context), ErrorMap());
+}
+
+void WriteMeshes(const RunResult& result, const OutputFolder& folder, const RunContext& context) {
+  folder.Write("face.hspline.json", HSplineToJson(result.fit.surface));
+  folder.Write("face.ply", ReconstructionPly(result.face.mesh, result, context));
+  folder.Write("implicit.ply", ReconstructionPly(result.implicit.mesh, result, context));
+  folder.Write("depth.ply",
+               MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthMap()));
+}
+
+std::string TimingJson(const std::vector<StepTime>& times) {
+  Json json = {{"steps", Json::array()}};
+  double total = 0;
+  for (const StepTime& time : times) {
+    json["steps"].push_back({{"step", time.step}, {"wall_s", time.wall_s}});
+    total += time.wall_s;
+  }
+  json["total_wall_s"] = total;
+  return json.dump(2) + "\n";
+}
+
+std::string ManifestJson(const RunResult& result, const OutputFolder& folder) {
+  Json json = {{"program", "semblance"},
+               {"version", SEMBLANCE_VERSION},
+               {"libraries", Json::object()},
+               {"inputs", Json::array()},
+               {"outputs", Json::array()}};
+  for (const auto& [name, version] : LibraryVersions()) {
+    json["libraries"][name] = version;
+  }
+  for (const std::filesystem::path& input : result.subject.inputs) {
+    json["inputs"].push_back(
+        {{"file", input.filename().string()}, {"sha256", Sha256OfFile(input)}});
+  }
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.Root())) {
+    const std::string name =
+        std::filesystem::relative(entry.path(), folder.Root()).generic_string();
+    if (entry.is_regular_file() && name != "manifest.json" && name != "timing.json") {
+      names.push_back(name);
+    }
+  }
+  std::sort(names.begin(), names.end());
+  for (const std::string& name : names) {
+    json["outputs"].push_back({{"file", name}, {"sha256", Sha256OfFile(folder.Root() / name)}});
+  }
+  return json.dump(2) + "\n";
+}
+
+}  // namespace
+
+std::string ResultJson(const Experiment& experiment, const RunResult& result) {
+  Json json = {
+      {"title", experiment.title}, {"subject", result.subject.name}, {"usable", result.usable()}};
+  json["face"] = result.truth ? MetricsToJson(result.truth->face) : Json(nullptr);
+  json["implicit_face"] = result.truth ? MetricsToJson(result.truth->implicit) : Json(nullptr);
+  json["depth"] = DepthJson(result);
+  json["implicit"] = ImplicitJson(result.implicit);
+  json["fit"] = FitJson(result);
+  json["notes"] = result.subject.notes;
+  for (const std::string& note : result.implicit.notes) {
+    json["notes"].push_back(note);
+  }
+  return json.dump(2) + "\n";
+}
+
+void WriteRun(const Experiment& experiment, const RunResult& result, const OutputFolder& folder,
+              const RunContext& context) {
+  context.Report("write", folder.Root().string());
+  folder.Write("resolved.yaml", WriteConfig(experiment));
+  folder.Write("result.json", ResultJson(experiment, result));
+  folder.Write("dowels.csv", DowelsCsv(result));
+  WriteMeshes(result, folder, context);
+  WritePictures(result, folder, context);
+  WriteReport(folder);
+  folder.Write("timing.json", TimingJson(result.times));
+  folder.Write("manifest.json", ManifestJson(result, folder));
+}
+
+}  // namespace semblance

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// report.html of a run, from the files of its folder alone.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "problems/report.h"
+#include "problems/run_folder.h"
+#include "surfaces/error.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Number(const Json& value, int digits = 2) {
+  if (value.is_number_float()) {
+    return fmt::format("{:.{}f}", value.get<double>(), digits);
+  }
+  return value.is_null() ? "" : value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+std::string Percent(const Json& share) {
+  return share.is_null() ? "" : fmt::format("{:.1f}", 100 * share.get<double>());
+}
+
+std::vector<ReportTile> Tiles(const Json& result) {
+  const Json& face = result.at("face");
+  const Json& fit = result.at("fit");
+  std::vector<ReportTile> tiles;
+  if (!face.is_null()) {
+    tiles = {
+        {"mean error", Number(face.at("mean_abs_mm")), "mm", "H-spline face against the true skin"},
+        {"RMS error", Number(face.at("rms_mm")), "mm", ""},
+        {"median", Number(face.at("median_mm")), "mm", ""},
+        {"95th percentile", Number(face.at("p95_mm")), "mm", ""},
+        {"within 2.5 mm", Percent(face.at("within_2_5mm")), "%", "of the scored area"}};
+  }
+  tiles.push_back(
+      {"dowel RMS", Number(fit.at("dowel_rms_mm")), "mm", "dowel tips to the fitted face"});
+  return tiles;
+}
+
+std::vector<std::string> MetricsRow(const std::string& name, const Json& s) {
+  return {name,
+          Number(s.at("area_cm2"), 1),
+          Number(s.at("mean_abs_mm")),
+          Number(s.at("rms_mm")),
+          Number(s.at("median_mm")),
+          Number(s.at("p95_mm")),
+          Number(s.at("max_mm")),
+          Number(s.at("mean_signed_mm")),
+          Percent(s.at("within_2_5mm")),
+          Percent(s.at("within_5mm"))};
+}
+
+ReportTable MetricsTable(const std::string& caption, const Json& metrics) {
+  ReportTable table{caption,
+                    {"part", "area (cm²)", "mean (mm)", "RMS (mm)", "median (mm)", "p95 (mm)",
+                     "max (mm)", "signed mean (mm)", "≤ 2.5 mm (%)", "≤ 5 mm (%)"},
+                    {}};
+  table.rows.push_back(MetricsRow("all, skin to face", metrics));
+  table.rows.push_back(MetricsRow("all, face to skin", metrics.at("reverse")));
+  for (const auto& [name, summary] : metrics.at("regions").items()) {
+    table.rows.push_back(MetricsRow(name, summary));
+  }
+  return table;
+}
+
+ReportTable LevelsTable(const Json& fit) {
+  ReportTable table{"Steps of the schedule",
+                    {"step", "level", "fraction", "RMS before (mm)", "RMS after (mm)",
+                     "largest move (mm)", "vertices without data"},
+                    {}};
+  int step = 0;
+  for (const Json& level : fit.at("levels")) {
+    table.rows.push_back({std::to_string(++step), Number(level.at("level")),
+                          Number(level.at("fraction")), Number(level.at("rms_before_mm")),
+                          Number(level.at("rms_after_mm")), Number(level.at("max_move_mm")),
+                          Number(level.at("uncovered_vertices"))});
+  }
+  return table;
+}
+
+// Some columns of dowels.csv, rounded for reading.
+ReportTable DowelsTable(const std::string& csv) {
+  ReportTable table{"Dowels", {"site", "depth (mm)", "SD (mm)", "u", "v", "fit residual (mm)"}, {}};
+  std::istringstream lines(csv);
+  std::string line;
+  std::getline(lines, line);  // the header
+  while (std::getline(lines, line)) {
+    std::vector<std::string> cells;
+    std::istringstream parts(line + ",");
+    for (std::string cell; std::getline(parts, cell, ',');) {
+      cells.push_back(cell);
+    }
+    const auto rounded = [&](std::size_t c) {
+      return c >= cells.size() || cells[c].empty() ? ""
+                                                   : fmt::format("{:.2f}", std::stod(cells[c]));
+    };
+    table.rows.push_back(
+        {cells.at(0), rounded(7), rounded(8), rounded(12), rounded(13), rounded(14)});
+  }
+  return table;
+}
+
+ReportTable CountsTable(const std::string& caption, const Json& values) {
+  ReportTable table{caption, {"what", "value"}, {}};
+  for (const auto& [name, value] : values.items()) {
+    if (!value.is_structured()) {
+      table.rows.push_back({name, Number(value, 3)});
+    }
+  }
+  return table;
+}
+
+ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
+  ReportSection section{.heading = "Against the true skin"};
+  section.paragraphs = {
+      "Scored is the skin in front of the dowel network, without the zones that the configuration "
+      "excludes; see resolved.yaml, region. Distances are to the "
+      "closest point, weighted by area; nothing was aligned to the true skin."};
+  section.images = {
+      ReportImageFromFile(folder.Root() / "pictures/error.png", "",
+                          "signed error of the H-spline face on the true skin from three sides"),
+      ReportImageFromFile(folder.Root() / "pictures/error_implicit.png", "",
+                          "signed error of the implicit face on the true skin"),
+      ReportImageFromFile(folder.Root() / "pictures/truth.png", "",
+                          "the true skin from three sides")};
+  section.tables = {MetricsTable("H-spline face", result.at("face")),
+                    MetricsTable("Implicit face", result.at("implicit_face"))};
+  return section;
+}
+
+ReportSection PictureSection(const OutputFolder& folder) {
+  ReportSection section{.heading = "From skull to face"};
+  for (const auto& [file, alt] :
+       {std::pair("skull_dowels", "skull with dowels"),
+        std::pair("depth", "interpolated tissue depth on the skull's shell"),
+        std::pair("implicit", "implicit face"), std::pair("face", "H-spline face"),
+        std::pair("face_over_skull", "H-spline face, translucent, over skull and dowels")}) {
+    section.images.push_back(
+        ReportImageFromFile(folder.Root() / "pictures" / (std::string(file) + ".png"), "",
+                            fmt::format("{} from three sides", alt)));
+  }
+  return section;
+}
+
+ReportSection NotesSection(const Json& result) {
+  ReportSection section{.heading = "Notes"};
+  for (const Json& note : result.at("notes")) {
+    section.paragraphs.push_back(note.get<std::string>());
+  }
+  if (section.paragraphs.empty()) {
+    section.paragraphs = {"Nothing to note."};
+  }
+  return section;
+}
+
+Report BuildReport(const Json& result, const OutputFolder& folder) {
+  Report report;
+  report.title = result.at("title").get<std::string>();
+  report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
+                    ". An approximation, not an identification.";
+  report.tiles = Tiles(result);
+  report.main_images = {ReportImageFromFile(
+      folder.Root() / "pictures/overview.png", "",
+      "skull and dowels, implicit face, H-spline face and true skin, from the front")};
+  if (!result.at("face").is_null()) {
+    report.sections.push_back(ErrorSection(result, folder));
+  }
+  report.sections.push_back(PictureSection(folder));
+  report.sections.push_back(
+      {.heading = "The fit",
+       .tables = {LevelsTable(result.at("fit")), CountsTable("Counts of the fit", result.at("fit")),
+                  DowelsTable(ReadFileBytes(folder.Root() / "dowels.csv"))}});
+  report.sections.push_back({.heading = "Depth and implicit surface",
+                             .tables = {CountsTable("Depth field", result.at("depth")),
+                                        CountsTable("Implicit surface", result.at("implicit"))}});
+  report.sections.push_back(NotesSection(result));
+  report.sections.push_back(
+      {.heading = "Configuration", .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml")});
+  report.footer = "semblance " SEMBLANCE_VERSION;
+  return report;
+}
+
+}  // namespace
+
+void WriteReport(const OutputFolder& folder) {
+  const std::filesystem::path file = folder.Root() / "result.json";
+  try {
+    folder.Write("report.html", ReportHtml(BuildReport(Json::parse(ReadFileBytes(file)), folder)));
+  } catch (const nlohmann::json::exception& e) {
+    throw IoError(fmt::format("{}: not the result of a run: {}", file.string(), e.what()));
+  }
+}
+
+}  // namespace semblance
