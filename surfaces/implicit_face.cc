@@ -86,7 +86,7 @@ std::vector<std::int64_t> FindSeeds(const TriMesh& shell, std::span<const double
 PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_mm,
                             const ImplicitSurface& surface, const ImplicitFaceOptions& options,
                             const RunContext& context, double& cell_mm) {
-  const ScalarField field = [&surface](const Vec3& p) { return surface.Value(p); };
+  const ScalarField field = [&surface](const Vec3& p) { return surface.Flattened(p); };
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
     const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
     const std::vector<std::int64_t> seeds = FindSeeds(shell, depth_mm, field, grid);

@@ -39,12 +39,18 @@ class InversePower {
 struct EmitterTriangle {
   Vec3 a, b, c;
   Vec3 centroid, normal;
-  double area_mm2, depth_mm, longest2_mm2;  // longest2: squared length of the longest edge
+  double area_mm2 = kNaN, depth_mm = kNaN;
+  double longest2_mm2 = kNaN;  // squared length of the longest edge
+  double gain = kNaN;          // the factor of its emission that does not depend on the point
   Vec3 edge_normal_a, edge_normal_b,
       edge_normal_c;  // in the plane, out of the triangle, across ab, bc, ca
-};
 
-constexpr double kClosest = 0.05;  // share of the depth below which distances count as this
+  // Distances closer than a share of the depth count as that, so that emission stays finite.
+  double Floor2(double depth_share) const {
+    constexpr double kClosest = 0.05;
+    return std::pow(kClosest * depth_share * depth_mm, 2);
+  }
+};
 
 // Distance from p to the triangle moved by `shift` along its normal, squared, and the height over
 // its plane.
@@ -69,16 +75,15 @@ bool ProjectsOnto(const EmitterTriangle& t, const Vec3& p) {
          (p - t.c).dot(t.edge_normal_c) <= 0;
 }
 
-// Each kernel: Emission(t, p, height), and Strength(t), the S with emission <= S /
-// distance^Falloff(), distances taken to the triangle less Advance(t).
+// Each kernel: Gain(t) sets EmitterTriangle::gain; Emission(t, p, height) at a height > 0 is at
+// most gain / distance^Falloff(), distances taken to the triangle less Advance(t).
 class ThesisKernel {
  public:
   explicit ThesisKernel(const ThesisEmitter& o) : k_(o.decay), power_(o.decay) {}
+  double Gain(const EmitterTriangle& t) const { return std::pow(t.depth_mm, k_); }
   double Emission(const EmitterTriangle& t, const Vec3& p, double) const {
-    return std::pow(t.depth_mm, k_) *
-           power_(std::max(SquaredDistance(t, p), std::pow(kClosest * t.depth_mm, 2)));
+    return t.gain * power_(std::max(SquaredDistance(t, p), t.Floor2(1)));
   }
-  double Strength(const EmitterTriangle& t) const { return std::pow(t.depth_mm, k_); }
   double Falloff() const { return k_; }
   double Advance(const EmitterTriangle&) const { return 0; }
 
@@ -90,16 +95,14 @@ class ThesisKernel {
 class SplitKernel {
  public:
   explicit SplitKernel(const SplitEmitter& o) : k_(o.decay), t_(o.split), power_(o.decay) {}
+  double Gain(const EmitterTriangle& t) const { return std::pow((1 - t_) * t.depth_mm, k_); }
   double Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
     const double shift = t_ * t.depth_mm;
     if (height < shift) {
       return ProjectsOnto(t, p) ? ImplicitSurface::kMostEmission : 0;
     }
-    const double floor2 = std::pow(kClosest * (1 - t_) * t.depth_mm, 2);
-    return std::pow((1 - t_) * t.depth_mm, k_) *
-           power_(std::max(SquaredDistance(t, p - shift * t.normal), floor2));
+    return t.gain * power_(std::max(SquaredDistance(t, p - shift * t.normal), t.Floor2(1 - t_)));
   }
-  double Strength(const EmitterTriangle& t) const { return std::pow((1 - t_) * t.depth_mm, k_); }
   double Falloff() const { return k_; }
   double Advance(const EmitterTriangle& t) const { return t_ * t.depth_mm; }
 
@@ -114,26 +117,21 @@ class SplitKernel {
 class FlatKernel {
  public:
   explicit FlatKernel(const FlatEmitter& o) : k_(o.decay), power_(o.decay + 3) {}
-  double Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
-    const double floor2 = std::pow(kClosest * t.depth_mm, 2);
-    const double r2 = std::max((p - t.centroid).squaredNorm(), floor2);
-    const double factor =
-        (k_ + 1) / (2 * std::numbers::pi) * PowerOfDepth(t.depth_mm) * height * t.area_mm2;
-    if (t.longest2_mm2 <= kCentroidShare * r2) {
-      return factor * power_(r2);
-    }
-    return factor * Mean(p, t.a, t.b, t.c, t.longest2_mm2, floor2);
+  double Gain(const EmitterTriangle& t) const {
+    return (k_ + 1) / (2 * std::numbers::pi) * std::pow(t.depth_mm, k_) * t.area_mm2;
   }
-  double Strength(const EmitterTriangle& t) const {
-    return (k_ + 1) / (2 * std::numbers::pi) * PowerOfDepth(t.depth_mm) * t.area_mm2;
+  double Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
+    const double r2 = (p - t.centroid).squaredNorm();
+    return t.gain * height *
+           (t.longest2_mm2 <= kCentroidShare * r2
+                ? power_(r2)
+                : Mean(p, t.a, t.b, t.c, t.longest2_mm2, t.Floor2(1)));
   }
   double Falloff() const { return k_ + 2; }  // height <= distance
   double Advance(const EmitterTriangle&) const { return 0; }
 
  private:
   static constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06;  // of the squared distance
-
-  double PowerOfDepth(double depth) const { return std::pow(depth, k_); }
 
   // Mean of |p - q|^-(k+3) over a triangle.
   double Mean(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c, double longest2,
@@ -162,7 +160,8 @@ Kernel MakeKernel(const FlatEmitter& o) { return FlatKernel(o); }
 Kernel MakeKernel(const SplitEmitter& o) { return SplitKernel(o); }
 Kernel MakeKernel(const ThesisEmitter& o) { return ThesisKernel(o); }
 
-EmitterTriangle MakeTriangle(const TriMesh& skull, const Triangle& t, double depth_mm) {
+EmitterTriangle MakeTriangle(const TriMesh& skull, const Triangle& t, double depth_mm,
+                             const Kernel& kernel) {
   EmitterTriangle e;
   e.a = skull.points[t[0]];
   e.b = skull.points[t[1]];
@@ -177,10 +176,12 @@ EmitterTriangle MakeTriangle(const TriMesh& skull, const Triangle& t, double dep
   e.edge_normal_a = (e.b - e.a).cross(e.normal);
   e.edge_normal_b = (e.c - e.b).cross(e.normal);
   e.edge_normal_c = (e.a - e.c).cross(e.normal);
+  e.gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
   return e;
 }
 
-std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm) {
+std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
+                                          const Kernel& kernel) {
   if (depth_mm.size() != skull.points.size()) {
     throw InputError(
         fmt::format("implicit surface: {} depths for {} vertices; one a vertex is needed",
@@ -198,7 +199,7 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   for (const Triangle& t : skull.triangles) {
     const double depth = (depth_mm[t[0]] + depth_mm[t[1]] + depth_mm[t[2]]) / 3;
     if (std::isfinite(depth) && TriangleAreaVector(skull, t).norm() > 0) {
-      emitters.push_back(MakeTriangle(skull, t, depth));
+      emitters.push_back(MakeTriangle(skull, t, depth, kernel));
     }
   }
   if (emitters.empty()) {
@@ -208,11 +209,12 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   return emitters;
 }
 
-// Bounding boxes over runs of emitters, for leaving out those too far away.
+// Bounding boxes over runs of emitters, for leaving out those whose emission is too small to count.
 struct Node {
   Box3 box;
   int begin = 0, end = 0;     // of emitters
   int left = -1, right = -1;  // -1 in a leaf
+  double gain = 0;            // sum over its emitters
 };
 
 class Tree {
@@ -221,24 +223,28 @@ class Tree {
     Split(emitters, 0, static_cast<int>(emitters.size()));
   }
 
-  // Calls visit(begin, end) for each run of emitters of which some may be within the distance.
-  template <class Visit>
-  void Near(const Vec3& p, double distance_mm, const Visit& visit) const {
+  // Calls visit(begin, end) for each run of emitters that is not left out, in a fixed order. A node
+  // is left out where bound(node), the most that it emits at p, is at most `least`; returns the sum
+  // of those bounds.
+  template <class Bound, class Visit>
+  double Near(double least, const Bound& bound, const Visit& visit) const {
     std::array<int, 64> stack;
     int size = 0;
+    double left_out = 0;
     stack[size++] = 0;
     while (size > 0) {
       const Node& node = nodes_[stack[--size]];
-      if (node.box.squaredExteriorDistance(p) > distance_mm * distance_mm) {
-        continue;
-      }
-      if (node.left < 0) {
+      const double most = bound(node);
+      if (most <= least) {
+        left_out += most;
+      } else if (node.left < 0) {
         visit(node.begin, node.end);
       } else {
         stack[size++] = node.right;
         stack[size++] = node.left;
       }
     }
+    return left_out;
   }
 
  private:
@@ -246,11 +252,12 @@ class Tree {
 
   int Split(std::vector<EmitterTriangle>& emitters, int begin, int end) {
     const int self = static_cast<int>(nodes_.size());
-    nodes_.push_back({Box3(), begin, end, -1, -1});
+    nodes_.push_back({Box3(), begin, end, -1, -1, 0});
     Box3 box, centers;
     for (int e = begin; e < end; ++e) {
       box.extend(emitters[e].a).extend(emitters[e].b).extend(emitters[e].c);
       centers.extend(emitters[e].centroid);
+      nodes_[self].gain += emitters[e].gain;
     }
     nodes_[self].box = box;
     if (end - begin > kLeaf) {
@@ -271,52 +278,68 @@ class Tree {
   std::vector<Node> nodes_;
 };
 
-// The distance beyond which all emitters together emit at most the error allowed: sum of strengths
-// / distance^falloff.
-double Cutoff(const Kernel& kernel, const std::vector<EmitterTriangle>& emitters,
-              double tail_error) {
-  if (tail_error == 0) {
-    return std::numeric_limits<double>::infinity();
-  }
-  return std::visit(
-      [&](const auto& k) {
-        double strength = 0, advance = 0;
-        for (const EmitterTriangle& t : emitters) {
-          strength += k.Strength(t);
-          advance = std::max(advance, k.Advance(t));
-        }
-        return std::pow(strength / tail_error, 1 / k.Falloff()) + advance;
-      },
-      kernel);
-}
-
 }  // namespace
 
 struct ImplicitSurface::Impl {
   Impl(const TriMesh& skull, std::span<const double> depth_mm, const ImplicitOptions& options)
-      : emitters(MakeEmitters(skull, depth_mm)),
-        kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
+      : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
+        emitters(MakeEmitters(skull, depth_mm, kernel)),
         tree(emitters),
-        cutoff_mm(Cutoff(kernel, emitters, options.tail_error)) {}
+        tail_error(options.tail_error),
+        decay(std::visit([](const auto& o) { return o.decay; }, options.emitter)) {
+    std::visit(
+        [this](const auto& k) {
+          for (const EmitterTriangle& t : emitters) {
+            advance_mm = std::max(advance_mm, k.Advance(t));
+          }
+        },
+        kernel);
+  }
+
+  // Visits the emitters near p such that the others together emit at most the tail error. The first
+  // guess at what a node may emit and be left out nearly always does.
+  template <class EmitterKernel, class Begin, class Visit>
+  void Near(const EmitterKernel& k, const Vec3& p, const Begin& begin, const Visit& visit) const {
+    constexpr double kFirstShare = 1.0 / 128;
+    const InversePower falloff(k.Falloff());
+    const auto bound = [&](const Node& node) {
+      const double distance2 = node.box.squaredExteriorDistance(p);
+      if (distance2 <= advance_mm * advance_mm) {
+        return std::numeric_limits<double>::infinity();
+      }
+      return node.gain *
+             falloff(advance_mm == 0 ? distance2 : std::pow(std::sqrt(distance2) - advance_mm, 2));
+    };
+    double least = kFirstShare * tail_error;
+    double left_out = 0;
+    do {
+      begin();
+      left_out = tree.Near(least, bound, visit);
+      least /= 8;
+    } while (left_out > tail_error);
+  }
 
   template <class EmitterKernel>
   double Sum(const EmitterKernel& k, const Vec3& p) const {
     double sum = 0;
-    tree.Near(p, cutoff_mm, [&](int begin, int end) {
+    const auto add = [&](int begin, int end) {
       for (int e = begin; e < end; ++e) {
         const double height = (p - emitters[e].a).dot(emitters[e].normal);
         if (height > 0) {
           sum += std::min(k.Emission(emitters[e], p, height), kMostEmission);
         }
       }
-    });
+    };
+    Near(
+        k, p, [&sum] { sum = 0; }, add);
     return sum;
   }
 
-  std::vector<EmitterTriangle> emitters;
   Kernel kernel;
+  std::vector<EmitterTriangle> emitters;
   Tree tree;
-  double cutoff_mm;
+  double tail_error, decay;
+  double advance_mm = 0;  // the most of any emitter
 };
 
 ImplicitSurface::ImplicitSurface(const TriMesh& skull, std::span<const double> depth_mm,
@@ -329,16 +352,27 @@ double ImplicitSurface::Value(const Vec3& p) const {
   return std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p); }, impl_->kernel) - 1;
 }
 
+double ImplicitSurface::Flattened(const Vec3& p) const {
+  constexpr double kLowest = -10;
+  const double emission = Value(p) + 1;
+  return emission > 0 ? std::max(1 - std::pow(emission, -1 / impl_->decay), kLowest) : kLowest;
+}
+
 std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
   std::int64_t count = 0;
-  impl_->tree.Near(p, impl_->cutoff_mm, [&](int begin, int end) { count += end - begin; });
+  std::visit(
+      [&](const auto& kernel) {
+        impl_->Near(
+            kernel, p, [&count] { count = 0; },
+            [&count](int begin, int end) { count += end - begin; });
+      },
+      impl_->kernel);
   return count;
 }
 
 std::int64_t ImplicitSurface::EmitterCount() const {
   return static_cast<std::int64_t>(impl_->emitters.size());
 }
-double ImplicitSurface::CutoffDistance_mm() const { return impl_->cutoff_mm; }
 
 double ImplicitSurface::MaxDepth_mm() const {
   double deepest = 0;

@@ -44,10 +44,13 @@ class ImplicitSurface {
 
   double Value(const Vec3& p) const;  // safe from several threads at once
 
+  // 1 - (Value(p) + 1)^(-1/decay), not below -10: the same sign, but over a plate of depth l it is
+  // (l - h) / l at height h, so that a search for the surface is one for the zero of a line.
+  double Flattened(const Vec3& p) const;
+
   // Emitters that the tail bound makes Value(p) sum.
   std::int64_t EmittersNear(const Vec3& p) const;
   std::int64_t EmitterCount() const;
-  double CutoffDistance_mm() const;  // emitters further than this are left out
   double MaxDepth_mm() const;
 
   // Triangles on a square of side depth, the mean over the skull's area: what drives the surface of

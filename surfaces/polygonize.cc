@@ -186,38 +186,55 @@ std::vector<std::int64_t> CrossedEdges(const Sampling& sampling, const SampleGri
 // A bracket on [0,1] along an edge: the field is positive at one end and not at the other.
 struct Bracket {
   double a, fa, b, fb;
+
+  double SecantRoot() const { return a + (b - a) * fa / (fa - fb); }
+  // Puts (x, f) in place of the end of its sign; true if that was the upper end.
+  bool Narrow(double x, double f) {
+    const bool lower = (f > 0) == (fa > 0);
+    (lower ? a : b) = x;
+    (lower ? fa : fb) = f;
+    return !lower;
+  }
 };
 
-// Emission falls like a power of distance, so differences of the field say little far from its
-// threshold; its signed root is nearly linear.
-double Flattened(double f) { return std::copysign(std::log1p(std::abs(f)), f); }
+using LineField = std::function<double(double)>;
 
-double Search(Bracket e, const EdgeSearchOptions& options,
-              const std::function<double(double)>& field, std::int64_t& evaluations) {
-  constexpr int kMostSteps = 60;
-  double fa = Flattened(e.fa), fb = Flattened(e.fb);
-  double x = 0.5;
-  for (int step = 0; step < kMostSteps && e.b - e.a > options.tolerance; ++step) {
-    const bool halve = options.method == EdgeSearch::kBisection;
-    const double last = x;
-    x = halve ? 0.5 * (e.a + e.b) : e.a + (e.b - e.a) * fa / (fa - fb);
-    if (!halve && step > 0 && std::abs(x - last) < 0.5 * options.tolerance) {
-      break;
-    }
-    const double f = Flattened(field(x));
+double Bisect(Bracket e, double tolerance, const LineField& field, std::int64_t& evaluations) {
+  while (e.b - e.a > tolerance) {
+    const double middle = 0.5 * (e.a + e.b);
+    e.Narrow(middle, field(middle));
     ++evaluations;
-    if ((f > 0) == (fa > 0)) {
-      fb *= step > 0 && x > last && !halve ? 0.5 : 1;  // Illinois: the end that stays counts half
-      e.a = x;
-      fa = f;
-    } else {
-      fa *= step > 0 && x < last && !halve ? 0.5 : 1;
-      e.b = x;
-      fb = f;
-    }
   }
-  return options.method == EdgeSearch::kBisection ? 0.5 * (e.a + e.b)
-                                                  : e.a + (e.b - e.a) * fa / (fa - fb);
+  return 0.5 * (e.a + e.b);
+}
+
+// Regula falsi as of Illinois: an end that stays twice counts half. Ends where the field is so
+// small that, by the slope of the bracket at hand, the crossing is within the tolerance.
+double FalsePosition(Bracket e, double tolerance, const LineField& field,
+                     std::int64_t& evaluations) {
+  constexpr int kMostSteps = 60;
+  int last = -1;
+  for (int step = 0; step < kMostSteps && e.b - e.a > tolerance; ++step) {
+    const double x = e.SecantRoot();
+    const double slope = std::abs(e.fa - e.fb) / (e.b - e.a);
+    const double f = field(x);
+    ++evaluations;
+    if (std::abs(f) <= 0.5 * tolerance * slope) {
+      return x;
+    }
+    const int upper = e.Narrow(x, f) ? 1 : 0;
+    if (upper == last) {
+      (upper ? e.fa : e.fb) *= 0.5;
+    }
+    last = upper;
+  }
+  return e.SecantRoot();
+}
+
+double Search(const Bracket& bracket, const EdgeSearchOptions& options, const LineField& field,
+              std::int64_t& evaluations) {
+  return (options.method == EdgeSearch::kBisection ? Bisect : FalsePosition)(
+      bracket, options.tolerance, field, evaluations);
 }
 
 // One point for each crossed edge, in their order.
