@@ -62,6 +62,19 @@ LandmarkFile Load(const FileSubject& options, Case& subject, const RunContext&) 
   return landmarks;
 }
 
+LandmarkFile Load(const CtSubject& options, Case& subject, const RunContext& context) {
+  if (options.volume.empty()) {
+    throw InputError("subject.volume: no file is named; give the path of an InVesalius project");
+  }
+  LandmarkFile landmarks = ReadLandmarks(options.landmarks, subject);
+  subject.inputs.push_back(options.volume);
+  CtImport import = ImportCt(ReadInvesalius(options.volume), options.import, context);
+  subject.skull = std::move(import.skull);
+  subject.skin = std::move(import.skin);
+  Append(subject.notes, import.notes);
+  return landmarks;
+}
+
 }  // namespace
 
 Case LoadCase(const Experiment& experiment, const RunContext& context) {

@@ -15,6 +15,7 @@
 #include "interp/outside_rule.h"
 #include "problems/dowel_depths.h"
 #include "problems/face_region.h"
+#include "problems/import_ct.h"
 #include "problems/landmarks.h"
 #include "problems/phantom.h"
 #include "problems/template_face.h"
@@ -41,7 +42,23 @@ void Fields(Visitor& visit, FileSubject& o) {
         o.landmarks);
 }
 
-using Subject = std::variant<PhantomOptions, FileSubject>;
+// A subject in a CT volume: skull and true skin are taken from it.
+struct CtSubject {
+  static constexpr std::string_view kName = "ct";
+  std::filesystem::path volume;
+  std::filesystem::path landmarks;
+  CtImportOptions import;
+};
+template <class Visitor>
+void Fields(Visitor& visit, CtSubject& o) {
+  visit(FieldInfo{.name = "volume", .doc = "InVesalius project (.inv3) of a head CT"}, o.volume);
+  visit(FieldInfo{.name = "landmarks", .doc = "YAML file of the landmarks on the skull"},
+        o.landmarks);
+  visit(FieldInfo{.name = "import", .doc = "how skull and skin are taken from the volume"},
+        o.import);
+}
+
+using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
 struct Experiment {
   std::string title = "untitled";

@@ -27,6 +27,8 @@ struct Arguments {
   std::string out;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   bool force = false, quiet = false, schema = false;
+  CtImportOptions ct;
+  std::string ct_edges = "threshold";
 };
 
 std::stop_source& StopSource() {
@@ -98,6 +100,25 @@ int OptionsCommand(const Arguments& arguments) {
   return kDone;
 }
 
+int ImportCtCommand(const Arguments& arguments) {
+  const std::filesystem::path volume = arguments.files.at(0);
+  CtImportOptions options = arguments.ct;
+  options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
+  const OutputFolder folder = MakeFolder(arguments, "out/" + volume.stem().string());
+  const CtImport import = ImportCt(ReadInvesalius(volume), options, MakeContext(arguments));
+  folder.Write("skull.ply", EncodeMesh(import.skull, ".ply"));
+  folder.Write("skin.ply", EncodeMesh(import.skin, ".ply"));
+  fmt::print("skull.ply: {} triangles; {} pieces below {} cm^2 dropped\n",
+             import.skull.triangles.size(), import.dropped_bone, options.smallest_bone_cm2);
+  fmt::print("skin.ply: {} triangles; {} pieces apart from the largest dropped\n",
+             import.skin.triangles.size(), import.dropped_skin);
+  for (const std::string& note : import.notes) {
+    fmt::print("note: {}\n", note);
+  }
+  fmt::print("folder: {}\n", std::filesystem::absolute(folder.Root()).lexically_normal().string());
+  return kDone;
+}
+
 int EvaluateCommand(const Arguments& arguments) {
   const TriMesh face = ReadMesh(arguments.files.at(0)), truth = ReadMesh(arguments.files.at(1));
   CheckHeadMesh(face, arguments.files.at(0));
@@ -144,6 +165,20 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
       ->allow_extra_args(false);
   add_output(run);
   add_work(run);
+  CLI::App* import =
+      add("import-ct", "meshes of skull and skin from a CT volume, in mm", &ImportCtCommand);
+  import->add_option("VOLUME", a.files, "InVesalius project (.inv3)")->required()->expected(1);
+  import->add_option("--bone-hu", a.ct.bone_hu, "Hounsfield value of the skull's surface")
+      ->check(CLI::Range(50.0, 3000.0))
+      ->capture_default_str();
+  import->add_option("--skin-hu", a.ct.skin_hu, "Hounsfield value of the skin's surface")
+      ->check(CLI::Range(-900.0, 0.0))
+      ->capture_default_str();
+  import->add_option("--edges", a.ct_edges, "threshold, or half_maximum, which thins tissue less")
+      ->check(CLI::IsMember({"threshold", "half_maximum"}))
+      ->capture_default_str();
+  add_output(import);
+  add_work(import);
   CLI::App* check = add("check", "validate configurations and run nothing", &CheckCommand);
   check->add_option("CONFIG", a.files, "YAML files")->required();
   check->add_option("--set", a.overrides, "path=value, laid over each")->allow_extra_args(false);
