@@ -26,7 +26,7 @@ constexpr auto EnumNames(FitAim) { return std::to_array<std::string_view>({"surf
 
 struct FitOptions {
   std::vector<LevelFit> schedule = PublishedSchedule();
-  std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}};
+  std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};
   FeatureRule features = FeatureRule::kRestore;
   FitAim aim = FitAim::kSurface;
 };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <set>
 
 #include "surfaces/error.h"
 
@@ -33,6 +34,7 @@ void CheckDistinct(const std::array<std::string, 3>& area) {
 DowelNetwork BuildNetwork(const NetworkPlan& plan, std::span<const Dowel> dowels) {
   const std::map<std::string, int> index = IndexBySite(dowels);
   DowelNetwork network;
+  std::set<std::string> missing_sites;
   for (const auto& area : plan.areas) {
     CheckDistinct(area);
     std::string missing;
@@ -40,7 +42,10 @@ DowelNetwork BuildNetwork(const NetworkPlan& plan, std::span<const Dowel> dowels
     for (int c = 0; c < 3; ++c) {
       const auto it = index.find(area[c]);
       found[c] = it == index.end() ? -1 : it->second;
-      missing += it == index.end() ? " " + area[c] : "";
+      if (it == index.end()) {
+        missing += fmt::format(" {}", area[c]);
+        missing_sites.insert(area[c]);
+      }
     }
     if (missing.empty()) {
       network.areas.push_back(found);
@@ -49,6 +54,7 @@ DowelNetwork BuildNetwork(const NetworkPlan& plan, std::span<const Dowel> dowels
           fmt::format("area {} {} {}: no dowel at{}", area[0], area[1], area[2], missing));
     }
   }
+  network.missing_sites.assign(missing_sites.begin(), missing_sites.end());
   return network;
 }
 

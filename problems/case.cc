@@ -75,6 +75,16 @@ LandmarkFile Load(const CtSubject& options, Case& subject, const RunContext& con
   return landmarks;
 }
 
+// One line for all areas, by the sites that they lack.
+void NoteDroppedAreas(Case& subject) {
+  const DowelNetwork& network = subject.network;
+  if (!network.dropped.empty()) {
+    subject.notes.push_back(fmt::format(
+        "dowel network: {} of {} areas dropped, as there is no dowel at {}", network.dropped.size(),
+        network.dropped.size() + network.areas.size(), fmt::join(network.missing_sites, ", ")));
+  }
+}
+
 }  // namespace
 
 Case LoadCase(const Experiment& experiment, const RunContext& context) {
@@ -95,7 +105,7 @@ Case LoadCase(const Experiment& experiment, const RunContext& context) {
         "{}: no area of the dowel network has all its three dowels; more landmarks are needed",
         subject.name));
   }
-  Append(subject.notes, subject.network.dropped);
+  NoteDroppedAreas(subject);
   subject.inputs.push_back(experiment.network);
   if (experiment.tissue.depths == DepthSource::kTable) {
     subject.inputs.push_back(experiment.tissue.table);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "surfaces/parallel.h"
 
@@ -43,26 +42,37 @@ double HalfMaximum(const std::vector<double>& profile, const HalfMaximumOptions&
   return kNaN;
 }
 
-// Each move becomes the mean of its own and those of its neighbours that have one.
-std::vector<double> Smoothed(const TriMesh& mesh, const std::vector<double>& moves) {
-  std::vector<double> sum(moves.size(), 0), count(moves.size(), 0);
-  const auto add = [&](std::int32_t to, std::int32_t from) {
-    if (std::isfinite(moves[from])) {
-      sum[to] += moves[from];
-      count[to] += 1;
-    }
-  };
+// Each move becomes the mean of its own and those of its neighbours. Marching cubes leaves slivers,
+// whose corners have unlike normals: as vectors, smoothed, their moves do not turn them over.
+std::vector<Vec3> Smoothed(const TriMesh& mesh, const std::vector<Vec3>& moves) {
+  std::vector<Vec3> sum(moves.size(), Vec3::Zero());
+  std::vector<double> count(moves.size(), 0);
   for (const Triangle& t : mesh.triangles) {
-    for (int c = 0; c < 3; ++c) {
-      add(t[c], t[c]);
-      add(t[c], t[(c + 1) % 3]);
-      add(t[(c + 1) % 3], t[c]);
+    const Vec3 all = moves[t[0]] + moves[t[1]] + moves[t[2]];
+    for (const std::int32_t corner : t) {
+      sum[corner] += all;
+      count[corner] += 3;
     }
   }
   for (std::size_t v = 0; v < sum.size(); ++v) {
-    sum[v] = count[v] > 0 ? sum[v] / count[v] : kNaN;
+    sum[v] = count[v] > 0 ? Vec3(sum[v] / count[v]) : moves[v];
   }
   return sum;
+}
+
+// Vertices on a side of the volume stay on it, for there the mesh is cut open, and none leaves the
+// volume.
+Vec3 MovedInside(const CtVolume& volume, const Vec3& p, const Vec3& move) {
+  Box3 box;
+  box.extend(volume.World(0, 0, 0));
+  box.extend(volume.World(volume.columns - 1, volume.rows - 1, volume.slices - 1));
+  Vec3 moved = (p + move).cwiseMax(box.min()).cwiseMin(box.max());
+  for (int axis = 0; axis < 3; ++axis) {
+    if (p[axis] == box.min()[axis] || p[axis] == box.max()[axis]) {
+      moved[axis] = p[axis];
+    }
+  }
+  return moved;
 }
 
 }  // namespace
@@ -70,18 +80,18 @@ std::vector<double> Smoothed(const TriMesh& mesh, const std::vector<double>& mov
 double MoveToHalfMaximum(const CtVolume& volume, const HalfMaximumOptions& options,
                          const RunContext& context, TriMesh& mesh) {
   const std::vector<Vec3> normals = VertexNormals(mesh);
-  std::vector<double> moves(mesh.points.size(), kNaN);
+  std::vector<Vec3> moves(mesh.points.size());
   ParallelFor(moves.size(), context.threads, 1024, [&](std::size_t v) {
-    moves[v] = HalfMaximum(Profile(volume, options, mesh.points[v], normals[v]), options);
+    const double move = HalfMaximum(Profile(volume, options, mesh.points[v], normals[v]), options);
+    moves[v] = (std::isfinite(move) ? move : 0) * normals[v];
   });
   for (int n = 0; n < options.smoothings; ++n) {
     moves = Smoothed(mesh, moves);
   }
   double sum = 0;
   for (std::size_t v = 0; v < moves.size(); ++v) {
-    const double move = std::isfinite(moves[v]) ? moves[v] : 0;
-    mesh.points[v] += move * normals[v];
-    sum += move;
+    mesh.points[v] = MovedInside(volume, mesh.points[v], moves[v]);
+    sum += moves[v].dot(normals[v]);
   }
   return moves.empty() ? 0 : sum / static_cast<double>(moves.size());
 }

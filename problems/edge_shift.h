@@ -17,8 +17,8 @@ struct HalfMaximumOptions {
 
 // A blurred edge lies midway between the plateaus on its two sides: the highest value within reach
 // along the inward normal and the lowest along the outward one. Moves each vertex there along its
-// normal and returns the mean move, outward positive. A vertex with no such crossing in reach moves
-// as its neighbours do.
+// normal and returns the mean move, outward positive. A vertex with no such crossing in reach
+// counts as not to be moved.
 double MoveToHalfMaximum(const CtVolume& volume, const HalfMaximumOptions& options,
                          const RunContext& context, TriMesh& mesh);
 

@@ -74,6 +74,7 @@ struct Experiment {
   PlacementOptions placement;
   std::vector<LevelFit> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds;
+  double cut_margin_mm = 5;
   int rounds = 1;
   FitOptions fit;
   FaceRegionOptions region;
@@ -100,6 +101,13 @@ void Fields(Visitor& visit, Experiment& o) {
                   .doc = "levels fitted to the dowels alone before seeds are taken; may be empty"},
         o.first_fit);
   visit(FieldInfo{.name = "seeds", .doc = "extra dowels on the implicit face"}, o.seeds);
+  visit(FieldInfo{.name = "cut_margin_mm",
+                  .unit = "mm",
+                  .min = -50,
+                  .max = 100,
+                  .doc = "no seeds nearer than this to a plane where the scan ends; beyond it the "
+                         "face follows the template"},
+        o.cut_margin_mm);
   visit(FieldInfo{.name = "rounds",
                   .min = 1,
                   .max = 20,

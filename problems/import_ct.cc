@@ -77,13 +77,19 @@ VoxelMask SideFaces(const VoxelMask& tissue, const VoxelGrid& grid) {
 }
 
 // Air that the sides of the volume reach without passing an opening narrower than `widest_mm`.
-VoxelMask FindOutsideAir(const VoxelMask& tissue, const VoxelGrid& grid, double widest_mm,
-                         int threads) {
+// Above the last slice there is air, so that it reaches the vault of a head that ends just below
+// it.
+VoxelMask FindOutsideAir(VoxelMask tissue, VoxelGrid grid, double widest_mm, int threads) {
+  const std::size_t voxels = tissue.size();
+  grid.counts[2] += 1 + static_cast<int>(std::ceil(widest_mm / grid.spacing_mm.z()));
+  tissue.resize(static_cast<std::size_t>(grid.Count()), 0);
   const double radius = 0.5 * widest_mm;
   const VoxelMask wide_air = Not(Grow(tissue, grid, radius, threads));
   const VoxelMask reached = Flood(wide_air, SideFaces(tissue, grid), grid);
   const VoxelMask back = Grow(reached, grid, radius + grid.spacing_mm.maxCoeff(), threads);
-  return Flood(And(back, Not(tissue)), reached, grid);
+  VoxelMask outside = Flood(And(back, Not(tissue)), reached, grid);
+  outside.resize(voxels);
+  return outside;
 }
 
 // The head's tissue: that of the largest body after what is thin was taken away, with what was thin

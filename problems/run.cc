@@ -5,6 +5,7 @@
 
 #include <chrono>
 
+#include "problems/cut_planes.h"
 #include "surfaces/mesh_query.h"
 
 namespace semblance {
@@ -80,6 +81,19 @@ struct FaceFit {
   FitResult fit;
 };
 
+// What of the implicit face may be seeded: near a plane where the scan ends, its surface is the
+// rim and the lid of the shell, not a face.
+TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh& implicit) {
+  const std::vector<CutPlane> planes = FindCutPlanes(subject.skull);
+  for (const CutPlane& plane : planes) {
+    subject.notes.push_back(
+        fmt::format("the skull is cut off at {}: no seeds within {:.0f} mm of there, and the face "
+                    "beyond it is the template's",
+                    InWords(plane), experiment.cut_margin_mm));
+  }
+  return WithinScan(implicit, planes, experiment.cut_margin_mm);
+}
+
 // Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
 // both (see seeding.h for why).
 FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, const FitTarget& dowels,
@@ -137,8 +151,10 @@ RunResult Run(const Experiment& experiment, const RunContext& context) {
   const FitTarget dowels = DowelTarget(subject.dowels, generic);
   const Similarity face_from_template = PlaceOnDowels(generic, dowels, experiment.placement);
   TemplateFace placed = Placed(generic, face_from_template);
-  FaceFit fitted =
-      step("fit", [&] { return FitFace(experiment, placed, dowels, implicit.dense, context); });
+  FaceFit fitted = step("fit", [&] {
+    return FitFace(experiment, placed, dowels, SeedableFace(experiment, subject, implicit.dense),
+                   context);
+  });
   Tessellation face =
       step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
   std::optional<TruthComparison> truth = step(

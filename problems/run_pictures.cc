@@ -12,9 +12,10 @@ namespace {
 constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
 constexpr int kWidth = 560, kHeight = 640;
 
-// What all pictures are framed to: the reconstructed face with the dowels.
+// What all pictures are framed to: skull, face and dowels.
 Box3 Region(const RunResult& result) {
   Box3 box = Bounds(result.face.mesh);
+  box.extend(Bounds(result.shell));
   for (const Dowel& dowel : result.subject.dowels) {
     box.extend(dowel.Tip());
   }
