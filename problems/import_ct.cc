@@ -97,10 +97,11 @@ VoxelMask FindOutsideAir(VoxelMask tissue, VoxelGrid grid, double widest_mm, int
 // before a sinus would be thin.
 VoxelMask FindHead(const VoxelMask& tissue, const VoxelMask& outside, const VoxelGrid& grid,
                    double thinnest_mm, int threads) {
-  const double radius = 0.5 * thinnest_mm;
-  const VoxelMask core = Not(Grow(outside, grid, radius, threads));
+  constexpr double kEar_mm = 20;
+  const VoxelMask core = Not(Grow(outside, grid, 0.5 * thinnest_mm, threads));
   const VoxelMask head_core = Largest(core, grid);
-  return And(Grow(head_core, grid, radius + 2 * grid.spacing_mm.maxCoeff(), threads), tissue);
+  const VoxelMask near = And(Grow(head_core, grid, 0.5 * thinnest_mm + kEar_mm, threads), tissue);
+  return Flood(near, head_core, grid);
 }
 
 // Rows run from back to front, that is against +y: the grid's second axis counts them from the

@@ -8,10 +8,6 @@
 namespace semblance {
 namespace {
 
-double AngleBetween(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
 int Root(std::vector<int>& parent, int i) {
   while (parent[i] != i) {
     parent[i] = parent[parent[i]];
@@ -81,15 +77,8 @@ std::vector<Vec3> VertexNormals(const TriMesh& mesh) {
   std::vector<Vec3> normals(mesh.points.size(), Vec3::Zero());
   for (const Triangle& t : mesh.triangles) {
     const Vec3 area_vector = TriangleAreaVector(mesh, t);
-    const double area = area_vector.norm();
-    if (!(area > 0)) {
-      continue;
-    }
-    for (int c = 0; c < 3; ++c) {
-      const Vec3& p = mesh.points[t[c]];
-      const double angle =
-          AngleBetween(mesh.points[t[(c + 1) % 3]] - p, mesh.points[t[(c + 2) % 3]] - p);
-      normals[t[c]] += angle / area * area_vector;
+    for (const std::int32_t corner : t) {
+      normals[corner] += area_vector;
     }
   }
   for (Vec3& n : normals) {
