@@ -83,8 +83,9 @@ fs::path OutputFolder::PathOf(std::string_view name) const {
   return path;
 }
 
-void OutputFolder::Write(std::string_view name, std::string_view bytes) const {
+void OutputFolder::Write(std::string_view name, std::string_view bytes) {
   WriteFileAtomically(PathOf(name), bytes);
+  written_.emplace_back(name);
 }
 
 }  // namespace semblance

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "surfaces/whole_file.h"
 
@@ -23,14 +25,18 @@ class OutputFolder {
 
   const std::filesystem::path& Root() const { return root_; }
 
+  // The names that Write has written, in that order.
+  const std::vector<std::string>& Written() const { return written_; }
+
   // Root() / name, e.g. "pictures/front.png"; the folders in between are created. Throws InputError
   // if `name` is empty, absolute or leads out of the folder, IoError if a folder cannot be created.
   std::filesystem::path PathOf(std::string_view name) const;
 
   // WriteFileAtomically(PathOf(name), bytes).
-  void Write(std::string_view name, std::string_view bytes) const;
+  void Write(std::string_view name, std::string_view bytes);
 
  private:
+  std::vector<std::string> written_;
   std::filesystem::path root_;
 };
 

@@ -99,8 +99,4 @@ std::string EncodePng(const Image& image) {
   return bytes;
 }
 
-void WritePng(const std::filesystem::path& path, const Image& image) {
-  WriteFileAtomically(path, EncodePng(image));
-}
-
 }  // namespace semblance

@@ -53,7 +53,4 @@ void Paste(Image& onto, const Image& picture, int x, int y);
 // InputError for a picture without pixels.
 std::string EncodePng(const Image& image);
 
-// EncodePng through WriteFileAtomically; throws IoError if the file cannot be written.
-void WritePng(const std::filesystem::path& path, const Image& image);
-
 }  // namespace semblance

@@ -62,7 +62,7 @@ void PrintFaceError(const char* what, const FaceMetrics& m) {
 int RunCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
-  const OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
+  OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
   const RunContext context = MakeContext(arguments);
   const RunResult result = Run(experiment, context);
   WriteRun(experiment, result, folder, context);
@@ -104,7 +104,7 @@ int ImportCtCommand(const Arguments& arguments) {
   const std::filesystem::path volume = arguments.files.at(0);
   CtImportOptions options = arguments.ct;
   options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
-  const OutputFolder folder = MakeFolder(arguments, "out/" + volume.stem().string());
+  OutputFolder folder = MakeFolder(arguments, "out/" + volume.stem().string());
   const CtImport import = ImportCt(ReadInvesalius(volume), options, MakeContext(arguments));
   folder.Write("skull.ply", EncodeMesh(import.skull, ".ply"));
   folder.Write("skin.ply", EncodeMesh(import.skin, ".ply"));
@@ -134,7 +134,8 @@ int ReportCommand(const Arguments& arguments) {
   if (!std::filesystem::is_directory(root)) {
     throw IoError(fmt::format("{}: no such folder; name the folder of a run", root.string()));
   }
-  WriteReport(OutputFolder(root, WhenNotEmpty::kReplaceFiles));
+  OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
+  WriteReport(folder);
   fmt::print("report: {}\n", (root / "report.html").string());
   return kDone;
 }

@@ -162,7 +162,7 @@ std::string ReconstructionPly(const TriMesh& mesh, const RunResult& result,
   return MappedPly(mesh, "scalar_error_mm", SignedErrorOf(mesh, result, context), ErrorMap());
 }
 
-void WriteMeshes(const RunResult& result, const OutputFolder& folder, const RunContext& context) {
+void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext& context) {
   folder.Write("face.hspline.json", HSplineToJson(result.fit.surface));
   folder.Write("face.ply", ReconstructionPly(result.face.mesh, result, context));
   folder.Write("implicit.ply", ReconstructionPly(result.implicit.mesh, result, context));
@@ -181,12 +181,16 @@ std::string TimingJson(const std::vector<StepTime>& times) {
   return json.dump(2) + "\n";
 }
 
-std::string ManifestJson(const RunResult& result, const OutputFolder& folder) {
+std::string ManifestJson(const Experiment& experiment, const RunResult& result,
+                         const OutputFolder& folder) {
   Json json = {{"program", "semblance"},
                {"version", SEMBLANCE_VERSION},
                {"libraries", Json::object()},
                {"inputs", Json::array()},
                {"outputs", Json::array()}};
+  if (const auto* phantom = std::get_if<PhantomOptions>(&experiment.subject)) {
+    json["random_seed"] = phantom->random_seed;
+  }
   for (const auto& [name, version] : LibraryVersions()) {
     json["libraries"][name] = version;
   }
@@ -194,14 +198,8 @@ std::string ManifestJson(const RunResult& result, const OutputFolder& folder) {
     json["inputs"].push_back(
         {{"file", input.filename().string()}, {"sha256", Sha256OfFile(input)}});
   }
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.Root())) {
-    const std::string name =
-        std::filesystem::relative(entry.path(), folder.Root()).generic_string();
-    if (entry.is_regular_file() && name != "manifest.json" && name != "timing.json") {
-      names.push_back(name);
-    }
-  }
+  std::vector<std::string> names = folder.Written();
+  std::erase(names, "timing.json");  // differs from run to run
   std::sort(names.begin(), names.end());
   for (const std::string& name : names) {
     json["outputs"].push_back({{"file", name}, {"sha256", Sha256OfFile(folder.Root() / name)}});
@@ -226,9 +224,10 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
   return json.dump(2) + "\n";
 }
 
-void WriteRun(const Experiment& experiment, const RunResult& result, const OutputFolder& folder,
+void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,
               const RunContext& context) {
   context.Report("write", folder.Root().string());
+  std::filesystem::remove(folder.Root() / "manifest.json");  // of a run that is written over
   folder.Write("resolved.yaml", WriteConfig(experiment));
   folder.Write("result.json", ResultJson(experiment, result));
   folder.Write("dowels.csv", DowelsCsv(result));
@@ -236,7 +235,7 @@ void WriteRun(const Experiment& experiment, const RunResult& result, const Outpu
   WritePictures(result, folder, context);
   WriteReport(folder);
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("manifest.json", ManifestJson(result, folder));
+  folder.Write("manifest.json", ManifestJson(experiment, result, folder));
 }
 
 }  // namespace semblance

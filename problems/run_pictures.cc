@@ -27,9 +27,9 @@ RenderOptions Options(Lighting lighting) {
 }
 
 void WriteViews(const Scene& scene, const RunResult& result, const Sheet& sheet, Lighting lighting,
-                const OutputFolder& folder, const char* name, int threads) {
-  WritePng(folder.PathOf(name),
-           RenderViews(scene, Region(result), kViews, sheet, Options(lighting), threads));
+                OutputFolder& folder, const char* name, int threads) {
+  folder.Write(name, EncodePng(RenderViews(scene, Region(result), kViews, sheet, Options(lighting),
+                                           threads)));
 }
 
 Image Front(const Scene& scene, const RunResult& result, int threads) {
@@ -44,7 +44,7 @@ Scene SkullScene(const RunResult& result) {
 
 // The story in one row: skull and dowels, implicit face, H-spline face and, where it is known, the
 // true skin.
-void WriteOverview(const RunResult& result, const OutputFolder& folder, int threads) {
+void WriteOverview(const RunResult& result, OutputFolder& folder, int threads) {
   std::vector<Image> pictures = {Front(SkullScene(result), result, threads),
                                  Front({{SkinObject(result.implicit.dense)}}, result, threads),
                                  Front({{SkinObject(result.face.mesh)}}, result, threads)};
@@ -55,10 +55,10 @@ void WriteOverview(const RunResult& result, const OutputFolder& folder, int thre
     pictures.push_back(Front({{SkinObject(*result.subject.skin)}}, result, threads));
     sheet.captions.push_back("true skin");
   }
-  WritePng(folder.PathOf("pictures/overview.png"), ContactSheet(pictures, sheet));
+  folder.Write("pictures/overview.png", EncodePng(ContactSheet(pictures, sheet)));
 }
 
-void WriteTruth(const RunResult& result, const OutputFolder& folder, int threads) {
+void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
   const TriMesh& skin = *result.subject.skin;
   WriteViews({{SkinObject(skin)}}, result, {"True skin", {}, std::nullopt}, Lighting::kStudio,
              folder, "pictures/truth.png", threads);
@@ -96,7 +96,7 @@ std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
   return error;
 }
 
-void WritePictures(const RunResult& result, const OutputFolder& folder, const RunContext& context) {
+void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context) {
   context.Report("pictures");
   const int threads = context.threads;
   WriteOverview(result, folder, threads);

@@ -20,6 +20,6 @@ std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
 
 // pictures/overview.png and, from front, three quarters and side: skull_dowels, depth, implicit,
 // face, face_over_skull and, where the true skin is known, truth and error (on the true skin).
-void WritePictures(const RunResult& result, const OutputFolder& folder, const RunContext& context);
+void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context);
 
 }  // namespace semblance

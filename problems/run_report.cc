@@ -166,7 +166,8 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
   report.tiles = Tiles(result);
   report.main_images = {ReportImageFromFile(
       folder.Root() / "pictures/overview.png", "",
-      "skull and dowels, implicit face, H-spline face and true skin, from the front")};
+      fmt::format("skull and dowels, implicit face, H-spline face{}, from the front",
+                  result.at("face").is_null() ? "" : " and true skin"))};
   if (!result.at("face").is_null()) {
     report.sections.push_back(ErrorSection(result, folder));
   }
@@ -187,7 +188,7 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
 
 }  // namespace
 
-void WriteReport(const OutputFolder& folder) {
+void WriteReport(OutputFolder& folder) {
   const std::filesystem::path file = folder.Root() / "result.json";
   try {
     folder.Write("report.html", ReportHtml(BuildReport(Json::parse(ReadFileBytes(file)), folder)));

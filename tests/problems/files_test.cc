@@ -93,7 +93,7 @@ TEST_F(FilesTest, ReadingWhatIsNoFileIsAnError) {
 }
 
 TEST_F(FilesTest, OutputFolderIsCreatedEmptyAndTakesFilesInSubfolders) {
-  const OutputFolder out(folder_ / "a" / "b", WhenNotEmpty::kRefuse);
+  OutputFolder out(folder_ / "a" / "b", WhenNotEmpty::kRefuse);
   EXPECT_EQ(Count(out.Root()), 0);
   out.Write("pictures/front.png", "png");
   EXPECT_EQ(ReadFileBytes(folder_ / "a/b/pictures/front.png"), "png");
@@ -101,13 +101,13 @@ TEST_F(FilesTest, OutputFolderIsCreatedEmptyAndTakesFilesInSubfolders) {
 }
 
 TEST_F(FilesTest, NotEmptyFolderIsRefusedInTheseWords) {
-  const OutputFolder first(folder_ / "run", WhenNotEmpty::kRefuse);
+  OutputFolder first(folder_ / "run", WhenNotEmpty::kRefuse);
   first.Write("result.json", "{}");
   EXPECT_EQ(MessageOf<IoError>([&] { OutputFolder(folder_ / "run", WhenNotEmpty::kRefuse); }),
             (folder_ / "run").string() +
                 ": the output folder exists and is not empty, and nothing is overwritten unless "
                 "asked; choose another folder, or say --force to replace files in it");
-  const OutputFolder forced(folder_ / "run", WhenNotEmpty::kReplaceFiles);
+  OutputFolder forced(folder_ / "run", WhenNotEmpty::kReplaceFiles);
   EXPECT_EQ(ReadFileBytes(forced.Root() / "result.json"), "{}") << "force deletes nothing";
 }
 
@@ -123,7 +123,7 @@ TEST_F(FilesTest, FolderThatCannotBeIsKnownAtOnce) {
 }
 
 TEST_F(FilesTest, NamesMustStayInsideTheFolder) {
-  const OutputFolder out(folder_ / "run", WhenNotEmpty::kRefuse);
+  OutputFolder out(folder_ / "run", WhenNotEmpty::kRefuse);
   for (const char* name : {"", ".", "..", "../x", "a/../../x", "/etc/x", "a/"}) {
     EXPECT_THROW(out.Write(name, "1"), InputError) << name;
   }
