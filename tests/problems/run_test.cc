@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The main job from a configuration to a folder, on a small phantom.
+#include "problems/run.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "problems/config.h"
+#include "problems/run_folder.h"
+#include "surfaces/whole_file.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+using ::testing::UnorderedElementsAreArray;
+using testing::WordsOf;
+
+const fs::path kConfigs = fs::path(SEMBLANCE_SOURCE_DIR) / "configs";
+
+// A phantom coarse enough to be quick.
+Experiment SmallPhantom(std::vector<std::string> overrides = {}) {
+  overrides.insert(overrides.begin(), {"subject.rings=40", "implicit.resolution=48"});
+  return ReadConfig<Experiment>(kConfigs / "phantom.yaml", overrides);
+}
+
+std::map<std::string, std::string> FilesOf(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) {
+      files[fs::relative(entry.path(), folder).generic_string()] = ReadFileBytes(entry.path());
+    }
+  }
+  return files;
+}
+
+std::map<std::string, std::string> FilesOfRun(const Experiment& experiment, const fs::path& folder,
+                                              int threads) {
+  RunContext context;
+  context.threads = threads;
+  OutputFolder output(folder, WhenNotEmpty::kRefuse);
+  WriteRun(experiment, semblance::Run(experiment, context), output, context);
+  auto files = FilesOf(folder);
+  EXPECT_EQ(files.erase("timing.json"), 1u);
+  return files;
+}
+
+TEST(Run, ThePhantomsImplicitFaceIsWithinAMillimetreOfTheTruth) {
+  const Experiment experiment = ReadConfig<Experiment>(
+      kConfigs / "phantom.yaml", std::vector<std::string>{"implicit.resolution=90"});
+  const RunResult result = semblance::Run(experiment, {});
+  ASSERT_TRUE(result.truth);
+  EXPECT_LE(result.truth->implicit.truth_to_face.rms_mm, 1.0);
+  EXPECT_GE(result.truth->implicit.truth_to_face.area_cm2, 250);
+  // The generic face has a nose and lips, the phantom has none.
+  EXPECT_LE(result.truth->face.truth_to_face.median_mm, 1.0);
+  EXPECT_TRUE(result.usable());
+}
+
+TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
+  const RunResult result = semblance::Run(SmallPhantom(), {});
+  const TriMesh& face = result.face.mesh;
+  const EdgeReport edges = CheckEdges(face);
+  EXPECT_EQ(edges.non_manifold, 0);
+  EXPECT_EQ(edges.inconsistent, 0);
+  EXPECT_EQ(ConnectedComponents(face).count, 1);
+  // Away from the middle of the head: no triangle on the dowels' side is turned over.
+  const Vec3 middle = Bounds(result.subject.skull).center();
+  int turned = 0;
+  for (const Triangle& t : face.triangles) {
+    turned += TriangleAreaVector(face, t).dot(TriangleCentroid(face, t) - middle) < 0 ? 1 : 0;
+  }
+  EXPECT_LT(turned, 0.02 * static_cast<double>(face.triangles.size()));
+}
+
+TEST(Run, SameBytesEachTimeAndForAnyNumberOfThreads) {
+  const ScratchFolder folder;
+  const Experiment experiment = SmallPhantom();
+  const auto one = FilesOfRun(experiment, folder / "one", 1);
+  EXPECT_EQ(FilesOfRun(experiment, folder / "two", 2), one);
+  const auto resolved = ReadConfig<Experiment>(folder / "one" / "resolved.yaml", {});
+  EXPECT_EQ(FilesOfRun(resolved, folder / "again", 2), one);
+}
+
+TEST(Run, TheFolderHoldsWhatItsManifestLists) {
+  const ScratchFolder folder;
+  const auto files = FilesOfRun(SmallPhantom(), folder / "run", 2);
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : files) {
+    names.push_back(name);
+  }
+  EXPECT_THAT(names, UnorderedElementsAreArray(
+                         {"depth.ply", "dowels.csv", "face.hspline.json", "face.ply",
+                          "implicit.ply", "manifest.json", "pictures/depth.png",
+                          "pictures/error.png", "pictures/error_implicit.png", "pictures/face.png",
+                          "pictures/face_over_skull.png", "pictures/implicit.png",
+                          "pictures/overview.png", "pictures/skull_dowels.png",
+                          "pictures/truth.png", "report.html", "resolved.yaml", "result.json"}));
+  const auto manifest = nlohmann::json::parse(files.at("manifest.json"));
+  EXPECT_EQ(manifest.at("outputs").size(), files.size() - 1);
+  EXPECT_EQ(manifest.at("random_seed"), 1);
+  const auto result = nlohmann::json::parse(files.at("result.json"));
+  for (const char* metric : {"mean_abs_mm", "rms_mm", "median_mm", "p95_mm", "hausdorff_mm",
+                             "within_2_5mm", "volume_between_cm3", "regions"}) {
+    EXPECT_TRUE(result.at("face").contains(metric)) << metric;
+  }
+  EXPECT_TRUE(result.at("fit").contains("dowel_rms_mm"));
+  EXPECT_EQ(result.at("fit").at("levels").size(), 6u);
+  EXPECT_THAT(files.at("face.ply"), HasSubstr("property uchar red"));
+  EXPECT_THAT(files.at("face.ply"), HasSubstr("quality"));
+  EXPECT_THAT(files.at("face.ply"), HasSubstr("scalar_error_mm"));
+}
+
+TEST(Run, TheReportIsBuiltAnewFromTheFolderAlone) {
+  const ScratchFolder folder;
+  const auto files = FilesOfRun(SmallPhantom(), folder / "run", 2);
+  fs::remove(folder / "run" / "report.html");
+  OutputFolder output(folder / "run", WhenNotEmpty::kReplaceFiles);
+  WriteReport(output);
+  EXPECT_EQ(ReadFileBytes(folder / "run" / "report.html"), files.at("report.html"));
+}
+
+TEST(Run, ASkullWithoutLandmarksIsOneClearError) {
+  const ScratchFolder folder;
+  std::ofstream(folder / "e.yaml")
+      << "subject: {type: files, skull: a.ply}\n"
+      << "network: " << (kConfigs / "networks/standard32.yaml") << "\n";
+  EXPECT_EQ(WordsOf<InputError>(
+                [&] { semblance::Run(ReadConfig<Experiment>(folder / "e.yaml", {}), {}); }),
+            "subject.landmarks: no file is named; a skull needs landmarks (configs/landmarks/ "
+            "shows the form)");
+}
+
+TEST(Run, CanBeStopped) {
+  std::stop_source source;
+  source.request_stop();
+  RunContext context;
+  context.stop_token = source.get_token();
+  EXPECT_THROW(semblance::Run(SmallPhantom(), context), Cancelled);
+}
+
+}  // namespace
+}  // namespace semblance
