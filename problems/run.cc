@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "problems/cut_planes.h"
+#include "problems/shell_dowels.h"
 #include "surfaces/mesh_query.h"
 
 namespace semblance {
@@ -33,10 +34,13 @@ class StepClock {
   std::vector<StepTime> times_;
 };
 
-DepthField FindDepth(const Experiment& experiment, const Case& subject, const TriMesh& shell,
+DepthField FindDepth(const Experiment& experiment, Case& subject, const TriMesh& shell,
                      const RunContext& context) {
+  constexpr double kLeastDepth_mm = 1;
+  const ShellDowels standing = StandOnShell(subject.dowels, shell, kLeastDepth_mm);
+  subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
   const std::vector<Vec3> normals = VertexNormals(shell);
-  const DepthInput input{shell, normals, subject.dowels, subject.network};
+  const DepthInput input{shell, normals, standing.dowels, subject.network};
   return ApplyOutsideRule(experiment.outside, input,
                           InterpolateDepth(experiment.interp, input, context), context);
 }
