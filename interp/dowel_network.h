@@ -21,7 +21,7 @@ struct NetworkPlan {
 struct DowelNetwork {
   std::vector<std::array<int, 3>> areas;
   std::vector<std::string> dropped;  // one line for each area that needs a site which has no dowel
-  std::vector<std::string> missing_sites;  // those sites, each once, sorted
+  std::vector<std::string> missing_sites = {};  // those sites, each once, sorted
 };
 
 // Areas in the plan's order; those that name a site without a dowel are dropped, and said so.

@@ -9,30 +9,8 @@
 namespace semblance {
 namespace {
 
-using Edge = std::array<std::int32_t, 2>;
-
-// Edges with one triangle.
-std::vector<Edge> BorderEdges(const TriMesh& mesh) {
-  std::vector<Edge> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (const Triangle& t : mesh.triangles) {
-    for (int c = 0; c < 3; ++c) {
-      edges.push_back({std::min(t[c], t[(c + 1) % 3]), std::max(t[c], t[(c + 1) % 3])});
-    }
-  }
-  std::sort(edges.begin(), edges.end());
-  std::vector<Edge> border;
-  for (auto first = edges.begin(); first != edges.end();) {
-    const auto last = std::upper_bound(first, edges.end(), *first);
-    if (last - first == 1) {
-      border.push_back(*first);
-    }
-    first = last;
-  }
-  return border;
-}
-
-double LengthAlong(const CutPlane& plane, const TriMesh& mesh, const std::vector<Edge>& border) {
+double LengthAlong(const CutPlane& plane, const TriMesh& mesh,
+                   const std::vector<MeshEdge>& border) {
   constexpr double kNear_mm = 1;
   double length = 0;
   for (const auto& [a, b] : border) {
@@ -48,7 +26,7 @@ double LengthAlong(const CutPlane& plane, const TriMesh& mesh, const std::vector
 
 std::vector<CutPlane> FindCutPlanes(const TriMesh& skull) {
   constexpr double kLeastBorder_mm = 100;
-  const std::vector<Edge> border = BorderEdges(skull);
+  const std::vector<MeshEdge> border = BorderEdges(skull);
   const Box3 box = Bounds(skull);
   std::vector<CutPlane> planes;
   for (int axis = 0; axis < 3; ++axis) {

@@ -92,15 +92,13 @@ std::vector<Sample> TakeSamples(const std::vector<double>& signed_mm,
   return samples;
 }
 
-// The vertices of the face whose nearest point of the true skin lies in a triangle that is scored
-// at all three corners.
 std::vector<bool> FaceOverScoredSkin(const TriMesh& truth, const FaceRegion& region,
                                      const MeshQuery& truth_query, const TriMesh& face,
                                      const RunContext& context) {
+  const std::vector<bool> comparable = ComparableTriangles(truth, region);
   std::vector<char> over(face.points.size(), 0);
   ParallelFor(face.points.size(), context.threads, 256, [&](std::size_t v) {
-    const Triangle& t = truth.triangles[truth_query.Closest(face.points[v]).triangle];
-    over[v] = region.scored[t[0]] && region.scored[t[1]] && region.scored[t[2]];
+    over[v] = comparable[truth_query.Closest(face.points[v]).triangle];
   });
   return {over.begin(), over.end()};
 }
@@ -114,6 +112,18 @@ void RequireScored(const FaceRegion& region) {
 }
 
 }  // namespace
+
+std::vector<bool> ComparableTriangles(const TriMesh& truth, const FaceRegion& region) {
+  std::vector<bool> usable = region.scored;
+  for (const MeshEdge& edge : BorderEdges(truth)) {
+    usable[edge[0]] = usable[edge[1]] = false;
+  }
+  std::vector<bool> comparable;
+  for (const Triangle& t : truth.triangles) {
+    comparable.push_back(usable[t[0]] && usable[t[1]] && usable[t[2]]);
+  }
+  return comparable;
+}
 
 std::vector<double> VertexAreas(const TriMesh& mesh) {
   std::vector<double> areas(mesh.points.size(), 0);

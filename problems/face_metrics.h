@@ -30,8 +30,8 @@ struct DistanceSummary {
 struct FaceMetrics {
   DistanceSummary
       truth_to_face;  // from each scored vertex of the true skin to the nearest point of the face
-  DistanceSummary face_to_truth;  // from each face vertex that lies over scored skin to the nearest
-                                  // point of the true skin
+  DistanceSummary face_to_truth;  // from each face vertex whose nearest point of the true skin lies
+                                  // in a comparable triangle, to that point
   double hausdorff_mm = kNaN;     // the larger of the two maxima
   double volume_between_cm3 =
       kNaN;  // integral of the absolute distance over the scored skin (thesis 5.3)
@@ -43,6 +43,10 @@ struct FaceMetrics {
 // region: of the vertices of `truth`. Throws InputError if nothing is scored.
 FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                          const RunContext& context);
+
+// One entry a triangle of the true skin: whether what is nearest to it can be compared with it. All
+// three corners are scored and none is on an open border, where a scan ends and the face goes on.
+std::vector<bool> ComparableTriangles(const TriMesh& truth, const FaceRegion& region);
 
 // All of `truth` as one region without parts.
 FaceRegion WholeSurface(const TriMesh& truth);

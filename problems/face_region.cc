@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 
 #include "surfaces/error.h"
 #include "surfaces/mesh_query.h"
@@ -26,20 +25,6 @@ TriMesh NetworkMesh(std::span<const Dowel> dowels, const DowelNetwork& network) 
     mesh.triangles.push_back({area[0], area[1], area[2]});
   }
   return mesh;
-}
-
-std::set<std::array<std::int32_t, 2>> BorderEdges(const TriMesh& mesh) {
-  std::set<std::array<std::int32_t, 2>> border;
-  for (const Triangle& t : mesh.triangles) {
-    for (int c = 0; c < 3; ++c) {
-      const std::array<std::int32_t, 2> edge = {std::min(t[c], t[(c + 1) % 3]),
-                                                std::max(t[c], t[(c + 1) % 3])};
-      if (!border.erase(edge)) {
-        border.insert(edge);
-      }
-    }
-  }
-  return border;
 }
 
 double DistanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
@@ -78,7 +63,7 @@ class BorderRule {
   }
 
   const TriMesh& network_;
-  std::set<std::array<std::int32_t, 2>> border_;
+  std::vector<MeshEdge> border_;
 };
 
 std::vector<Sphere> ExcludedSpheres(std::span<const Dowel> dowels,

@@ -80,14 +80,14 @@ ColourMap ErrorMap() { return DivergingMap(8); }
 std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
                                   const RunContext& context) {
   const TriMesh& skin = *result.subject.skin;
-  const FaceRegion& region = result.truth->region;
+  const std::vector<bool> comparable = ComparableTriangles(skin, result.truth->region);
   const MeshQuery query(skin);
   const std::vector<Vec3> normals = VertexNormals(skin);
   std::vector<double> error(mesh.points.size(), kNaN);
   ParallelFor(error.size(), context.threads, 256, [&](std::size_t v) {
     const MeshPoint nearest = query.Closest(mesh.points[v]);
     const Triangle& t = skin.triangles[nearest.triangle];
-    if (region.scored[t[0]] && region.scored[t[1]] && region.scored[t[2]]) {
+    if (comparable[nearest.triangle]) {
       const double side =
           (mesh.points[v] - nearest.position).dot(normals[t[0]] + normals[t[1]] + normals[t[2]]);
       error[v] = side < 0 ? -nearest.distance_mm : nearest.distance_mm;

@@ -124,6 +124,26 @@ EdgeReport CheckEdges(const TriMesh& mesh) {
   return report;
 }
 
+std::vector<MeshEdge> BorderEdges(const TriMesh& mesh) {
+  std::vector<MeshEdge> edges;
+  edges.reserve(3 * mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles) {
+    for (int c = 0; c < 3; ++c) {
+      edges.push_back({std::min(t[c], t[(c + 1) % 3]), std::max(t[c], t[(c + 1) % 3])});
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  std::vector<MeshEdge> border;
+  for (auto first = edges.begin(); first != edges.end();) {
+    const auto last = std::upper_bound(first, edges.end(), *first);
+    if (last - first == 1) {
+      border.push_back(*first);
+    }
+    first = last;
+  }
+  return border;
+}
+
 TriMesh Submesh(const TriMesh& mesh, const std::vector<bool>& keep) {
   std::vector<std::int32_t> renumbered(mesh.points.size(), -1);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {

@@ -29,8 +29,8 @@ double Area(const TriMesh& mesh);                                 // mm^2
 double SignedVolume(
     const TriMesh& mesh);  // mm^3; > 0 if closed and outward; origin-dependent if open
 
-// Unit normals, one a vertex, weighted by the area of its triangles, so that the slivers of marching
-// cubes have no say. Zero where a vertex has no triangle of positive area.
+// Unit normals, one a vertex, weighted by the area of its triangles, so that the slivers of
+// marching cubes have no say. Zero where a vertex has no triangle of positive area.
 std::vector<Vec3> VertexNormals(const TriMesh& mesh);
 
 // Component of each triangle by shared vertices, numbered 0, 1, ... in order of the first triangle.
@@ -49,6 +49,10 @@ struct EdgeReport {
   std::int64_t inconsistent = 0;
 };
 EdgeReport CheckEdges(const TriMesh& mesh);
+
+// The edges with one triangle, lower vertex first, sorted.
+using MeshEdge = std::array<std::int32_t, 2>;
+std::vector<MeshEdge> BorderEdges(const TriMesh& mesh);
 
 // The triangles for which keep[t] is true, and the points they use, in their old order. keep: one a
 // triangle.

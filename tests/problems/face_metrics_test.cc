@@ -131,5 +131,16 @@ TEST(FaceMetrics, NothingScoredIsAnError) {
   EXPECT_THROW(CompareFaces(truth, none, truth, RunContext{}), InputError);
 }
 
+TEST(CompareFaces, WhereTheScanEndsTheFaceMayGoOn) {
+  const TriMesh truth = testing::Plate(100, 20);
+  TriMesh face = testing::Plate(300, 60);  // goes on for 100 mm on all sides
+  for (Vec3& p : face.points) {
+    p += Vec3(-100, -100, 2);
+  }
+  const FaceMetrics metrics = CompareFaces(truth, WholeSurface(truth), face, {});
+  EXPECT_NEAR(metrics.face_to_truth.max_mm, 2, 1e-9);
+  EXPECT_NEAR(metrics.hausdorff_mm, 2, 1e-9);
+}
+
 }  // namespace
 }  // namespace semblance
