@@ -14,7 +14,7 @@ void Append(std::vector<std::string>& notes, const std::vector<std::string>& mor
   notes.insert(notes.end(), more.begin(), more.end());
 }
 
-TriMesh ReadHeadMesh(const std::filesystem::path& path, const char* option, Case& subject) {
+TriMesh ReadHeadMesh(const std::filesystem::path& path, const char* option, SubjectData& subject) {
   if (path.empty()) {
     throw InputError(fmt::format(
         "subject.{}: no file is named; give the path of a mesh (PLY, OBJ, STL or OFF)", option));
@@ -25,7 +25,7 @@ TriMesh ReadHeadMesh(const std::filesystem::path& path, const char* option, Case
   return mesh;
 }
 
-LandmarkFile ReadLandmarks(const std::filesystem::path& path, Case& subject) {
+LandmarkFile ReadLandmarks(const std::filesystem::path& path, SubjectData& subject) {
   if (path.empty()) {
     throw InputError(
         "subject.landmarks: no file is named; a skull needs landmarks (configs/landmarks/ shows "
@@ -35,8 +35,8 @@ LandmarkFile ReadLandmarks(const std::filesystem::path& path, Case& subject) {
   return ReadLandmarkFile(path);
 }
 
-// Each Load fills subject.skull, skin, name, inputs and notes, and returns the landmarks.
-LandmarkFile Load(const PhantomOptions& options, Case& subject, const RunContext&) {
+// Each Load fills subject.skull, skin, inputs and notes, and returns the landmarks.
+LandmarkFile Load(const PhantomOptions& options, SubjectData& subject, const RunContext&) {
   Phantom phantom = MakePhantom(options);
   subject.skull = std::move(phantom.skull);
   subject.skin = std::move(phantom.face);
@@ -53,7 +53,7 @@ LandmarkFile Load(const PhantomOptions& options, Case& subject, const RunContext
   return file;
 }
 
-LandmarkFile Load(const FileSubject& options, Case& subject, const RunContext&) {
+LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunContext&) {
   LandmarkFile landmarks = ReadLandmarks(options.landmarks, subject);
   subject.skull = ReadHeadMesh(options.skull, "skull", subject);
   if (!options.skin.empty()) {
@@ -62,7 +62,7 @@ LandmarkFile Load(const FileSubject& options, Case& subject, const RunContext&) 
   return landmarks;
 }
 
-LandmarkFile Load(const CtSubject& options, Case& subject, const RunContext& context) {
+LandmarkFile Load(const CtSubject& options, SubjectData& subject, const RunContext& context) {
   if (options.volume.empty()) {
     throw InputError("subject.volume: no file is named; give the path of an InVesalius project");
   }
@@ -85,20 +85,33 @@ void NoteDroppedAreas(Case& subject) {
   }
 }
 
-}  // namespace
-
-Case LoadCase(const Experiment& experiment, const RunContext& context) {
+void CheckFilesNamed(const Experiment& experiment) {
   if (experiment.network.empty()) {
     throw InputError(
         "network: no file is named; give the path of a dowel network (configs/networks/ has the "
         "standard one)");
   }
-  Case subject;
-  const LandmarkFile landmarks = std::visit(
-      [&](const auto& options) { return Load(options, subject, context); }, experiment.subject);
-  subject.name = landmarks.subject;
-  subject.dowels = PlaceDowels(landmarks, subject.skull, experiment.landmarks);
-  Append(subject.notes, FillDepths(experiment.tissue, landmarks, subject.dowels));
+}
+
+}  // namespace
+
+SubjectData LoadSubject(const Subject& subject, const RunContext& context) {
+  SubjectData data;
+  data.landmarks =
+      std::visit([&](const auto& options) { return Load(options, data, context); }, subject);
+  return data;
+}
+
+Case MakeCase(const SubjectData& data, const Experiment& experiment) {
+  CheckFilesNamed(experiment);
+  Case subject{.name = data.landmarks.subject,
+               .skull = data.skull,
+               .skin = data.skin,
+               .dowels = PlaceDowels(data.landmarks, data.skull, experiment.landmarks),
+               .network = {},
+               .notes = data.notes,
+               .inputs = data.inputs};
+  Append(subject.notes, FillDepths(experiment.tissue, data.landmarks, subject.dowels));
   subject.network = BuildNetwork(ReadNetworkPlan(experiment.network), subject.dowels);
   if (subject.network.areas.empty()) {
     throw InputError(fmt::format(

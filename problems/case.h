@@ -12,18 +12,30 @@
 
 namespace semblance {
 
+// What was read or made of a subject, before any choice of depth or network.
+struct SubjectData {
+  TriMesh skull;                // mm, outward
+  std::optional<TriMesh> skin;  // the true skin, in the skull's frame, where it is known
+  LandmarkFile landmarks;
+  std::vector<std::string> notes;
+  std::vector<std::filesystem::path> inputs;  // files that were read
+};
+
 struct Case {
   std::string name;
-  TriMesh skull;                   // mm, outward
-  std::optional<TriMesh> skin;     // the true skin, in the skull's frame, where it is known
+  TriMesh skull;
+  std::optional<TriMesh> skin;
   std::vector<Dowel> dowels;       // with depths
   DowelNetwork network;            // of those dowels
   std::vector<std::string> notes;  // what a reader of the result should know, a line each
-  std::vector<std::filesystem::path> inputs;  // files that were read, for the manifest
+  std::vector<std::filesystem::path> inputs;  // for the manifest
 };
 
-// Reads or makes the subject, checks its meshes, places the dowels on the bone and gives them their
-// depths. Throws InputError, IoError or ConfigError with one clear line for what cannot be used.
-Case LoadCase(const Experiment& experiment, const RunContext& context);
+// Reads or makes the subject and checks its meshes. Throws InputError, IoError or ConfigError with
+// one clear line for what cannot be used.
+SubjectData LoadSubject(const Subject& subject, const RunContext& context);
+
+// Places the dowels on the bone and gives them their depths and network. Throws as LoadSubject.
+Case MakeCase(const SubjectData& subject, const Experiment& experiment);
 
 }  // namespace semblance

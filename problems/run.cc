@@ -3,47 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-
 #include "problems/cut_planes.h"
-#include "problems/shell_dowels.h"
 #include "surfaces/mesh_query.h"
 
 namespace semblance {
 namespace {
-
-// Runs one step, tells of it, and notes how long it took.
-class StepClock {
- public:
-  explicit StepClock(const RunContext& context) : context_(context) {}
-
-  template <class Step>
-  auto operator()(const char* name, Step&& step) {
-    context_.ThrowIfStopped();
-    context_.Report(name);
-    const auto start = std::chrono::steady_clock::now();
-    auto value = step();
-    times_.push_back(
-        {name, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
-    return value;
-  }
-  std::vector<StepTime> Take() { return std::move(times_); }
-
- private:
-  const RunContext& context_;
-  std::vector<StepTime> times_;
-};
-
-DepthField FindDepth(const Experiment& experiment, Case& subject, const TriMesh& shell,
-                     const RunContext& context) {
-  constexpr double kLeastDepth_mm = 1;
-  const ShellDowels standing = StandOnShell(subject.dowels, shell, kLeastDepth_mm);
-  subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
-  const std::vector<Vec3> normals = VertexNormals(shell);
-  const DepthInput input{shell, normals, standing.dowels, subject.network};
-  return ApplyOutsideRule(experiment.outside, input,
-                          InterpolateDepth(experiment.interp, input, context), context);
-}
 
 // The dowel tips for which the generic face has a (u,v).
 FitTarget DowelTarget(const std::vector<Dowel>& dowels, const TemplateFace& face) {
@@ -139,34 +103,38 @@ std::optional<TruthComparison> Measure(const Experiment& experiment, const Case&
 
 }  // namespace
 
-RunResult Run(const Experiment& experiment, const RunContext& context) {
+RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache) {
   constexpr int kQuadsPerPatch = 4;
   StepClock step(context);
-  Case subject = step("load subject", [&] { return LoadCase(experiment, context); });
-  TriMesh shell =
-      step("fill skull", [&] { return FillSkull(subject.skull, experiment.fill, context); });
-  DepthField depth =
-      step("interpolate depth", [&] { return FindDepth(experiment, subject, shell, context); });
-  ImplicitFace implicit = step("implicit face", [&] {
-    return BuildImplicitFace(shell, depth.depth_mm, experiment.implicit, context);
-  });
+  StageCache own_cache(4);
+  const auto skull = MakeSkullStage(experiment, cache ? *cache : own_cache, step, context);
+  Case subject = skull->subject;
   const TemplateFace generic =
       step("make template", [&] { return MakeTemplateFace(experiment.face_template); });
   const FitTarget dowels = DowelTarget(subject.dowels, generic);
   const Similarity face_from_template = PlaceOnDowels(generic, dowels, experiment.placement);
   TemplateFace placed = Placed(generic, face_from_template);
   FaceFit fitted = step("fit", [&] {
-    return FitFace(experiment, placed, dowels, SeedableFace(experiment, subject, implicit.dense),
-                   context);
+    return FitFace(experiment, placed, dowels,
+                   SeedableFace(experiment, subject, skull->implicit.dense), context);
   });
   Tessellation face =
       step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
-  std::optional<TruthComparison> truth = step(
-      "measure", [&] { return Measure(experiment, subject, face.mesh, implicit.mesh, context); });
-  return {std::move(subject),        std::move(shell),         std::move(depth),
-          std::move(implicit),       face_from_template,       std::move(placed),
-          std::move(fitted.seeding), std::move(fitted.target), std::move(fitted.fit),
-          std::move(face),           std::move(truth),         step.Take()};
+  std::optional<TruthComparison> truth = step("measure", [&] {
+    return Measure(experiment, subject, face.mesh, skull->implicit.mesh, context);
+  });
+  return {std::move(subject),
+          skull->shell,
+          skull->depth,
+          skull->implicit,
+          face_from_template,
+          std::move(placed),
+          std::move(fitted.seeding),
+          std::move(fitted.target),
+          std::move(fitted.fit),
+          std::move(face),
+          std::move(truth),
+          step.Take()};
 }
 
 }  // namespace semblance

@@ -8,14 +8,10 @@
 
 #include "problems/case.h"
 #include "problems/face_metrics.h"
+#include "problems/skull_stage.h"
 #include "surfaces/tessellate.h"
 
 namespace semblance {
-
-struct StepTime {
-  std::string step;
-  double wall_s = kNaN;
-};
 
 // Against the true skin, where it is known.
 struct TruthComparison {
@@ -42,7 +38,9 @@ struct RunResult {
 };
 
 // Loads the case, fills the skull, interpolates depth, lays the implicit face, places the generic
-// face, seeds, fits, measures. Throws as LoadCase does, and Cancelled.
-RunResult Run(const Experiment& experiment, const RunContext& context);
+// face, seeds, fits, measures. Throws as LoadSubject does, and Cancelled. What experiments have in
+// common (the subject, its shell, the implicit face) is taken from `cache`, where one is given; the
+// result does not depend on it.
+RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache = nullptr);
 
 }  // namespace semblance
