@@ -25,6 +25,13 @@ std::string Hex(const unsigned char* bytes, unsigned int count) {
 
 }  // namespace
 
+std::string Sha256OfText(std::string_view text) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
+  unsigned int length = 0;
+  EVP_Digest(text.data(), text.size(), digest.data(), &length, EVP_sha256(), nullptr);
+  return Hex(digest.data(), length);
+}
+
 std::string Sha256OfFile(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) {

@@ -4,12 +4,14 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 namespace semblance {
 
-// Lower-case hexadecimal SHA-256 of a file's bytes. Throws IoError if it cannot be read.
+// Lower-case hexadecimal SHA-256 of a text, or of a file's bytes (IoError if it cannot be read).
+std::string Sha256OfText(std::string_view text);
 std::string Sha256OfFile(const std::filesystem::path& path);
 
 // Name and version of each library that has a part in a result, and of the compiler.

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include "problems/config.h"
+#include "problems/manifest.h"
+#include "problems/run_folder.h"
+#include "surfaces/whole_file.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+fs::path TrialFolder(const fs::path& folder, const std::string& id) {
+  return folder / "trials" / id;
+}
+
+// The status of a finished trial; nothing if it is not there or not whole.
+std::optional<std::string> StatusOf(const fs::path& folder, const std::string& id) {
+  const fs::path file = TrialFolder(folder, id) / "trial.json";
+  if (!fs::exists(file)) {
+    return std::nullopt;
+  }
+  const Json json = Json::parse(ReadFileBytes(file), nullptr, false);
+  const bool whole = json.is_object() && json.value("id", "") == id;
+  return whole ? std::optional(json.value("status", "failed")) : std::nullopt;
+}
+
+Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
+  Json json = {{"id", trial.id}, {"subject", trial.subject}, {"axes", Json::object()}};
+  for (std::size_t k = 0; k < plan.axes.size(); ++k) {
+    json["axes"][plan.axes[k]] = trial.values[k];
+  }
+  return json;
+}
+
+// What identifies how a trial came about. Inputs by name and content: folders differ by machine.
+void AppendProvenance(const StudyTrial& trial, Json& json) {
+  std::string config = WriteConfig(trial.experiment);
+  json["inputs"] = Json::array();
+  for (const fs::path& file : InputFilesOf(trial.experiment)) {
+    json["inputs"].push_back({{"file", file.filename().string()}, {"sha256", Sha256OfFile(file)}});
+    for (std::size_t at = config.find(file.string()); at != config.npos;
+         at = config.find(file.string(), at)) {
+      config.replace(at, file.string().size(), file.filename().string());
+    }
+  }
+  json["config"] = config;
+  json["version"] = SEMBLANCE_VERSION;
+  json["libraries"] = Json::object();
+  for (const auto& [name, version] : LibraryVersions()) {
+    json["libraries"][name] = version;
+  }
+}
+
+std::string TimingJson(const RunResult& result) {
+  Json json = Json::object();
+  for (const StepTime& time : result.times) {
+    json[time.step] = time.wall_s;
+  }
+  return json.dump(2) + "\n";
+}
+
+class StudyRunner {
+ public:
+  StudyRunner(const StudyPlan& plan, fs::path folder, const StudyRunOptions& options,
+              const RunContext& context)
+      : plan_(plan),
+        folder_(std::move(folder)),
+        options_(options),
+        context_(context),
+        cache_(3 * options.jobs + 6) {}
+
+  StudySummary Run() {
+    for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
+      if (static_cast<int>(n % options_.shards) == options_.shard) {
+        Queue(plan_.trials[n]);
+      }
+    }
+    std::vector<std::jthread> threads;
+    for (int job = 0; job < std::min<int>(options_.jobs, static_cast<int>(queue_.size())); ++job) {
+      threads.emplace_back([this] { Work(); });
+    }
+    threads.clear();  // joins
+    if (broken_) {
+      std::rethrow_exception(broken_);
+    }
+    context_.ThrowIfStopped();
+    return summary_;
+  }
+
+ private:
+  void Queue(const StudyTrial& trial) {
+    ++summary_.trials;
+    const auto status = StatusOf(folder_, trial.id);
+    if (status && (*status != "failed" || !options_.retry_failed)) {
+      ++summary_.skipped;
+    } else {
+      queue_.push_back(&trial);
+    }
+  }
+
+  void Work() {
+    while (!context_.stop_token.stop_requested() && !broken_flag_) {
+      const std::size_t n = next_++;
+      if (n >= queue_.size()) {
+        return;
+      }
+      try {
+        RunTrial(*queue_[n]);
+      } catch (const Cancelled&) {
+        return;
+      } catch (...) {  // the folder cannot be written: no trial can
+        const std::lock_guard lock(mutex_);
+        broken_ = std::current_exception();
+        broken_flag_ = true;
+      }
+    }
+  }
+
+  void RunTrial(const StudyTrial& trial) {
+    RunContext quiet;
+    quiet.stop_token = context_.stop_token;
+    Json json = TrialHead(plan_, trial);
+    std::optional<RunResult> result;
+    try {
+      result.emplace(semblance::Run(trial.experiment, quiet, &cache_));
+      json["status"] = result->usable() ? "done" : "unusable";
+      json["result"] = Json::parse(ResultJson(trial.experiment, *result));
+    } catch (const Error& error) {
+      json["status"] = "failed";
+      json["reason"] = error.what();
+    }
+    AppendProvenance(trial, json);
+    Write(trial, json, result, quiet);
+    Tell(trial, json);
+  }
+
+  void Write(const StudyTrial& trial, const Json& json, const std::optional<RunResult>& result,
+             const RunContext& quiet) {
+    OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
+    if (result && plan_.keep == StudyKeep::kRun) {
+      WriteRun(trial.experiment, *result, output, quiet);
+    } else if (result) {
+      output.Write("timing.json", TimingJson(*result));
+    }
+    output.Write("trial.json", json.dump(1) + "\n");  // last: it says that the trial is whole
+  }
+
+  void Tell(const StudyTrial& trial, const Json& json) {
+    const std::lock_guard lock(mutex_);
+    ++(json["status"] == "failed" ? summary_.failed : summary_.done);
+    const int finished = summary_.done + summary_.failed + summary_.skipped;
+    context_.Report(
+        "study",
+        fmt::format("trial {} of {}: {} {} {}", finished, summary_.trials, trial.subject,
+                    fmt::join(trial.values, " "), json["status"].get<std::string>()),
+        static_cast<double>(finished) / summary_.trials);
+  }
+
+  const StudyPlan& plan_;
+  fs::path folder_;
+  const StudyRunOptions& options_;
+  const RunContext& context_;
+  StageCache cache_;
+  std::vector<const StudyTrial*> queue_;
+  std::atomic<std::size_t> next_ = 0;
+  std::atomic<bool> broken_flag_ = false;
+  std::mutex mutex_;
+  std::exception_ptr broken_;
+  StudySummary summary_;
+};
+
+// The hash in a folder's plan.json; empty where there is none.
+std::string PlanHashOf(const fs::path& folder) {
+  const fs::path file = folder / "plan.json";
+  if (!fs::exists(file)) {
+    return "";
+  }
+  return Json::parse(ReadFileBytes(file), nullptr, false).value("hash", "");
+}
+
+}  // namespace
+
+std::string PlanJson(const StudyPlan& plan) {
+  Json json = {{"title", plan.title}, {"hash", plan.hash},       {"metric", plan.metric},
+               {"axes", plan.axes},   {"trials", Json::array()}, {"notes", plan.notes}};
+  for (const StudyTrial& trial : plan.trials) {
+    json["trials"].push_back(
+        {{"id", trial.id}, {"subject", trial.subject}, {"values", trial.values}});
+  }
+  return json.dump(1) + "\n";
+}
+
+StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
+                      const RunContext& context) {
+  OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
+  const std::string there = PlanHashOf(folder);
+  if (!there.empty() && there != plan.hash) {
+    throw IoError(fmt::format(
+        "{}: the folder holds another study (plan {}, this is {}); choose another --out",
+        folder.string(), there, plan.hash));
+  }
+  output.Write("plan.json", PlanJson(plan));
+  return StudyRunner(plan, folder, options, context).Run();
+}
+
+void GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
+  for (const fs::path& other : others) {
+    const std::string hash = PlanHashOf(other);
+    if (hash.empty() || (!PlanHashOf(folder).empty() && PlanHashOf(folder) != hash)) {
+      throw IoError(fmt::format("{}: no folder of this study (its plan.json is missing or another)",
+                                other.string()));
+    }
+    OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
+    output.Write("plan.json", ReadFileBytes(other / "plan.json"));
+    if (!fs::exists(other / "trials")) {
+      continue;
+    }
+    for (const auto& entry : fs::directory_iterator(other / "trials")) {
+      const std::string id = entry.path().filename().string();
+      if (StatusOf(other, id) && !StatusOf(folder, id)) {
+        fs::create_directories(folder / "trials");
+        fs::copy(entry.path(), TrialFolder(folder, id),
+                 fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+      }
+    }
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Runs the trials of a study. Each is one folder, written whole or not at all, so that a study that
+// was killed goes on where it was, and shards of it can run anywhere.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "problems/study_plan.h"
+#include "surfaces/run_context.h"
+
+namespace semblance {
+
+struct StudyRunOptions {
+  int jobs = 1;   // trials at a time, each on one thread
+  int shard = 0;  // of shards: trials n with n % shards == shard
+  int shards = 1;
+  bool retry_failed = false;  // run again what failed before
+};
+
+struct StudySummary {
+  int trials = 0;   // of this shard
+  int skipped = 0;  // were there already
+  int done = 0, failed = 0;
+};
+
+// In `folder`: plan.json (all trials), trials/<id>/trial.json (status, axes, metrics, resolved
+// experiment, versions; the same bytes whenever and wherever it ran) and timing.json; with
+// `keep: run` the files of a run beside them. A trial that cannot be done is a trial.json with the
+// reason. What trials have in common is made once. Throws IoError if the folder cannot be written
+// or holds another plan, Cancelled on request (after the trials at hand).
+StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
+                      const StudyRunOptions& options, const RunContext& context);
+
+// Copies finished trials from other folders of the same plan; those that are there already stay.
+// Throws IoError if a folder is of another plan.
+void GatherTrials(const std::filesystem::path& folder,
+                  const std::vector<std::filesystem::path>& others);
+
+// plan.json as text.
+std::string PlanJson(const StudyPlan& plan);
+
+}  // namespace semblance

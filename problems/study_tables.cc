@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "surfaces/error.h"
+#include "surfaces/whole_file.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// All numbers of an object by dotted path; lists are left out.
+void Flatten(const Json& json, const std::string& path, std::map<std::string, double>& out) {
+  if (json.is_number()) {
+    out[path] = json.get<double>();
+  } else if (json.is_object()) {
+    for (const auto& [key, value] : json.items()) {
+      Flatten(value, path.empty() ? key : fmt::format("{}.{}", path, key), out);
+    }
+  }
+}
+
+void ReadTrial(const fs::path& folder, TrialRow& row) {
+  const fs::path file = folder / "trials" / row.id / "trial.json";
+  row.status = "missing";
+  if (!fs::exists(file)) {
+    return;
+  }
+  const Json json = Json::parse(ReadFileBytes(file), nullptr, false);
+  if (!json.is_object() || json.value("id", "") != row.id) {
+    return;
+  }
+  row.status = json.value("status", "failed");
+  row.reason = json.value("reason", "");
+  if (json.contains("result")) {
+    Flatten(json["result"], "", row.metrics);
+  }
+}
+
+// A cell as RFC 4180 wants it.
+std::string Cell(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return quoted + "\"";
+}
+
+std::string Cells(const std::vector<std::string>& texts) {
+  std::string line;
+  for (const std::string& text : texts) {
+    line += Cell(text) + ",";
+  }
+  return line;
+}
+
+std::string Number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+
+}  // namespace
+
+int StudyResults::Count(const std::string& status) const {
+  return static_cast<int>(std::count_if(trials.begin(), trials.end(),
+                                        [&](const TrialRow& row) { return row.status == status; }));
+}
+
+StudyResults ReadStudyResults(const fs::path& folder) {
+  const fs::path file = folder / "plan.json";
+  StudyResults results;
+  try {
+    const Json plan = Json::parse(ReadFileBytes(file));
+    results.title = plan.at("title");
+    results.hash = plan.at("hash");
+    results.metric = plan.at("metric");
+    results.axes = plan.at("axes").get<std::vector<std::string>>();
+    results.notes = plan.at("notes").get<std::vector<std::string>>();
+    for (const Json& trial : plan.at("trials")) {
+      TrialRow row;
+      row.id = trial.at("id");
+      row.subject = trial.at("subject");
+      row.values = trial.at("values").get<std::vector<std::string>>();
+      ReadTrial(folder, row);
+      results.trials.push_back(std::move(row));
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw IoError(fmt::format("{}: not the plan of a study: {}", file.string(), error.what()));
+  }
+  return results;
+}
+
+std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric) {
+  std::vector<Treatment> treatments;
+  for (const TrialRow& row : results.trials) {
+    auto it = std::find_if(treatments.begin(), treatments.end(),
+                           [&](const Treatment& t) { return t.values == row.values; });
+    if (it == treatments.end()) {
+      it = treatments.insert(it, {row.values, {}});
+    }
+    const auto value = row.metrics.find(metric);
+    if (row.status == "done" && value != row.metrics.end()) {
+      it->by_subject[row.subject] = value->second;
+    }
+  }
+  return treatments;
+}
+
+std::string TrialsCsv(const StudyResults& results) {
+  std::string csv = "trial,subject," + Cells(results.axes) + "status,metric,value\n";
+  for (const TrialRow& row : results.trials) {
+    const std::string head =
+        fmt::format("{},{},{}{},", row.id, Cell(row.subject), Cells(row.values), row.status);
+    if (row.metrics.empty()) {
+      csv += fmt::format("{}{},\n", head, row.reason.empty() ? "" : Cell(row.reason));
+    }
+    for (const auto& [metric, value] : row.metrics) {
+      csv += fmt::format("{}{},{}\n", head, metric, value);
+    }
+  }
+  return csv;
+}
+
+std::string SummaryCsv(const StudyResults& results) {
+  std::set<std::string> metrics;
+  for (const TrialRow& row : results.trials) {
+    for (const auto& [metric, value] : row.metrics) {
+      metrics.insert(metric);
+    }
+  }
+  std::string csv =
+      Cells(results.axes) + "metric,n,mean,sd,median,min,max,mean_low_95,mean_high_95\n";
+  for (const std::string& metric : metrics) {
+    for (const Treatment& treatment : Treatments(results, metric)) {
+      std::vector<double> values;
+      for (const auto& [subject, value] : treatment.by_subject) {
+        values.push_back(value);
+      }
+      const SampleSummary s = Summarize(values);
+      csv += fmt::format("{}{},{},{},{},{},{},{},{},{}\n", Cells(treatment.values), metric, s.n,
+                         Number(s.mean), Number(s.sd), Number(s.median), Number(s.min),
+                         Number(s.max), Number(s.mean_95.low), Number(s.mean_95.high));
+    }
+  }
+  return csv;
+}
+
+}  // namespace semblance
