@@ -52,8 +52,8 @@ class StudyReader {
 
  private:
   void ReadHead() {
-    const std::vector<std::string> known = {"title", "base",   "subjects", "grid", "zip",
-                                            "list",  "sample", "metric",   "keep"};
+    const std::vector<std::string> known = {"title", "base", "set",    "subjects", "grid",
+                                            "zip",   "list", "sample", "metric",   "keep"};
     const FieldInfo info;
     RefuseUnknownKeys(errors_, {study_, "", info}, known);
     if (const ConfigNode* title = study_.Find("title")) {
@@ -91,10 +91,22 @@ class StudyReader {
     return LoadExperiment(*base, "base");
   }
 
+  // What the whole study sets, over the base and below the subjects.
+  ConfigNode WithSettings(ConfigNode tree, const ConfigNode& owner, const std::string& path) {
+    const ConfigNode* set = owner.Find("set");
+    const FieldInfo info;
+    if (set && RequireMap(errors_, {*set, JoinPath(path, "set"), info})) {
+      for (const ConfigNode::Entry& entry : set->entries) {
+        Set({entry.key, entry.key_place, entry.value}, tree, errors_);
+      }
+    }
+    return tree;
+  }
+
   std::vector<StudySubject> ReadSubjects(const ConfigNode& base) {
     const ConfigNode* list = study_.Find("subjects");
     if (!list) {
-      return {{"base", base}};
+      return {{"base", WithSettings(base, study_, "")}};
     }
     std::vector<StudySubject> subjects;
     const FieldInfo info{.name = "subjects", .min = 1};
@@ -130,12 +142,7 @@ class StudyReader {
     if (const ConfigNode* file = node.Find("base")) {
       subject.tree = MergeTrees(subject.tree, LoadExperiment(*file, JoinPath(path, "base")));
     }
-    if (const ConfigNode* set = node.Find("set");
-        set && RequireMap(errors_, {*set, JoinPath(path, "set"), info})) {
-      for (const ConfigNode::Entry& entry : set->entries) {
-        Set({entry.key, entry.key_place, entry.value}, subject.tree, errors_);
-      }
-    }
+    subject.tree = WithSettings(WithSettings(subject.tree, study_, ""), node, path);
     subjects.push_back(std::move(subject));
   }
 

@@ -4,6 +4,7 @@
 //
 //     title: ...
 //     base: ../phantom.yaml            # the experiment that the trials vary
+//     set: {implicit.resolution: 75}   # for all trials
 //     subjects:                        # each with what it changes; without it, the base's own
 //       - {name: a, set: {subject.random_seed: 1}}
 //       - {name: b, base: ../cranium.yaml, optional: true}   # skipped where its files are missing

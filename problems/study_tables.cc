@@ -115,12 +115,12 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
 }
 
 std::string TrialsCsv(const StudyResults& results) {
-  std::string csv = "trial,subject," + Cells(results.axes) + "status,metric,value\n";
+  std::string csv = "trial,subject," + Cells(results.axes) + "status,reason,metric,value\n";
   for (const TrialRow& row : results.trials) {
-    const std::string head =
-        fmt::format("{},{},{}{},", row.id, Cell(row.subject), Cells(row.values), row.status);
+    const std::string head = fmt::format("{},{},{}{},{},", row.id, Cell(row.subject),
+                                         Cells(row.values), row.status, Cell(row.reason));
     if (row.metrics.empty()) {
-      csv += fmt::format("{}{},\n", head, row.reason.empty() ? "" : Cell(row.reason));
+      csv += head + ",\n";
     }
     for (const auto& [metric, value] : row.metrics) {
       csv += fmt::format("{}{},{}\n", head, metric, value);

@@ -38,9 +38,9 @@ struct Treatment {
 };
 std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric);
 
-// trials.csv: trial, subject, the axes, status, metric, value; one line a number, in the order of
-// the plan. summary.csv: the axes, metric, n, mean, sd, median, min, max and the bootstrap's 95 %
-// interval of the mean over subjects.
+// trials.csv: trial, subject, the axes, status, reason, metric, value; one line a number, in the
+// order of the plan. summary.csv: the axes, metric, n, mean, sd, median, min, max and the
+// bootstrap's 95 % interval of the mean over subjects.
 std::string TrialsCsv(const StudyResults& results);
 std::string SummaryCsv(const StudyResults& results);
 

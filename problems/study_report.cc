@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/report.h"
+#include "problems/svg_plot.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kLeastSubjects = 6;  // two-sided, five subjects cannot reach p < 0.05
+
+std::string Number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.3f}", value) : "";
+}
+
+std::string IntervalText(const Interval& interval) {
+  return std::isfinite(interval.low) ? fmt::format("{:.3f} to {:.3f}", interval.low, interval.high)
+                                     : "";
+}
+
+std::string LabelOf(const Treatment& treatment) {
+  std::string label;
+  for (const std::string& value : treatment.values) {
+    label += label.empty() || value.empty() ? value : ", " + value;
+  }
+  return label.empty() ? "base" : label;
+}
+
+std::vector<double> ValuesOf(const Treatment& treatment) {
+  std::vector<double> values;
+  for (const auto& [subject, value] : treatment.by_subject) {
+    values.push_back(value);
+  }
+  return values;
+}
+
+// Best mean first; those without values last.
+std::vector<Treatment> Ranked(std::vector<Treatment> treatments) {
+  std::stable_sort(treatments.begin(), treatments.end(), [](const auto& a, const auto& b) {
+    const double x = Summarize(ValuesOf(a)).mean, y = Summarize(ValuesOf(b)).mean;
+    return std::isfinite(x) && (!std::isfinite(y) || x < y);
+  });
+  return treatments;
+}
+
+ReportTable RankingTable(const std::vector<Treatment>& ranked, const std::string& metric) {
+  ReportTable table{
+      fmt::format("Treatments by {}, best mean first", metric),
+      {"treatment", "subjects", "mean", "mean, 95 % interval", "sd", "median", "min", "max"},
+      {}};
+  for (const Treatment& treatment : ranked) {
+    const SampleSummary s = Summarize(ValuesOf(treatment));
+    table.rows.push_back({LabelOf(treatment), std::to_string(s.n), Number(s.mean),
+                          IntervalText(s.mean_95), Number(s.sd), Number(s.median), Number(s.min),
+                          Number(s.max)});
+  }
+  return table;
+}
+
+std::vector<double> Differences(const Treatment& treatment, const Treatment& best) {
+  std::vector<double> differences;
+  for (const auto& [subject, value] : treatment.by_subject) {
+    if (const auto other = best.by_subject.find(subject); other != best.by_subject.end()) {
+      differences.push_back(value - other->second);
+    }
+  }
+  return differences;
+}
+
+ReportTable PairsTable(const std::vector<Treatment>& ranked) {
+  ReportTable table{
+      fmt::format("Each treatment less the best ({}), paired by subject", LabelOf(ranked[0])),
+      {"treatment", "pairs", "mean difference", "95 % interval", "worse in", "Wilcoxon p",
+       "p, Holm"},
+      {}};
+  std::vector<double> p;
+  for (std::size_t n = 1; n < ranked.size(); ++n) {
+    const std::vector<double> d = Differences(ranked[n], ranked[0]);
+    const SampleSummary s = Summarize(d);
+    const WilcoxonResult w = Wilcoxon(d);
+    const bool enough = s.n >= kLeastSubjects && std::isfinite(w.p);
+    p.push_back(enough ? w.p : 1);
+    const auto worse = std::count_if(d.begin(), d.end(), [](double x) { return x > 0; });
+    table.rows.push_back({LabelOf(ranked[n]), std::to_string(s.n), Number(s.mean),
+                          IntervalText(s.mean_95), fmt::format("{} of {}", worse, s.n),
+                          enough ? fmt::format("{:.4f}{}", w.p, w.exact ? "" : " (normal)") : "",
+                          enough ? "?" : ""});
+  }
+  const std::vector<double> adjusted = Holm(p);
+  for (std::size_t n = 0; n < table.rows.size(); ++n) {
+    std::string& cell = table.rows[n].back();
+    cell = cell.empty() ? "" : fmt::format("{:.4f}", adjusted[n]);
+  }
+  return table;
+}
+
+// The subjects that all treatments have, as a table for Friedman's test.
+std::vector<std::vector<double>> CompleteTable(const std::vector<Treatment>& treatments) {
+  std::vector<std::vector<double>> rows;
+  for (const auto& [subject, value] : treatments[0].by_subject) {
+    std::vector<double> row;
+    for (const Treatment& treatment : treatments) {
+      if (const auto it = treatment.by_subject.find(subject); it != treatment.by_subject.end()) {
+        row.push_back(it->second);
+      }
+    }
+    if (row.size() == treatments.size()) {
+      rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+ReportSection RankSection(const std::vector<Treatment>& ranked) {
+  ReportSection section{.heading = "Do the treatments differ?"};
+  const auto rows = CompleteTable(ranked);
+  if (static_cast<int>(rows.size()) < kLeastSubjects || ranked.size() < 2) {
+    section.paragraphs = {fmt::format(
+        "{} subjects have a value for all {} treatments. That is too few for a test: at least {} "
+        "subjects and 2 treatments are needed. The differences above stand for themselves.",
+        rows.size(), ranked.size(), kLeastSubjects)};
+    return section;
+  }
+  const FriedmanResult f = Friedman(rows);
+  std::vector<RankedLabel> labels;
+  for (std::size_t n = 0; n < ranked.size(); ++n) {
+    labels.push_back({LabelOf(ranked[n]), f.mean_ranks[n]});
+  }
+  section.images = {
+      {RankPlotSvg(labels, f.critical_difference),
+       "Ranks within each subject, averaged. Treatments that a grey line joins cannot "
+       "be told apart at 5 % (Nemenyi).",
+       "mean ranks of the treatments with the critical difference"}};
+  section.paragraphs = {fmt::format(
+      "Over {} subjects and {} treatments: Friedman's chi-square is {:.3f}; in Iman and "
+      "Davenport's form F = {:.3f}, p = {:.2g}.",
+      f.subjects, f.treatments, f.chi2, f.f, f.p)};
+  return section;
+}
+
+ReportSection TrialsSection(const StudyResults& results) {
+  ReportSection section{.heading = "Trials"};
+  section.paragraphs = results.notes;
+  ReportTable table{fmt::format("Every trial, with {}", results.metric),
+                    {"trial", "subject", "treatment", "status", "value", "reason"},
+                    {}};
+  for (const TrialRow& row : results.trials) {
+    const auto value = row.metrics.find(results.metric);
+    table.rows.push_back({row.id, row.subject, LabelOf({row.values, {}}), row.status,
+                          value == row.metrics.end() ? "" : Number(value->second), row.reason});
+  }
+  section.tables = {table};
+  return section;
+}
+
+std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
+  std::vector<BoxRow> rows;
+  for (const Treatment& treatment : ranked) {
+    rows.push_back({LabelOf(treatment), ValuesOf(treatment)});
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::string StudyReportHtml(const StudyResults& results) {
+  const std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
+  Report report;
+  report.title = results.title;
+  report.subtitle = fmt::format(
+      "Study {} over {}", results.hash,
+      results.axes.empty() ? "subjects alone" : fmt::format("{}", fmt::join(results.axes, ", ")));
+  report.tiles = {{"trials done", std::to_string(results.Count("done")), "",
+                   fmt::format("of {}", results.trials.size())},
+                  {"failed", std::to_string(results.Count("failed")), "", ""},
+                  {"missing", std::to_string(results.Count("missing")), "", "not run yet"}};
+  if (ranked.empty() || ranked[0].by_subject.empty()) {
+    report.sections.push_back({.heading = "No value",
+                               .paragraphs = {fmt::format(
+                                   "No trial that is done has a value of '{}'.", results.metric)}});
+  } else {
+    report.tiles.push_back(
+        {"best mean", Number(Summarize(ValuesOf(ranked[0])).mean), "", LabelOf(ranked[0])});
+    report.main_images = {{BoxPlotSvg(Boxes(ranked), results.metric),
+                           "One dot a subject; box: quartiles and median.",
+                           "box plot of the metric, one row a treatment"}};
+    ReportSection treatments{.heading = "Treatments"};
+    treatments.tables = {RankingTable(ranked, results.metric)};
+    if (ranked.size() > 1) {
+      treatments.tables.push_back(PairsTable(ranked));
+      treatments.images = {{CumulativePlotSvg(Boxes(ranked), results.metric),
+                            "Share of subjects below each value.",
+                            "cumulative distribution of the metric, one line a treatment"}};
+    }
+    report.sections.push_back(treatments);
+    report.sections.push_back(RankSection(ranked));
+  }
+  report.sections.push_back(TrialsSection(results));
+  report.footer = "semblance " SEMBLANCE_VERSION;
+  return ReportHtml(report);
+}
+
+StudyResults WriteStudyTables(OutputFolder& folder) {
+  StudyResults results = ReadStudyResults(folder.Root());
+  folder.Write("trials.csv", TrialsCsv(results));
+  folder.Write("summary.csv", SummaryCsv(results));
+  folder.Write("report.html", StudyReportHtml(results));
+  return results;
+}
+
+}  // namespace semblance

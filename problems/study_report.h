@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a study found, as one page.
+#pragma once
+
+#include <string>
+
+#include "problems/files.h"
+#include "problems/study_tables.h"
+
+namespace semblance {
+
+// Writes trials.csv, summary.csv and report.html of what is in the folder so far; what is missing
+// is counted and said. Returns what was read. Throws IoError as ReadStudyResults.
+StudyResults WriteStudyTables(OutputFolder& folder);
+
+// Ranks the treatments by the study's metric, shows their spread, and compares each with the best
+// over the subjects that have both: effect first, p-values last, and none below 6 subjects.
+std::string StudyReportHtml(const StudyResults& results);
+
+}  // namespace semblance

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The plots of a study's report, as SVG files.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace semblance {
+
+// One row of a box plot: all its values, in any order.
+struct BoxRow {
+  std::string label;
+  std::vector<double> values;
+};
+
+// Boxes side by side over one axis: quartiles, median, whiskers to the last value within 1.5 times
+// the box (Tukey 1977), and every value as a dot. Rows without values show a dash.
+std::string BoxPlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
+
+// Mean ranks on a line, 1 (best) on the left, with the critical difference as a bar; treatments
+// that differ by less are joined (Demsar 2006).
+struct RankedLabel {
+  std::string label;
+  double mean_rank = 0;
+};
+std::string RankPlotSvg(std::vector<RankedLabel> treatments, double critical_difference);
+
+// The cumulative share of values below each, one line a row.
+std::string CumulativePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
+
+// A round step for about `count` ticks over [low, high]: 1, 2 or 5 times a power of ten.
+double TickStep(double low, double high, int count);
+
+}  // namespace semblance
