@@ -225,7 +225,6 @@ std::vector<std::vector<double>> UnitSamples(SampleMethod method, int n, int dim
   std::vector<std::vector<double>> points(n, std::vector<double>(dimensions));
   if (method == SampleMethod::kSobol) {
     boost::random::sobol engine(dimensions);
-    engine.discard(dimensions);  // the origin
     for (auto& point : points) {
       for (double& x : point) {
         x = static_cast<double>(engine() >> 11) * 0x1.0p-53;

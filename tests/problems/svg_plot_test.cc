@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/svg_plot.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <pugixml.hpp>
+
+namespace semblance {
+namespace {
+
+// Numbers of elements of a name; fails if the text is no XML.
+int Count(const std::string& svg, const char* name) {
+  pugi::xml_document document;
+  EXPECT_TRUE(document.load_string(svg.c_str()));
+  int count = 0;
+  for (const auto& node : document.child("svg").children(name)) {
+    count += node ? 1 : 0;
+  }
+  return count;
+}
+
+const std::vector<BoxRow> kRows = {
+    {"a <b> & \"c\"", {1, 2, 3, 4, 100}}, {"none", {}}, {"one", {5}}};
+
+TEST(BoxPlot, HasEachValueAndABoxARow) {
+  const std::string svg = BoxPlotSvg(kRows, "rms (mm)");
+  EXPECT_EQ(Count(svg, "circle"), 6);
+  EXPECT_EQ(Count(svg, "rect"), 2 + 1);  // the paper too
+}
+
+TEST(CumulativePlot, HasALineARow) {
+  EXPECT_EQ(Count(CumulativePlotSvg(kRows, "rms (mm)"), "polyline"), 3);
+}
+
+TEST(RankPlot, PutsTheBestFirst) {
+  const std::string svg = RankPlotSvg({{"worse", 1.8}, {"better", 1.2}}, 0.4);
+  EXPECT_EQ(Count(svg, "circle"), 2);
+  EXPECT_LT(svg.find("better"), svg.find("worse"));
+  EXPECT_EQ(
+      Count(RankPlotSvg({{"a", 1}, {"b", 2}}, std::numeric_limits<double>::quiet_NaN()), "circle"),
+      2);
+}
+
+TEST(TickStep, IsRound) {
+  EXPECT_DOUBLE_EQ(TickStep(0, 7, 7), 1);
+  EXPECT_DOUBLE_EQ(TickStep(0, 10, 7), 2);
+  EXPECT_DOUBLE_EQ(TickStep(0, 0.03, 7), 0.005);
+  EXPECT_DOUBLE_EQ(TickStep(0, 65, 7), 10);
+}
+
+TEST(Plots, AllValuesAlikeIsNoTrouble) {
+  EXPECT_EQ(Count(BoxPlotSvg({{"same", {2, 2, 2}}}, "x"), "circle"), 3);
+  EXPECT_EQ(BoxPlotSvg({{"same", {2, 2, 2}}}, "x").find("nan"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace semblance
