@@ -7,6 +7,7 @@
 
 #include "interp/barycentric.h"
 #include "interp/inverse_distance.h"
+#include "interp/kriging.h"
 #include "interp/mean.h"
 #include "interp/moving_least_squares.h"
 #include "interp/nearest.h"
@@ -14,8 +15,8 @@
 
 namespace semblance {
 
-using DepthScheme =
-    std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis, MovingLeastSquares>;
+using DepthScheme = std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis,
+                                 MovingLeastSquares, Kriging>;
 
 // One entry a vertex. Where the status is kAssigned the depth is finite and within the range of the
 // dowels' depths (without a scheme's `clamp`: above 0); elsewhere it is NaN, for an OutsideRule to
