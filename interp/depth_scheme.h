@@ -6,6 +6,8 @@
 #include <variant>
 
 #include "interp/barycentric.h"
+#include "interp/biharmonic.h"
+#include "interp/harmonic.h"
 #include "interp/inverse_distance.h"
 #include "interp/kriging.h"
 #include "interp/mean.h"
@@ -16,7 +18,7 @@
 namespace semblance {
 
 using DepthScheme = std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis,
-                                 MovingLeastSquares, Kriging>;
+                                 MovingLeastSquares, Kriging, Harmonic, Biharmonic>;
 
 // One entry a vertex. Where the status is kAssigned the depth is finite and within the range of the
 // dowels' depths (without a scheme's `clamp`: above 0); elsewhere it is NaN, for an OutsideRule to

@@ -112,7 +112,7 @@ std::optional<double> MissAtDowels_mm(const DepthScheme& scheme) {
   return std::visit(
       [](const auto& o) -> std::optional<double> {
         const std::string_view name = o.kName;
-        if (name == "mean" || name == "moving_least_squares") {
+        if (name == "mean" || name == "moving_least_squares" || name == "harmonic") {
           return std::nullopt;
         }
         return 1e-6;

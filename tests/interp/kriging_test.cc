@@ -25,8 +25,8 @@ KrigingModel ModelOf(const Kriging& options, DowelScene scene) {
   return FitKriging(options, scene.Input(), RunContext{});
 }
 
-// Depths of a random process with unit normals from sums of uniform numbers: a moving sum of noise
-// along x, whose covariance falls linearly to 0 at `length`.
+// Depths along x, sums of noise in a moving window: their covariance falls linearly to 0 at
+// `length`.
 DowelScene RoughScene(int count, double spacing_mm, double length_mm, std::uint64_t random_seed) {
   Random random(random_seed);
   const int window = static_cast<int>(length_mm / spacing_mm);
