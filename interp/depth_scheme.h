@@ -27,4 +27,7 @@ using DepthScheme = std::variant<Barycentric, Nearest, Mean, InverseDistance, Ra
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run);
 
+// Does the scheme work along the skull's surface, so that points alone do not do?
+bool NeedsSurface(const DepthScheme& scheme);
+
 }  // namespace semblance
