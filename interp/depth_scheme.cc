@@ -9,4 +9,8 @@ DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                     scheme);
 }
 
+bool NeedsSurface(const DepthScheme& scheme) {
+  return std::holds_alternative<Harmonic>(scheme) || std::holds_alternative<Biharmonic>(scheme);
+}
+
 }  // namespace semblance

@@ -6,18 +6,28 @@
 #include <variant>
 
 #include "interp/barycentric.h"
+#include "interp/biharmonic.h"
+#include "interp/harmonic.h"
+#include "interp/inverse_distance.h"
+#include "interp/kriging.h"
 #include "interp/mean.h"
+#include "interp/moving_least_squares.h"
 #include "interp/nearest.h"
+#include "interp/radial_basis.h"
 
 namespace semblance {
 
-using DepthScheme = std::variant<Barycentric, Nearest, Mean>;
+using DepthScheme = std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis,
+                                 MovingLeastSquares, Kriging, Harmonic, Biharmonic>;
 
 // One entry a vertex. Where the status is kAssigned the depth is finite and within the range of the
-// dowels' depths; elsewhere it is NaN, for an OutsideRule to fill. The result does not depend on
-// run.threads nor on the order of the dowels (beyond rounding). Throws InputError where the scheme
-// cannot use the input, Cancelled if stopped.
+// dowels' depths (without a scheme's `clamp`: above 0); elsewhere it is NaN, for an OutsideRule to
+// fill. The result does not depend on run.threads nor on the order of the dowels (beyond rounding).
+// Throws InputError where the scheme cannot use the input, Cancelled if stopped.
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run);
+
+// Does the scheme work along the skull's surface, so that points alone do not do?
+bool NeedsSurface(const DepthScheme& scheme);
 
 }  // namespace semblance

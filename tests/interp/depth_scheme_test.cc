@@ -6,7 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <numeric>
+#include <algorithm>
+#include <optional>
 
 #include "surfaces/error.h"
 #include "tests/testing/dowel_scenes.h"
@@ -18,7 +19,9 @@ using testing::Count;
 using testing::DomeScene;
 using testing::DowelScene;
 using testing::FlatScene;
+using testing::Moved;
 using testing::SameBytes;
+using testing::ScatteredScene;
 
 template <std::size_t... Index>
 std::vector<DepthScheme> EachOf(std::index_sequence<Index...>) {
@@ -87,6 +90,81 @@ TEST_P(EveryScheme, TheOrderOfTheDowelsDoesNotMatter) {
 TEST_P(EveryScheme, TheNumberOfThreadsDoesNotMatter) {
   const DowelScene scene = DomeScene();
   EXPECT_TRUE(SameBytes(FieldOf(scene, 1), FieldOf(scene, 2)));
+}
+
+TEST_P(EveryScheme, ARigidMotionDoesNotMatter) {
+  const DowelScene scene = DomeScene();
+  const Mat3 rotation =
+      Eigen::AngleAxisd(1.1, Vec3(0.4, -0.3, 0.85).normalized()).toRotationMatrix();
+  const DepthField a = FieldOf(scene);
+  const DepthField b =
+      FieldOf(Moved(scene, {.rotation = rotation, .translation = Vec3(300, -120, 45)}));
+  EXPECT_EQ(a.status, b.status);
+  for (std::size_t i = 0; i < a.status.size(); ++i) {
+    if (a.status[i] == DepthStatus::kAssigned) {
+      ASSERT_NEAR(a.depth_mm[i], b.depth_mm[i], 1e-6);
+    }
+  }
+}
+
+// How far a scheme may miss a dowel that stands on a vertex and has no sd; none where it smooths.
+std::optional<double> MissAtDowels_mm(const DepthScheme& scheme) {
+  return std::visit(
+      [](const auto& o) -> std::optional<double> {
+        const std::string_view name = o.kName;
+        if (name == "mean" || name == "moving_least_squares" || name == "harmonic") {
+          return std::nullopt;
+        }
+        return 1e-6;
+      },
+      scheme);
+}
+
+TEST_P(EveryScheme, HonoursTheDowelsUnlessItSmooths) {
+  DowelScene scene = DomeScene();
+  for (Dowel& dowel : scene.dowels) {
+    dowel.base = *std::ranges::min_element(scene.skull.points, {},
+                                           [&](const Vec3& p) { return (p - dowel.base).norm(); });
+    dowel.sd_mm = kNaN;
+  }
+  const std::optional<double> miss = MissAtDowels_mm(GetParam());
+  const DepthField field = FieldOf(scene);
+  for (const Dowel& dowel : scene.dowels) {
+    const auto at = std::ranges::find(scene.skull.points, dowel.base) - scene.skull.points.begin();
+    ASSERT_EQ(field.status[at], DepthStatus::kAssigned);
+    if (miss) {
+      EXPECT_NEAR(field.depth_mm[at], dowel.depth_mm, *miss) << dowel.site;
+    }
+  }
+}
+
+TEST_P(EveryScheme, WorksWithTwoHundredDowels) {
+  DowelScene scene = ScatteredScene(200);
+  for (int k = 0; k < 66; ++k) {
+    scene.network.areas.push_back({k, k + 67, k + 133});
+  }
+  const DepthField field = FieldOf(scene);
+  EXPECT_GT(Count(field, DepthStatus::kAssigned), 100);
+  for (std::size_t i = 0; i < field.status.size(); ++i) {
+    EXPECT_EQ(std::isfinite(field.depth_mm[i]), field.status[i] == DepthStatus::kAssigned);
+  }
+}
+
+TEST_P(EveryScheme, WorksOnAPartialSkull) {
+  DowelScene scene = DomeScene();
+  scene.dowels.erase(scene.dowels.begin());  // sg
+  scene.network.areas = {{2, 1, 3}};
+  std::vector<bool> keep;
+  for (const Triangle& t : scene.skull.triangles) {
+    keep.push_back(scene.skull.points[t[0]].x() > -10 && scene.skull.points[t[0]].z() < 50);
+  }
+  scene.skull = Submesh(scene.skull, keep);
+  scene.normals = VertexNormals(scene.skull);
+  const DepthField field = FieldOf(scene);
+  EXPECT_GT(Count(field, DepthStatus::kAssigned), 10);
+  for (std::size_t i = 0; i < field.status.size(); ++i) {
+    EXPECT_EQ(std::isfinite(field.depth_mm[i]), field.status[i] == DepthStatus::kAssigned);
+  }
 }
 
 TEST_P(EveryScheme, EqualDepthsGiveThatDepth) {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -59,6 +61,40 @@ inline DowelScene DomeScene() {
   add("n", 0, 10, 6, {0, 0, 0});
   add("me", 1, -50, 11, {0.05, 0, 0.1});
   scene.network.areas = {{0, 2, 3}, {0, 3, 1}, {3, 2, 4}, {3, 4, 1}};
+  return scene;
+}
+
+// `count` dowels at vertices of the front half of a sphere of 90 mm, in no network.
+inline DowelScene ScatteredScene(int count) {
+  DowelScene scene;
+  scene.skull = SphereMesh({0, 0, 0}, 90, 40);
+  scene.normals = VertexNormals(scene.skull);
+  std::vector<std::size_t> front;
+  for (std::size_t i = 0; i < scene.skull.points.size(); ++i) {
+    if (scene.skull.points[i].y() < -5) {
+      front.push_back(i);
+    }
+  }
+  Random random(7);
+  for (int k = 0; k < count; ++k) {
+    const std::size_t vertex = front[front.size() * k / count];
+    const Vec3& base = scene.skull.points[vertex];
+    const double depth = 10 + base.z() / 20 + std::sin(base.x() / 20) + random.Uniform(-0.5, 0.5);
+    scene.dowels.push_back({std::to_string(100000 + k), base, base / 90, depth, kNaN});
+  }
+  return scene;
+}
+
+// All of the scene moved by a rotation and a translation.
+inline DowelScene Moved(DowelScene scene, const Similarity& to_from) {
+  scene.skull = Transformed(scene.skull, to_from);
+  for (Vec3& normal : scene.normals) {
+    normal = to_from.rotation * normal;
+  }
+  for (Dowel& dowel : scene.dowels) {
+    dowel.base = to_from * dowel.base;
+    dowel.direction = to_from.rotation * dowel.direction;
+  }
   return scene;
 }
 

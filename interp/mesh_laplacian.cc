@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/mesh_laplacian.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <span>
+
+namespace semblance {
+namespace {
+
+constexpr double kMostCotangent = 100;
+constexpr double kLeastEdge = 1e-4;  // of an edge's two half cotangents
+constexpr double kLeastArea = 1e-2;  // of the mean
+constexpr std::size_t kLeaf = 64;    // unknowns not worth a further cut
+
+// Of the corner `at`.
+double Cotangent(const Vec3& at, const Vec3& b, const Vec3& c) {
+  const Vec3 to_b = b - at, to_c = c - at;
+  const double sine = to_b.cross(to_c).norm(), cosine = to_b.dot(to_c);
+  if (std::abs(cosine) >= kMostCotangent * sine) {
+    return cosine < 0 ? -kMostCotangent : kMostCotangent;
+  }
+  return cosine / sine;
+}
+
+using Entries = std::vector<Eigen::Triplet<double>>;
+
+// Half cotangents between vertices, those of an edge's triangles summed.
+Eigen::SparseMatrix<double> EdgeWeights(const TriMesh& mesh) {
+  Entries entries;
+  entries.reserve(6 * mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const int at = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
+      if (at == b || b == c || c == at) {
+        continue;
+      }
+      const double half = Cotangent(mesh.points[at], mesh.points[b], mesh.points[c]) / 2;
+      entries.emplace_back(b, c, half);
+      entries.emplace_back(c, b, half);
+    }
+  }
+  const auto n = static_cast<Eigen::Index>(mesh.points.size());
+  Eigen::SparseMatrix<double> weights(n, n);
+  weights.setFromTriplets(entries.begin(), entries.end());
+  return weights;
+}
+
+Eigen::VectorXd VertexAreas(const TriMesh& mesh) {
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(mesh.points.size()));
+  for (const Triangle& t : mesh.triangles) {
+    const double third = TriangleAreaVector(mesh, t).norm() / 3;
+    for (const int v : t) {
+      areas[v] += third;
+    }
+  }
+  const double mean = areas.size() > 0 ? areas.mean() : 0;
+  return areas.cwiseMax(mean > 0 ? kLeastArea * mean : 1);
+}
+
+class Dissection {
+ public:
+  Dissection(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& pattern)
+      : points_(points), pattern_(pattern), side_(points.size(), 0) {
+    order_.resize(points.size());
+    std::iota(order_.begin(), order_.end(), 0);
+    Cut(order_);
+  }
+  std::vector<int> Take() { return std::move(order_); }
+
+ private:
+  // Orders `part`: one half, the other half, and last what separates them.
+  void Cut(std::span<int> part) {
+    if (part.size() <= kLeaf) {
+      return;
+    }
+    const std::size_t half = part.size() / 2;
+    const int axis = LongestAxis(part);
+    std::ranges::nth_element(part, part.begin() + static_cast<std::ptrdiff_t>(half), {},
+                             [&](int i) { return std::pair(points_[i][axis], i); });
+    const int left = ++mark_, right = ++mark_;
+    for (std::size_t k = 0; k < part.size(); ++k) {
+      side_[part[k]] = k < half ? left : right;
+    }
+    const auto separator =
+        std::stable_partition(part.begin() + static_cast<std::ptrdiff_t>(half), part.end(),
+                              [&](int i) { return !Touches(i, left); });
+    const auto rest = static_cast<std::size_t>(separator - part.begin());
+    Cut(part.first(half));
+    Cut(part.subspan(half, rest - half));
+  }
+
+  int LongestAxis(std::span<const int> part) const {
+    Box3 box;
+    for (const int i : part) {
+      box.extend(points_[i]);
+    }
+    int axis = 0;
+    box.sizes().maxCoeff(&axis);
+    return axis;
+  }
+
+  bool Touches(int i, int side) const {
+    for (Eigen::SparseMatrix<double>::InnerIterator it(pattern_, i); it; ++it) {
+      if (side_[it.row()] == side) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const std::vector<Vec3>& points_;
+  const Eigen::SparseMatrix<double>& pattern_;
+  std::vector<int> side_;  // the last half that each unknown was in
+  int mark_ = 0;
+  std::vector<int> order_;
+};
+
+}  // namespace
+
+MeshLaplacian BuildLaplacian(const TriMesh& mesh) {
+  MeshLaplacian laplacian;
+  Eigen::SparseMatrix<double>& matrix = laplacian.stiffness;
+  matrix = EdgeWeights(mesh);
+  Entries diagonal;
+  for (int column = 0; column < matrix.outerSize(); ++column) {
+    double sum = 0;
+    for (Eigen::SparseMatrix<double>::InnerIterator it(matrix, column); it; ++it) {
+      it.valueRef() = -std::max(it.value(), kLeastEdge);
+      sum -= it.value();
+    }
+    diagonal.emplace_back(column, column, sum);
+  }
+  Eigen::SparseMatrix<double> sums(matrix.rows(), matrix.cols());
+  sums.setFromTriplets(diagonal.begin(), diagonal.end());
+  matrix += sums;
+  laplacian.area_mm2 = VertexAreas(mesh);
+  return laplacian;
+}
+
+std::vector<int> Pieces(const Eigen::SparseMatrix<double>& stiffness) {
+  std::vector<int> piece(static_cast<std::size_t>(stiffness.cols()), -1);
+  int count = 0;
+  std::vector<int> open;
+  for (int first = 0; first < stiffness.cols(); ++first) {
+    if (piece[first] >= 0) {
+      continue;
+    }
+    piece[first] = count;
+    open.push_back(first);
+    while (!open.empty()) {
+      const int at = open.back();
+      open.pop_back();
+      for (Eigen::SparseMatrix<double>::InnerIterator it(stiffness, at); it; ++it) {
+        if (piece[it.row()] < 0) {
+          piece[it.row()] = count;
+          open.push_back(static_cast<int>(it.row()));
+        }
+      }
+    }
+    ++count;
+  }
+  return piece;
+}
+
+MeshSolver::MeshSolver(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& matrix) {
+  const std::vector<int> order = Dissection(points, matrix).Take();
+  order_.resize(matrix.rows());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    order_.indices()[order[k]] = static_cast<int>(k);
+  }
+  Eigen::SparseMatrix<double> ordered(matrix.rows(), matrix.cols());
+  ordered = matrix.twistedBy(order_);
+  factor_.compute(ordered);
+}
+
+Eigen::VectorXd MeshSolver::Solve(const Eigen::VectorXd& right) const {
+  const Eigen::VectorXd ordered = order_ * right;
+  return order_.inverse() * Eigen::VectorXd(factor_.solve(ordered));
+}
+
+}  // namespace semblance
