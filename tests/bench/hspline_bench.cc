@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Batch evaluation of H-splines against OpenCASCADE's B-spline of the same dense net and a plain de
+// Boor, one thread, in one run; and the memory that the patches need against that of the dense net.
+#include <fmt/format.h>
+
+#include <Geom_BSplineSurface.hxx>
+#include <TColStd_Array1OfInteger.hxx>
+#include <TColStd_Array1OfReal.hxx>
+#include <TColgp_Array2OfPnt.hxx>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <gp_Pnt.hxx>
+#include <gp_Vec.hxx>
+
+#include "surfaces/hspline_batch.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kCount = 1'000'000;
+constexpr int kRepeats = 5;  // the fastest counts
+
+// Million calls a second.
+template <class Body>
+double Rate(const Body& body) {
+  double best = 0;
+  for (int r = 0; r < kRepeats; ++r) {
+    const auto start = std::chrono::steady_clock::now();
+    body();
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    best = std::max(best, kCount / taken.count() / 1e6);
+  }
+  return best;
+}
+
+// A face-like surface: 8 x 8 patches, four more levels, 3000 edits within a quarter of the domain.
+HSplineSurface FaceLike() {
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 4};
+  HSplineSurface surface = testing::SmoothSurface(shape, 1);
+  testing::Random random(2);
+  for (int level = 1; level <= 4; ++level) {
+    std::map<VertexId, std::optional<Vec3>> offsets;
+    for (int e = 0; e < 750; ++e) {
+      offsets[{level, static_cast<int>(random.Uniform(0.25, 0.75) * shape.Columns(level)),
+               static_cast<int>(random.Uniform(0.25, 0.75) * shape.Rows(level))}] =
+          random.InBox(-0.2, 0.2);
+    }
+    surface.SetOffsets(offsets);
+  }
+  return surface;
+}
+
+Handle(Geom_BSplineSurface) OcctOf(const HSplineSurface& surface) {
+  const int level = surface.shape().max_level;
+  const ControlNet& net = surface.Net(level);
+  TColgp_Array2OfPnt poles(1, net.columns, 1, net.rows);
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      const Vec3& p = net.At(i, j);
+      poles.SetValue(i + 1, j + 1, gp_Pnt(p.x(), p.y(), p.z()));
+    }
+  }
+  const auto knots = [](int patches) {
+    TColStd_Array1OfReal values(1, patches + 7);
+    for (int k = 0; k < patches + 7; ++k) {
+      values.SetValue(k + 1, (k - 3.0) / patches);
+    }
+    return values;
+  };
+  const auto ones = [](int patches) { return TColStd_Array1OfInteger(1, patches + 7); };
+  const int m = surface.shape().PatchesU(level), n = surface.shape().PatchesV(level);
+  TColStd_Array1OfInteger mu = ones(m), mv = ones(n);
+  mu.Init(1);
+  mv.Init(1);
+  return new Geom_BSplineSurface(poles, knots(m), knots(n), mu, mv, 3, 3);
+}
+
+// De Boor's triangle along both directions of one patch of the net, with uniform knots.
+Vec3 DeBoorPoint(const ControlNet& net, int m, int n, const Vec2& uv) {
+  const double x = uv.x() * m, y = uv.y() * n;
+  const int i = std::min(static_cast<int>(x), m - 1), j = std::min(static_cast<int>(y), n - 1);
+  const auto triangle = [](std::array<Vec3, 4> d, double t) {
+    for (int r = 1; r <= 3; ++r) {
+      for (int k = 3; k >= r; --k) {
+        const double alpha = (t + 3 - k) / (4 - r);
+        d[k] = (1 - alpha) * d[k - 1] + alpha * d[k];
+      }
+    }
+    return d[3];
+  };
+  std::array<Vec3, 4> rows;
+  for (int b = 0; b < 4; ++b) {
+    rows[b] = triangle(
+        {net.At(i, j + b), net.At(i + 1, j + b), net.At(i + 2, j + b), net.At(i + 3, j + b)},
+        x - i);
+  }
+  return triangle(rows, y - j);
+}
+
+void Print(const char* name, double ours, double peer, double goal, const char* unit,
+           bool less_is_better = false) {
+  const double ratio = less_is_better ? peer / ours : ours / peer;
+  fmt::print(
+      "{{\"name\": \"{}\", \"ours\": {:.4g}, \"peer\": {:.4g}, \"ratio\": {:.3g}, \"goal\": {:g}, "
+      "\"met\": {}, \"unit\": \"{}\", \"command\": \"build/tests/bench/hspline_bench\"}}\n",
+      name, ours, peer, ratio, goal, ratio >= goal, unit);
+}
+
+double Largest(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double largest = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    largest = std::max(largest, (a[k] - b[k]).norm());
+  }
+  return largest;
+}
+
+int Main() {
+  const HSplineSurface surface = FaceLike();
+  const int level = surface.shape().max_level, m = surface.shape().PatchesU(level),
+            n = surface.shape().PatchesV(level);
+  testing::Random random(3);
+  std::vector<Vec2> uv;
+  for (int k = 0; k < kCount; ++k) {
+    uv.emplace_back(random.Uniform(0, 1), random.Uniform(0, 1));
+  }
+  const HSplineBatch batch(surface);
+  const Handle(Geom_BSplineSurface) occt = OcctOf(surface);
+  SurfaceSamples ours;
+  std::vector<Vec3> points(kCount), normals(kCount), plain(kCount);
+  const double batch_normals = Rate([&] { ours = batch.PointsAndNormals(uv); });
+  const double batch_points = Rate([&] { ours.points = batch.Points(uv); });
+  const double occt_normals = Rate([&] {
+    for (int k = 0; k < kCount; ++k) {
+      gp_Pnt p;
+      gp_Vec du, dv;
+      occt->D1(uv[k].x(), uv[k].y(), p, du, dv);
+      points[k] = Vec3(p.X(), p.Y(), p.Z());
+      normals[k] = Vec3(du.X(), du.Y(), du.Z()).cross(Vec3(dv.X(), dv.Y(), dv.Z())).normalized();
+    }
+  });
+  const double plain_points = Rate([&] {
+    for (int k = 0; k < kCount; ++k) {
+      plain[k] = DeBoorPoint(surface.Net(level), m, n, uv[k]);
+    }
+  });
+  constexpr double kSame = 1e-10;  // the peers must have been asked the same
+  if (Largest(ours.points, points) > kSame || Largest(ours.normals, normals) > kSame ||
+      Largest(ours.points, plain) > kSame) {
+    fmt::print(stderr, "hspline_bench: the values differ by {} mm and {} (normals), {} mm\n",
+               Largest(ours.points, points), Largest(ours.normals, normals),
+               Largest(ours.points, plain));
+    return 1;
+  }
+  Print("hspline.point_normal_vs_occt", batch_normals, occt_normals, 5, "million a second");
+  Print("hspline.point_vs_deboor", batch_points, plain_points, 1, "million a second");
+  // One vertex edited on level 7: our patches against the vertices of the dense net.
+  HSplineSurface sparse =
+      testing::SmoothSurface({.patches_u = 8, .patches_v = 8, .max_level = 7}, 1);
+  sparse.SetOffset({7, 512, 512}, Vec3(0, 0, 1));
+  const ControlNet& dense = sparse.Net(7);
+  Print("hspline.memory_vs_dense", HSplineBatch(sparse).Bytes() / 1e6,
+        dense.vertices.size() * sizeof(Vec3) / 1e6, 10, "MB", true);
+  return 0;
+}
+
+}  // namespace
+}  // namespace semblance
+
+int main() { return semblance::Main(); }
