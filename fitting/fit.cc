@@ -65,11 +65,10 @@ PatchGrid GridOf(const HSplineShape& shape, int level) {
 
 // The detail that finer levels add at uv is taken off the point that the level aims at.
 Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
-  Observation o{.stencil = StencilAt(surface.shape(), level, point.uv),
-                .position = point.position,
-                .weight = point.weight};
-  if (aim == FitAim::kSurface) {
-    o.position -= surface.Point(point.uv) - o.stencil.Apply(surface.Net(level));
+  Observation o{.uv = point.uv, .position = point.position, .weight = point.weight};
+  if (aim == FitAim::kSurface && level < surface.shape().max_level) {
+    const Vec3 coarse = surface.StencilAt(level, point.uv).Apply(surface.Net(level));
+    o.position -= surface.Point(point.uv) - coarse;
   }
   return o;
 }
@@ -81,6 +80,7 @@ LevelView ViewOf(int level, const HSplineSurface& surface, const HSplineSurface&
                  .rest = rest.Net(level),
                  .lengths_mm = MeanLengths(GridOf(rest.shape(), 0), rest.Net(0)),
                  .observations = {}};
+  view.observations.reserve(target.points.size());
   for (const FitPoint& point : target.points) {
     view.observations.push_back(Observe(point, surface, level, aim));
   }
