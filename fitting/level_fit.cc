@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -11,6 +10,7 @@
 
 #include "fitting/level_solver.h"
 #include "fitting/normal_equations.h"
+#include "fitting/sparse_factor.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
 
@@ -19,10 +19,6 @@ namespace {
 
 double WeightOf(const Term& term) {
   return std::visit([](const auto& t) { return t.weight; }, term);
-}
-
-double CostOf(const Term& term, const LevelView& view, const ControlNet& net) {
-  return std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
 }
 
 bool NeedsExtent(const Term& term) {
@@ -63,11 +59,10 @@ SparseMatrix Scaled(const SparseMatrix& lower) {
 // being zero. A pivot just above the threshold leaves shift / threshold in the next one, so the
 // threshold is above the root of the shift.
 int NumericalRank(const SparseMatrix& lower, std::size_t observations) {
-  Eigen::SimplicialLDLT<SparseMatrix> factor;
-  factor.setShift(1e-13);
-  factor.compute(Scaled(lower));
-  const auto pivots = (factor.vectorD().array() > 1e-6).count();
-  return static_cast<int>(std::min<Eigen::Index>(pivots, observations));
+  constexpr double kIndependent = 1e-6;
+  const Eigen::VectorXd pivots = Pivots(Scaled(lower), 1e-13, kIndependent);
+  return static_cast<int>(
+      std::min<Eigen::Index>((pivots.array() > kIndependent).count(), observations));
 }
 
 double MaxMove(const ControlNet& a, const ControlNet& b) {
@@ -78,20 +73,29 @@ double MaxMove(const ControlNet& a, const ControlNet& b) {
   return largest;
 }
 
+// Without a loss the misfit is that of the root mean square, which is known.
+double CostOf(const Term& term, const LevelView& view, const ControlNet& net, double rms_mm) {
+  const auto* const points = std::get_if<PointTerm>(&term);
+  if (points != nullptr && IsSeparable(*points) && !view.observations.empty()) {
+    return points->weight * rms_mm * rms_mm;
+  }
+  return std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
+}
+
 void Measure(const LevelView& view, std::span<const Term> terms, LevelSolution& solution) {
   LevelSummary& summary = solution.summary;
+  summary.rms_before_mm = ObservationRms(view, view.start);
+  summary.rms_after_mm = ObservationRms(view, solution.net);
   for (const Term& term : terms) {
     summary.terms.push_back({.term = std::string(TermName(term)),
-                             .before = CostOf(term, view, view.start),
-                             .after = CostOf(term, view, solution.net)});
+                             .before = CostOf(term, view, view.start, summary.rms_before_mm),
+                             .after = CostOf(term, view, solution.net, summary.rms_after_mm)});
   }
   NormalMatrix normal(view.grid);
   AddRows(PointTerm{}, view, normal);
   const SparseMatrix lower = normal.Lower();
   summary.uncovered_vertices = static_cast<int>((lower.diagonal().array() <= 0).count());
   summary.rank = NumericalRank(lower, view.observations.size());
-  summary.rms_before_mm = ObservationRms(view, view.start);
-  summary.rms_after_mm = ObservationRms(view, solution.net);
   summary.max_move_mm = MaxMove(view.start, solution.net);
 }
 

@@ -2,14 +2,14 @@
 #include "fitting/level_solver.h"
 
 #include <ceres/solver.h>
-#include <dlfcn.h>
 
-#include <Eigen/CholmodSupport>
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 
+#include "fitting/blas_threads.h"
 #include "fitting/normal_equations.h"
+#include "fitting/sparse_factor.h"
 #include "fitting/term_cost.h"
 
 namespace semblance {
@@ -55,21 +55,6 @@ ceres::Solver::Options SolverOptions(double stiffness) {
   return options;
 }
 
-// OpenBLAS, where the sparse Cholesky uses it, sums in an order that depends on its number of
-// threads, and so on the machine. One thread gives the same bytes everywhere (and small blocks gain
-// nothing from more); looked up at run time, for other BLAS libraries have no such function.
-void UseOneBlasThread() {
-  static const bool done = [] {
-    using SetThreads = void (*)(int);
-    void* const symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
-    if (symbol != nullptr) {
-      reinterpret_cast<SetThreads>(symbol)(1);
-    }
-    return true;
-  }();
-  static_cast<void>(done);
-}
-
 std::string Lowercase(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -112,13 +97,11 @@ Eigen::MatrixX3d ResidualOf(const LevelView& view, std::span<const Term> terms,
 
 void Descend(const LevelView& view, std::span<const Term> terms, const SparseMatrix& normal,
              ControlNet& net, SolverOutcome& outcome) {
-  Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::Lower> factor;
-  factor.setShift(1 / Radius(TypicalStiffness(terms, net.vertices.size())));
-  factor.compute(normal);
-  outcome.usable = factor.info() == Eigen::Success;
+  const SparseFactor factor(normal, 1 / Radius(TypicalStiffness(terms, net.vertices.size())));
+  outcome.usable = factor.usable();
   outcome.termination = "no_convergence";
   while (outcome.usable && outcome.iterations < kMaxIterations) {
-    const Eigen::MatrixX3d step = factor.solve(ResidualOf(view, terms, net));
+    const Eigen::MatrixX3d step = factor.Solve(ResidualOf(view, terms, net));
     outcome.usable = step.allFinite();
     ++outcome.iterations;
     if (outcome.usable && Step(step, net) <= kStepTolerance) {
@@ -167,7 +150,6 @@ SolverOutcome SolveDirectly(const LevelView& view, std::span<const Term> terms, 
   if (outcome.free_vertices == 0) {
     return outcome;
   }
-  UseOneBlasThread();
   const ControlNet before = net;
   Descend(view, terms, normal, net, outcome);
   if (!outcome.usable) {
