@@ -65,11 +65,10 @@ PatchGrid GridOf(const HSplineShape& shape, int level) {
 
 // The detail that finer levels add at uv is taken off the point that the level aims at.
 Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
-  Observation o{.stencil = StencilAt(surface.shape(), level, point.uv),
-                .position = point.position,
-                .weight = point.weight};
-  if (aim == FitAim::kSurface) {
-    o.position -= surface.Point(point.uv) - o.stencil.Apply(surface.Net(level));
+  Observation o{.uv = point.uv, .position = point.position, .weight = point.weight};
+  if (aim == FitAim::kSurface && level < surface.shape().max_level) {
+    const Vec3 coarse = surface.StencilAt(level, point.uv).Apply(surface.Net(level));
+    o.position -= surface.Point(point.uv) - coarse;
   }
   return o;
 }
@@ -81,6 +80,7 @@ LevelView ViewOf(int level, const HSplineSurface& surface, const HSplineSurface&
                  .rest = rest.Net(level),
                  .lengths_mm = MeanLengths(GridOf(rest.shape(), 0), rest.Net(0)),
                  .observations = {}};
+  view.observations.reserve(target.points.size());
   for (const FitPoint& point : target.points) {
     view.observations.push_back(Observe(point, surface, level, aim));
   }
@@ -114,6 +114,7 @@ double WeightedRms(std::vector<std::array<double, 2>> weight_and_distance) {
 
 double PointRms(const HSplineSurface& surface, const FitTarget& target) {
   std::vector<std::array<double, 2>> all;
+  all.reserve(target.points.size());
   for (const FitPoint& p : target.points) {
     all.push_back({p.weight, (surface.Point(p.uv) - p.position).norm()});
   }
@@ -121,8 +122,7 @@ double PointRms(const HSplineSurface& surface, const FitTarget& target) {
 }
 
 LevelSummary FitStep(const LevelFit& step, const HSplineSurface& rest, const FitTarget& target,
-                     const FitOptions& options, HSplineSurface& surface) {
-  const double rms_before_mm = PointRms(surface, target);
+                     const FitOptions& options, double rms_before_mm, HSplineSurface& surface) {
   LevelSolution solution =
       FitLevel(ViewOf(step.level, surface, rest, target, options.aim), options.terms);
   LevelSummary summary = std::move(solution.summary);
@@ -145,36 +145,113 @@ int RestoreFeatures(const HSplineSurface& rest, std::span<const VertexId> featur
 }
 
 void MeasurePoints(const FitTarget& target, FitResult& result) {
-  FitTarget dowels;
+  std::vector<std::array<double, 2>> all, dowels;
+  all.reserve(target.points.size());
   for (const FitPoint& p : target.points) {
+    result.uv.push_back(p.uv);
     result.residual_mm.push_back((result.surface.Point(p.uv) - p.position).norm());
-    if (!IsSeeded(p)) {
-      dowels.points.push_back(p);
+    all.push_back({p.weight, result.residual_mm.back()});
+    if (IsSeeded(p)) {
+      continue;
     }
+    dowels.push_back(all.back());
   }
-  result.point_rms_mm = PointRms(result.surface, target);
-  result.dowel_rms_mm = PointRms(result.surface, dowels);
+  const bool seeded = dowels.size() < all.size();
+  result.point_rms_mm = WeightedRms(std::move(all));
+  result.dowel_rms_mm = seeded ? WeightedRms(std::move(dowels)) : result.point_rms_mm;
   result.usable = std::all_of(result.levels.begin(), result.levels.end(),
                               [](const LevelSummary& s) { return s.usable; });
 }
 
+// Takes the steps of a schedule, with the relaxation after each.
+class Fitter {
+ public:
+  Fitter(const HSplineSurface& rest, const FitTarget& target, const FitOptions& options,
+         FitResult& result)
+      : rest_(rest),
+        given_(target),
+        options_(options),
+        result_(result),
+        rms_mm_(PointRms(result.surface, target)) {
+    if (options.relaxation.mode != RelaxationMode::kNone) {
+      moved_ = target;
+      std::vector<Vec2> uv;
+      for (const FitPoint& p : target.points) {
+        uv.push_back(p.uv);
+      }
+      mesh_.emplace(rest, uv);
+    }
+  }
+
+  void Take(const LevelFit& step) {
+    result_.levels.push_back(Solve(step));
+    if (!mesh_) {
+      return;
+    }
+    const RelaxationOptions& options = options_.relaxation;
+    if (options.mode == RelaxationMode::kFootpoint) {
+      result_.relaxations.push_back(Move(options.rounds));
+      return;
+    }
+    for (int round = 0; round < options.rounds; ++round) {
+      const RelaxationSummary moved = Move(1);
+      round == 0 ? result_.relaxations.push_back(moved) : Join(moved, result_.relaxations.back());
+      const double rms_before_mm = result_.levels.back().rms_before_mm;
+      result_.levels.back() = Solve(step);
+      result_.levels.back().rms_before_mm = rms_before_mm;
+    }
+  }
+
+  const FitTarget& target() const { return mesh_ ? moved_ : given_; }
+
+ private:
+  LevelSummary Solve(const LevelFit& step) {
+    LevelSummary summary = FitStep(step, rest_, target(), options_, rms_mm_, result_.surface);
+    rms_mm_ = summary.rms_after_mm;
+    return summary;
+  }
+
+  RelaxationSummary Move(int rounds) {
+    const RelaxationSummary summary =
+        Relax(result_.surface, rest_, *mesh_, options_.relaxation, rounds, moved_);
+    rms_mm_ = PointRms(result_.surface, moved_);
+    return summary;
+  }
+
+  static void Join(const RelaxationSummary& next, RelaxationSummary& all) {
+    all.after = next.after;
+    all.max_move_mm = std::max(all.max_move_mm, next.max_move_mm);
+    all.flips_prevented += next.flips_prevented;
+    all.steps_shortened += next.steps_shortened;
+  }
+
+  const HSplineSurface& rest_;
+  const FitTarget& given_;
+  const FitOptions& options_;
+  FitResult& result_;
+  double rms_mm_;
+  FitTarget moved_;  // the points as relaxation has left them; unused without
+  std::optional<DowelMesh> mesh_;
+};
+
 }  // namespace
 
-FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
+FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& given,
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context) {
-  CheckInput(start, rest, target, features, options);
+  CheckInput(start, rest, given, features, options);
   FitResult result{.surface = start};
+  Fitter fitter(rest, given, options, result);
   for (const LevelFit& step : options.schedule) {
     context.ThrowIfStopped();
     context.Report(
         "fit", fmt::format("level {}, fraction {}", step.level, step.fraction),
         static_cast<double>(result.levels.size()) / static_cast<double>(options.schedule.size()));
-    result.levels.push_back(FitStep(step, rest, target, options, result.surface));
+    fitter.Take(step);
   }
   const bool restore = options.features == FeatureRule::kRestore;
   result.restored_features = restore ? RestoreFeatures(rest, features, result.surface) : 0;
-  MeasurePoints(target, result);
+  MeasurePoints(fitter.target(), result);
   return result;
 }
 

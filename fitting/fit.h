@@ -10,6 +10,7 @@
 #include "fitting/fit_schedule.h"
 #include "fitting/fit_target.h"
 #include "fitting/level_fit.h"
+#include "fitting/relaxation.h"
 #include "fitting/term.h"
 #include "surfaces/hspline_surface.h"
 #include "surfaces/run_context.h"
@@ -29,6 +30,7 @@ struct FitOptions {
   std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};
   FeatureRule features = FeatureRule::kRestore;
   FitAim aim = FitAim::kSurface;
+  RelaxationOptions relaxation = {};
 };
 template <class Visitor>
 void Fields(Visitor& visit, FitOptions& o) {
@@ -47,22 +49,28 @@ void Fields(Visitor& visit, FitOptions& o) {
                          "finer levels as it stands, meets the points; level: so that the level "
                          "alone does, as the thesis may be read, which lets detail overshoot"},
         o.aim);
+  visit(FieldInfo{.name = "relaxation",
+                  .doc = "whether and how the points' (u,v) move over the surface after each step"},
+        o.relaxation);
 }
 
 struct FitResult {
   HSplineSurface surface;
-  std::vector<LevelSummary> levels = {};  // one a step of the schedule
-  std::vector<double> residual_mm = {};   // one a point of the target, in its order: distance of
-                                          // the final surface at its (u,v)
-  double point_rms_mm = kNaN;             // of all points, weighted, after features were restored
-  double dowel_rms_mm = kNaN;  // of the points that were not seeded (seeding.h), weighted
-  int restored_features = -1;  // offsets that were given back
-  bool usable = false;         // every step's solution could be used
+  std::vector<LevelSummary> levels = {};            // one a step of the schedule
+  std::vector<RelaxationSummary> relaxations = {};  // one a step, or none without relaxation
+  std::vector<Vec2> uv = {};             // one a point of the target: where relaxation has left it
+  std::vector<double> residual_mm = {};  // one a point of the target, in its order: distance of
+                                         // the final surface at its (u,v)
+  double point_rms_mm = kNaN;            // of all points, weighted, after features were restored
+  double dowel_rms_mm = kNaN;            // of the points that were not seeded (seeding.h), weighted
+  int restored_features = -1;            // offsets that were given back
+  bool usable = false;                   // every step's solution could be used
 };
 
 // Fits the levels of the schedule in turn: Net(level) is solved for as a plain B-spline (FitLevel)
 // and each vertex goes c + fraction (c' - c) of the way. Exactly the offsets of scheduled levels
-// change (and the vertices of level 0, if scheduled); finer detail rides along.
+// change (and the vertices of level 0, if scheduled); finer detail rides along. After each step the
+// points' (u,v) may move (relaxation.h).
 //   start: the placed template, or a surface that is already partly fitted.
 //   rest: the placed template, from which displacement is measured and whose offsets features get
 //     back; same shape as start. The first overload takes start for it. With it a caller can fit

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/level_fit.h"
 
-#include <ceres/solver.h>
-#include <dlfcn.h>
 #include <fmt/format.h>
 
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 #include <utility>
 
+#include "fitting/level_solver.h"
+#include "fitting/normal_equations.h"
+#include "fitting/sparse_factor.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
 
@@ -19,10 +19,6 @@ namespace {
 
 double WeightOf(const Term& term) {
   return std::visit([](const auto& t) { return t.weight; }, term);
-}
-
-double CostOf(const Term& term, const LevelView& view, const ControlNet& net) {
-  return std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
 }
 
 bool NeedsExtent(const Term& term) {
@@ -48,139 +44,25 @@ void CheckView(const LevelView& view, std::span<const Term> terms) {
   }
 }
 
-// Sums depend on their order: a canonical one makes the result independent of the caller's.
-void SortObservations(std::vector<Observation>& observations) {
-  const auto key = [](const Observation& o) {
-    return std::tuple(o.stencil.index, o.stencil.weight, o.position.x(), o.position.y(),
-                      o.position.z(), o.weight);
-  };
-  std::sort(observations.begin(), observations.end(),
-            [&](const Observation& a, const Observation& b) { return key(a) < key(b); });
+// Patches are named by their first vertex.
+int PatchOf(const PatchGrid& grid, const Vec2& uv) { return grid.StencilAt(uv).index[0]; }
+
+// The whole normal matrix with its columns scaled to 1 on the diagonal, which leaves the rank.
+SparseMatrix Scaled(const SparseMatrix& lower) {
+  const Eigen::VectorXd d = lower.diagonal();
+  const Eigen::VectorXd scale =
+      (d.array() > 0).select(d.array().max(1e-300).rsqrt(), Eigen::ArrayXd::Zero(d.size()));
+  return scale.asDiagonal() * lower * scale.asDiagonal();
 }
 
-void AddTerms(const LevelView& view, std::span<const Term> terms, ControlNet& net,
-              ceres::Problem& problem) {
-  for (const Term& term : terms) {
-    if (WeightOf(term) > 0) {
-      std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
-    }
-  }
-}
-
-// What the eigenvalues of the normal equations are measured by: residuals are means over points or
-// vertices, so a vertex that is well held has about weight / vertices on the diagonal.
-double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
-  double sum = 0;
-  for (const Term& term : terms) {
-    sum += WeightOf(term);
-  }
-  return sum / static_cast<double>(vertices);
-}
-
-// Ceres damps by D / radius with D clamped to [min, max]; both at 1 give the identity, and a fixed
-// radius the proximal-point iteration x <- argmin cost(y) + |y - x|^2 / radius, which goes to the
-// least-squares solution nearest to the start. Damping by the diagonal, Ceres' default, would
-// instead move the least-held vertices most. Determined directions converge in two or three steps.
-ceres::Solver::Options SolverOptions(double stiffness) {
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
-  options.num_threads = 1;
-  options.logging_type = ceres::SILENT;
-  options.jacobi_scaling = false;
-  options.min_lm_diagonal = options.max_lm_diagonal = 1;
-  options.initial_trust_region_radius = std::min(1e8 / stiffness, 1e16);
-  options.max_trust_region_radius = options.initial_trust_region_radius;
-  options.max_num_iterations = 50;
-  options.function_tolerance = 1e-15;
-  options.gradient_tolerance = 0;  // blind to weakly determined directions
-  options.parameter_tolerance = 1e-13;
-  return options;
-}
-
-// OpenBLAS, where the sparse Cholesky uses it, sums in an order that depends on its number of
-// threads, and so on the machine. One thread gives the same bytes everywhere (and small blocks gain
-// nothing from more); looked up at run time, for other BLAS libraries have no such function.
-void UseOneBlasThread() {
-  static const bool done = [] {
-    using SetThreads = void (*)(int);
-    void* const symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
-    if (symbol != nullptr) {
-      reinterpret_cast<SetThreads>(symbol)(1);
-    }
-    return true;
-  }();
-  static_cast<void>(done);
-}
-
-std::string Lowercase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-void Solve(const LevelView& view, std::span<const Term> terms, LevelSolution& solution) {
-  ceres::Problem problem;
-  AddTerms(view, terms, solution.net, problem);
-  solution.summary.free_vertices = problem.NumParameterBlocks();
-  if (problem.NumParameterBlocks() == 0) {
-    solution.summary.iterations = 0;
-    solution.summary.termination = "nothing to solve";
-    solution.summary.usable = true;
-    return;
-  }
-  UseOneBlasThread();
-  ceres::Solver::Summary summary;
-  ceres::Solve(SolverOptions(TypicalStiffness(terms, solution.net.vertices.size())), &problem,
-               &summary);
-  solution.summary.iterations = static_cast<int>(summary.iterations.size()) - 1;
-  solution.summary.termination =
-      Lowercase(ceres::TerminationTypeToString(summary.termination_type));
-  solution.summary.usable = summary.IsSolutionUsable();
-  if (!summary.IsSolutionUsable()) {
-    solution.net = view.start;
-  }
-}
-
-using SparseMatrix = Eigen::SparseMatrix<double>;
-
-SparseMatrix ObservationMatrix(const LevelView& view) {
-  std::vector<Eigen::Triplet<double>> entries;
-  for (std::size_t i = 0; i < view.observations.size(); ++i) {
-    const Stencil& s = view.observations[i].stencil;
-    for (int k = 0; k < 16; ++k) {
-      entries.emplace_back(static_cast<int>(i), s.index[k], s.weight[k]);
-    }
-  }
-  SparseMatrix matrix(static_cast<int>(view.observations.size()),
-                      static_cast<int>(view.start.vertices.size()));
-  matrix.setFromTriplets(entries.begin(), entries.end());
-  return matrix.pruned(1, 0);
-}
-
-int UncoveredVertices(const SparseMatrix& matrix) {
-  int uncovered = 0;
-  for (int column = 0; column < matrix.cols(); ++column) {
-    uncovered += SparseMatrix::InnerIterator(matrix, column) ? 0 : 1;
-  }
-  return uncovered;
-}
-
-// Pivots of the normal equations of the matrix with its columns scaled to 1 (which leaves the rank)
-// that stand out of a shift, which keeps the others from being zero. A pivot just above the
-// threshold leaves shift / threshold in the next one, so the threshold is above the root of the
-// shift.
-int NumericalRank(SparseMatrix matrix) {
-  for (int column = 0; column < matrix.cols(); ++column) {
-    const double norm = matrix.col(column).norm();
-    matrix.col(column) *= norm > 0 ? 1 / norm : 0;
-  }
-  const SparseMatrix normal = matrix.transpose() * matrix;
-  Eigen::SimplicialLDLT<SparseMatrix> factor;
-  factor.setShift(1e-13);
-  factor.compute(normal);
-  const auto pivots = static_cast<int>((factor.vectorD().array() > 1e-6).count());
-  return std::min(pivots, static_cast<int>(matrix.rows()));
+// Pivots of the scaled normal equations that stand out of a shift, which keeps the others from
+// being zero. A pivot just above the threshold leaves shift / threshold in the next one, so the
+// threshold is above the root of the shift.
+int NumericalRank(const SparseMatrix& lower, std::size_t observations) {
+  constexpr double kIndependent = 1e-6;
+  const Eigen::VectorXd pivots = Pivots(Scaled(lower), 1e-13, kIndependent);
+  return static_cast<int>(
+      std::min<Eigen::Index>((pivots.array() > kIndependent).count(), observations));
 }
 
 double MaxMove(const ControlNet& a, const ControlNet& b) {
@@ -191,36 +73,75 @@ double MaxMove(const ControlNet& a, const ControlNet& b) {
   return largest;
 }
 
+// Without a loss the misfit is that of the root mean square, which is known.
+double CostOf(const Term& term, const LevelView& view, const ControlNet& net, double rms_mm) {
+  const auto* const points = std::get_if<PointTerm>(&term);
+  if (points != nullptr && IsSeparable(*points) && !view.observations.empty()) {
+    return points->weight * rms_mm * rms_mm;
+  }
+  return std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
+}
+
 void Measure(const LevelView& view, std::span<const Term> terms, LevelSolution& solution) {
   LevelSummary& summary = solution.summary;
-  for (const Term& term : terms) {
-    summary.terms.push_back({.term = std::string(TermName(term)),
-                             .before = CostOf(term, view, view.start),
-                             .after = CostOf(term, view, solution.net)});
-  }
-  const SparseMatrix matrix = ObservationMatrix(view);
-  summary.uncovered_vertices = UncoveredVertices(matrix);
-  summary.rank = NumericalRank(matrix);
   summary.rms_before_mm = ObservationRms(view, view.start);
   summary.rms_after_mm = ObservationRms(view, solution.net);
+  for (const Term& term : terms) {
+    summary.terms.push_back({.term = std::string(TermName(term)),
+                             .before = CostOf(term, view, view.start, summary.rms_before_mm),
+                             .after = CostOf(term, view, solution.net, summary.rms_after_mm)});
+  }
+  NormalMatrix normal(view.grid);
+  AddRows(PointTerm{}, view, normal);
+  const SparseMatrix lower = normal.Lower();
+  summary.uncovered_vertices = static_cast<int>((lower.diagonal().array() <= 0).count());
+  summary.rank = NumericalRank(lower, view.observations.size());
   summary.max_move_mm = MaxMove(view.start, solution.net);
 }
 
 }  // namespace
 
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms) {
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms, LevelSolver solver) {
   CheckView(view, terms);
-  SortObservations(view.observations);
+  SortObservations(view.grid, view.observations);
   LevelSolution solution{.net = view.start, .summary = {}};
-  Solve(view, terms, solution);
+  const bool direct = solver == LevelSolver::kFastest && AllSeparable(terms);
+  const SolverOutcome outcome =
+      direct ? SolveDirectly(view, terms, solution.net) : SolveByCeres(view, terms, solution.net);
+  solution.summary.iterations = outcome.iterations;
+  solution.summary.free_vertices = outcome.free_vertices;
+  solution.summary.termination = outcome.termination;
+  solution.summary.usable = outcome.usable;
   Measure(view, terms, solution);
   return solution;
+}
+
+void SortObservations(const PatchGrid& grid, std::vector<Observation>& observations) {
+  std::vector<std::pair<int, int>> order;  // patch, observation
+  order.reserve(observations.size());
+  for (const Observation& o : observations) {
+    order.emplace_back(PatchOf(grid, o.uv), static_cast<int>(order.size()));
+  }
+  const auto key = [&](const std::pair<int, int>& entry) {
+    const Observation& o = observations[entry.second];
+    return std::tuple(entry.first, o.uv.x(), o.uv.y(), o.position.x(), o.position.y(),
+                      o.position.z(), o.weight);
+  };
+  std::sort(order.begin(), order.end(), [&](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first < b.first : key(a) < key(b);
+  });
+  std::vector<Observation> sorted;
+  sorted.reserve(observations.size());
+  for (const auto& [patch, index] : order) {
+    sorted.push_back(observations[index]);
+  }
+  observations = std::move(sorted);
 }
 
 double ObservationRms(const LevelView& view, const ControlNet& net) {
   double sum = 0, weights = 0;
   for (const Observation& o : view.observations) {
-    sum += o.weight * (o.stencil.Apply(net) - o.position).squaredNorm();
+    sum += o.weight * (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm();
     weights += o.weight;
   }
   return weights > 0 ? std::sqrt(sum / weights) : kNaN;

@@ -12,9 +12,9 @@
 
 namespace semblance {
 
-// One point that the level should meet: stencil applied to the net is to be `position`.
+// One point that the level should meet: its plain B-spline at uv is to be `position`.
 struct Observation {
-  Stencil stencil;
+  Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
   Vec3 position = Vec3::Constant(kNaN);  // mm
   double weight = 1;                     // > 0, relative to the other points
 };
@@ -41,7 +41,7 @@ struct LevelSummary {
   std::vector<TermCosts> terms;  // in the order of the terms
   double rms_before_mm = kNaN;   // of the observations, weighted
   double rms_after_mm = kNaN;    // at the solution; Fit gives that of the surface it wrote back
-  int iterations = -1;           // of Ceres
+  int iterations = -1;           // of the solver
   int free_vertices = -1;        // that some term touches; all others stay
   int uncovered_vertices = -1;   // that no observation touches
   int rank = -1;  // estimated numerical rank of the observations' matrix; vertices - rank
@@ -56,13 +56,23 @@ struct LevelSolution {
   LevelSummary summary;
 };
 
-// Minimises the sum of the terms over the level's control vertices, 3 doubles a parameter block, by
-// Ceres (sparse Cholesky, one thread). Where the terms leave vertices undetermined, the solution
-// nearest to view.start is taken (thesis 4.2 has no word on it; the steps are damped by a multiple
-// of the identity, a proximal-point iteration, which converges to it). Observations are used in a
+enum class LevelSolver {
+  kFastest,  // a direct factorisation where the terms allow it, else Ceres
+  kCeres     // always; the checked reference
+};
+
+// Minimises the sum of the terms over the level's control vertices. Terms that are linear and treat
+// x, y and z alike share one sparse Cholesky factor; any others are solved by Ceres, 3 doubles a
+// parameter block, one thread. Where the terms leave vertices undetermined, the solution nearest to
+// view.start is taken (thesis 4.2 has no word on it; the steps are damped by a multiple of the
+// identity, a proximal-point iteration, which converges to it). Observations are used in a
 // canonical order, so their order has no effect. Throws InputError if nothing can be solved: sizes
 // that disagree, or a template without extent for a term that needs it.
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms);
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
+                       LevelSolver solver = LevelSolver::kFastest);
+
+// The canonical order, patch by patch.
+void SortObservations(const PatchGrid& grid, std::vector<Observation>& observations);
 
 // Weighted root mean square distance of the observations from the net, mm; NaN without any.
 double ObservationRms(const LevelView& view, const ControlNet& net);

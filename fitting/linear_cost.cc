@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "fitting/row_reduction.h"
+
 namespace semblance {
 namespace {
 
@@ -60,7 +62,7 @@ bool LinearCost::Evaluate(double const* const* parameters, double* residuals,
   return true;
 }
 
-void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, LinearCost::Rows3 b,
+void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                        std::span<const int> vertices, std::unique_ptr<ceres::LossFunction> loss,
                        ControlNet& net, ceres::Problem& problem) {
   const std::vector<int> used = UsedVertices(*a, vertices);
@@ -74,6 +76,16 @@ void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, LinearCost::Row
   if (!blocks.empty()) {
     problem.AddResidualBlock(new LinearCost(std::move(a), std::move(b)), loss.release(), blocks);
   }
+}
+
+void ProblemSink::Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
+                      std::span<const int> vertices) {
+  if (reduce_ && a->rows() > a->cols()) {
+    LinearRows rows = ReducedRows(*a, b);
+    a = std::make_shared<const Eigen::MatrixXd>(std::move(rows.a));
+    b = std::move(rows.b);
+  }
+  AddLinearResidual(std::move(a), std::move(b), vertices, nullptr, net_, problem_);
 }
 
 }  // namespace semblance

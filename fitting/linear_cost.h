@@ -10,6 +10,7 @@
 #include <memory>
 #include <span>
 
+#include "fitting/row_sink.h"
 #include "surfaces/control_net.h"
 
 namespace semblance {
@@ -19,8 +20,6 @@ namespace semblance {
 // rows x 3. The Jacobian is the Kronecker product of A and the 3 x 3 identity.
 class LinearCost final : public ceres::CostFunction {
  public:
-  using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
-
   LinearCost(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b);
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
@@ -33,8 +32,23 @@ class LinearCost final : public ceres::CostFunction {
 // Adds a LinearCost over the vertices of `net` that `vertices` names, one a column of `a`. A vertex
 // named twice gets the sum of its columns; one whose columns are zero is left out.
 // `loss` may be empty.
-void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, LinearCost::Rows3 b,
+void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                        std::span<const int> vertices, std::unique_ptr<ceres::LossFunction> loss,
                        ControlNet& net, ceres::Problem& problem);
+
+// Rows become residuals over the vertices of `net`, a parameter block of 3 doubles each. Blocks
+// with more rows than columns are reduced first (row_reduction.h), unless told not to.
+class ProblemSink final : public RowSink {
+ public:
+  ProblemSink(ControlNet& net, ceres::Problem& problem, bool reduce = true)
+      : net_(net), problem_(problem), reduce_(reduce) {}
+  void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
+           std::span<const int> vertices) override;
+
+ private:
+  ControlNet& net_;
+  ceres::Problem& problem_;
+  bool reduce_;
+};
 
 }  // namespace semblance

@@ -65,6 +65,14 @@ std::array<int, 16> PatchGrid::PatchVertices(int i, int j) const {
   return vertices;
 }
 
+Stencil PatchGrid::StencilAt(const Vec2& uv, DerivativeOrder order) const {
+  const HSplineShape shape{.patches_u = patches_u,
+                           .patches_v = patches_v,
+                           .max_level = 0,
+                           .closure = periodic_u ? Closure::kPeriodicU : Closure::kOpen};
+  return semblance::StencilAt(shape, 0, uv, order);
+}
+
 PatchForm ThinPlateForm(double size_s, double size_t) {
   return DerivativeForm(2, 0, size_s, size_t) + 2 * DerivativeForm(1, 1, size_s, size_t) +
          DerivativeForm(0, 2, size_s, size_t);

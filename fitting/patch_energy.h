@@ -6,6 +6,7 @@
 #include <array>
 
 #include "surfaces/control_net.h"
+#include "surfaces/hspline_surface.h"
 
 namespace semblance {
 
@@ -20,6 +21,8 @@ struct PatchGrid {
   // The sixteen vertices of patch (i, j), the one at column a, row b of its 4 x 4 at a + 4 b. With
   // periodic u a column stands at several a if patches_u < 4.
   std::array<int, 16> PatchVertices(int i, int j) const;
+  // semblance::StencilAt on this net; its vertices are PatchVertices of the patch at uv.
+  Stencil StencilAt(const Vec2& uv, DerivativeOrder order = {}) const;
 };
 
 // x^T form x is the energy of one patch for one coordinate x (16) of its vertices.

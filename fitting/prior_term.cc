@@ -3,7 +3,6 @@
 #include <cmath>
 #include <memory>
 
-#include "fitting/linear_cost.h"
 #include "fitting/term_cost.h"
 
 namespace semblance {
@@ -15,14 +14,13 @@ const ControlNet& Anchor(const PriorTerm& term, const LevelView& view) {
 
 }  // namespace
 
-void AddResiduals(const PriorTerm& term, const LevelView& view, ControlNet& net,
-                  ceres::Problem& problem) {
+void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink) {
   const ControlNet& anchor = Anchor(term, view);
-  const double factor = std::sqrt(term.weight / static_cast<double>(net.vertices.size()));
+  const double factor = std::sqrt(term.weight / static_cast<double>(anchor.vertices.size()));
   const auto a = std::make_shared<const Eigen::MatrixXd>(Eigen::MatrixXd::Constant(1, 1, factor));
-  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+  for (std::size_t k = 0; k < anchor.vertices.size(); ++k) {
     const std::array<int, 1> vertex = {static_cast<int>(k)};
-    AddLinearResidual(a, factor * anchor.vertices[k].transpose(), vertex, nullptr, net, problem);
+    sink.Add(a, factor * anchor.vertices[k].transpose(), vertex);
   }
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 
-#include "fitting/linear_cost.h"
 #include "fitting/term_cost.h"
 
 namespace semblance {
@@ -38,7 +37,7 @@ ControlNet Origin(SmoothnessOf of, const LevelView& view) {
 }
 
 void AddForm(const PatchForm& form, const ControlNet& origin, const PatchGrid& grid,
-             ControlNet& net, ceres::Problem& problem) {
+             RowSink& sink) {
   const auto root = std::make_shared<const Eigen::MatrixXd>(FormRoot(form));
   for (int j = 0; j < grid.patches_v; ++j) {
     for (int i = 0; i < grid.patches_u; ++i) {
@@ -47,7 +46,7 @@ void AddForm(const PatchForm& form, const ControlNet& origin, const PatchGrid& g
       for (int k = 0; k < 16; ++k) {
         x0.row(k) = origin.vertices[vertices[k]];
       }
-      AddLinearResidual(root, *root * x0, vertices, nullptr, net, problem);
+      sink.Add(root, *root * x0, vertices);
     }
   }
 }
@@ -63,14 +62,12 @@ double Energy(const PatchForm& form, const ControlNet& origin, const PatchGrid& 
 
 }  // namespace
 
-void AddResiduals(const SmoothnessTerm& term, const LevelView& view, ControlNet& net,
-                  ceres::Problem& problem) {
-  AddForm(ScaledForm(term, view), Origin(term.of, view), view.grid, net, problem);
+void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink) {
+  AddForm(ScaledForm(term, view), Origin(term.of, view), view.grid, sink);
 }
 
-void AddResiduals(const MembraneTerm& term, const LevelView& view, ControlNet& net,
-                  ceres::Problem& problem) {
-  AddForm(ScaledForm(term, view), Origin(term.of, view), view.grid, net, problem);
+void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink) {
+  AddForm(ScaledForm(term, view), Origin(term.of, view), view.grid, sink);
 }
 
 double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net) {

@@ -104,8 +104,8 @@ void Fields(Visitor& visit, SmoothnessTerm& o) {
 }
 
 // Membrane: weight * length_mm^2 * mean over the surface of |f_s|^2 + |f_t|^2, integrated exactly;
-// f, s and t as for SmoothnessTerm. Resists stretching; only translations are free of cost: where there is
-// no point, the surface moves along with its neighbourhood.
+// f, s and t as for SmoothnessTerm. Resists stretching; only translations are free of cost: where
+// there is no point, the surface moves along with its neighbourhood.
 struct MembraneTerm {
   static constexpr std::string_view kName = "membrane";
   double weight = 0.1;

@@ -1,26 +1,41 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each term twice: as residuals for Ceres, and as the plain sum that its documentation states.
+// Each term twice: as rows or residuals to minimise, and as the plain sum that its documentation
+// states.
 #pragma once
 
 #include <ceres/problem.h>
 
-#include <vector>
-
 #include "fitting/level_fit.h"
+#include "fitting/linear_cost.h"
+#include "fitting/row_sink.h"
 #include "fitting/term.h"
 
 namespace semblance {
 
+// Whether the term is |A X - B|^2 with the same A for x, y and z; then AddRows gives its rows.
+inline bool IsSeparable(const PointTerm& term) { return term.loss == RobustLoss::kNone; }
+template <class T>
+bool IsSeparable(const T&) {
+  return true;
+}
+
+// The rows of a separable term; their sum of squares equals TermCost.
+void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
+
 // Adds the residuals of a term over `net`, whose vertices become parameter blocks of 3 doubles. The
-// sum of their squares (robust: of their losses), which is twice Ceres' cost, equals TermCost.
+// sum of their squares (robust: of their losses), which is twice Ceres' cost, equals TermCost but
+// for a constant: the points of a patch are reduced to at most 16 rows (row_reduction.h), without
+// what no net can change. Points are reduced best in the order of SortObservations.
 void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem);
-void AddResiduals(const PriorTerm& term, const LevelView& view, ControlNet& net,
-                  ceres::Problem& problem);
-void AddResiduals(const SmoothnessTerm& term, const LevelView& view, ControlNet& net,
-                  ceres::Problem& problem);
-void AddResiduals(const MembraneTerm& term, const LevelView& view, ControlNet& net,
-                  ceres::Problem& problem);
+template <class T>
+void AddResiduals(const T& term, const LevelView& view, ControlNet& net, ceres::Problem& problem) {
+  ProblemSink sink(net, problem);
+  AddRows(term, view, sink);
+}
 
 // The cost of a term as term.h states it, mm^2.
 double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net);

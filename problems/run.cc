@@ -64,7 +64,7 @@ TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh&
 
 // Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
 // both (see seeding.h for why).
-FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, const FitTarget& dowels,
+FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTarget dowels,
                 const TriMesh& implicit, const RunContext& context) {
   const std::vector<VertexId> features = FeatureVertices(placed);
   const std::vector<Sphere> masks = TemplateMasks(placed);
@@ -83,6 +83,9 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, const 
     target.points.insert(target.points.end(), seeding.points.begin(), seeding.points.end());
     FitResult fit = Fit(surface, placed.surface, target, features, experiment.fit, context);
     surface = fit.surface;
+    for (std::size_t k = 0; k < dowels.points.size(); ++k) {
+      dowels.points[k].uv = fit.uv[k];  // where relaxation has left them
+    }
     result.emplace(std::move(seeding), std::move(target), std::move(fit));
   }
   return std::move(*result);

@@ -82,6 +82,21 @@ Json LevelJson(const LevelSummary& level) {
   return json;
 }
 
+Json RelaxationJson(const RelaxationSummary& step) {
+  const auto penalties = [](const RelaxationPenalties& p) -> Json {
+    return {{"distance", p.distance},
+            {"bunching", p.bunching},
+            {"distortion", p.distortion},
+            {"crease", p.crease},
+            {"standard", p.standard}};
+  };
+  return {{"before", penalties(step.before)},
+          {"after", penalties(step.after)},
+          {"max_move_mm", step.max_move_mm},
+          {"flips_prevented", step.flips_prevented},
+          {"steps_shortened", step.steps_shortened}};
+}
+
 Json FitJson(const RunResult& result) {
   Json json = {{"dowel_rms_mm", result.fit.dowel_rms_mm},
                {"point_rms_mm", result.fit.point_rms_mm},
@@ -96,6 +111,9 @@ Json FitJson(const RunResult& result) {
                {"levels", Json::array()}};
   for (const LevelSummary& level : result.fit.levels) {
     json["levels"].push_back(LevelJson(level));
+  }
+  for (const RelaxationSummary& step : result.fit.relaxations) {
+    json["relaxations"].push_back(RelaxationJson(step));
   }
   return json;
 }

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <utility>
 
+#include "fitting/row_reduction.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
 #include "tests/testing/level_views.h"
@@ -43,8 +44,8 @@ TEST(LevelFit, ReproducesASurfaceOfTheSpace) {
   const ControlNet truth = Sheet(6, 5, 3, 4);
   std::vector<Observation> lattice;
   for (int k = 0; k < 31 * 31; ++k) {
-    const Stencil s = PlainStencil(6, 5, Vec2(k % 31, k / 31) / 30);
-    lattice.push_back({.stencil = s, .position = s.Apply(truth), .weight = 1});
+    const Vec2 uv = Vec2(k % 31, k / 31) / 30;
+    lattice.push_back({.uv = uv, .position = PlainStencil(6, 5, uv).Apply(truth)});
   }
   const LevelView view = View(Sheet(6, 5, 0, 0), lattice);
   const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
@@ -76,7 +77,7 @@ void AddPoints(const LevelView& view, DenseSystem& dense) {
     sum += o.weight;
   }
   for (const Observation& o : view.observations) {
-    dense.Add(o.stencil, std::sqrt(o.weight / sum), o.position,
+    dense.Add(view.grid.StencilAt(o.uv), std::sqrt(o.weight / sum), o.position,
               static_cast<int>(view.start.vertices.size()));
   }
 }
@@ -178,6 +179,15 @@ double SurfaceDistance(const ControlNet& a, const ControlNet& b) {
   return largest;
 }
 
+double ObservationDistance(const LevelView& view, const ControlNet& a, const ControlNet& b) {
+  double largest = 0;
+  for (const Observation& o : view.observations) {
+    const Stencil s = view.grid.StencilAt(o.uv);
+    largest = std::max(largest, (s.Apply(a) - s.Apply(b)).norm());
+  }
+  return largest;
+}
+
 // A disc of 36 mm without data: exact thin-plate smoothness stays bounded there however weak,
 // where sampled smoothness is known to run away.
 TEST(LevelFit, AHoleInTheDataStaysBounded) {
@@ -191,7 +201,7 @@ TEST(LevelFit, AHoleInTheDataStaysBounded) {
   }
   std::vector<Observation> observations;
   for (const Observation& o : Observe(truth, 3000, 11, 0.5)) {
-    const Vec3 p = o.stencil.Apply(rest);
+    const Vec3 p = PlainStencil(m, n, o.uv).Apply(rest);
     const bool hole = std::hypot(p.x() - 40, p.y() - 30) < 18;
     if (!hole) {
       observations.push_back(o);
@@ -202,6 +212,73 @@ TEST(LevelFit, AHoleInTheDataStaysBounded) {
         View(rest, observations), std::vector<Term>{PointTerm{}, SmoothnessTerm{.weight = weight}});
     EXPECT_LT(SurfaceDistance(solution.net, truth), 20) << weight;
     EXPECT_GT(solution.summary.uncovered_vertices, 0);
+  }
+}
+
+// Random data, patches with few points, with many copies of one point, with points on one line.
+std::vector<LevelView> ViewsOfEveryRank() {
+  std::vector<LevelView> views = {NoisyView()};
+  views.push_back(View(Sheet(4, 3, 2, 1), Observe(Sheet(4, 3, 3, 2), 20, 3, 1)));
+  std::vector<Observation> copies = Observe(Sheet(4, 3, 3, 2), 4, 5, 1), line = copies;
+  for (int k = 0; k < 100; ++k) {
+    copies.push_back(copies[k % 4]);
+    copies.back().position.z() += k % 7;
+    line.push_back(line.front());
+    line.back().uv.x() = 0.01 * k;
+  }
+  views.push_back(View(Sheet(4, 3, 2, 1), copies));
+  views.push_back(View(Sheet(4, 3, 2, 1), line));
+  return views;
+}
+
+// The points one by one, dense, without any reduction.
+ControlNet DenseMinimiser(const LevelView& view) {
+  DenseSystem dense;
+  AddPoints(view, dense);
+  Eigen::MatrixXd x0(view.start.vertices.size(), 3);
+  for (std::size_t k = 0; k < view.start.vertices.size(); ++k) {
+    x0.row(k) = view.start.vertices[k];
+  }
+  x0 += dense.a.completeOrthogonalDecomposition().solve(dense.b - dense.a * x0);
+  ControlNet net = view.start;
+  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+    net.vertices[k] = x0.row(k);
+  }
+  return net;
+}
+
+// Ceres stops where its cost no longer falls, so it is held to less.
+TEST(LevelFit, ReducedPointsAndTheDirectPathKeepTheMinimiser) {
+  const std::vector<Term> points = {PointTerm{}};
+  const std::vector<Term> held = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}, PriorTerm{}};
+  for (const LevelView& view : ViewsOfEveryRank()) {
+    SCOPED_TRACE(view.observations.size());
+    const LevelSolution direct = FitLevel(view, points),
+                        ceres = FitLevel(view, points, LevelSolver::kCeres);
+    const ControlNet reference = DenseMinimiser(view);
+    EXPECT_LT(ObservationDistance(view, direct.net, reference), 1e-9);
+    EXPECT_LT(ObservationDistance(view, ceres.net, reference), 1e-7);
+    EXPECT_EQ(direct.summary.free_vertices, ceres.summary.free_vertices);
+    EXPECT_LT(Distance(FitLevel(view, held).net, FitLevel(view, held, LevelSolver::kCeres).net),
+              1e-8);
+  }
+}
+
+// The sum of squares changes by a constant, whatever the rank of the rows.
+TEST(RowReduction, KeepsTheNormalEquationsInAsFewRows) {
+  Random random(5);
+  const auto number = [&] { return random.Uniform(-1, 1); };
+  for (const int rank : {16, 9, 1}) {
+    for (const int count : {10, 17, 128, 1000}) {
+      const Eigen::MatrixXd a = Eigen::MatrixXd::NullaryExpr(count, rank, number) *
+                                Eigen::MatrixXd::NullaryExpr(rank, 16, number);
+      const Rows3 b = 100 * Rows3::NullaryExpr(count, 3, number);
+      const LinearRows few = ReducedRows(a, b);
+      EXPECT_LE(few.a.rows(), count > 16 ? rank : count);
+      EXPECT_LT((few.a.transpose() * few.a - a.transpose() * a).norm(), 1e-13 * a.squaredNorm());
+      EXPECT_LT((few.a.transpose() * few.b - a.transpose() * b).norm(),
+                1e-13 * a.norm() * b.norm());
+    }
   }
 }
 

@@ -34,7 +34,7 @@ inline std::vector<Observation> Observe(const ControlNet& truth, int count,
   for (int k = 0; k < count; ++k) {
     const Vec2 uv(random.Uniform(0, u_max), random.Uniform(0, 1));
     const Stencil s = PlainStencil(truth.columns - 3, truth.rows - 3, uv);
-    observations.push_back({.stencil = s,
+    observations.push_back({.uv = uv,
                             .position = s.Apply(truth) + random.InBox(-noise_mm, noise_mm),
                             .weight = random.Uniform(0.5, 2)});
   }
@@ -48,6 +48,7 @@ inline LevelView View(const ControlNet& start, std::vector<Observation> observat
                  .lengths_mm = {},
                  .observations = std::move(observations)};
   view.lengths_mm = MeanLengths(view.grid, view.rest);
+  SortObservations(view.grid, view.observations);
   return view;
 }
 
