@@ -5,7 +5,7 @@ SUDO     := $(if $(filter 0,$(shell id -u)),,sudo)
 PRESET   ?= release
 DEMO_OUT ?= out/demo
 
-.PHONY: all setup build demo test sanitize format check clean
+.PHONY: all setup build demo test bench sanitize format check clean
 
 all: build
 
@@ -25,6 +25,14 @@ demo: build
 
 test: build
 	@ctest --preset $(PRESET)
+
+# Measures against peers in one run; build/bench.json holds the lines and the machine.
+bench: build
+	@cmake --build build --target bench
+	@for program in build/tests/bench/*_bench; do echo "$$program" >&2; $$program; done | tee build/bench.lines >&2
+	@{ echo '{"machine": "'"$$(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | sed 's/^ //'), $$(nproc) cores"'",'; \
+	  echo '"entries": ['; grep '^{' build/bench.lines | sed '$$!s/$$/,/'; echo ']}'; } > build/bench.json; rm build/bench.lines
+	@echo build/bench.json
 
 # The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:
