@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/mesh_spline.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "interp/mesh_laplacian.h"
-#include "surfaces/error.h"
 #include "surfaces/mesh_query.h"
 #include "surfaces/parallel.h"
 #include "surfaces/point_triangle.h"
@@ -198,27 +195,16 @@ std::vector<double> SolveMeshSpline(const MeshSpline& spline, std::string_view s
                                     const TriMesh& skull, const std::vector<DepthSample>& samples,
                                     const RunContext& run) {
   run.ThrowIfStopped();
-  if (skull.triangles.empty()) {
-    throw InputError(
-        fmt::format("{}: the skull has {} vertices and no triangle, but this scheme works along "
-                    "its surface; give a mesh or choose a scheme in space",
-                    scheme, skull.points.size()));
-  }
+  CheckSurface(scheme, skull);
   return Spline(spline, skull, samples, run).Solve(samples, run);
 }
 
 DepthField AssignSpline(const std::vector<double>& depth_mm, const DepthLimits& limits,
                         const DepthInput& input, const std::vector<DepthSample>& samples,
                         double max_angle_deg, const RunContext& run) {
-  DepthField field = AssignWhereFacing(input, samples, max_angle_deg, run, [&](std::size_t i) {
-    return DepthValue{std::isnan(depth_mm[i]) ? kNaN : limits(depth_mm[i]), kNaN};
+  return AssignWhereFacing(input, samples, max_angle_deg, run, [&](std::size_t i) {
+    return DepthValue{limits(depth_mm[i]), kNaN};
   });
-  for (std::size_t i = 0; i < depth_mm.size(); ++i) {
-    if (std::isnan(depth_mm[i])) {
-      field.status[i] = DepthStatus::kOutside;
-    }
-  }
-  return field;
 }
 
 }  // namespace semblance
