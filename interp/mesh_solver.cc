@@ -195,6 +195,9 @@ Eigen::MatrixXd MeshSolver::Solve(const Eigen::MatrixXd& right) const {
   Eigen::MatrixXd x = right(order_, Eigen::all);
   for (const Front& front : fronts_) {
     auto own = x.middleRows(front.begin, front.end - front.begin);
+    if ((own.array() == 0).all()) {
+      continue;  // right sides of few entries touch few fronts
+    }
     front.own.triangularView<Eigen::Lower>().solveInPlace(own);
     const Eigen::MatrixXd down = front.below * own;
     x(front.border, Eigen::all) -= down;

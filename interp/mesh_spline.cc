@@ -147,11 +147,12 @@ class Spline {
     return right;
   }
 
-  // G times right sides; of mean 0 on each piece.
-  Eigen::MatrixXd Varying(Eigen::MatrixXd right) const {
+  // G times right sides; of mean 0 on each piece. Where a right side's sum on a piece is not 0,
+  // what holds its vertex answers: the same for all places there, so nothing where the l_i sum to
+  // 0.
+  Eigen::MatrixXd Varying(const Eigen::MatrixXd& right) const {
     const Eigen::VectorXd& area = laplacian_.area_mm2;
     const Eigen::VectorXd ones = Eigen::VectorXd::Ones(area.size());
-    TakeShares(right, ones, area);
     Eigen::MatrixXd values = solver_.Solve(right);
     TakeShares(values, area, ones);
     if (options_.energy == SplineEnergy::kLaplacian) {
