@@ -1,7 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/depth_scheme.h"
 
+#include <type_traits>
+
 namespace semblance {
+namespace {
+
+template <class Scheme>
+bool GoesAlong(const Scheme& scheme) {
+  if constexpr (requires { scheme.distance == DowelDistance::kGeodesic; }) {
+    return scheme.distance == DowelDistance::kGeodesic;
+  }
+  return std::is_same_v<Scheme, Harmonic> || std::is_same_v<Scheme, Biharmonic>;
+}
+
+}  // namespace
 
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run) {
@@ -10,7 +23,7 @@ DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
 }
 
 bool NeedsSurface(const DepthScheme& scheme) {
-  return std::holds_alternative<Harmonic>(scheme) || std::holds_alternative<Biharmonic>(scheme);
+  return std::visit([](const auto& options) { return GoesAlong(options); }, scheme);
 }
 
 }  // namespace semblance

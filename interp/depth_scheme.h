@@ -12,13 +12,15 @@
 #include "interp/kriging.h"
 #include "interp/mean.h"
 #include "interp/moving_least_squares.h"
+#include "interp/natural_neighbour.h"
 #include "interp/nearest.h"
 #include "interp/radial_basis.h"
 
 namespace semblance {
 
-using DepthScheme = std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis,
-                                 MovingLeastSquares, Kriging, Harmonic, Biharmonic>;
+using DepthScheme =
+    std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis, MovingLeastSquares,
+                 Kriging, Harmonic, Biharmonic, NaturalNeighbour>;
 
 // One entry a vertex. Where the status is kAssigned the depth is finite and within the range of the
 // dowels' depths (without a scheme's `clamp`: above 0); elsewhere it is NaN, for an OutsideRule to

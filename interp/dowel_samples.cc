@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/dowel_samples.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <tuple>
+
+#include "surfaces/error.h"
 
 namespace semblance {
 namespace {
@@ -73,7 +77,7 @@ DepthLimits::DepthLimits(const std::vector<DepthSample>& samples, bool clamp) {
 }
 
 double DepthLimits::operator()(double depth_mm) const {
-  return std::clamp(depth_mm, least_mm_, most_mm_);
+  return std::isnan(depth_mm) ? kNaN : std::clamp(depth_mm, least_mm_, most_mm_);
 }
 
 DepthField AssignWhereFacing(const DepthInput& input, const std::vector<DepthSample>& samples,
@@ -88,11 +92,20 @@ DepthField AssignWhereFacing(const DepthInput& input, const std::vector<DepthSam
       return;
     }
     const DepthValue value = at(i);
-    field.status[i] = DepthStatus::kAssigned;
+    field.status[i] = std::isnan(value.mm) ? DepthStatus::kOutside : DepthStatus::kAssigned;
     field.depth_mm[i] = value.mm;
     field.sd_mm[i] = value.sd_mm;
   });
   return field;
+}
+
+void CheckSurface(std::string_view scheme, const TriMesh& skull) {
+  if (skull.triangles.empty()) {
+    throw InputError(
+        fmt::format("{}: the skull has {} vertices and no triangle, but this scheme works along "
+                    "its surface; give a mesh or choose a scheme in space",
+                    scheme, skull.points.size()));
+  }
 }
 
 SampleFrame FrameOf(const std::vector<DepthSample>& samples) {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <string_view>
 #include <vector>
 
 #include "interp/depth_input.h"
@@ -27,7 +28,7 @@ std::vector<DepthSample> DepthSamples(std::span<const Dowel> dowels);
 class DepthLimits {
  public:
   DepthLimits(const std::vector<DepthSample>& samples, bool clamp);
-  double operator()(double depth_mm) const;
+  double operator()(double depth_mm) const;  // NaN stays NaN
 
  private:
   double least_mm_, most_mm_;
@@ -47,11 +48,15 @@ struct DepthValue {
   double sd_mm = kNaN;
 };
 
-// at(i) at each vertex that faces the dowels around it, kNotFacing at the others. The direction of
-// the dowels around a vertex is their mean, weighted by the inverse squared distance.
+// at(i) at each vertex that faces the dowels around it, kOutside where that has no depth,
+// kNotFacing at the others. The direction of the dowels around a vertex is their mean, weighted by
+// the inverse squared distance.
 DepthField AssignWhereFacing(const DepthInput& input, const std::vector<DepthSample>& samples,
                              double max_angle_deg, const RunContext& run,
                              const std::function<DepthValue(std::size_t)>& at);
+
+// Throws InputError, naming the scheme, if the skull has no triangle.
+void CheckSurface(std::string_view scheme, const TriMesh& skull);
 
 // Centre, size and directions of a set of points: what makes linear terms well-posed.
 struct SampleFrame {

@@ -28,6 +28,40 @@ DepthValue WeightedMean(const std::vector<DepthSample>& samples, double power, c
   return {depth / sum, sd / sum};
 }
 
+constexpr double kAtBase_mm = 1e-9;  // so near, a dowel stands alone
+
+struct Sums {
+  double weight = 0, depth = 0, sd = 0;
+  bool at_base = false;
+
+  void Add(const DepthSample& sample, double distance_mm, double power) {
+    if (at_base || !std::isfinite(distance_mm)) {
+      return;
+    }
+    at_base = distance_mm <= kAtBase_mm;
+    if (at_base) {
+      *this = {1, sample.depth_mm, sample.sd_mm, true};
+      return;
+    }
+    const double w = std::pow(distance_mm, -power);
+    weight += w;
+    depth += w * sample.depth_mm;
+    sd += w * sample.sd_mm;
+  }
+};
+
+std::vector<Sums> SumsAlong(const DepthInput& input, const std::vector<DepthSample>& samples,
+                            double power, const RunContext& run) {
+  std::vector<Sums> sums(input.skull.points.size());
+  ForEachGeodesic(InverseDistance::kName, input.skull, samples, run,
+                  [&](std::size_t k, const std::vector<double>& distance) {
+                    ForEachVertex(input, run, [&](std::size_t i) {
+                      sums[i].Add(samples[k], distance[i], power);
+                    });
+                  });
+  return sums;
+}
+
 }  // namespace
 
 DepthField InterpolateDepth(const InverseDistance& options, const DepthInput& input,
@@ -35,6 +69,12 @@ DepthField InterpolateDepth(const InverseDistance& options, const DepthInput& in
   CheckDepthInput(input);
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const DepthLimits limits(samples, true);
+  if (options.distance == DowelDistance::kGeodesic) {
+    const std::vector<Sums> sums = SumsAlong(input, samples, options.power, run);
+    return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
+      return DepthValue{limits(sums[i].depth / sums[i].weight), sums[i].sd / sums[i].weight};
+    });
+  }
   return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
     const DepthValue mean = WeightedMean(samples, options.power, input.skull.points[i]);
     return DepthValue{limits(mean.mm), mean.sd_mm};  // against rounding

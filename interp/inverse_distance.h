@@ -5,12 +5,14 @@
 #include <string_view>
 
 #include "interp/depth_input.h"
+#include "interp/surface_distance.h"
 
 namespace semblance {
 
 struct InverseDistance {
   static constexpr std::string_view kName = "inverse_distance";
   double power = 3;
+  DowelDistance distance = DowelDistance::kEuclidean;
   double max_angle_deg = 90;
 };
 template <class Visitor>
@@ -22,12 +24,14 @@ void Fields(Visitor& visit, InverseDistance& o) {
                          "tends to the nearest dowel, less to the mean; the field is flat at each "
                          "dowel above 1 and has a peak there up to 1"},
         o.power);
+  DistanceField(visit, o.distance);
   MaxAngleField(visit, o.max_angle_deg);
 }
 
-// Weights by the straight distance to the bases; at a base, that dowel alone. Always within the
-// dowels' range. sd_mm is averaged alike, as if all dowels deviated together; NaN if one of them
-// has none. kNotFacing as AssignWhereFacing. Throws InputError as CheckDepthInput.
+// Weights by the distance to the bases; at a base, that dowel alone. Always within the dowels'
+// range. sd_mm is averaged alike, as if all dowels deviated together; NaN if one of them has none.
+// kNotFacing as AssignWhereFacing, kOutside where no dowel is reached along the bone. Throws
+// InputError as CheckDepthInput, or if the skull has no triangle to go along.
 DepthField InterpolateDepth(const InverseDistance& options, const DepthInput& input,
                             const RunContext& run);
 

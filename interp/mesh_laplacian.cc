@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <span>
 
 namespace semblance {
 namespace {
@@ -12,7 +10,6 @@ namespace {
 constexpr double kMostCotangent = 100;
 constexpr double kLeastEdge = 1e-4;  // of an edge's two half cotangents
 constexpr double kLeastArea = 1e-2;  // of the mean
-constexpr std::size_t kLeaf = 64;    // unknowns not worth a further cut
 
 // Of the corner `at`.
 double Cotangent(const Vec3& at, const Vec3& b, const Vec3& c) {
@@ -59,64 +56,6 @@ Eigen::VectorXd VertexAreas(const TriMesh& mesh) {
   return areas.cwiseMax(mean > 0 ? kLeastArea * mean : 1);
 }
 
-class Dissection {
- public:
-  Dissection(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& pattern)
-      : points_(points), pattern_(pattern), side_(points.size(), 0) {
-    order_.resize(points.size());
-    std::iota(order_.begin(), order_.end(), 0);
-    Cut(order_);
-  }
-  std::vector<int> Take() { return std::move(order_); }
-
- private:
-  // Orders `part`: one half, the other half, and last what separates them.
-  void Cut(std::span<int> part) {
-    if (part.size() <= kLeaf) {
-      return;
-    }
-    const std::size_t half = part.size() / 2;
-    const int axis = LongestAxis(part);
-    std::ranges::nth_element(part, part.begin() + static_cast<std::ptrdiff_t>(half), {},
-                             [&](int i) { return std::pair(points_[i][axis], i); });
-    const int left = ++mark_, right = ++mark_;
-    for (std::size_t k = 0; k < part.size(); ++k) {
-      side_[part[k]] = k < half ? left : right;
-    }
-    const auto separator =
-        std::stable_partition(part.begin() + static_cast<std::ptrdiff_t>(half), part.end(),
-                              [&](int i) { return !Touches(i, left); });
-    const auto rest = static_cast<std::size_t>(separator - part.begin());
-    Cut(part.first(half));
-    Cut(part.subspan(half, rest - half));
-  }
-
-  int LongestAxis(std::span<const int> part) const {
-    Box3 box;
-    for (const int i : part) {
-      box.extend(points_[i]);
-    }
-    int axis = 0;
-    box.sizes().maxCoeff(&axis);
-    return axis;
-  }
-
-  bool Touches(int i, int side) const {
-    for (Eigen::SparseMatrix<double>::InnerIterator it(pattern_, i); it; ++it) {
-      if (side_[it.row()] == side) {
-        return true;
-      }
-    }
-    return false;
-  }
-
-  const std::vector<Vec3>& points_;
-  const Eigen::SparseMatrix<double>& pattern_;
-  std::vector<int> side_;  // the last half that each unknown was in
-  int mark_ = 0;
-  std::vector<int> order_;
-};
-
 }  // namespace
 
 MeshLaplacian BuildLaplacian(const TriMesh& mesh) {
@@ -162,22 +101,6 @@ std::vector<int> Pieces(const Eigen::SparseMatrix<double>& stiffness) {
     ++count;
   }
   return piece;
-}
-
-MeshSolver::MeshSolver(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& matrix) {
-  const std::vector<int> order = Dissection(points, matrix).Take();
-  order_.resize(matrix.rows());
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    order_.indices()[order[k]] = static_cast<int>(k);
-  }
-  Eigen::SparseMatrix<double> ordered(matrix.rows(), matrix.cols());
-  ordered = matrix.twistedBy(order_);
-  factor_.compute(ordered);
-}
-
-Eigen::VectorXd MeshSolver::Solve(const Eigen::VectorXd& right) const {
-  const Eigen::VectorXd ordered = order_ * right;
-  return order_.inverse() * Eigen::VectorXd(factor_.solve(ordered));
 }
 
 }  // namespace semblance

@@ -2,7 +2,6 @@
 // The cotangent Laplacian of a skull as it comes: open, of several pieces, with slivers.
 #pragma once
 
-#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <vector>
 
@@ -26,18 +25,5 @@ MeshLaplacian BuildLaplacian(const TriMesh& mesh);
 // The piece of each vertex by the matrix's entries, numbered 0, 1, ... in order of the first
 // vertex.
 std::vector<int> Pieces(const Eigen::SparseMatrix<double>& stiffness);
-
-// Solves with one symmetric positive definite matrix of a mesh many times.
-class MeshSolver {
- public:
-  // points: one an unknown; they give an elimination order (nested dissection), nothing else.
-  MeshSolver(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& matrix);
-  Eigen::VectorXd Solve(const Eigen::VectorXd& right) const;
-
- private:
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>
-      factor_;
-};
 
 }  // namespace semblance

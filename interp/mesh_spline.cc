@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/mesh_spline.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "interp/mesh_laplacian.h"
-#include "surfaces/error.h"
+#include "interp/mesh_solver.h"
 #include "surfaces/mesh_query.h"
 #include "surfaces/parallel.h"
 #include "surfaces/point_triangle.h"
@@ -17,6 +15,8 @@ namespace semblance {
 namespace {
 
 constexpr double kLeastSoftness = 1e-12;  // two dowels closest to one vertex must not be singular
+
+constexpr std::size_t kTogether = 16;  // right sides solved at a time: 8 bytes a vertex each
 
 // The function's mean that one dowel speaks of: sum of weight times value, weights of sum 1.
 struct Place {
@@ -120,54 +120,61 @@ class Spline {
     return matrix + ground;
   }
 
-  void TakeMeans(Eigen::VectorXd& values) const {
-    Eigen::VectorXd sums = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(piece_area_.size()));
+  // On each piece, from each column: `share` times its sum over all of the piece.
+  void TakeShares(Eigen::MatrixXd& columns, const Eigen::VectorXd& summed,
+                  const Eigen::VectorXd& share) const {
+    Eigen::MatrixXd sums =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(piece_area_.size()), columns.cols());
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
-      sums[pieces_[i]] += laplacian_.area_mm2[i] * values[i];
+      const auto row = static_cast<Eigen::Index>(i);
+      sums.row(pieces_[i]) += summed[row] * columns.row(row);
     }
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
-      values[i] -= sums[pieces_[i]] / piece_area_[pieces_[i]];
+      const auto row = static_cast<Eigen::Index>(i);
+      columns.row(row) -= share[row] / piece_area_[pieces_[i]] * sums.row(pieces_[i]);
     }
   }
 
-  Eigen::VectorXd Combined(const Eigen::VectorXd& of_place) const {
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(pieces_.size()));
+  // One column a column of place weights.
+  Eigen::MatrixXd Combined(const Eigen::MatrixXd& of_place) const {
+    Eigen::MatrixXd right =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pieces_.size()), of_place.cols());
     for (std::size_t k = 0; k < places_.size(); ++k) {
       for (const auto& [vertex, weight] : places_[k].weights) {
-        right[vertex] += of_place[static_cast<Eigen::Index>(k)] * weight;
+        right.row(vertex) += weight * of_place.row(static_cast<Eigen::Index>(k));
       }
     }
     return right;
   }
 
-  // G times a right side; of mean 0 on each piece.
-  Eigen::VectorXd Varying(Eigen::VectorXd right) const {
-    Eigen::VectorXd totals = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(piece_area_.size()));
-    for (std::size_t i = 0; i < pieces_.size(); ++i) {
-      totals[pieces_[i]] += right[i];
-    }
-    for (std::size_t i = 0; i < pieces_.size(); ++i) {
-      right[i] -= totals[pieces_[i]] / piece_area_[pieces_[i]] * laplacian_.area_mm2[i];
-    }
-    Eigen::VectorXd values = solver_.Solve(right);
-    TakeMeans(values);
+  // G times right sides; of mean 0 on each piece. Where a right side's sum on a piece is not 0,
+  // what holds its vertex answers: the same for all places there, so nothing where the l_i sum to
+  // 0.
+  Eigen::MatrixXd Varying(const Eigen::MatrixXd& right) const {
+    const Eigen::VectorXd& area = laplacian_.area_mm2;
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(area.size());
+    Eigen::MatrixXd values = solver_.Solve(right);
+    TakeShares(values, area, ones);
     if (options_.energy == SplineEnergy::kLaplacian) {
-      values = solver_.Solve(laplacian_.area_mm2.cwiseProduct(values));
-      TakeMeans(values);
+      values = solver_.Solve(area.asDiagonal() * values);
+      TakeShares(values, area, ones);
     }
     return values;
   }
 
   Eigen::MatrixXd Kernel(const RunContext& run) const {
-    Eigen::MatrixXd kernel(Size(), Size());
-    ParallelFor(places_.size(), run.threads, 1, [&](std::size_t column) {
+    const Eigen::Index n = Size();
+    Eigen::MatrixXd kernel = Eigen::MatrixXd::Zero(n, n);
+    const std::size_t blocks = (places_.size() + kTogether - 1) / kTogether;
+    ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
       run.ThrowIfStopped();
-      const auto c = static_cast<Eigen::Index>(column);
-      const Eigen::VectorXd values = Varying(Combined(Eigen::VectorXd::Unit(Size(), c)));
-      for (Eigen::Index r = 0; r < Size(); ++r) {
-        kernel(r, c) = 0;
+      const auto first = static_cast<Eigen::Index>(block * kTogether);
+      const Eigen::Index count = std::min<Eigen::Index>(kTogether, n - first);
+      const Eigen::MatrixXd values =
+          Varying(Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count)));
+      for (Eigen::Index r = 0; r < n; ++r) {
         for (const auto& [vertex, weight] : places_[r].weights) {
-          kernel(r, c) += weight * values[vertex];
+          kernel.row(r).segment(first, count) += weight * values.row(vertex);
         }
       }
     });
@@ -198,27 +205,16 @@ std::vector<double> SolveMeshSpline(const MeshSpline& spline, std::string_view s
                                     const TriMesh& skull, const std::vector<DepthSample>& samples,
                                     const RunContext& run) {
   run.ThrowIfStopped();
-  if (skull.triangles.empty()) {
-    throw InputError(
-        fmt::format("{}: the skull has {} vertices and no triangle, but this scheme works along "
-                    "its surface; give a mesh or choose a scheme in space",
-                    scheme, skull.points.size()));
-  }
+  CheckSurface(scheme, skull);
   return Spline(spline, skull, samples, run).Solve(samples, run);
 }
 
 DepthField AssignSpline(const std::vector<double>& depth_mm, const DepthLimits& limits,
                         const DepthInput& input, const std::vector<DepthSample>& samples,
                         double max_angle_deg, const RunContext& run) {
-  DepthField field = AssignWhereFacing(input, samples, max_angle_deg, run, [&](std::size_t i) {
-    return DepthValue{std::isnan(depth_mm[i]) ? kNaN : limits(depth_mm[i]), kNaN};
+  return AssignWhereFacing(input, samples, max_angle_deg, run, [&](std::size_t i) {
+    return DepthValue{limits(depth_mm[i]), kNaN};
   });
-  for (std::size_t i = 0; i < depth_mm.size(); ++i) {
-    if (std::isnan(depth_mm[i])) {
-      field.status[i] = DepthStatus::kOutside;
-    }
-  }
-  return field;
 }
 
 }  // namespace semblance

@@ -9,7 +9,7 @@
 namespace semblance {
 namespace {
 
-constexpr double kLeastWeight = 1e-20;  // of the nearest dowel's; below, it has no effect
+constexpr double kLeastLog = -40;  // of a weight over the nearest dowel's; below, it has no effect
 
 // Of weighted samples around p; positions relative to p, so that the value at p is the value at 0.
 struct Moments {
@@ -37,9 +37,9 @@ Moments MomentsAround(const std::vector<DepthSample>& samples, double width_mm, 
   for (const DepthSample& sample : samples) {
     const Vec3 x = sample.base - p;
     // Relative to the nearest one: far from all dowels the weights would vanish.
-    const double weight = std::exp((nearest2 - x.squaredNorm()) / (width_mm * width_mm));
-    if (weight > kLeastWeight) {
-      moments.Add(weight, x, sample.depth_mm);
+    const double log = (nearest2 - x.squaredNorm()) / (width_mm * width_mm);
+    if (log > kLeastLog) {
+      moments.Add(std::exp(log), x, sample.depth_mm);
     }
   }
   return moments;

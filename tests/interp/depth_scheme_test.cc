@@ -24,8 +24,24 @@ using testing::SameBytes;
 using testing::ScatteredScene;
 
 template <std::size_t... Index>
-std::vector<DepthScheme> EachOf(std::index_sequence<Index...>) {
+std::vector<DepthScheme> Defaults(std::index_sequence<Index...>) {
   return {std::variant_alternative_t<Index, DepthScheme>{}...};
+}
+
+// Every scheme with its defaults, and then the options that change its ways.
+std::vector<DepthScheme> Schemes() {
+  std::vector<DepthScheme> schemes =
+      Defaults(std::make_index_sequence<std::variant_size_v<DepthScheme>>{});
+  const DowelDistance along = DowelDistance::kGeodesic;
+  schemes.emplace_back(Nearest{.distance = along});
+  schemes.emplace_back(InverseDistance{.distance = along});
+  schemes.emplace_back(RadialBasis{.kernel = RadialKernel::kCubic});
+  schemes.emplace_back(RadialBasis{.kernel = RadialKernel::kGaussian});
+  schemes.emplace_back(RadialBasis{.kernel = RadialKernel::kWendlandC2, .tail_degree = 0});
+  schemes.emplace_back(Kriging{.covariance = Covariance::kSquaredExponential});
+  schemes.emplace_back(Kriging{.covariance = Covariance::kMatern12, .state_sd = false});
+  schemes.emplace_back(NaturalNeighbour{.weights = NeighbourWeights::kLaplace});
+  return schemes;
 }
 
 class EveryScheme : public ::testing::TestWithParam<DepthScheme> {
@@ -42,12 +58,14 @@ class EveryScheme : public ::testing::TestWithParam<DepthScheme> {
     return "no error";
   }
 };
-INSTANTIATE_TEST_SUITE_P(
-    DepthScheme, EveryScheme,
-    ::testing::ValuesIn(EachOf(std::make_index_sequence<std::variant_size_v<DepthScheme>>{})),
-    [](const auto& each) {
-      return std::visit([](const auto& o) { return std::string(o.kName); }, each.param);
-    });
+INSTANTIATE_TEST_SUITE_P(DepthScheme, EveryScheme, ::testing::ValuesIn(Schemes()),
+                         [](const auto& each) {
+                           const auto name =
+                               std::visit([](const auto& o) { return o.kName; }, each.param);
+                           return each.index < std::variant_size_v<DepthScheme>
+                                      ? std::string(name)
+                                      : fmt::format("{}_{}", name, each.index);
+                         });
 
 TEST_P(EveryScheme, DepthIsFiniteAndWithinTheDowelsWhereAssignedAndElsewhereNone) {
   const DowelScene scene = DomeScene();

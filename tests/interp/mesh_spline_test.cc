@@ -10,6 +10,7 @@
 #include "interp/biharmonic.h"
 #include "interp/harmonic.h"
 #include "interp/mesh_laplacian.h"
+#include "interp/mesh_solver.h"
 #include "surfaces/error.h"
 #include "tests/testing/dowel_scenes.h"
 
@@ -84,8 +85,11 @@ TEST(MeshSolver, Solves) {
   Eigen::SparseMatrix<double> matrix = laplacian.stiffness;
   matrix.diagonal() += laplacian.area_mm2;
   Random random(3);
-  const Eigen::VectorXd right = Values(sphere, [&](const Vec3&) { return random.Uniform(-1, 1); });
-  const Eigen::VectorXd solution = MeshSolver(sphere.points, matrix).Solve(right);
+  Eigen::MatrixXd right(static_cast<Eigen::Index>(sphere.points.size()), 3);
+  for (double& value : right.reshaped()) {
+    value = random.Uniform(-1, 1);
+  }
+  const Eigen::MatrixXd solution = MeshSolver(sphere.points, matrix).Solve(right);
   EXPECT_NEAR((matrix * solution - right).norm(), 0, 1e-11);
 }
 
