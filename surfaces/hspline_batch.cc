@@ -59,7 +59,8 @@ struct Jet {
   return {Cubic(r0, r1, r2, r3, t), Cubic(d0, d1, d2, d3, t), CubicSlope(r1, r2, r3, t)};
 }
 
-SEMBLANCE_KERNEL void EvaluatePoints(const Polynomial& p, std::size_t count, Pack& pack) {
+SEMBLANCE_KERNEL void EvaluatePoints(const Polynomial& __restrict p, std::size_t count,
+                                     Pack& __restrict pack) {
   for (std::size_t k = 0; k < count; ++k) {
     pack.point[0][k] = ValueOf(p.power[0], pack.s[k], pack.t[k]);
     pack.point[1][k] = ValueOf(p.power[1], pack.s[k], pack.t[k]);
@@ -67,7 +68,8 @@ SEMBLANCE_KERNEL void EvaluatePoints(const Polynomial& p, std::size_t count, Pac
   }
 }
 
-SEMBLANCE_KERNEL void EvaluateNormals(const Polynomial& p, std::size_t count, Pack& pack) {
+SEMBLANCE_KERNEL void EvaluateNormals(const Polynomial& __restrict p, std::size_t count,
+                                      Pack& __restrict pack) {
   constexpr double kDegenerate = 1e-12;  // as HSplineSurface::Frame judges
   const double su = p.scale_u, sv = p.scale_v;
   for (std::size_t k = 0; k < count; ++k) {
@@ -79,8 +81,8 @@ SEMBLANCE_KERNEL void EvaluateNormals(const Polynomial& p, std::size_t count, Pa
     const double nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
     const double length = std::sqrt(nx * nx + ny * ny + nz * nz);
     const double tangents = ux * ux + uy * uy + uz * uz + (vx * vx + vy * vy + vz * vz);
-    const bool regular = length > kDegenerate * tangents;
-    const double inverse = (regular ? 1.0 : 0.0) / (regular ? length : 1.0);
+    const double regular = length > kDegenerate * tangents ? 1.0 : 0.0;
+    const double inverse = regular / (length + (1 - regular));  // no branch: vectorised
     pack.point[0][k] = x.value;
     pack.point[1][k] = y.value;
     pack.point[2][k] = z.value;

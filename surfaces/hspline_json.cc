@@ -3,104 +3,21 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <nlohmann/json.hpp>
-#include <set>
-
 #include "surfaces/error.h"
+#include "surfaces/json_parts.h"
 
 namespace semblance {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using namespace json_parts;
 
 constexpr std::string_view kFormat = "semblance-hspline";
 constexpr int kVersion = 1;
 
-template <class Enum>
-Enum EnumFromName(const std::string& name) {
-  const auto names = EnumNames(Enum{});
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) {
-    throw IoError(fmt::format("'{}' is not one of {}", name, fmt::join(names, ", ")));
-  }
-  return static_cast<Enum>(found - names.begin());
-}
-
-void RequireKeys(const Json& json) {
-  const std::set<std::string> wanted = {"format",    "version", "patches",
-                                        "max_level", "closure", "offset_reference",
-                                        "units",     "level0",  "offsets"};
-  if (!json.is_object()) {
-    throw IoError("the top is not an object");
-  }
-  for (const auto& [key, value] : json.items()) {
-    if (!wanted.contains(key)) {
-      throw IoError(fmt::format("unknown entry '{}'; known are {}", key, fmt::join(wanted, ", ")));
-    }
-  }
-  for (const std::string& key : wanted) {
-    if (!json.contains(key)) {
-      throw IoError(fmt::format("entry '{}' is missing", key));
-    }
-  }
-}
-
-void RequireFormat(const Json& json) {
-  if (json.at("format") != kFormat || json.at("version") != kVersion || json.at("units") != "mm") {
-    throw IoError(fmt::format("it is {} version {} in {}; only {} version {} in mm can be read",
-                              json.at("format").dump(), json.at("version").dump(),
-                              json.at("units").dump(), kFormat, kVersion));
-  }
-}
-
-void RequireSize(const Json& row, std::size_t size) {
-  if (!row.is_array() || row.size() != size) {
-    throw IoError(fmt::format("{} is not a list of {} numbers", row.dump(), size));
-  }
-}
-
-int IntFromJson(const Json& number) {
-  constexpr int kMost = 1'000'000;  // far above all that is allowed anywhere, safe to reckon with
-  if (!number.is_number_integer() || number < -kMost || number > kMost) {
-    throw IoError(fmt::format("{} is not a whole number of a sensible size", number.dump()));
-  }
-  return number.get<int>();
-}
-
-double DoubleFromJson(const Json& number) {
-  if (!number.is_number()) {
-    throw IoError(fmt::format("{} is not a number", number.dump()));
-  }
-  return number.get<double>();
-}
-
-const Json& ListFromJson(const Json& json, const char* key) {
-  if (!json.at(key).is_array()) {
-    throw IoError(fmt::format("'{}' is not a list", key));
-  }
-  return json.at(key);
-}
-
-HSplineShape ShapeFromJson(const Json& json) {
-  RequireSize(json.at("patches"), 2);
-  HSplineShape shape;
-  shape.patches_u = IntFromJson(json.at("patches")[0]);
-  shape.patches_v = IntFromJson(json.at("patches")[1]);
-  shape.max_level = IntFromJson(json.at("max_level"));
-  shape.closure = EnumFromName<Closure>(json.at("closure").get<std::string>());
-  shape.reference = EnumFromName<OffsetReference>(json.at("offset_reference").get<std::string>());
-  return shape;
-}
-
-Vec3 VecFromJson(const Json& row, std::size_t first) {
-  return {DoubleFromJson(row.at(first)), DoubleFromJson(row.at(first + 1)),
-          DoubleFromJson(row.at(first + 2))};
-}
-
 HSplineSurface SurfaceFromJson(const Json& json) {
-  RequireKeys(json);
-  RequireFormat(json);
+  RequireKeys(json, {"format", "version", "patches", "max_level", "closure", "offset_reference",
+                     "units", "level0", "offsets"});
+  RequireFormat(json, kFormat, kVersion);
   const HSplineShape shape = ShapeFromJson(json);
   ControlNet net{shape.Columns(0), shape.Rows(0), {}};
   for (const Json& row : ListFromJson(json, "level0")) {
@@ -108,29 +25,12 @@ HSplineSurface SurfaceFromJson(const Json& json) {
     net.vertices.push_back(VecFromJson(row, 0));
   }
   std::map<VertexId, std::optional<Vec3>> offsets;
-  for (const Json& row : ListFromJson(json, "offsets")) {
-    RequireSize(row, 6);
-    const VertexId vertex{IntFromJson(row[0]), IntFromJson(row[1]), IntFromJson(row[2])};
-    if (!offsets.emplace(vertex, VecFromJson(row, 3)).second) {
-      throw IoError(fmt::format("vertex ({}, {}) of level {} has two offsets", vertex.i, vertex.j,
-                                vertex.level));
-    }
+  for (const auto& [vertex, offset] : OffsetsFromJson(json)) {
+    offsets.emplace(vertex, offset);
   }
   HSplineSurface surface(shape, std::move(net));
   surface.SetOffsets(offsets);
   return surface;
-}
-
-// The JSON library keeps one of several entries of the same name, silently.
-Json ParseWithoutRepeats(std::string_view text) {
-  std::set<std::string> seen;
-  return Json::parse(text, [&seen](int depth, Json::parse_event_t event, Json& parsed) {
-    if (event == Json::parse_event_t::key && depth == 1 &&
-        !seen.insert(parsed.get<std::string>()).second) {
-      throw IoError(fmt::format("entry '{}' stands twice", parsed.get<std::string>()));
-    }
-    return true;  // keep it
-  });
 }
 
 }  // namespace
@@ -141,18 +41,12 @@ std::string HSplineToJson(const HSplineSurface& surface) {
   json["format"] = kFormat;
   json["version"] = kVersion;
   json["units"] = "mm";
-  json["patches"] = {shape.patches_u, shape.patches_v};
-  json["max_level"] = shape.max_level;
-  json["closure"] = EnumNames(shape.closure)[static_cast<int>(shape.closure)];
-  json["offset_reference"] = EnumNames(shape.reference)[static_cast<int>(shape.reference)];
+  ShapeToJson(shape, json);
   json["level0"] = Json::array();
   for (const Vec3& p : surface.Net(0).vertices) {
     json["level0"].push_back({p.x(), p.y(), p.z()});
   }
-  json["offsets"] = Json::array();
-  for (const auto& [vertex, o] : surface.Offsets()) {
-    json["offsets"].push_back({vertex.level, vertex.i, vertex.j, o.x(), o.y(), o.z()});
-  }
+  json["offsets"] = OffsetsToJson(surface.Offsets());
   return json.dump() + "\n";
 }
 

@@ -91,9 +91,15 @@ SurfaceFrame FrameOf(const HSplineShape& shape, int level, const ControlNet& net
   frame.du = StencilAt(shape, level, uv, {1, 0}).Apply(net);
   frame.dv = StencilAt(shape, level, uv, {0, 1}).Apply(net);
   const Vec3 normal = frame.du.cross(frame.dv);
-  // Parallel or vanishing tangents, judged relative to the tangents' own size.
-  constexpr double kDegenerate = 1e-12;
-  if (normal.norm() > kDegenerate * (frame.du.squaredNorm() + frame.dv.squaredNorm())) {
+  // Parallel tangents, judged relative to the tangents' own size, and vanishing ones, judged by
+  // what rounding leaves of differences of vertices.
+  constexpr double kDegenerate = 1e-12, kRounding = 1e-15;
+  const double noise =
+      kRounding * frame.point.norm() * std::max(shape.PatchesU(level), shape.PatchesV(level));
+  const double least = std::min(frame.du.norm(), frame.dv.norm());
+  frame.regular = least > noise &&
+                  normal.norm() > kDegenerate * (frame.du.squaredNorm() + frame.dv.squaredNorm());
+  if (frame.regular) {
     const Vec3 n = normal.normalized(), t = frame.du.normalized();
     frame.axes << t, n.cross(t), n;
   }
@@ -128,7 +134,7 @@ Reference ReferenceOf(const HSplineShape& shape, const ControlNet& coarser,
   if (shape.reference == OffsetReference::kWorld) {
     return {frame.point, Mat3::Identity()};
   }
-  if (!frame.axes.allFinite()) {
+  if (!frame.regular) {
     throw InputError(
         fmt::format("H-spline: the surface of level {} has no frame at (u,v) = ({}, {}), its "
                     "tangents vanish or are parallel; move the vertices around it apart",

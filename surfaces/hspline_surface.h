@@ -52,9 +52,12 @@ struct SurfaceFrame {
   Vec3 point = Vec3::Constant(kNaN);
   Vec3 du = Vec3::Constant(kNaN);  // first derivatives with respect to u and v in [0,1], mm
   Vec3 dv = Vec3::Constant(kNaN);
-  Mat3 axes = Mat3::Constant(kNaN);  // columns: unit u-tangent, normal x u-tangent, unit normal (of
-                                     // du x dv); NaN where degenerate
+  Mat3 axes = Mat3::Zero();  // columns: unit u-tangent, normal x u-tangent, unit normal (of du x
+                             // dv); zero where not regular
+  bool regular = false;      // the tangents do not vanish and are not parallel
+
   Vec3 Normal() const { return axes.col(2); }
+  double Jacobian() const { return du.cross(dv).norm(); }  // mm^2 of surface per unit of u x v
 };
 
 struct SecondDerivatives {  // with respect to u and v in [0,1], mm
@@ -102,7 +105,7 @@ class HSplineSurface {
   Vec3 Derivative(const Vec2& uv, DerivativeOrder order) const;
   SecondDerivatives Second(const Vec2& uv) const;
   SurfaceFrame Frame(const Vec2& uv) const;
-  Vec3 Normal(const Vec2& uv) const { return Frame(uv).Normal(); }  // unit; NaN where degenerate
+  Vec3 Normal(const Vec2& uv) const { return Frame(uv).Normal(); }  // unit; zero where degenerate
 
   // The absolute control vertices of one level; a plain B-spline that holds the detail of levels
   // 0..level.
