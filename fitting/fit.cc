@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "fitting/seeding.h"
@@ -44,6 +45,31 @@ void CheckFeatures(std::span<const VertexId> features, int max_level) {
   }
 }
 
+std::vector<LevelFit> StepsOf(const FitOptions& options) {
+  const auto* const plan = std::get_if<CoarseToFinePlan>(&options.plan);
+  if (plan == nullptr) {
+    return options.schedule;
+  }
+  std::vector<LevelFit> steps;
+  for (int level = 0; level <= plan->finest; ++level) {
+    steps.push_back({level, plan->fraction});
+  }
+  return steps;
+}
+
+// Every level of the steps, coarse to fine.
+std::vector<LevelFit> SweepOf(const std::vector<LevelFit>& steps) {
+  std::set<int> levels;
+  for (const LevelFit& step : steps) {
+    levels.insert(step.level);
+  }
+  std::vector<LevelFit> sweep;
+  for (const int level : levels) {
+    sweep.push_back({level, 1});
+  }
+  return sweep;
+}
+
 void CheckInput(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
                 std::span<const VertexId> features, const FitOptions& options) {
   if (!(start.shape() == rest.shape())) {
@@ -53,7 +79,7 @@ void CheckInput(const HSplineSurface& start, const HSplineSurface& rest, const F
     Fail("the target has no point; give dowels or seed some");
   }
   CheckTarget(target);
-  CheckSchedule(options.schedule, start.shape().max_level);
+  CheckSchedule(StepsOf(options), start.shape().max_level);
   CheckFeatures(features, start.shape().max_level);
 }
 
@@ -167,10 +193,12 @@ void MeasurePoints(const FitTarget& target, FitResult& result) {
 class Fitter {
  public:
   Fitter(const HSplineSurface& rest, const FitTarget& target, const FitOptions& options,
-         FitResult& result)
+         std::size_t most_steps, const RunContext& context, FitResult& result)
       : rest_(rest),
         given_(target),
         options_(options),
+        most_steps_(static_cast<double>(most_steps)),
+        context_(context),
         result_(result),
         rms_mm_(PointRms(result.surface, target)) {
     if (options.relaxation.mode != RelaxationMode::kNone) {
@@ -183,6 +211,19 @@ class Fitter {
     }
   }
 
+  void TakeAll(const std::vector<LevelFit>& steps) {
+    for (const LevelFit& step : steps) {
+      context_.ThrowIfStopped();
+      context_.Report("fit", fmt::format("level {}, fraction {}", step.level, step.fraction),
+                      static_cast<double>(result_.levels.size()) / most_steps_);
+      Take(step);
+    }
+  }
+
+  double rms_mm() const { return rms_mm_; }
+  const FitTarget& target() const { return mesh_ ? moved_ : given_; }
+
+ private:
   void Take(const LevelFit& step) {
     result_.levels.push_back(Solve(step));
     if (!mesh_) {
@@ -202,9 +243,6 @@ class Fitter {
     }
   }
 
-  const FitTarget& target() const { return mesh_ ? moved_ : given_; }
-
- private:
   LevelSummary Solve(const LevelFit& step) {
     LevelSummary summary = FitStep(step, rest_, target(), options_, rms_mm_, result_.surface);
     rms_mm_ = summary.rms_after_mm;
@@ -228,6 +266,8 @@ class Fitter {
   const HSplineSurface& rest_;
   const FitTarget& given_;
   const FitOptions& options_;
+  double most_steps_;
+  const RunContext& context_;
   FitResult& result_;
   double rms_mm_;
   FitTarget moved_;  // the points as relaxation has left them; unused without
@@ -241,13 +281,20 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
               const RunContext& context) {
   CheckInput(start, rest, given, features, options);
   FitResult result{.surface = start};
-  Fitter fitter(rest, given, options, result);
-  for (const LevelFit& step : options.schedule) {
-    context.ThrowIfStopped();
-    context.Report(
-        "fit", fmt::format("level {}, fraction {}", step.level, step.fraction),
-        static_cast<double>(result.levels.size()) / static_cast<double>(options.schedule.size()));
-    fitter.Take(step);
+  const std::vector<LevelFit> steps = StepsOf(options), sweep = SweepOf(steps);
+  const auto* const until = std::get_if<UntilPlan>(&options.plan);
+  const int passes = until == nullptr ? 1 : until->max_passes;
+  Fitter fitter(rest, given, options, passes * steps.size() + options.sweeps * sweep.size(),
+                context, result);
+  for (int pass = 0; pass < passes; ++pass) {
+    const double before_mm = fitter.rms_mm();
+    fitter.TakeAll(steps);
+    if (until != nullptr && !(before_mm - fitter.rms_mm() > until->tolerance_mm)) {
+      break;
+    }
+  }
+  for (int k = 0; k < options.sweeps; ++k) {
+    fitter.TakeAll(sweep);
   }
   const bool restore = options.features == FeatureRule::kRestore;
   result.restored_features = restore ? RestoreFeatures(rest, features, result.surface) : 0;

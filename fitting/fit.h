@@ -31,6 +31,8 @@ struct FitOptions {
   FeatureRule features = FeatureRule::kRestore;
   FitAim aim = FitAim::kSurface;
   RelaxationOptions relaxation = {};
+  SchedulePlan plan = ListedPlan{};
+  int sweeps = 0;
 };
 template <class Visitor>
 void Fields(Visitor& visit, FitOptions& o) {
@@ -52,6 +54,17 @@ void Fields(Visitor& visit, FitOptions& o) {
   visit(FieldInfo{.name = "relaxation",
                   .doc = "whether and how the points' (u,v) move over the surface after each step"},
         o.relaxation);
+  visit(FieldInfo{.name = "plan",
+                  .doc = "listed: the steps of the schedule once; coarse_to_fine: level by level "
+                         "instead; until: the schedule again and again while that helps"},
+        o.plan);
+  visit(
+      FieldInfo{.name = "sweeps",
+                .min = 0,
+                .max = 100,
+                .doc = "how often all levels that were fitted are fitted again at the end, coarse "
+                       "to fine and whole (back-fitting)"},
+      o.sweeps);
 }
 
 struct FitResult {

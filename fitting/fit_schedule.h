@@ -2,6 +2,8 @@
 // In which order the levels of an H-spline are fitted, and how much of each solve is kept.
 #pragma once
 
+#include <string_view>
+#include <variant>
 #include <vector>
 
 #include "surfaces/fields.h"
@@ -34,5 +36,51 @@ void Fields(Visitor& visit, LevelFit& o) {
 inline std::vector<LevelFit> PublishedSchedule() {
   return {{0, 0.4}, {1, 0.35}, {2, 0.35}, {0, 0.35}, {1, 0.3}, {2, 0.3}};
 }
+
+// The steps of the list, once.
+struct ListedPlan {
+  static constexpr std::string_view kName = "listed";
+};
+template <class Visitor>
+void Fields(Visitor&, ListedPlan&) {}
+
+// Levels 0, 1, .. finest, in place of the list.
+struct CoarseToFinePlan {
+  static constexpr std::string_view kName = "coarse_to_fine";
+  int finest = 2;
+  double fraction = 1;
+};
+template <class Visitor>
+void Fields(Visitor& visit, CoarseToFinePlan& o) {
+  visit(FieldInfo{.name = "finest",
+                  .min = 0,
+                  .max = 12,
+                  .doc = "last level to fit; the list of steps is not used"},
+        o.finest);
+  visit(FieldInfo{.name = "fraction", .min = 0, .max = 1, .doc = "as that of a step of the list"},
+        o.fraction);
+}
+
+// The steps of the list again and again, while the points' root mean square distance falls.
+struct UntilPlan {
+  static constexpr std::string_view kName = "until";
+  double tolerance_mm = 0.01;
+  int max_passes = 20;
+};
+template <class Visitor>
+void Fields(Visitor& visit, UntilPlan& o) {
+  visit(FieldInfo{.name = "tolerance_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 10,
+                  .doc = "a pass over the list that lowers the points' root mean square distance "
+                         "by no more than this is the last"},
+        o.tolerance_mm);
+  visit(
+      FieldInfo{.name = "max_passes", .min = 1, .max = 1000, .doc = "passes over the list at most"},
+      o.max_passes);
+}
+
+using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan>;
 
 }  // namespace semblance

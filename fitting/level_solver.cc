@@ -64,7 +64,13 @@ std::string Lowercase(std::string text) {
 void AddAllRows(const LevelView& view, std::span<const Term> terms, RowSink& sink) {
   for (const Term& term : terms) {
     if (WeightOf(term) > 0) {
-      std::visit([&](const auto& t) { AddRows(t, view, sink); }, term);
+      std::visit(
+          [&]<class T>(const T& t) {
+            if constexpr (RowTerm<T>) {
+              AddRows(t, view, sink);
+            }
+          },
+          term);
     }
   }
 }

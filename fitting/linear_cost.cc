@@ -78,6 +78,45 @@ void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
   }
 }
 
+CoupledCost::CoupledCost(std::shared_ptr<const Eigen::MatrixXd> a, Eigen::VectorXd b)
+    : a_(std::move(a)), b_(std::move(b)) {
+  mutable_parameter_block_sizes()->assign(a_->cols() / 3, 3);
+  set_num_residuals(static_cast<int>(a_->rows()));
+}
+
+bool CoupledCost::Evaluate(double const* const* parameters, double* residuals,
+                           double** jacobians) const {
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  Eigen::Map<Eigen::VectorXd> r(residuals, a_->rows());
+  r = -b_;
+  for (Eigen::Index k = 0; k < a_->cols() / 3; ++k) {
+    r += a_->middleCols<3>(3 * k) * Eigen::Map<const Eigen::Vector3d>(parameters[k]);
+    if (jacobians != nullptr && jacobians[k] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[k], a_->rows(), 3) = a_->middleCols<3>(3 * k);
+    }
+  }
+  return true;
+}
+
+void AddCoupledResidual(const Eigen::MatrixXd& a, Eigen::VectorXd b, std::span<const int> vertices,
+                        ControlNet& net, ceres::Problem& problem) {
+  std::vector<int> used(vertices.begin(), vertices.end());
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(a.rows(), 3 * used.size());
+  std::vector<double*> blocks;
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    const auto at = std::lower_bound(used.begin(), used.end(), vertices[k]) - used.begin();
+    sums.middleCols<3>(3 * at) += a.middleCols<3>(3 * k);
+  }
+  for (const int vertex : used) {
+    blocks.push_back(net.vertices[vertex].data());
+  }
+  problem.AddResidualBlock(
+      new CoupledCost(std::make_shared<const Eigen::MatrixXd>(std::move(sums)), std::move(b)),
+      nullptr, blocks);
+}
+
 void ProblemSink::Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                       std::span<const int> vertices) {
   if (reduce_ && a->rows() > a->cols()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Residuals that are linear in control vertices: A X - B, the one cost of this floor.
+// Residuals that are linear in control vertices.
 #pragma once
 
 #include <ceres/cost_function.h>
@@ -28,6 +28,23 @@ class LinearCost final : public ceres::CostFunction {
   std::shared_ptr<const Eigen::MatrixXd> a_;
   Rows3 b_;
 };
+
+// Residual A x - b where x stacks the coordinates x y z of the control vertices, 3 columns of A
+// each: for terms that couple them. A is rows x 3 vertices, b has as many rows.
+class CoupledCost final : public ceres::CostFunction {
+ public:
+  CoupledCost(std::shared_ptr<const Eigen::MatrixXd> a, Eigen::VectorXd b);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  std::shared_ptr<const Eigen::MatrixXd> a_;
+  Eigen::VectorXd b_;
+};
+
+// Adds a CoupledCost over the vertices of `net` that `vertices` names; as AddLinearResidual.
+void AddCoupledResidual(const Eigen::MatrixXd& a, Eigen::VectorXd b, std::span<const int> vertices,
+                        ControlNet& net, ceres::Problem& problem);
 
 // Adds a LinearCost over the vertices of `net` that `vertices` names, one a column of `a`. A vertex
 // named twice gets the sum of its columns; one whose columns are zero is left out.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <ceres/loss_function.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -22,7 +23,7 @@ double WeightSum(const LevelView& view) {
   return sum;
 }
 
-// rho(s); the same formulas as ceres::HuberLoss and ceres::CauchyLoss.
+// rho(s); the same formulas as those of Ceres.
 double Rho(const PointTerm& term, double s) {
   const double a = term.loss_width_mm;
   switch (term.loss) {
@@ -30,6 +31,8 @@ double Rho(const PointTerm& term, double s) {
       return s <= a * a ? s : 2 * a * std::sqrt(s) - a * a;
     case RobustLoss::kCauchy:
       return a * a * std::log1p(s / (a * a));
+    case RobustLoss::kTukey:
+      return a * a / 3 * (1 - std::pow(std::max(1 - s / (a * a), 0.0), 3));
     case RobustLoss::kNone:
       break;
   }
@@ -40,6 +43,8 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scal
   std::unique_ptr<ceres::LossFunction> loss;
   if (term.loss == RobustLoss::kHuber) {
     loss = std::make_unique<ceres::HuberLoss>(term.loss_width_mm);
+  } else if (term.loss == RobustLoss::kTukey) {
+    loss = std::make_unique<ceres::TukeyLoss>(term.loss_width_mm);
   } else {
     loss = std::make_unique<ceres::CauchyLoss>(term.loss_width_mm);
   }

@@ -12,18 +12,23 @@
 
 namespace semblance {
 
-// Whether the term is |A X - B|^2 with the same A for x, y and z; then AddRows gives its rows.
-inline bool IsSeparable(const PointTerm& term) { return term.loss == RobustLoss::kNone; }
-template <class T>
-bool IsSeparable(const T&) {
-  return true;
-}
-
-// The rows of a separable term; their sum of squares equals TermCost.
+// The rows of a term that is the same for x, y and z (PointTerm: without a loss); their sum of
+// squares equals TermCost.
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
+
+// Terms that are |A X - B|^2 with the same A for x, y and z; then AddRows gives its rows.
+template <class T>
+concept RowTerm = requires(const T& term, const LevelView& view, RowSink& sink) {
+  AddRows(term, view, sink);
+};
+inline bool IsSeparable(const PointTerm& term) { return term.loss == RobustLoss::kNone; }
+template <class T>
+bool IsSeparable(const T&) {
+  return RowTerm<T>;
+}
 
 // Adds the residuals of a term over `net`, whose vertices become parameter blocks of 3 doubles. The
 // sum of their squares (robust: of their losses), which is twice Ceres' cost, equals TermCost but
@@ -31,7 +36,11 @@ void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
 // what no net can change. Points are reduced best in the order of SortObservations.
 void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem);
-template <class T>
+void AddResiduals(const TangentPointTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+template <RowTerm T>
 void AddResiduals(const T& term, const LevelView& view, ControlNet& net, ceres::Problem& problem) {
   ProblemSink sink(net, problem);
   AddRows(term, view, sink);
@@ -42,5 +51,7 @@ double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& 
 double TermCost(const PriorTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const TangentPointTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net);
 
 }  // namespace semblance

@@ -73,6 +73,9 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
   if (!experiment.first_fit.empty()) {
     FitOptions first = experiment.fit;
     first.schedule = experiment.first_fit;
+    first.plan = ListedPlan{};
+    first.sweeps = 0;
+    first.relaxation.mode = RelaxationMode::kNone;
     surface = Fit(surface, placed.surface, dowels, features, first, context).surface;
   }
   std::optional<FaceFit> result;

@@ -228,6 +228,50 @@ TEST(Fit, AScheduleCanBeFittedInParts) {
   EXPECT_TRUE(SameBytes(parts.Net(3), whole.Net(3)));
 }
 
+TEST(Fit, CoarseToFineIsThatList) {
+  const HSplineSurface start = RandomSurface(Shape(), 2);
+  const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 200);
+  const FitOptions plan{.plan = CoarseToFinePlan{.finest = 2, .fraction = 0.7}, .sweeps = 1};
+  const FitOptions list{.schedule = {{0, 0.7}, {1, 0.7}, {2, 0.7}, {0, 1}, {1, 1}, {2, 1}}};
+  const FitResult a = Fit(start, target, {}, plan, {}), b = Fit(start, target, {}, list, {});
+  EXPECT_TRUE(SameBytes(a.surface.Net(3), b.surface.Net(3)));
+  EXPECT_EQ(a.levels.size(), 6u);
+  const FitOptions deep{.plan = CoarseToFinePlan{.finest = 4}};
+  EXPECT_THROW(Fit(start, target, {}, deep, {}), InputError);
+}
+
+TEST(Fit, UntilRepeatsWhileItHelps) {
+  const HSplineSurface start = RandomSurface(Shape(), 2);
+  const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 400, Vec3(3, -8, 2), 0.3);
+  const double once = Fit(start, target, {}, {}, {}).point_rms_mm;
+  const auto run = [&](double tolerance_mm, int max_passes) {
+    const UntilPlan plan{.tolerance_mm = tolerance_mm, .max_passes = max_passes};
+    return Fit(start, target, {}, {.plan = plan}, {});
+  };
+  const FitResult result = run(1e-3, 100);
+  const std::size_t passes = result.levels.size() / 6;
+  ASSERT_GT(passes, 2u);
+  ASSERT_LT(passes, 100u);
+  for (std::size_t pass = 0; pass < passes; ++pass) {
+    const double fall =
+        result.levels[6 * pass].rms_before_mm - result.levels[6 * pass + 5].rms_after_mm;
+    EXPECT_EQ(fall > 1e-3, pass + 1 < passes) << pass;
+  }
+  EXPECT_LT(result.point_rms_mm, once);
+  EXPECT_EQ(run(1e-3, 2).levels.size(), 12u);
+  EXPECT_EQ(run(10, 100).levels.size(), 6u);
+}
+
+TEST(Fit, BackFittingSweepsComeNearer) {
+  const HSplineSurface start = RandomSurface(Shape(), 2);
+  const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 400, Vec3(3, -8, 2));
+  const FitOptions without{.plan = CoarseToFinePlan{}};
+  FitOptions with = without;
+  with.sweeps = 2;
+  EXPECT_LT(Fit(start, target, {}, with, {}).point_rms_mm,
+            Fit(start, target, {}, without, {}).point_rms_mm);
+}
+
 // The same displacement costs the same at each level, in both domains.
 TEST(Fit, SmoothnessMeansTheSameAtEveryLevel) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {

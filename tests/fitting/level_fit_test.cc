@@ -337,6 +337,11 @@ TEST(LevelFit, RobustLossesForgiveOutliers) {
   const double plain = error(RobustLoss::kNone);
   EXPECT_LT(error(RobustLoss::kHuber), 0.3 * plain);
   EXPECT_LT(error(RobustLoss::kCauchy), 0.05 * plain);
+  // Tukey's loss needs a start near enough: that of the others.
+  LevelView near = view;
+  near.start = FitLevel(view, std::vector<Term>{PointTerm{.loss = RobustLoss::kHuber}}).net;
+  const PointTerm tukey{.loss = RobustLoss::kTukey, .loss_width_mm = 10};
+  EXPECT_LT(Distance(FitLevel(near, std::vector<Term>{tukey}).net, truth), 1e-3 * plain);
 }
 
 TEST(LevelFit, NothingToSolveLeavesTheNet) {

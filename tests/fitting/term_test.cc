@@ -115,5 +115,47 @@ TEST(Terms, AffineMapsOfTheTemplateDoNotBend) {
   EXPECT_GT(TermCost(MembraneTerm{}, view, view.start), 1e-3);
 }
 
+TEST(Terms, TangentPointsWithoutSlidingArePoints) {
+  const LevelView view = NoisyView();
+  const double points = TermCost(PointTerm{}, view, view.start);
+  EXPECT_NEAR(TermCost(TangentPointTerm{.tangential = 1}, view, view.start), points,
+              1e-12 * points);
+  // A flat sheet that slides within itself costs only what sliding is said to.
+  LevelView flat = view;
+  for (ControlNet* const net : {&flat.start, &flat.rest}) {
+    *net = Sheet(4, 3, 0, 0);
+    for (Vec3& v : net->vertices) {
+      v.z() = 0;
+    }
+  }
+  for (Observation& o : flat.observations) {
+    o.position = flat.grid.StencilAt(o.uv).Apply(flat.start) + Vec3(3, 4, 0);
+  }
+  EXPECT_NEAR(TermCost(TangentPointTerm{.tangential = 0}, flat, flat.start), 0, 1e-12);
+  EXPECT_NEAR(TermCost(TangentPointTerm{.tangential = 0.1}, flat, flat.start), 2.5, 1e-12);
+}
+
+// Mirrored at the sheet's plane x = 40, wherever the whole is turned to.
+TEST(Terms, MirroredDisplacementsAreSymmetric) {
+  LevelView view = NoisyView();
+  const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).matrix();
+  for (int j = 0; j < view.rest.rows; ++j) {
+    for (int i = 0; i < view.rest.columns; ++i) {
+      const int twin = view.rest.columns - 1 - i;
+      view.rest.At(i, j).z() = 5 * std::cos(i - 3);
+      view.start.At(i, j) = view.rest.At(i, j) + Vec3(i - twin, 2 + j, std::cos(i - 3));
+    }
+  }
+  for (std::size_t k = 0; k < view.rest.vertices.size(); ++k) {
+    view.rest.vertices[k] = turn * view.rest.vertices[k];
+    view.start.vertices[k] = turn * view.start.vertices[k];
+  }
+  const SymmetryTerm surface{.of = SmoothnessOf::kSurface};
+  EXPECT_NEAR(TermCost(SymmetryTerm{}, view, view.start), 0, 1e-12);
+  EXPECT_NEAR(TermCost(surface, view, view.start), 0, 1e-12);
+  view.start.At(1, 1) += turn * Vec3(1, 0, 0);
+  EXPECT_NEAR(TermCost(SymmetryTerm{.weight = 1}, view, view.start), 2.0 / 42, 1e-12);
+}
+
 }  // namespace
 }  // namespace semblance

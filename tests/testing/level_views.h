@@ -62,6 +62,9 @@ inline std::vector<Term> AllTerms() {
   std::vector<Term> terms = EveryTerm(std::make_index_sequence<std::variant_size_v<Term>>());
   terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kHuber, .loss_width_mm = 1});
   terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kCauchy, .loss_width_mm = 2});
+  terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kTukey, .loss_width_mm = 30});
+  terms.push_back(TangentPointTerm{.weight = 2, .tangential = 0.5});
+  terms.push_back(SymmetryTerm{.weight = 0.2, .of = SmoothnessOf::kSurface});
   terms.push_back(PriorTerm{.weight = 3, .towards = PriorTowards::kTemplate});
   terms.push_back(SmoothnessTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
   terms.push_back(MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});

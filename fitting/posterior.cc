@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/posterior.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <variant>
+
+#include "fitting/normal_equations.h"
+#include "fitting/sparse_factor.h"
+#include "fitting/term_cost.h"
+#include "surfaces/error.h"
+
+namespace semblance {
+namespace {
+
+void Check(const LevelView& view, std::span<const double> sd_mm, std::span<const Term> terms) {
+  if (sd_mm.size() != view.observations.size()) {
+    throw InputError(fmt::format("posterior: {} standard deviations for {} points; give one each",
+                                 sd_mm.size(), view.observations.size()));
+  }
+  for (std::size_t k = 0; k < sd_mm.size(); ++k) {
+    if (!(std::isfinite(sd_mm[k]) && sd_mm[k] > 0)) {
+      throw InputError(fmt::format(
+          "posterior: the standard deviation of point {} is {} mm; give a positive number", k,
+          sd_mm[k]));
+    }
+  }
+  for (const Term& term : terms) {
+    const auto usable = [](const auto& t) { return t.weight <= 0 || IsSeparable(t); };
+    if (!std::visit(usable, term)) {
+      throw InputError(fmt::format(
+          "posterior: the term '{}' has a robust loss or couples the coordinates; leave it out or "
+          "take points without a loss",
+          TermName(term)));
+    }
+  }
+}
+
+// In whatever order the points are given.
+double SortedSum(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+double PointWeight(std::span<const Term> terms) {
+  double sum = 0;
+  for (const Term& term : terms) {
+    const auto* const points = std::get_if<PointTerm>(&term);
+    sum += points == nullptr ? 0 : points->weight;
+  }
+  return sum;
+}
+
+// What makes a term's cost a sum of squares in units of its deviation: a point counts
+// weight * w / sum(w) in the fit and 1 / sd^2 here.
+double PriorScale(const LevelView& view, std::span<const double> sd_mm,
+                  std::span<const Term> terms) {
+  std::vector<double> weights, variances;
+  for (std::size_t k = 0; k < sd_mm.size(); ++k) {
+    weights.push_back(view.observations[k].weight);
+    variances.push_back(weights.back() * sd_mm[k] * sd_mm[k]);
+  }
+  const double count = static_cast<double>(sd_mm.size()), points = PointWeight(terms);
+  return count > 0 && points > 0
+             ? SortedSum(weights) / points / (SortedSum(std::move(variances)) / count)
+             : 1;
+}
+
+void AddPoints(LevelView view, std::span<const double> sd_mm, NormalMatrix& normal) {
+  std::vector<double> weights;
+  for (std::size_t k = 0; k < sd_mm.size(); ++k) {
+    weights.push_back(1 / (sd_mm[k] * sd_mm[k]));
+    view.observations[k].weight = weights.back();
+  }
+  SortObservations(view.grid, view.observations);
+  AddRows(PointTerm{.weight = SortedSum(std::move(weights))}, view, normal);
+}
+
+void AddPrior(const LevelView& view, std::span<const Term> terms, double scale,
+              NormalMatrix& normal) {
+  for (const Term& term : terms) {
+    std::visit(
+        [&]<class T>(T t) {
+          t.weight *= scale;
+          if constexpr (RowTerm<T> && !std::is_same_v<T, PointTerm>) {
+            AddRows(t, view, normal);
+          }
+        },
+        term);
+  }
+}
+
+}  // namespace
+
+std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double> sd_mm,
+                                   std::span<const Term> terms, std::span<const Vec2> uv) {
+  Check(view, sd_mm, terms);
+  NormalMatrix normal(view.grid);
+  if (!view.observations.empty() && PointWeight(terms) > 0) {
+    AddPoints(view, sd_mm, normal);
+  }
+  AddPrior(view, terms, PriorScale(view, sd_mm, terms), normal);
+  const SparseMatrix lower = normal.Lower();
+  const double largest = std::max(lower.diagonal().maxCoeff(), 1e-12);
+  const SparseFactor factor(lower, 1e-11 * largest);  // keeps what nothing holds from being zero
+  if (!factor.usable()) {
+    throw InputError("posterior: the normal matrix has no factor; add a prior or smoothness term");
+  }
+  constexpr std::size_t kAtOnce = 64;  // right-hand sides, to bound the memory
+  std::vector<double> sigma;
+  for (std::size_t begin = 0; begin < uv.size(); begin += kAtOnce) {
+    const auto part = uv.subspan(begin, std::min(kAtOnce, uv.size() - begin));
+    Eigen::MatrixXd stencils = Eigen::MatrixXd::Zero(lower.rows(), part.size());
+    for (std::size_t k = 0; k < part.size(); ++k) {
+      const Stencil s = view.grid.StencilAt(part[k]);
+      for (int v = 0; v < 16; ++v) {
+        stencils(s.index[v], k) += s.weight[v];
+      }
+    }
+    const Eigen::VectorXd variances = stencils.cwiseProduct(factor.Solve(stencils)).colwise().sum();
+    for (const double variance : variances) {
+      sigma.push_back(std::sqrt(variance));
+    }
+  }
+  return sigma;
+}
+
+std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineSurface& rest,
+                                   const FitTarget& target, std::span<const double> sd_mm,
+                                   int level, std::span<const Term> terms,
+                                   std::span<const Vec2> uv) {
+  const HSplineShape& shape = surface.shape();
+  if (level < 0 || level > shape.max_level || !(shape == rest.shape())) {
+    throw InputError(fmt::format(
+        "posterior: level {} of a surface with levels 0..{}; give one of them, and a template of "
+        "the same shape",
+        level, shape.max_level));
+  }
+  CheckTarget(target);
+  const bool periodic = shape.closure == Closure::kPeriodicU;
+  LevelView view{
+      .grid = {.patches_u = shape.PatchesU(level),
+               .patches_v = shape.PatchesV(level),
+               .periodic_u = periodic},
+      .start = surface.Net(level),
+      .rest = rest.Net(level),
+      .lengths_mm = MeanLengths(
+          {.patches_u = shape.patches_u, .patches_v = shape.patches_v, .periodic_u = periodic},
+          rest.Net(0)),
+      .observations = {}};
+  for (const FitPoint& p : target.points) {
+    view.observations.push_back({.uv = p.uv, .position = p.position, .weight = p.weight});
+  }
+  return PosteriorSigma(view, sd_mm, terms, uv);
+}
+
+}  // namespace semblance

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/posterior.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <numbers>
+
+#include "fitting/normal_equations.h"
+#include "fitting/term_cost.h"
+#include "surfaces/error.h"
+#include "tests/testing/level_views.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+using testing::Observe;
+using testing::Random;
+using testing::Sheet;
+using testing::View;
+
+double Gaussian(Random& random) {
+  const double r = std::sqrt(-2 * std::log(random.Uniform(1e-300, 1)));
+  return r * std::cos(2 * std::numbers::pi * random.Uniform(0, 1));
+}
+
+// 25 points on the left half of the sheet, known to 0.5 to 2 mm and weighted accordingly.
+struct Problem {
+  LevelView view = View(Sheet(4, 3, 0, 0), Observe(Sheet(4, 3, 0, 0), 25, 3, 0, 0.5));
+  std::vector<double> sd_mm;
+  std::vector<Term> terms = {PointTerm{}, MembraneTerm{.weight = 0.05},
+                             PriorTerm{.weight = 0.01, .towards = PriorTowards::kTemplate}};
+  std::vector<Vec2> uv = {{0.1, 0.2}, {0.3, 0.5}, {0.5, 0.9}, {0.75, 0.4}, {0.98, 0.98}};
+
+  Problem() {
+    Random random(4);
+    for (Observation& o : view.observations) {
+      sd_mm.push_back(random.Uniform(0.5, 2));
+      o.weight = 7 / (sd_mm.back() * sd_mm.back());
+    }
+  }
+};
+
+// Draws of the terms' prior around the template, in mm: the cost of a net is weight_sum times
+// minus twice the logarithm of its density, weight_sum = sum of the points' 1 / sd^2.
+ControlNet DrawTruth(const Problem& problem, Random& random) {
+  NormalMatrix normal(problem.view.grid);
+  for (const Term& term : problem.terms) {
+    if (const auto* const membrane = std::get_if<MembraneTerm>(&term)) {
+      AddRows(*membrane, problem.view, normal);
+    } else if (const auto* const prior = std::get_if<PriorTerm>(&term)) {
+      AddRows(*prior, problem.view, normal);
+    }
+  }
+  double weight_sum = 0;
+  for (const double sd : problem.sd_mm) {
+    weight_sum += 1 / (sd * sd);
+  }
+  const Eigen::MatrixXd precision = weight_sum * Eigen::MatrixXd(normal.Lower());  // its lower half
+  const Eigen::LLT<Eigen::MatrixXd> factor(precision);
+  const Eigen::MatrixXd draw = factor.matrixU().solve(
+      Eigen::MatrixXd::NullaryExpr(precision.rows(), 3, [&] { return Gaussian(random); }));
+  ControlNet net = problem.view.rest;
+  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+    net.vertices[k] += draw.row(k).transpose();
+  }
+  return net;
+}
+
+// True faces drawn from the prior, dowels with their noise, FitLevel: its error is as large as
+// sigma says, near the points and far from them.
+TEST(Posterior, SigmaIsTheErrorOfTheFit) {
+  const Problem problem;
+  const std::vector<double> sigma =
+      PosteriorSigma(problem.view, problem.sd_mm, problem.terms, problem.uv);
+  Random random(9);
+  constexpr int kDraws = 700;  // x 3 coordinates; the estimate's own deviation is 1.5 %
+  std::vector<double> squares(problem.uv.size(), 0);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const ControlNet truth = DrawTruth(problem, random);
+    LevelView view = problem.view;
+    for (std::size_t k = 0; k < view.observations.size(); ++k) {
+      Observation& o = view.observations[k];
+      const Vec3 noise(Gaussian(random), Gaussian(random), Gaussian(random));
+      o.position = view.grid.StencilAt(o.uv).Apply(truth) + problem.sd_mm[k] * noise;
+    }
+    const ControlNet fitted = FitLevel(view, problem.terms).net;
+    for (std::size_t k = 0; k < problem.uv.size(); ++k) {
+      const Stencil s = view.grid.StencilAt(problem.uv[k]);
+      squares[k] += (s.Apply(fitted) - s.Apply(truth)).squaredNorm() / (3 * kDraws);
+    }
+  }
+  for (std::size_t k = 0; k < problem.uv.size(); ++k) {
+    EXPECT_NEAR(std::sqrt(squares[k]), sigma[k], 0.06 * sigma[k]) << k;
+  }
+  EXPECT_GT(sigma.back(), 2 * sigma.front());  // no point is near
+}
+
+TEST(Posterior, ScalesWithTheDeviationsAndNotWithTheWeights) {
+  Problem problem;
+  const std::vector<double> once =
+      PosteriorSigma(problem.view, problem.sd_mm, problem.terms, problem.uv);
+  for (std::size_t k = 0; k < problem.sd_mm.size(); ++k) {
+    problem.sd_mm[k] *= 3;
+    problem.view.observations[k].weight *= 5;
+  }
+  const std::vector<double> thrice =
+      PosteriorSigma(problem.view, problem.sd_mm, problem.terms, problem.uv);
+  for (std::size_t k = 0; k < once.size(); ++k) {
+    EXPECT_NEAR(thrice[k], 3 * once[k], 1e-9 * once[k]);
+  }
+}
+
+TEST(Posterior, OfASurfaceIsThatOfItsLevel) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 1};
+  const HSplineSurface rest = testing::SmoothSurface(shape, 1);
+  FitTarget target;
+  for (int k = 0; k < 100; ++k) {
+    const Vec2 uv((k % 10 + 0.5) / 10, (k / 10 + 0.5) / 10);
+    target.points.push_back({.label = "a", .position = rest.Point(uv), .uv = uv});
+  }
+  const std::vector<double> sd_mm(100, 1.0);
+  const std::vector<Vec2> uv = {{0.5, 0.5}, {0.2, 0.7}};
+  const std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}};
+  const auto coarse = PosteriorSigma(rest, rest, target, sd_mm, 0, terms, uv);
+  const auto fine = PosteriorSigma(rest, rest, target, sd_mm, 1, terms, uv);
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    EXPECT_LT(coarse[k], 1);  // many points, few unknowns
+    EXPECT_LE(coarse[k], fine[k] * (1 + 1e-9));
+  }
+}
+
+TEST(Posterior, WrongInputIsNamed) {
+  Problem problem;
+  const auto message = [&]() -> std::string {
+    try {
+      PosteriorSigma(problem.view, problem.sd_mm, problem.terms, problem.uv);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(message(), "no error");
+  problem.terms.push_back(SymmetryTerm{});
+  EXPECT_THAT(message(), ::testing::HasSubstr("'symmetry'"));
+  problem.terms.pop_back();
+  problem.sd_mm[3] = 0;
+  EXPECT_THAT(message(), ::testing::HasSubstr("point 3 is 0 mm"));
+  problem.sd_mm.pop_back();
+  EXPECT_THAT(message(), ::testing::HasSubstr("24 standard deviations for 25 points"));
+}
+
+}  // namespace
+}  // namespace semblance
