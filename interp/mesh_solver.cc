@@ -115,6 +115,8 @@ class Elimination {
     Update update{front.border, full.bottomRightCorner(border, border)};
     if (own > 0) {
       Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(front.own);
+    }
+    if (own > 0 && border > 0) {  // Eigen's products do not take empty matrices
       front.own.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(
           front.below);
       update.matrix.selfadjointView<Eigen::Lower>().rankUpdate(front.below, -1);
@@ -199,13 +201,20 @@ Eigen::MatrixXd MeshSolver::Solve(const Eigen::MatrixXd& right) const {
       continue;  // right sides of few entries touch few fronts
     }
     front.own.triangularView<Eigen::Lower>().solveInPlace(own);
-    const Eigen::MatrixXd down = front.below * own;
-    x(front.border, Eigen::all) -= down;
+    if (!front.border.empty()) {
+      const Eigen::MatrixXd down = front.below * own;
+      x(front.border, Eigen::all) -= down;
+    }
   }
   for (auto it = fronts_.rbegin(); it != fronts_.rend(); ++it) {
     auto own = x.middleRows(it->begin, it->end - it->begin);
-    const Eigen::MatrixXd border = x(it->border, Eigen::all);
-    own.noalias() -= it->below.transpose() * border;
+    if (own.rows() == 0) {
+      continue;
+    }
+    if (!it->border.empty()) {
+      const Eigen::MatrixXd border = x(it->border, Eigen::all);
+      own.noalias() -= it->below.transpose() * border;
+    }
     it->own.triangularView<Eigen::Lower>().transpose().solveInPlace(own);
   }
   Eigen::MatrixXd solution(right.rows(), right.cols());
