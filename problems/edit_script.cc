@@ -71,13 +71,6 @@ void MoveVertex(const VertexId& vertex, const std::optional<Vec3>& offset, Contr
 
 }  // namespace
 
-template <class Report>
-void CheckValue(Report& report, const RegionReset& reset) {
-  if (reset.v[0] > reset.v[1]) {
-    report("v", fmt::format("runs from {} to {}; put the lower first", reset.v[0], reset.v[1]));
-  }
-}
-
 EditScript ReadEditScript(const std::filesystem::path& path) {
   return ReadConfig<EditScript>(path);
 }

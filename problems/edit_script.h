@@ -67,6 +67,13 @@ void Fields(Visitor& visit, EditScript& o) {
   visit(FieldInfo{.name = "edits", .doc = "vertices that get another offset"}, o.edits);
 }
 
+template <class Report>
+void CheckValue(Report& report, const RegionReset& reset) {
+  if (reset.v[0] > reset.v[1]) {
+    report("v", "runs from the higher to the lower; put the lower first");
+  }
+}
+
 // A YAML file. Throws IoError if it cannot be read, ConfigError with a line for each fault.
 EditScript ReadEditScript(const std::filesystem::path& path);
 
