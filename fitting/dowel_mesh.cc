@@ -70,7 +70,7 @@ DowelMesh::DowelMesh(const HSplineSurface& template_surface, std::span<const Vec
 }
 
 bool DowelMesh::Turned(const std::array<int, 3>& triangle, std::span<const Vec2> uv) const {
-  constexpr double kLeft = 0.01;  // of the area, or of that of its sides' squares if it was flat
+  constexpr double kLeft = 0.01;  // of the area that it had in the template
   return DoubleArea(triangle, uv) <= kLeft * DoubleArea(triangle, rest_uv_);
 }
 

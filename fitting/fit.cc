@@ -170,7 +170,8 @@ int RestoreFeatures(const HSplineSurface& rest, std::span<const VertexId> featur
   return static_cast<int>(offsets.size());
 }
 
-void MeasurePoints(const FitTarget& target, FitResult& result) {
+// known_rms_mm: of all points, if the surface is as the last step left it; else NaN.
+void MeasurePoints(const FitTarget& target, double known_rms_mm, FitResult& result) {
   std::vector<std::array<double, 2>> all, dowels;
   all.reserve(target.points.size());
   for (const FitPoint& p : target.points) {
@@ -183,7 +184,7 @@ void MeasurePoints(const FitTarget& target, FitResult& result) {
     dowels.push_back(all.back());
   }
   const bool seeded = dowels.size() < all.size();
-  result.point_rms_mm = WeightedRms(std::move(all));
+  result.point_rms_mm = std::isnan(known_rms_mm) ? WeightedRms(std::move(all)) : known_rms_mm;
   result.dowel_rms_mm = seeded ? WeightedRms(std::move(dowels)) : result.point_rms_mm;
   result.usable = std::all_of(result.levels.begin(), result.levels.end(),
                               [](const LevelSummary& s) { return s.usable; });
@@ -298,7 +299,7 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
   }
   const bool restore = options.features == FeatureRule::kRestore;
   result.restored_features = restore ? RestoreFeatures(rest, features, result.surface) : 0;
-  MeasurePoints(fitter.target(), result);
+  MeasurePoints(fitter.target(), result.restored_features > 0 ? kNaN : fitter.rms_mm(), result);
   return result;
 }
 

@@ -82,7 +82,14 @@ double CostOf(const Term& term, const LevelView& view, const ControlNet& net, do
   return std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
 }
 
-void Measure(const LevelView& view, std::span<const Term> terms, LevelSolution& solution) {
+SparseMatrix PointNormal(const LevelView& view) {
+  NormalMatrix normal(view.grid);
+  AddRows(PointTerm{}, view, normal);
+  return normal.Lower();
+}
+
+void Measure(const LevelView& view, std::span<const Term> terms, const SparseMatrix& lower,
+             LevelSolution& solution) {
   LevelSummary& summary = solution.summary;
   summary.rms_before_mm = ObservationRms(view, view.start);
   summary.rms_after_mm = ObservationRms(view, solution.net);
@@ -91,9 +98,6 @@ void Measure(const LevelView& view, std::span<const Term> terms, LevelSolution& 
                              .before = CostOf(term, view, view.start, summary.rms_before_mm),
                              .after = CostOf(term, view, solution.net, summary.rms_after_mm)});
   }
-  NormalMatrix normal(view.grid);
-  AddRows(PointTerm{}, view, normal);
-  const SparseMatrix lower = normal.Lower();
   summary.uncovered_vertices = static_cast<int>((lower.diagonal().array() <= 0).count());
   summary.rank = NumericalRank(lower, view.observations.size());
   summary.max_move_mm = MaxMove(view.start, solution.net);
@@ -112,7 +116,7 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> terms, LevelSolver 
   solution.summary.free_vertices = outcome.free_vertices;
   solution.summary.termination = outcome.termination;
   solution.summary.usable = outcome.usable;
-  Measure(view, terms, solution);
+  Measure(view, terms, outcome.points.rows() > 0 ? outcome.points : PointNormal(view), solution);
   return solution;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <vector>
 
 #include "fitting/blas_threads.h"
 #include "fitting/normal_equations.h"
@@ -88,9 +89,19 @@ double Step(const Eigen::MatrixX3d& step, ControlNet& net) {
   return std::sqrt(length / std::max(size, 1e-26));
 }
 
-SparseMatrix NormalOf(const LevelView& view, std::span<const Term> terms) {
+// All terms' matrix; that of the points is kept on the way.
+SparseMatrix NormalOf(const LevelView& view, std::span<const Term> terms, SparseMatrix& points) {
+  std::vector<Term> observing, others;
+  for (const Term& term : terms) {
+    (std::holds_alternative<PointTerm>(term) && WeightOf(term) > 0 ? observing : others)
+        .push_back(term);
+  }
   NormalMatrix matrix(view.grid);
-  AddAllRows(view, terms, matrix);
+  AddAllRows(view, observing, matrix);
+  if (!observing.empty()) {
+    points = matrix.Lower();
+  }
+  AddAllRows(view, others, matrix);
   return matrix.Lower();
 }
 
@@ -150,8 +161,8 @@ SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, C
 }
 
 SolverOutcome SolveDirectly(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
-  const SparseMatrix normal = NormalOf(view, terms);
   SolverOutcome outcome;
+  const SparseMatrix normal = NormalOf(view, terms, outcome.points);
   outcome.free_vertices = static_cast<int>((normal.diagonal().array() > 0).count());
   if (outcome.free_vertices == 0) {
     return outcome;

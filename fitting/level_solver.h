@@ -6,6 +6,7 @@
 #include <string>
 
 #include "fitting/level_fit.h"
+#include "fitting/normal_equations.h"
 
 namespace semblance {
 
@@ -13,7 +14,9 @@ struct SolverOutcome {
   int iterations = 0;
   int free_vertices = 0;  // that some term touches
   std::string termination = "nothing to solve";
-  bool usable = true;  // else the net is as it was
+  bool usable = true;        // else the net is as it was
+  SparseMatrix points = {};  // lower normal matrix of the points, times some factor; by
+                             // SolveDirectly if they are among the terms, else 0 x 0
 };
 
 // Whether SolveDirectly can: every term with a weight is separable (term_cost.h).

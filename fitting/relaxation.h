@@ -104,7 +104,8 @@ struct RelaxationSummary {
 };
 
 // The triangles of the points' (u,v), Delaunay in mm of the template; they never turn over. Points
-// of the same (u,v) share a corner. With a periodic u the network is cut at u = 0.
+// of the same (u,v) share a corner. With a periodic u the network is cut at u = 0, which no point
+// passes.
 class DowelMesh {
  public:
   // template_surface: where `uv` are the points' places before any move. Needs no particular count
