@@ -5,7 +5,7 @@ SUDO     := $(if $(filter 0,$(shell id -u)),,sudo)
 PRESET   ?= release
 DEMO_OUT ?= out/demo
 
-.PHONY: all setup build demo test bench sanitize format check clean
+.PHONY: all setup configure build demo test bench sanitize format check clean
 
 all: build
 
@@ -16,11 +16,15 @@ setup:
 	  $(SUDO) apt-get update -qq && \
 	  $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing; fi
 
-build: setup
-	@cmake --preset $(PRESET) > build.log 2>&1 || { cat build.log; exit 1; }; rm -f build.log
+configure: setup
+	@cmake --preset $(PRESET) > configure.log 2>&1 || { cat configure.log; exit 1; }; rm -f configure.log
+
+build: configure
 	@cmake --build --preset $(PRESET)
 
-demo: build
+# The program alone: the tests would double the time.
+demo: configure
+	@cmake --build --preset $(PRESET) --target semblance
 	@build/problems/semblance run configs/demo.yaml --out $(DEMO_OUT) --force
 
 test: build
