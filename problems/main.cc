@@ -333,7 +333,9 @@ int Main(int argc, char** argv) {
     fmt::print(stderr, "semblance: {}\n", e.what());
     return kBadInput;
   } catch (const Cancelled&) {
-    fmt::print(stderr, "semblance: stopped; nothing was written\n");
+    fmt::print(
+        stderr,
+        "semblance: stopped; no run was written, and the finished trials of a study are kept\n");
     return kNotUsable;
   }
 }
