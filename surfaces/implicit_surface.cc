@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "surfaces/error.h"
+#include "surfaces/polygon_integral.h"
 
 namespace semblance {
 namespace {
@@ -111,27 +112,48 @@ class SplitKernel {
   InversePower power_;
 };
 
-// The integral by quadrature: the centroid where the triangle is small against its distance, the
-// three edge midpoints (exact for quadratics) where it is less so, and four smaller triangles where
-// it is near.
+// The integral: by the centroid where the triangle is small against its distance, by the three edge
+// midpoints (exact for quadratics) where it is less so. Where it is near, in closed form for a
+// whole decay, unless the point lies flat beside it; else by four smaller triangles.
 class FlatKernel {
  public:
-  explicit FlatKernel(const FlatEmitter& o) : k_(o.decay), power_(o.decay + 3) {}
+  explicit FlatKernel(const FlatEmitter& o)
+      : k_(o.decay),
+        closed_(o.decay == std::floor(o.decay) ? static_cast<int>(o.decay) + 1 : -1),
+        power_(o.decay + 3) {}
   double Gain(const EmitterTriangle& t) const {
     return (k_ + 1) / (2 * std::numbers::pi) * std::pow(t.depth_mm, k_) * t.area_mm2;
   }
   double Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
     const double r2 = (p - t.centroid).squaredNorm();
+    if (t.longest2_mm2 <= kCentroidShare * r2) {
+      return t.gain * height * power_(r2);
+    }
+    const double height2 = height * height, floor2 = t.Floor2(1);
+    const bool closed = closed_ > 0 && t.longest2_mm2 > kMidpointShare * r2 &&
+                        height2 >= std::max(floor2, kFlatShare * r2);
     return t.gain * height *
-           (t.longest2_mm2 <= kCentroidShare * r2
-                ? power_(r2)
-                : Mean(p, t.a, t.b, t.c, t.longest2_mm2, t.Floor2(1)));
+           (closed ? ClosedForm(t, p, height) / t.area_mm2
+                   : Mean(p, t.a, t.b, t.c, t.longest2_mm2, floor2));
   }
   double Falloff() const { return k_ + 2; }  // height <= distance
   double Advance(const EmitterTriangle&) const { return 0; }
 
  private:
-  static constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06;  // of the squared distance
+  // of the squared distance
+  static constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06, kFlatShare = 0.001;
+
+  double ClosedForm(const EmitterTriangle& t, const Vec3& p, double height) const {
+    const auto edge = [&p](const Vec3& u, const Vec3& v, const Vec3& out) {
+      const Vec3 from = u - p, along = v - u;
+      const double inverse = 1 / along.norm(), begin = from.dot(along) * inverse;
+      return EdgeFromFoot{from.dot(out) * inverse, begin, begin + 1 / inverse};
+    };
+    const std::array<EdgeFromFoot, 3> edges = {edge(t.a, t.b, t.edge_normal_a),
+                                               edge(t.b, t.c, t.edge_normal_b),
+                                               edge(t.c, t.a, t.edge_normal_c)};
+    return IntegrateInversePower(edges, height, closed_);
+  }
 
   // Mean of |p - q|^-(k+3) over a triangle.
   double Mean(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c, double longest2,
@@ -151,6 +173,7 @@ class FlatKernel {
   }
 
   double k_;
+  int closed_;  // n of IntegrateInversePower; -1 where there is no closed form
   InversePower power_;
 };
 

@@ -143,6 +143,37 @@ TEST_P(EmitterLaws, TheTailLeftOutIsWithinItsBound) {
   }
 }
 
+// Far, near, beside and over the triangle; 4^7 parts, each by its centroid, are the oracle.
+TEST(FlatEmitter, ATriangleAloneIsItsIntegral) {
+  const TriMesh triangle{{{0, 0, 0}, {4, 0, 0}, {1, 3, 0}}, {{0, 1, 2}}};
+  const int parts = 128;
+  const double depth = 7, pi = std::acos(-1.0);
+  Random random(8);
+  for (const double decay : {6.0, 5.0, 4.5}) {
+    const ImplicitSurface surface = Surface(triangle, depth, FlatEmitter{decay}, 0);
+    for (int n = 0; n < 60; ++n) {
+      const double reach = n % 2 == 0 ? 3 : 20;
+      const Vec3 p(random.Uniform(-reach, reach), random.Uniform(-reach, reach),
+                   random.Uniform(0.4, reach));
+      double sum = 0;
+      for (int i = 0; i < parts; ++i) {
+        for (int j = 0; i + j < parts; ++j) {
+          for (const double third : {1.0 / 3, 2.0 / 3}) {
+            if (third > 0.5 && i + j + 1 >= parts) {
+              continue;
+            }
+            const double s = (i + third) / parts, t = (j + third) / parts;
+            sum += std::pow((p - Vec3(4 * s + t, 3 * t, 0)).norm(), -(decay + 3));
+          }
+        }
+      }
+      const double integral = sum * 6.0 / (parts * parts);
+      const double emission = (decay + 1) / (2 * pi) * std::pow(depth, decay) * p.z() * integral;
+      EXPECT_NEAR((surface.Value(p) + 1) / emission, 1, 0.03) << decay << ": " << p.transpose();
+    }
+  }
+}
+
 TEST(ThesisEmitter, ATriangleAloneIsExtrusionCylindersAndBalls) {
   TriMesh triangle{{{0, 0, 0}, {30, 0, 0}, {0, 20, 0}}, {{0, 1, 2}}};
   const double depth = 7;
