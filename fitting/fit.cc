@@ -149,8 +149,8 @@ double PointRms(const HSplineSurface& surface, const FitTarget& target) {
 
 LevelSummary FitStep(const LevelFit& step, const HSplineSurface& rest, const FitTarget& target,
                      const FitOptions& options, double rms_before_mm, HSplineSurface& surface) {
-  LevelSolution solution =
-      FitLevel(ViewOf(step.level, surface, rest, target, options.aim), options.terms);
+  LevelSolution solution = FitLevel(ViewOf(step.level, surface, rest, target, options.aim),
+                                    options.terms, options.solver);
   LevelSummary summary = std::move(solution.summary);
   summary.level = step.level;
   summary.fraction = step.fraction;

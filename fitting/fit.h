@@ -33,6 +33,7 @@ struct FitOptions {
   RelaxationOptions relaxation = {};
   SchedulePlan plan = ListedPlan{};
   int sweeps = 0;
+  LevelSolver solver = LevelSolver::kCeres;
 };
 template <class Visitor>
 void Fields(Visitor& visit, FitOptions& o) {
@@ -65,6 +66,11 @@ void Fields(Visitor& visit, FitOptions& o) {
                 .doc = "how often all levels that were fitted are fitted again at the end, coarse "
                        "to fine and whole (back-fitting)"},
       o.sweeps);
+  visit(FieldInfo{.name = "solver",
+                  .doc = "ceres: one problem a level, its parameter blocks the control vertices; "
+                         "fastest: one direct factorisation of the same least squares wherever no "
+                         "loss and no coupled term forbids it, the same surface to rounding"},
+        o.solver);
 }
 
 struct FitResult {

@@ -112,6 +112,7 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> terms, LevelSolver 
   const bool direct = solver == LevelSolver::kFastest && AllSeparable(terms);
   const SolverOutcome outcome =
       direct ? SolveDirectly(view, terms, solution.net) : SolveByCeres(view, terms, solution.net);
+  solution.summary.solver = direct ? "direct" : "ceres";
   solution.summary.iterations = outcome.iterations;
   solution.summary.free_vertices = outcome.free_vertices;
   solution.summary.termination = outcome.termination;

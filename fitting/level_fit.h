@@ -2,8 +2,10 @@
 // The least-squares fit of one level of an H-spline, seen as a plain B-spline.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fitting/patch_energy.h"
@@ -46,7 +48,8 @@ struct LevelSummary {
   int uncovered_vertices = -1;   // that no observation touches
   int rank = -1;  // estimated numerical rank of the observations' matrix; vertices - rank
                   // directions are left to the other terms, or stay
-  double max_move_mm = kNaN;  // of a vertex, at the solution; Fit: as written back
+  double max_move_mm = kNaN;       // of a vertex, at the solution; Fit: as written back
+  std::string solver = "not run";  // ceres or direct
   std::string termination = "not run";
   bool usable = false;  // the solver's solution can be used; else the net is unchanged
 };
@@ -57,19 +60,23 @@ struct LevelSolution {
 };
 
 enum class LevelSolver {
-  kFastest,  // a direct factorisation where the terms allow it, else Ceres
-  kCeres     // always; the checked reference
+  kCeres,   // one ceres::Problem, whose parameter blocks are the level's control vertices
+  kFastest  // a direct factorisation where the terms allow it, else Ceres; the same minimiser
 };
+constexpr auto EnumNames(LevelSolver) {
+  return std::to_array<std::string_view>({"ceres", "fastest"});
+}
 
-// Minimises the sum of the terms over the level's control vertices. Terms that are linear and treat
-// x, y and z alike share one sparse Cholesky factor; any others are solved by Ceres, 3 doubles a
-// parameter block, one thread. Where the terms leave vertices undetermined, the solution nearest to
-// view.start is taken (thesis 4.2 has no word on it; the steps are damped by a multiple of the
-// identity, a proximal-point iteration, which converges to it). Observations are used in a
-// canonical order, so their order has no effect. Throws InputError if nothing can be solved: sizes
-// that disagree, or a template without extent for a term that needs it.
+// Minimises the sum of the terms over the level's control vertices: by Ceres, 3 doubles a parameter
+// block, one thread; or, if the fastest way is asked for and all terms are linear and treat x, y
+// and z alike, with one sparse Cholesky factor for the three. Where the terms leave vertices
+// undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word on it; the
+// steps are damped by a multiple of the identity, a proximal-point iteration, which converges to
+// it). Observations are used in a canonical order, so their order has no effect. Throws InputError
+// if nothing can be solved: sizes that disagree, or a template without extent for a term that needs
+// it.
 LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
-                       LevelSolver solver = LevelSolver::kFastest);
+                       LevelSolver solver = LevelSolver::kCeres);
 
 // The canonical order, patch by patch.
 void SortObservations(const PatchGrid& grid, std::vector<Observation>& observations);
