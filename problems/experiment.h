@@ -73,10 +73,10 @@ struct Experiment {
   TemplateOptions face_template;
   PlacementOptions placement;
   std::vector<LevelFit> first_fit = {{.level = 0, .fraction = 1}};
-  SeedOptions seeds;
+  SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;
   int rounds = 1;
-  FitOptions fit;
+  FitOptions fit = {.relaxation = {.mode = RelaxationMode::kFootpoint}};
   FaceRegionOptions region;
 };
 template <class Visitor>

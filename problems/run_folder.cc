@@ -73,6 +73,7 @@ Json LevelJson(const LevelSummary& level) {
                {"free_vertices", level.free_vertices},
                {"uncovered_vertices", level.uncovered_vertices},
                {"rank", level.rank},
+               {"solver", level.solver},
                {"iterations", level.iterations},
                {"usable", level.usable},
                {"terms", Json::array()}};
@@ -138,9 +139,22 @@ std::string DowelsCsv(const RunResult& result) {
     csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", d.site, d.base.x(),
                        d.base.y(), d.base.z(), d.direction.x(), d.direction.y(), d.direction.z(),
                        d.depth_mm, Cell(d.sd_mm), tip.x(), tip.y(), tip.z(),
-                       index < 0 ? "" : Cell(result.target.points[index].uv.x()),
-                       index < 0 ? "" : Cell(result.target.points[index].uv.y()),
+                       index < 0 ? "" : Cell(result.fit.uv[index].x()),
+                       index < 0 ? "" : Cell(result.fit.uv[index].y()),
                        index < 0 ? "" : Cell(result.fit.residual_mm[index]));
+  }
+  return csv;
+}
+
+std::string SeedsCsv(const RunResult& result) {
+  std::string csv = "seed,x_mm,y_mm,z_mm,u,v,weight,fit_residual_mm\n";
+  for (std::size_t k = 0; k < result.target.points.size(); ++k) {
+    const FitPoint& p = result.target.points[k];
+    if (IsSeeded(p)) {
+      csv += fmt::format("{},{},{},{},{},{},{},{}\n", p.label, p.position.x(), p.position.y(),
+                         p.position.z(), result.fit.uv[k].x(), result.fit.uv[k].y(), p.weight,
+                         Cell(result.fit.residual_mm[k]));
+    }
   }
   return csv;
 }
@@ -249,6 +263,7 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
   folder.Write("resolved.yaml", WriteConfig(experiment));
   folder.Write("result.json", ResultJson(experiment, result));
   folder.Write("dowels.csv", DowelsCsv(result));
+  folder.Write("seeds.csv", SeedsCsv(result));
   WriteMeshes(result, folder, context);
   WritePictures(result, folder, context);
   WriteReport(folder);
