@@ -28,12 +28,10 @@ void Fields(Visitor& visit, ImplicitOptions& o) {
 }
 
 // Value(p) = sum of emissions - 1: positive inside. Bounded: each emission is capped at
-// kMostEmission, and at distances below 5 % of the depth it is that at 5 %, so that it is finite on
+// 1e12, and at distances below 5 % of the depth it is that at 5 %, so that it is finite on
 // vertices, edges and planes of emitters.
 class ImplicitSurface {
  public:
-  static constexpr double kMostEmission = 1e12;
-
   // depth_mm: one a vertex; a triangle emits with the mean of its three (thesis 3.1), and not at
   // all where one is NaN. Throws InputError if nothing emits, if a depth is not positive, or if the
   // sizes differ.
