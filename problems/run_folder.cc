@@ -13,6 +13,7 @@
 #include "problems/face_metrics_json.h"
 #include "problems/manifest.h"
 #include "problems/run_pictures.h"
+#include "problems/scene_json.h"
 #include "surfaces/hspline_json.h"
 #include "surfaces/mesh_io.h"
 #include "surfaces/mesh_query.h"
@@ -251,6 +252,7 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
   folder.Write("dowels.csv", DowelsCsv(result));
   WriteMeshes(result, folder, context);
   WritePictures(result, folder, context);
+  folder.Write("scene.json", SceneJson(result, context));
   WriteReport(folder);
   folder.Write("timing.json", TimingJson(result.times));
   folder.Write("manifest.json", ManifestJson(experiment, result, folder));

@@ -7,6 +7,7 @@
 
 #include "problems/report.h"
 #include "problems/run_folder.h"
+#include "problems/scene_json.h"
 #include "surfaces/error.h"
 
 namespace semblance {
@@ -170,6 +171,10 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
                   result.at("face").is_null() ? "" : " and true skin"))};
   if (!result.at("face").is_null()) {
     report.sections.push_back(ErrorSection(result, folder));
+  }
+  const std::filesystem::path scene = folder.Root() / "scene.json";
+  if (std::filesystem::exists(scene)) {  // runs of older versions have none
+    report.scenes = CollectScenes({{result.at("subject"), ReadFileBytes(scene)}}, 0).json;
   }
   report.sections.push_back(PictureSection(folder));
   report.sections.push_back(
