@@ -157,7 +157,7 @@ std::string Script(std::string_view text) { return fmt::format("<script>\n{}</sc
 
 // The 3-D view, with all that it is made of. In JSON "<" can stand in strings only, where it may be
 // written as \u003c, so that no "</script>" ends the block early.
-std::string ViewHtml(const std::string& scenes) {
+std::string ViewHtml(const std::string& scenes, const std::string& note) {
   if (scenes.empty() || ThreeScript().empty()) {
     return {};
   }
@@ -173,7 +173,9 @@ std::string ViewHtml(const std::string& scenes) {
       "<section>\n<h2 id=\"s0\">In three dimensions</h2>\n<p>Drag to turn, shift and drag to move, "
       "wheel to zoom; point at a surface or a dowel to read its value.</p>\n"
       "<div id=\"view3d\"></div>\n<script type=\"application/json\" id=\"view3d-scenes\">";
-  html += safe + "</script>\n</section>\n";
+  html += safe + "</script>\n";
+  html += note.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeHtml(note));
+  html += "</section>\n";
   return html + Script(ThreeScript()) + Script(ReportViewScript());
 }
 
@@ -216,7 +218,7 @@ std::string ReportHtml(const Report& report) {
   for (const ReportImage& image : report.main_images) {
     html += ImageHtml(image);
   }
-  html += ViewHtml(report.scenes);
+  html += ViewHtml(report.scenes, report.scenes_note);
   for (std::size_t i = 0; i < report.sections.size(); ++i) {
     html += SectionHtml(report.sections[i], i + 1);
   }

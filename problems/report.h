@@ -46,6 +46,7 @@ struct Report {
   std::vector<ReportImage> main_images;  // the first picture people see, usually one
   std::string scenes = {};               // CollectScenes (scene_json.h) for the 3-D view; empty:
                                          // none. Left out where the program lacks three.js
+  std::string scenes_note = {};          // below it; may be empty
   std::vector<ReportSection> sections;
   std::string footer;  // e.g. the version; no time, so that the same run gives the same bytes
 };

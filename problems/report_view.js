@@ -99,7 +99,7 @@
     });
   };
 
-  const compass = element('canvas', {className: 'view3d-compass', width: 168, height: 168});
+  const compass = element('canvas', {className: 'view3d-compass', width: 224, height: 224});
   const legends = element('div', {className: 'view3d-legends'});
 
   const drawCompass = () => {
@@ -114,14 +114,14 @@
         .map(([name, ...to]) => ({name, at: new THREE.Vector3(...to).applyQuaternion(turn)}))
         .sort((a, b) => a.at.z - b.at.z);
     for (const {name, at} of axes) {
-      const x = middle + 46 * at.x, y = middle - 46 * at.y;
+      const x = middle + 62 * at.x, y = middle - 62 * at.y;
       pen.globalAlpha = at.z > -0.3 ? 1 : 0.3;
       pen.strokeStyle = pen.fillStyle = '#3b444d';
       pen.beginPath();
       pen.moveTo(middle, middle);
       pen.lineTo(x, y);
       pen.stroke();
-      if (Math.abs(at.z) < 0.93) { pen.fillText(name, middle + 66 * at.x, middle - 68 * at.y); }
+      if (Math.abs(at.z) < 0.93) { pen.fillText(name, middle + 84 * at.x, middle - 84 * at.y); }
     }
   };
 

@@ -16,7 +16,7 @@ class SemblanceCamera {
   // Degrees: turn 0 looks at the face from the front, 90 at the subject's left side; rise 90 looks from above.
   look(turn, rise) {
     this.target = this.centre.clone();
-    this.distance = 2.1 * this.extent;
+    this.distance = 1.75 * this.extent;
     this.turn = turn;
     this.rise = rise;
     this.update();

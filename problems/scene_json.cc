@@ -98,9 +98,11 @@ class SceneWriter {
     for (int level = 0; level <= result_.fit.surface.shape().max_level; ++level) {
       Net(level);
     }
-    const Json scene = {
-        {"label", result_.subject.name}, {"facts", Facts()},      {"maps", Maps()},
-        {"layers", layers_},             {"blobs", blobs_.All()}};
+    const Json scene = {{"label", result_.subject.name},
+                        {"facts", Facts()},
+                        {"maps", Maps()},
+                        {"layers", layers_},
+                        {"blobs", blobs_.All()}};
     return scene.dump() + "\n";
   }
 
@@ -134,7 +136,7 @@ class SceneWriter {
         }
       }
     });
-    Mesh("depth", "Tissue depth on the skull", mesh, "#8f8f8f");
+    Mesh("depth", "Tissue depth on skull", mesh, "#8f8f8f");
     layers_.back()["map"] = "depth";
     layers_.back()["always_mapped"] = true;
     layers_.back()["values"] = blobs_.AddValues(depth);

@@ -98,13 +98,25 @@ StudyResults ReadStudyResults(const fs::path& folder) {
   return results;
 }
 
+std::string TreatmentLabel(const std::vector<std::string>& axes,
+                           const std::vector<std::string>& values) {
+  std::string label;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (axes[k] == "title" && !values[k].empty()) {
+      return values[k];
+    }
+    label += label.empty() || values[k].empty() ? values[k] : ", " + values[k];
+  }
+  return label.empty() ? "base" : label;
+}
+
 std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric) {
   std::vector<Treatment> treatments;
   for (const TrialRow& row : results.trials) {
     auto it = std::find_if(treatments.begin(), treatments.end(),
                            [&](const Treatment& t) { return t.values == row.values; });
     if (it == treatments.end()) {
-      it = treatments.insert(it, {row.values, {}});
+      it = treatments.insert(it, {row.values, TreatmentLabel(results.axes, row.values), {}});
     }
     const auto value = row.metrics.find(metric);
     if (row.status == "done" && value != row.metrics.end()) {

@@ -34,8 +34,12 @@ StudyResults ReadStudyResults(const std::filesystem::path& folder);
 // One treatment: the trials that differ in the subject only.
 struct Treatment {
   std::vector<std::string> values;           // one an axis
+  std::string label;                         // TreatmentLabel of them
   std::map<std::string, double> by_subject;  // the metric, of trials that are done
 };
+// The title, where the study sets one, else all values that are not empty.
+std::string TreatmentLabel(const std::vector<std::string>& axes,
+                           const std::vector<std::string>& values);
 std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric);
 
 // trials.csv: trial, subject, the axes, status, reason, metric, value; one line a number, in the
