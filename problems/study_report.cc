@@ -152,6 +152,54 @@ ReportSection TrialsSection(const StudyResults& results) {
   return section;
 }
 
+// The mean of one curve of the trials over subjects, point by point, one row a treatment; of
+// subjects whose curve is as long as the first one's.
+std::vector<BoxRow> MeanCurves(const StudyResults& results, const std::vector<Treatment>& ranked,
+                               std::vector<double> TrialRow::*curve) {
+  std::vector<BoxRow> rows;
+  for (const Treatment& treatment : ranked) {
+    BoxRow mean{treatment.label, {}};
+    int count = 0;
+    for (const TrialRow& row : results.trials) {
+      const std::vector<double>& values = row.*curve;
+      if (row.values == treatment.values && row.status == "done" &&
+          (count == 0 || values.size() == mean.values.size())) {
+        mean.values.resize(values.size(), 0);
+        for (std::size_t k = 0; k < values.size(); ++k) {
+          mean.values[k] += values[k];
+        }
+        ++count;
+      }
+    }
+    for (double& value : mean.values) {
+      value /= count;
+    }
+    if (!mean.values.empty()) {
+      rows.push_back(std::move(mean));
+    }
+  }
+  return rows;
+}
+
+ReportSection CurvesSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  ReportSection section{.heading = "Errors and convergence"};
+  const auto errors = MeanCurves(results, ranked, &TrialRow::quantiles_mm);
+  const auto steps = MeanCurves(results, ranked, &TrialRow::step_rms_mm);
+  if (!errors.empty()) {
+    section.images.push_back(
+        {CumulativePlotSvg(errors, "distance of the H-spline face from the true skin (mm)"),
+         "Share of the scored skin within each distance; quantiles averaged over subjects.",
+         "cumulative distribution of the face's error, one line a treatment"});
+  }
+  if (!steps.empty()) {
+    section.images.push_back(
+        {ConvergencePlotSvg(steps, "RMS distance of the fitted points (mm)"),
+         "Convergence: after each step of the last round's schedule, averaged over subjects.",
+         "root mean square distance by step of the schedule, one line a treatment"});
+  }
+  return section;
+}
+
 std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
   std::vector<BoxRow> rows;
   for (const Treatment& treatment : ranked) {
@@ -227,6 +275,7 @@ std::string StudyReportHtml(const StudyResults& results, const SceneCollection& 
     }
     report.sections.push_back(treatments);
     report.sections.push_back(RankSection(ranked));
+    report.sections.push_back(CurvesSection(results, ranked));
   }
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
