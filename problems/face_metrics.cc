@@ -64,6 +64,22 @@ DistanceSummary Summarize(std::vector<Sample> samples) {
   return summary;
 }
 
+std::vector<double> Quantiles(std::vector<Sample> samples) {
+  constexpr int kSteps = 20;
+  std::stable_sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
+    return std::abs(a.signed_mm) < std::abs(b.signed_mm);
+  });
+  double area = 0;
+  for (const Sample& s : samples) {
+    area += s.area_mm2;
+  }
+  std::vector<double> quantiles;
+  for (int k = 0; k <= kSteps && area > 0; ++k) {
+    quantiles.push_back(WeightedQuantile(samples, area, static_cast<double>(k) / kSteps));
+  }
+  return quantiles;
+}
+
 // Distance of each wanted point to the mesh, positive where the mesh lies on the outer side of the
 // point's normal.
 std::vector<double> SignedDistances(const TriMesh& from, const std::vector<bool>& wanted,
@@ -147,8 +163,10 @@ FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const T
   const std::vector<double> truth_areas = VertexAreas(truth);
   FaceMetrics metrics;
   metrics.signed_mm = SignedDistances(truth, region.scored, face_query, context);
-  metrics.truth_to_face =
-      Summarize(TakeSamples(metrics.signed_mm, truth_areas, [](std::size_t) { return true; }));
+  const std::vector<Sample> all =
+      TakeSamples(metrics.signed_mm, truth_areas, [](std::size_t) { return true; });
+  metrics.truth_to_face = Summarize(all);
+  metrics.quantiles_mm = Quantiles(all);
   for (int part = 0; part < static_cast<int>(kFaceParts.size()); ++part) {
     const auto samples = TakeSamples(metrics.signed_mm, truth_areas,
                                      [&](std::size_t v) { return region.part[v] == part; });

@@ -36,6 +36,8 @@ struct FaceMetrics {
   double volume_between_cm3 =
       kNaN;  // integral of the absolute distance over the scored skin (thesis 5.3)
   std::map<std::string, DistanceSummary> regions;  // truth_to_face by part of the face
+  std::vector<double> quantiles_mm;  // of the absolute truth_to_face, by area: the k-th of 21 is
+                                     // not exceeded on k/20 of it
   std::vector<double> signed_mm;  // one a vertex of the true skin, NaN where not scored
 };
 

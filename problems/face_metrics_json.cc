@@ -27,6 +27,7 @@ Json MetricsToJson(const FaceMetrics& metrics) {
   Json json = SummaryToJson(metrics.truth_to_face);
   json["hausdorff_mm"] = metrics.hausdorff_mm;
   json["volume_between_cm3"] = metrics.volume_between_cm3;
+  json["quantiles_mm"] = metrics.quantiles_mm;
   json["reverse"] = SummaryToJson(metrics.face_to_truth);
   json["regions"] = Json::object();
   for (const auto& [name, summary] : metrics.regions) {

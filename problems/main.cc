@@ -15,6 +15,7 @@
 #include "problems/run_folder.h"
 #include "problems/study_report.h"
 #include "problems/study_run.h"
+#include "problems/study_submit.h"
 #include "surfaces/hspline_io.h"
 #include "surfaces/mesh_check.h"
 #include "surfaces/mesh_io.h"
@@ -30,8 +31,9 @@ struct Arguments {
   std::vector<std::string> overrides;
   std::string out, inverse;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool force = false, quiet = false, schema = false, list = false;
+  bool force = false, quiet = false, schema = false, list = false, slurm = false;
   StudyRunOptions study;
+  SubmitOptions submit;
   std::string shard;
   CtImportOptions ct;
   std::string ct_edges = "threshold";
@@ -159,8 +161,12 @@ int PrintStudyState(const StudyResults& results, const std::filesystem::path& ro
   fmt::print("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
              results.trials.size(), results.Count("unusable"), results.Count("failed"),
              results.Count("missing"));
-  fmt::print("report: {}\n",
-             std::filesystem::absolute(root / "report.html").lexically_normal().string());
+  if (std::filesystem::exists(root / "report.html")) {
+    fmt::print("report: {}\n",
+               std::filesystem::absolute(root / "report.html").lexically_normal().string());
+  } else {
+    fmt::print("no report yet; semblance merge {} makes one of what is there\n", root.string());
+  }
   return results.Count("done") == static_cast<int>(results.trials.size()) ? kDone : kNotUsable;
 }
 
@@ -177,6 +183,9 @@ int StudyCommand(const Arguments& arguments) {
   }
   const std::filesystem::path root =
       arguments.out.empty() ? "out/" + file.stem().string() : arguments.out;
+  if (!arguments.quiet) {
+    options.on_trial = StudyProgress(stderr);
+  }
   const StudySummary summary = RunStudy(plan, root, options, MakeContext(arguments));
   if (options.shards > 1) {
     fmt::print(
@@ -203,6 +212,18 @@ int MergeCommand(const Arguments& arguments) {
 int StatusCommand(const Arguments& arguments) {
   const std::filesystem::path root = arguments.files.at(0);
   return PrintStudyState(ReadStudyResults(root), root);
+}
+
+int SubmitCommand(const Arguments& arguments) {
+  SubmitOptions options = arguments.submit;
+  options.program = std::filesystem::read_symlink("/proc/self/exe");
+  options.study = arguments.files.at(0);
+  options.folder = arguments.out.empty() ? "out/" + options.study.stem().string() : arguments.out;
+  ReadStudy(options.study);  // its faults are said here, not by every node
+  fmt::print("{}", SubmitScript(options));
+  std::fflush(stdout);
+  SubmitStudy(options);
+  return kDone;
 }
 
 int EvaluateCommand(const Arguments& arguments) {
@@ -292,6 +313,23 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
   CLI::App* merge = add("merge", "the tables and report of a study from its shards", &MergeCommand);
   merge->add_option("DIR", a.files, "folder of the study, then folders to take trials from")
       ->required();
+  CLI::App* submit =
+      add("submit", "run a study on a cluster: an array of shards, then the merge", &SubmitCommand);
+  submit->add_option("CONFIG", a.files, "YAML file of the study")->required()->expected(1);
+  submit->add_flag("--slurm", a.slurm, "the engine; the only one so far")->required();
+  submit->add_option("--out", a.out, "folder for the trials, which every node must see");
+  submit
+      ->add_option("--shards", a.submit.shards,
+                   "elements of the array; each should have work for 30 s or more")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  submit->add_option("--jobs", a.submit.jobs, "trials at a time in each")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  submit
+      ->add_option("--sbatch", a.submit.sbatch,
+                   "an option for sbatch, e.g. --sbatch=--partition=long; may be repeated")
+      ->allow_extra_args(false);
   CLI::App* status = add("status", "how far a study has come", &StatusCommand);
   status->add_option("DIR", a.files, "folder of the study")->required()->expected(1);
   CLI::App* check = add("check", "validate configurations and run nothing", &CheckCommand);

@@ -8,63 +8,11 @@
 #include <cstdint>
 
 #include "problems/files.h"
+#include "problems/report_assets.h"
 #include "surfaces/error.h"
 
 namespace semblance {
 namespace {
-
-constexpr std::string_view kStyle = R"css(
-:root { color-scheme: light dark; --paper: #fff; --ink: #1d2126; --soft: #5c6570; --line: #dfe3e8;
-  --card: #f5f7f9; --accent: #0b5c8f; }
-@media (prefers-color-scheme: dark) { :root { --paper: #14171a; --ink: #e6e9ec; --soft: #9aa4af;
-  --line: #2d343b; --card: #1c2126; --accent: #7cc0ee; } }
-* { box-sizing: border-box; }
-html { -webkit-text-size-adjust: 100%; }
-body { margin: 0 auto; max-width: 76rem; padding: 1.5rem clamp(1rem, 3vw, 2.5rem) 3rem;
-  background: var(--paper); color: var(--ink);
-  font: 1rem/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
-h1 { margin: 0; font-size: clamp(1.5rem, 3.2vw, 2.1rem); line-height: 1.2; letter-spacing: -.01em; }
-h2 { margin: 2.6rem 0 .6rem; padding-top: .9rem; border-top: 1px solid var(--line);
-  font-size: 1.3rem; line-height: 1.3; }
-p { margin: .6rem 0; max-width: 46rem; overflow-wrap: break-word; }
-.subtitle { margin: .3rem 0 0; color: var(--soft); }
-nav { margin: .9rem 0 0; font-size: .92rem; }
-nav a { margin-right: 1.1rem; color: var(--accent); text-decoration: none; }
-nav a:hover, nav a:focus { text-decoration: underline; }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(9.5rem, 1fr)); gap: .75rem;
-  margin: 1.2rem 0; padding: 0; }
-.tile { padding: .7rem .9rem .75rem; background: var(--card); border: 1px solid var(--line);
-  border-radius: .6rem; }
-.tile dt { color: var(--soft); font-size: .85rem; }
-.tile dd { margin: 0; }
-.value { font-size: 1.7rem; font-weight: 600; line-height: 1.25; font-variant-numeric: tabular-nums;
-  overflow-wrap: anywhere; }
-.unit { margin-left: .25rem; color: var(--soft); font-size: .95rem; font-weight: 400; }
-.note { color: var(--soft); font-size: .82rem; line-height: 1.35; }
-figure { margin: 1rem 0; }
-figure img { display: block; max-width: 100%; height: auto; border: 1px solid var(--line);
-  border-radius: .6rem; background: #fff; }
-figcaption { margin-top: .4rem; max-width: 46rem; color: var(--soft); font-size: .9rem; }
-.scroll { overflow-x: auto; margin: 1rem 0; }
-figure .scroll { margin: 0; }
-@media screen and (max-width: 44rem) { img.wide { width: 56rem; max-width: none; } }
-table { border-collapse: collapse; font-size: .93rem; font-variant-numeric: tabular-nums; }
-caption { padding: 0 0 .4rem; text-align: left; color: var(--soft); font-size: .9rem; }
-th, td { padding: .32rem .9rem .32rem 0; border-bottom: 1px solid var(--line); text-align: left;
-  vertical-align: top; }
-th { border-bottom: 2px solid var(--line); font-weight: 600; }
-th.n, td.n { padding-left: .9rem; padding-right: .4rem; text-align: right; white-space: nowrap; }
-pre { overflow-x: auto; margin: 1rem 0; padding: .9rem 1rem; background: var(--card);
-  border: 1px solid var(--line); border-radius: .6rem; font: .85rem/1.5 ui-monospace,
-  SFMono-Regular, Menlo, Consolas, "Liberation Mono", monospace; }
-footer { margin-top: 3rem; padding-top: .9rem; border-top: 1px solid var(--line);
-  color: var(--soft); font-size: .85rem; }
-@media print { :root { color-scheme: light; --paper: #fff; --ink: #000; --soft: #444;
-  --line: #bbb; --card: #fff; --accent: #000; }
-  body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; }
-  figure, .tile, tr { break-inside: avoid; } h2 { break-after: avoid; }
-  pre { white-space: pre-wrap; } .scroll { overflow: visible; } }
-)css";
 
 std::string MimeType(const ReportImage& image) {
   const std::string_view bytes = image.bytes;
@@ -200,6 +148,37 @@ std::string NavigationHtml(const std::vector<ReportSection>& sections) {
   return html + "</nav>\n";
 }
 
+// A policy that lets the page reach nothing outside itself.
+constexpr std::string_view kPolicy =
+    "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src "
+    "'unsafe-inline'";
+
+std::string Script(std::string_view text) { return fmt::format("<script>\n{}</script>\n", text); }
+
+// The 3-D view, with all that it is made of. In JSON "<" can stand in strings only, where it may be
+// written as \u003c, so that no "</script>" ends the block early.
+std::string ViewHtml(const std::string& scenes, const std::string& note) {
+  if (scenes.empty() || ThreeScript().empty()) {
+    return {};
+  }
+  std::string safe;
+  for (const char c : scenes) {
+    if (c == '<') {
+      safe += "\\u003c";
+    } else {
+      safe += c;
+    }
+  }
+  std::string html =
+      "<section>\n<h2 id=\"s0\">In three dimensions</h2>\n<p>Drag to turn, shift and drag to move, "
+      "wheel to zoom; point at a surface or a dowel to read its value.</p>\n"
+      "<div id=\"view3d\"></div>\n<script type=\"application/json\" id=\"view3d-scenes\">";
+  html += safe + "</script>\n";
+  html += note.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeHtml(note));
+  html += "</section>\n";
+  return html + Script(ThreeScript()) + Script(ReportViewScript());
+}
+
 std::string SectionHtml(const ReportSection& section, std::size_t number) {
   std::string html =
       fmt::format("<section>\n<h2 id=\"s{}\">{}</h2>\n", number, EscapeHtml(section.heading));
@@ -229,8 +208,9 @@ std::string ReportHtml(const Report& report) {
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
       "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<header>\n<h1>{}</h1>\n",
-      EscapeHtml(report.title), kStyle, EscapeHtml(report.title));
+      kPolicy, EscapeHtml(report.title), ReportStyle(), EscapeHtml(report.title));
   if (!report.subtitle.empty()) {
     html += fmt::format("<p class=\"subtitle\">{}</p>\n", EscapeHtml(report.subtitle));
   }
@@ -238,6 +218,7 @@ std::string ReportHtml(const Report& report) {
   for (const ReportImage& image : report.main_images) {
     html += ImageHtml(image);
   }
+  html += ViewHtml(report.scenes, report.scenes_note);
   for (std::size_t i = 0; i < report.sections.size(); ++i) {
     html += SectionHtml(report.sections[i], i + 1);
   }
@@ -245,7 +226,7 @@ std::string ReportHtml(const Report& report) {
   if (!report.footer.empty()) {
     html += fmt::format("<footer>{}</footer>\n", EscapeHtml(report.footer));
   }
-  return html + "</body>\n</html>\n";
+  return html + Script(ReportTableScript()) + "</body>\n</html>\n";
 }
 
 std::string EscapeHtml(std::string_view text) {

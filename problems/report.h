@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A report as one HTML file that needs nothing else: no network, no script, no font file.
+// A report as one HTML file that needs nothing else: no network, no other file. Its scripts sort
+// tables and show the 3-D view; without them all the rest is still there.
 #pragma once
 
 #include <filesystem>
@@ -43,6 +44,9 @@ struct Report {
   std::string subtitle;
   std::vector<ReportTile> tiles;         // the key numbers, on the first screen
   std::vector<ReportImage> main_images;  // the first picture people see, usually one
+  std::string scenes = {};               // CollectScenes (scene_json.h) for the 3-D view; empty:
+                                         // none. Left out where the program lacks three.js
+  std::string scenes_note = {};          // below it; may be empty
   std::vector<ReportSection> sections;
   std::string footer;  // e.g. the version; no time, so that the same run gives the same bytes
 };

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "problems/cut_planes.h"
+#include "problems/stage_key.h"
 #include "surfaces/mesh_query.h"
 
 namespace semblance {
@@ -113,13 +114,16 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   constexpr int kQuadsPerPatch = 4;
   StepClock step(context);
   StageCache own_cache(4);
-  const auto skull = MakeSkullStage(experiment, cache ? *cache : own_cache, step, context);
+  StageCache& shared = cache ? *cache : own_cache;
+  const auto skull = MakeSkullStage(experiment, shared, step, context);
   Case subject = skull->subject;
-  const TemplateFace generic =
-      step("make template", [&] { return MakeTemplateFace(experiment.face_template); });
-  const FitTarget dowels = DowelTarget(subject.dowels, generic);
-  const Similarity face_from_template = PlaceOnDowels(generic, dowels, experiment.placement);
-  TemplateFace placed = Placed(generic, face_from_template);
+  const auto generic = step("make template", [&] {
+    return shared.Get<TemplateFace>(StageKey("template", experiment.face_template),
+                                    [&] { return MakeTemplateFace(experiment.face_template); });
+  });
+  const FitTarget dowels = DowelTarget(subject.dowels, *generic);
+  const Similarity face_from_template = PlaceOnDowels(*generic, dowels, experiment.placement);
+  TemplateFace placed = Placed(*generic, face_from_template);
   FaceFit fitted = step("fit", [&] {
     return FitFace(experiment, placed, dowels,
                    SeedableFace(experiment, subject, skull->implicit.dense), context);

@@ -39,8 +39,8 @@ struct RunResult {
 
 // Loads the case, fills the skull, interpolates depth, lays the implicit face, places the generic
 // face, seeds, fits, measures. Throws as LoadSubject does, and Cancelled. What experiments have in
-// common (the subject, its shell, the implicit face) is taken from `cache`, where one is given; the
-// result does not depend on it.
+// common (the subject, its shell, the implicit face, the generic face) is taken from `cache`, where
+// one is given; the result does not depend on it.
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache = nullptr);
 
 }  // namespace semblance

@@ -13,6 +13,7 @@
 #include "problems/face_metrics_json.h"
 #include "problems/manifest.h"
 #include "problems/run_pictures.h"
+#include "problems/scene_json.h"
 #include "surfaces/hspline_json.h"
 #include "surfaces/mesh_io.h"
 #include "surfaces/mesh_query.h"
@@ -213,13 +214,12 @@ std::string TimingJson(const std::vector<StepTime>& times) {
   return json.dump(2) + "\n";
 }
 
-std::string ManifestJson(const Experiment& experiment, const RunResult& result,
-                         const OutputFolder& folder) {
+// What went in, and what it was made with.
+Json Provenance(const Experiment& experiment, const RunResult& result) {
   Json json = {{"program", "semblance"},
                {"version", SEMBLANCE_VERSION},
                {"libraries", Json::object()},
-               {"inputs", Json::array()},
-               {"outputs", Json::array()}};
+               {"inputs", Json::array()}};
   if (const auto* phantom = std::get_if<PhantomOptions>(&experiment.subject)) {
     json["random_seed"] = phantom->random_seed;
   }
@@ -230,13 +230,19 @@ std::string ManifestJson(const Experiment& experiment, const RunResult& result,
     json["inputs"].push_back(
         {{"file", input.filename().string()}, {"sha256", Sha256OfFile(input)}});
   }
+  return json;
+}
+
+std::string ManifestJson(Json provenance, const OutputFolder& folder) {
   std::vector<std::string> names = folder.Written();
   std::erase(names, "timing.json");  // differs from run to run
   std::sort(names.begin(), names.end());
+  provenance["outputs"] = Json::array();
   for (const std::string& name : names) {
-    json["outputs"].push_back({{"file", name}, {"sha256", Sha256OfFile(folder.Root() / name)}});
+    provenance["outputs"].push_back(
+        {{"file", name}, {"sha256", Sha256OfFile(folder.Root() / name)}});
   }
-  return json.dump(2) + "\n";
+  return provenance.dump(2) + "\n";
 }
 
 }  // namespace
@@ -266,9 +272,12 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
   folder.Write("seeds.csv", SeedsCsv(result));
   WriteMeshes(result, folder, context);
   WritePictures(result, folder, context);
+  folder.Write("scene.json", SceneJson(result, context));
+  const Json provenance = Provenance(experiment, result);
+  folder.Write("provenance.json", provenance.dump(2) + "\n");
   WriteReport(folder);
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("manifest.json", ManifestJson(experiment, result, folder));
+  folder.Write("manifest.json", ManifestJson(provenance, folder));
 }
 
 }  // namespace semblance

@@ -7,6 +7,8 @@
 
 #include "problems/report.h"
 #include "problems/run_folder.h"
+#include "problems/scene_json.h"
+#include "problems/svg_plot.h"
 #include "surfaces/error.h"
 
 namespace semblance {
@@ -66,6 +68,28 @@ ReportTable MetricsTable(const std::string& caption, const Json& metrics) {
     table.rows.push_back(MetricsRow(name, summary));
   }
   return table;
+}
+
+std::vector<double> Numbers(const Json& list) {
+  std::vector<double> numbers;
+  for (const Json& value : list) {
+    numbers.push_back(value.is_number() ? value.get<double>() : kNaN);
+  }
+  return numbers;
+}
+
+ReportImage ConvergencePlot(const Json& fit) {
+  BoxRow row{"last round", {}};
+  for (const Json& level : fit.at("levels")) {
+    if (row.values.empty() && level.at("rms_before_mm").is_number()) {
+      row.values.push_back(level.at("rms_before_mm").get<double>());
+    }
+    row.values.push_back(
+        level.at("rms_after_mm").is_number() ? level.at("rms_after_mm").get<double>() : kNaN);
+  }
+  return {ConvergencePlotSvg({row}, "RMS distance of the fitted points (mm)"),
+          "How far the fitted points are from the surface, step by step.",
+          "root mean square distance by step of the schedule"};
 }
 
 ReportTable LevelsTable(const Json& fit) {
@@ -128,6 +152,13 @@ ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
                           "signed error of the implicit face on the true skin"),
       ReportImageFromFile(folder.Root() / "pictures/truth.png", "",
                           "the true skin from three sides")};
+  section.images.push_back(
+      {CumulativePlotSvg(
+           {{"H-spline face", Numbers(result.at("face").at("quantiles_mm"))},
+            {"implicit face", Numbers(result.at("implicit_face").at("quantiles_mm"))}},
+           "distance from the true skin (mm)"),
+       "Share of the scored skin within each distance.",
+       "cumulative distribution of the errors of both faces"});
   section.tables = {MetricsTable("H-spline face", result.at("face")),
                     MetricsTable("Implicit face", result.at("implicit_face"))};
   return section;
@@ -171,9 +202,14 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
   if (!result.at("face").is_null()) {
     report.sections.push_back(ErrorSection(result, folder));
   }
+  const std::filesystem::path scene = folder.Root() / "scene.json";
+  if (std::filesystem::exists(scene)) {  // runs of older versions have none
+    report.scenes = CollectScenes({{result.at("subject"), ReadFileBytes(scene)}}, 0).json;
+  }
   report.sections.push_back(PictureSection(folder));
   report.sections.push_back(
       {.heading = "The fit",
+       .images = {ConvergencePlot(result.at("fit"))},
        .tables = {LevelsTable(result.at("fit")), CountsTable("Counts of the fit", result.at("fit")),
                   DowelsTable(ReadFileBytes(folder.Root() / "dowels.csv"))}});
   report.sections.push_back({.heading = "Depth and implicit surface",
@@ -182,6 +218,14 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
   report.sections.push_back(NotesSection(result));
   report.sections.push_back(
       {.heading = "Configuration", .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml")});
+  const std::filesystem::path provenance = folder.Root() / "provenance.json";
+  if (std::filesystem::exists(provenance)) {
+    report.sections.push_back(
+        {.heading = "Provenance",
+         .paragraphs = {"What went in, by content, and what it was made with. manifest.json beside "
+                        "this page has the hash of every output too."},
+         .preformatted = ReadFileBytes(provenance)});
+  }
   report.footer = "semblance " SEMBLANCE_VERSION;
   return report;
 }

@@ -1,21 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/skull_stage.h"
 
-#include "problems/config.h"
 #include "problems/shell_dowels.h"
+#include "problems/stage_key.h"
 
 namespace semblance {
 namespace {
-
-// The text of options, as the key of what is made from them.
-template <class... Options>
-std::string KeyOf(const char* stage, const Options&... options) {
-  std::string key = stage;
-  for (const std::string& text : {ToFlowYaml(ConfigTreeOf(options))...}) {
-    key += "\n" + text;
-  }
-  return key;
-}
 
 DepthField FindDepth(const Experiment& experiment, Case& subject, const TriMesh& shell,
                      const RunContext& context) {
@@ -31,12 +21,12 @@ DepthField FindDepth(const Experiment& experiment, Case& subject, const TriMesh&
 SkullStage Make(const Experiment& e, StageCache& cache, StepClock& step,
                 const RunContext& context) {
   const auto data = step("load subject", [&] {
-    return cache.Get<SubjectData>(KeyOf("subject", e.subject),
+    return cache.Get<SubjectData>(StageKey("subject", e.subject),
                                   [&] { return LoadSubject(e.subject, context); });
   });
   Case subject = MakeCase(*data, e);
   const auto shell = step("fill skull", [&] {
-    return cache.Get<TriMesh>(KeyOf("shell", e.subject, e.fill),
+    return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
                               [&] { return FillSkull(data->skull, e.fill, context); });
   });
   DepthField depth =
@@ -51,8 +41,8 @@ SkullStage Make(const Experiment& e, StageCache& cache, StepClock& step,
 
 std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache& cache,
                                                  StepClock& step, const RunContext& context) {
-  return cache.Get<SkullStage>(KeyOf("skull stage", e.subject, e.landmarks, e.tissue, e.network,
-                                     e.interp, e.outside, e.fill, e.implicit),
+  return cache.Get<SkullStage>(StageKey("skull stage", e.subject, e.landmarks, e.tissue, e.network,
+                                        e.interp, e.outside, e.fill, e.implicit),
                                [&] { return Make(e, cache, step, context); });
 }
 

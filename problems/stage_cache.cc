@@ -11,6 +11,8 @@ StageCache::Value StageCache::GetAny(const std::string& key, const std::function
     std::unique_lock lock(mutex_);
     if (const auto it = values_.find(key); it != values_.end()) {
       const std::shared_future<Value> there = it->second;
+      std::erase(order_, key);
+      order_.push_back(key);
       lock.unlock();
       return there.get();
     }

@@ -13,7 +13,7 @@
 namespace semblance {
 
 // Safe from several threads: the first that asks for a key makes its value, the others wait for it.
-// Keeps the `capacity` (>= 1) values that were made last; those in use live on without it.
+// Keeps the `capacity` (>= 1) values that were asked for last; those in use live on without it.
 class StageCache {
  public:
   explicit StageCache(int capacity) : capacity_(capacity) {}
@@ -34,7 +34,7 @@ class StageCache {
 
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_future<Value>> values_;
-  std::deque<std::string> order_;  // of keys, oldest first
+  std::deque<std::string> order_;  // of keys, that asked for longest ago first
   int capacity_;
   int made_ = 0;
 };

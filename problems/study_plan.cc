@@ -63,7 +63,8 @@ class StudyReader {
       ReadScalar(errors_, {*metric, "metric", info}, plan_.metric);
     }
     if (const ConfigNode* keep = study_.Find("keep")) {
-      const std::vector<std::string> words = {"summary", "run"};
+      constexpr auto kNames = EnumNames(StudyKeep{});
+      const std::vector<std::string> words(kNames.begin(), kNames.end());
       plan_.keep = static_cast<StudyKeep>(
           ReadWord(errors_, {*keep, "keep", info}, "word", words).value_or(0));
     }

@@ -13,7 +13,7 @@
 //     list: [{seeds.level: 1}, {seeds.level: 2, rounds: 2}]            # by hand
 //     sample: {method: lhs, n: 20, random_seed: 1, ranges: {seeds.weight: [0.1, 1.0]}}
 //     metric: face.rms_mm              # that the report ranks by; lower is better
-//     keep: summary                    # or run: the whole folder of each run
+//     keep: summary                    # view: and what the report's 3-D view needs; run: all files
 //
 // Each of grid, zip, list and sample gives rows; a trial is a subject with one row of each. A value
 // is any part of an experiment, be it a number or a whole strategy.
@@ -30,8 +30,10 @@
 
 namespace semblance {
 
-enum class StudyKeep { kSummary, kRun };
-constexpr auto EnumNames(StudyKeep) { return std::to_array<std::string_view>({"summary", "run"}); }
+enum class StudyKeep { kSummary, kView, kRun };
+constexpr auto EnumNames(StudyKeep) {
+  return std::to_array<std::string_view>({"summary", "view", "run"});
+}
 
 struct StudyTrial {
   std::string id;       // 12 hex digits of the hash of the resolved experiment, its input files by

@@ -7,12 +7,14 @@
 #include <cmath>
 
 #include "problems/report.h"
+#include "problems/results_sqlite.h"
 #include "problems/svg_plot.h"
 
 namespace semblance {
 namespace {
 
-constexpr int kLeastSubjects = 6;  // two-sided, five subjects cannot reach p < 0.05
+constexpr std::size_t kMostScenes = 40;  // in one list to choose from
+constexpr int kLeastSubjects = 6;        // two-sided, five subjects cannot reach p < 0.05
 
 std::string Number(double value) {
   return std::isfinite(value) ? fmt::format("{:.3f}", value) : "";
@@ -21,14 +23,6 @@ std::string Number(double value) {
 std::string IntervalText(const Interval& interval) {
   return std::isfinite(interval.low) ? fmt::format("{:.3f} to {:.3f}", interval.low, interval.high)
                                      : "";
-}
-
-std::string LabelOf(const Treatment& treatment) {
-  std::string label;
-  for (const std::string& value : treatment.values) {
-    label += label.empty() || value.empty() ? value : ", " + value;
-  }
-  return label.empty() ? "base" : label;
 }
 
 std::vector<double> ValuesOf(const Treatment& treatment) {
@@ -55,7 +49,7 @@ ReportTable RankingTable(const std::vector<Treatment>& ranked, const std::string
       {}};
   for (const Treatment& treatment : ranked) {
     const SampleSummary s = Summarize(ValuesOf(treatment));
-    table.rows.push_back({LabelOf(treatment), std::to_string(s.n), Number(s.mean),
+    table.rows.push_back({treatment.label, std::to_string(s.n), Number(s.mean),
                           IntervalText(s.mean_95), Number(s.sd), Number(s.median), Number(s.min),
                           Number(s.max)});
   }
@@ -74,7 +68,7 @@ std::vector<double> Differences(const Treatment& treatment, const Treatment& bes
 
 ReportTable PairsTable(const std::vector<Treatment>& ranked) {
   ReportTable table{
-      fmt::format("Each treatment less the best ({}), paired by subject", LabelOf(ranked[0])),
+      fmt::format("Each treatment less the best ({}), paired by subject", ranked[0].label),
       {"treatment", "pairs", "mean difference", "95 % interval", "worse in", "Wilcoxon p",
        "p, Holm"},
       {}};
@@ -86,7 +80,7 @@ ReportTable PairsTable(const std::vector<Treatment>& ranked) {
     const bool enough = s.n >= kLeastSubjects && std::isfinite(w.p);
     p.push_back(enough ? w.p : 1);
     const auto worse = std::count_if(d.begin(), d.end(), [](double x) { return x > 0; });
-    table.rows.push_back({LabelOf(ranked[n]), std::to_string(s.n), Number(s.mean),
+    table.rows.push_back({ranked[n].label, std::to_string(s.n), Number(s.mean),
                           IntervalText(s.mean_95), fmt::format("{} of {}", worse, s.n),
                           enough ? fmt::format("{:.4f}{}", w.p, w.exact ? "" : " (normal)") : "",
                           enough ? "?" : ""});
@@ -129,7 +123,7 @@ ReportSection RankSection(const std::vector<Treatment>& ranked) {
   const FriedmanResult f = Friedman(rows);
   std::vector<RankedLabel> labels;
   for (std::size_t n = 0; n < ranked.size(); ++n) {
-    labels.push_back({LabelOf(ranked[n]), f.mean_ranks[n]});
+    labels.push_back({ranked[n].label, f.mean_ranks[n]});
   }
   section.images = {
       {RankPlotSvg(labels, f.critical_difference),
@@ -151,24 +145,106 @@ ReportSection TrialsSection(const StudyResults& results) {
                     {}};
   for (const TrialRow& row : results.trials) {
     const auto value = row.metrics.find(results.metric);
-    table.rows.push_back({row.id, row.subject, LabelOf({row.values, {}}), row.status,
+    table.rows.push_back({row.id, row.subject, TreatmentLabel(results.axes, row.values), row.status,
                           value == row.metrics.end() ? "" : Number(value->second), row.reason});
   }
   section.tables = {table};
   return section;
 }
 
-std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
+// The mean of one curve of the trials over subjects, point by point, one row a treatment; of
+// subjects whose curve is as long as the first one's.
+std::vector<BoxRow> MeanCurves(const StudyResults& results, const std::vector<Treatment>& ranked,
+                               std::vector<double> TrialRow::*curve) {
   std::vector<BoxRow> rows;
   for (const Treatment& treatment : ranked) {
-    rows.push_back({LabelOf(treatment), ValuesOf(treatment)});
+    BoxRow mean{treatment.label, {}};
+    int count = 0;
+    for (const TrialRow& row : results.trials) {
+      const std::vector<double>& values = row.*curve;
+      if (row.values == treatment.values && row.status == "done" &&
+          (count == 0 || values.size() == mean.values.size())) {
+        mean.values.resize(values.size(), 0);
+        for (std::size_t k = 0; k < values.size(); ++k) {
+          mean.values[k] += values[k];
+        }
+        ++count;
+      }
+    }
+    for (double& value : mean.values) {
+      value /= count;
+    }
+    if (!mean.values.empty()) {
+      rows.push_back(std::move(mean));
+    }
   }
   return rows;
 }
 
+ReportSection CurvesSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  ReportSection section{.heading = "Errors and convergence"};
+  const auto errors = MeanCurves(results, ranked, &TrialRow::quantiles_mm);
+  const auto steps = MeanCurves(results, ranked, &TrialRow::step_rms_mm);
+  if (!errors.empty()) {
+    section.images.push_back(
+        {CumulativePlotSvg(errors, "distance of the H-spline face from the true skin (mm)"),
+         "Share of the scored skin within each distance; quantiles averaged over subjects.",
+         "cumulative distribution of the face's error, one line a treatment"});
+  }
+  if (!steps.empty()) {
+    section.images.push_back(
+        {ConvergencePlotSvg(steps, "RMS distance of the fitted points (mm)"),
+         "Convergence: after each step of the last round's schedule, averaged over subjects.",
+         "root mean square distance by step of the schedule, one line a treatment"});
+  }
+  return section;
+}
+
+std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
+  std::vector<BoxRow> rows;
+  for (const Treatment& treatment : ranked) {
+    rows.push_back({treatment.label, ValuesOf(treatment)});
+  }
+  return rows;
+}
+
+// Of each subject in turn all treatments, the best first, so that the view compares them there.
+SceneCollection Scenes(const StudyResults& results, const std::filesystem::path& root) {
+  constexpr std::size_t kLimit_bytes = 12'000'000;
+  std::vector<std::string> subjects;
+  for (const TrialRow& row : results.trials) {
+    if (std::find(subjects.begin(), subjects.end(), row.subject) == subjects.end()) {
+      subjects.push_back(row.subject);
+    }
+  }
+  std::vector<SceneText> scenes;
+  for (const std::string& subject : subjects) {
+    for (const Treatment& treatment : Ranked(Treatments(results, results.metric))) {
+      for (const TrialRow& row : results.trials) {
+        const std::filesystem::path file = root / "trials" / row.id / "scene.json";
+        if (row.subject == subject && row.values == treatment.values && row.status == "done" &&
+            scenes.size() < kMostScenes && std::filesystem::exists(file)) {
+          scenes.push_back({fmt::format("{} | {}", treatment.label, subject), ReadFileBytes(file)});
+        }
+      }
+    }
+  }
+  return scenes.empty() ? SceneCollection{} : CollectScenes(scenes, kLimit_bytes);
+}
+
+std::string SceneNote(const StudyResults& results, const SceneCollection& scenes) {
+  const int left = results.Count("done") - scenes.count;
+  return scenes.count == 0 || left == 0
+             ? ""
+             : fmt::format(
+                   "{} of {} trials are here, best treatments first, subject by subject, to keep "
+                   "this file small; each other one can be run by itself from its trial.json.",
+                   scenes.count, results.Count("done"));
+}
+
 }  // namespace
 
-std::string StudyReportHtml(const StudyResults& results) {
+std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes) {
   const std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
   Report report;
   report.title = results.title;
@@ -185,7 +261,7 @@ std::string StudyReportHtml(const StudyResults& results) {
                                    "No trial that is done has a value of '{}'.", results.metric)}});
   } else {
     report.tiles.push_back(
-        {"best mean", Number(Summarize(ValuesOf(ranked[0])).mean), "", LabelOf(ranked[0])});
+        {"best mean", Number(Summarize(ValuesOf(ranked[0])).mean), "", ranked[0].label});
     report.main_images = {{BoxPlotSvg(Boxes(ranked), results.metric),
                            "One dot a subject; box: quartiles and median.",
                            "box plot of the metric, one row a treatment"}};
@@ -199,7 +275,10 @@ std::string StudyReportHtml(const StudyResults& results) {
     }
     report.sections.push_back(treatments);
     report.sections.push_back(RankSection(ranked));
+    report.sections.push_back(CurvesSection(results, ranked));
   }
+  report.scenes = scenes.json;
+  report.scenes_note = SceneNote(results, scenes);
   report.sections.push_back(TrialsSection(results));
   report.footer = "semblance " SEMBLANCE_VERSION;
   return ReportHtml(report);
@@ -209,7 +288,8 @@ StudyResults WriteStudyTables(OutputFolder& folder) {
   StudyResults results = ReadStudyResults(folder.Root());
   folder.Write("trials.csv", TrialsCsv(results));
   folder.Write("summary.csv", SummaryCsv(results));
-  folder.Write("report.html", StudyReportHtml(results));
+  folder.Write("results.sqlite", ResultsSqlite(results));
+  folder.Write("report.html", StudyReportHtml(results, Scenes(results, folder.Root())));
   return results;
 }
 

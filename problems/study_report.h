@@ -5,16 +5,18 @@
 #include <string>
 
 #include "problems/files.h"
+#include "problems/scene_json.h"
 #include "problems/study_tables.h"
 
 namespace semblance {
 
-// Writes trials.csv, summary.csv and report.html of what is in the folder so far; what is missing
-// is counted and said. Returns what was read. Throws IoError as ReadStudyResults.
+// Writes trials.csv, summary.csv, results.sqlite and report.html of what is in the folder so far;
+// what is missing is counted and said. Returns what was read. Throws IoError as ReadStudyResults.
 StudyResults WriteStudyTables(OutputFolder& folder);
 
 // Ranks the treatments by the study's metric, shows their spread, and compares each with the best
-// over the subjects that have both: effect first, p-values last, and none below 6 subjects.
-std::string StudyReportHtml(const StudyResults& results);
+// over the subjects that have both: effect first, p-values last, and none below 6 subjects. scenes:
+// of the trials that the 3-D view offers side by side (CollectScenes); may be empty.
+std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes = {});
 
 }  // namespace semblance

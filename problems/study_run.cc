@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <ctime>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -13,6 +15,7 @@
 #include "problems/config.h"
 #include "problems/manifest.h"
 #include "problems/run_folder.h"
+#include "problems/scene_json.h"
 #include "surfaces/whole_file.h"
 
 namespace semblance {
@@ -63,8 +66,15 @@ void AppendProvenance(const StudyTrial& trial, Json& json) {
   }
 }
 
-std::string TimingJson(const RunResult& result) {
-  Json json = Json::object();
+double ThreadCpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// Wall time of each step and, of the whole, the processor's; what others made for it is not in it.
+std::string TimingJson(const RunResult& result, double cpu_s) {
+  Json json = {{"cpu_s", cpu_s}};
   for (const StepTime& time : result.times) {
     json[time.step] = time.wall_s;
   }
@@ -133,6 +143,7 @@ class StudyRunner {
     quiet.stop_token = context_.stop_token;
     Json json = TrialHead(plan_, trial);
     std::optional<RunResult> result;
+    const double cpu_before_s = ThreadCpu_s();
     try {
       result.emplace(semblance::Run(trial.experiment, quiet, &cache_));
       json["status"] = result->usable() ? "done" : "unusable";
@@ -142,17 +153,21 @@ class StudyRunner {
       json["reason"] = error.what();
     }
     AppendProvenance(trial, json);
-    Write(trial, json, result, quiet);
+    Write(trial, json, result, ThreadCpu_s() - cpu_before_s);
     Tell(trial, json);
   }
 
   void Write(const StudyTrial& trial, const Json& json, const std::optional<RunResult>& result,
-             const RunContext& quiet) {
+             double cpu_s) {
+    const RunContext quiet;
     OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
     if (result && plan_.keep == StudyKeep::kRun) {
       WriteRun(trial.experiment, *result, output, quiet);
     } else if (result) {
-      output.Write("timing.json", TimingJson(*result));
+      output.Write("timing.json", TimingJson(*result, cpu_s));
+      if (plan_.keep == StudyKeep::kView) {
+        output.Write("scene.json", SceneJson(*result, quiet));
+      }
     }
     output.Write("trial.json", json.dump(1) + "\n");  // last: it says that the trial is whole
   }
@@ -160,14 +175,23 @@ class StudyRunner {
   void Tell(const StudyTrial& trial, const Json& json) {
     const std::lock_guard lock(mutex_);
     ++(json["status"] == "failed" ? summary_.failed : summary_.done);
-    const int finished = summary_.done + summary_.failed + summary_.skipped;
-    context_.Report(
-        "study",
-        fmt::format("trial {} of {}: {} {} {}", finished, summary_.trials, trial.subject,
-                    fmt::join(trial.values, " "), json["status"].get<std::string>()),
-        static_cast<double>(finished) / summary_.trials);
+    if (!options_.on_trial) {
+      return;
+    }
+    const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
+    const std::string reason =
+        json.contains("reason") ? ": " + json["reason"].get<std::string>() : "";
+    options_.on_trial({.trials = summary_.trials,
+                       .finished = summary_.done + summary_.failed + summary_.skipped,
+                       .finished_before = summary_.skipped,
+                       .failed = summary_.failed,
+                       .elapsed_s = elapsed_s},
+                      fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
+                                  fmt::join(trial.values, " "), reason));
   }
 
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start_ = Clock::now();
   const StudyPlan& plan_;
   fs::path folder_;
   const StudyRunOptions& options_;

@@ -4,10 +4,12 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "problems/study_plan.h"
+#include "problems/study_progress.h"
 #include "surfaces/run_context.h"
 
 namespace semblance {
@@ -17,6 +19,8 @@ struct StudyRunOptions {
   int shard = 0;  // of shards: trials n with n % shards == shard
   int shards = 1;
   bool retry_failed = false;  // run again what failed before
+  // May be empty. Called from one thread at a time after each trial; text: subject, values, status.
+  std::function<void(const StudyPace&, const std::string& text)> on_trial = {};
 };
 
 struct StudySummary {
@@ -27,9 +31,10 @@ struct StudySummary {
 
 // In `folder`: plan.json (all trials), trials/<id>/trial.json (status, axes, metrics, resolved
 // experiment, versions; the same bytes whenever and wherever it ran) and timing.json; with
-// `keep: run` the files of a run beside them. A trial that cannot be done is a trial.json with the
-// reason. What trials have in common is made once. Throws IoError if the folder cannot be written
-// or holds another plan, Cancelled on request (after the trials at hand).
+// `keep: view` scene.json, with `keep: run` all files of a run beside them. A trial that cannot be
+// done is a trial.json with the reason. What trials have in common is made once. Throws IoError if
+// the folder cannot be written or holds another plan, Cancelled on request (after the trials at
+// hand).
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);
 

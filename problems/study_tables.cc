@@ -28,6 +28,24 @@ void Flatten(const Json& json, const std::string& path, std::map<std::string, do
   }
 }
 
+// What is drawn as a curve, where it is there.
+void ReadCurves(const Json& result, TrialRow& row) {
+  const Json quantiles = result.value(Json::json_pointer("/face/quantiles_mm"), Json());
+  const Json levels = result.value(Json::json_pointer("/fit/levels"), Json());
+  for (const Json& value : quantiles.is_array() ? quantiles : Json::array()) {
+    row.quantiles_mm.push_back(value.is_number() ? value.get<double>() : kNaN);
+  }
+  for (const Json& level : levels.is_array() ? levels : Json::array()) {
+    const auto number = [&](const char* name) {
+      return level.contains(name) && level[name].is_number() ? level[name].get<double>() : kNaN;
+    };
+    if (row.step_rms_mm.empty()) {
+      row.step_rms_mm.push_back(number("rms_before_mm"));
+    }
+    row.step_rms_mm.push_back(number("rms_after_mm"));
+  }
+}
+
 void ReadTrial(const fs::path& folder, TrialRow& row) {
   const fs::path file = folder / "trials" / row.id / "trial.json";
   row.status = "missing";
@@ -42,6 +60,7 @@ void ReadTrial(const fs::path& folder, TrialRow& row) {
   row.reason = json.value("reason", "");
   if (json.contains("result")) {
     Flatten(json["result"], "", row.metrics);
+    ReadCurves(json["result"], row);
   }
 }
 
@@ -98,13 +117,25 @@ StudyResults ReadStudyResults(const fs::path& folder) {
   return results;
 }
 
+std::string TreatmentLabel(const std::vector<std::string>& axes,
+                           const std::vector<std::string>& values) {
+  std::string label;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (axes[k] == "title" && !values[k].empty()) {
+      return values[k];
+    }
+    label += label.empty() || values[k].empty() ? values[k] : ", " + values[k];
+  }
+  return label.empty() ? "base" : label;
+}
+
 std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric) {
   std::vector<Treatment> treatments;
   for (const TrialRow& row : results.trials) {
     auto it = std::find_if(treatments.begin(), treatments.end(),
                            [&](const Treatment& t) { return t.values == row.values; });
     if (it == treatments.end()) {
-      it = treatments.insert(it, {row.values, {}});
+      it = treatments.insert(it, {row.values, TreatmentLabel(results.axes, row.values), {}});
     }
     const auto value = row.metrics.find(metric);
     if (row.status == "done" && value != row.metrics.end()) {

@@ -17,6 +17,8 @@ struct TrialRow {
   std::string status;                     // done, unusable, failed, missing
   std::string reason;                     // of a failure
   std::map<std::string, double> metrics;  // by dotted path in result.json; finite ones only
+  std::vector<double> quantiles_mm;       // of the face's error (FaceMetrics); empty: none
+  std::vector<double> step_rms_mm;        // before the first step of the fit, after each
 };
 
 struct StudyResults {
@@ -34,8 +36,12 @@ StudyResults ReadStudyResults(const std::filesystem::path& folder);
 // One treatment: the trials that differ in the subject only.
 struct Treatment {
   std::vector<std::string> values;           // one an axis
+  std::string label;                         // TreatmentLabel of them
   std::map<std::string, double> by_subject;  // the metric, of trials that are done
 };
+// The title, where the study sets one, else all values that are not empty.
+std::string TreatmentLabel(const std::vector<std::string>& axes,
+                           const std::vector<std::string>& values);
 std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric);
 
 // trials.csv: trial, subject, the axes, status, reason, metric, value; one line a number, in the

@@ -106,6 +106,29 @@ std::string Box(const BoxRow& row, const Axis& axis, double y) {
   return svg;
 }
 
+// The n-th line of a plot: its own colour, dashed where colours come round again.
+std::string Polyline(const std::string& points, std::size_t n) {
+  return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}/>\n",
+                     points, kColours[n % kColours.size()],
+                     n >= kColours.size() ? " stroke-dasharray=\"6 4\"" : "");
+}
+
+double LegendHeight(const std::vector<BoxRow>& rows) {
+  return 22 * static_cast<double>((rows.size() + 1) / 2);
+}
+
+// Two columns of labels under a plot of lines.
+std::string LineLegend(const std::vector<BoxRow>& rows, double left, double top) {
+  std::string svg;
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    const double x = left + static_cast<double>(n % 2) * (kWidth - left) / 2,
+                 y = top + 22 * static_cast<double>(n / 2);
+    svg += Polyline(fmt::format("{:.2f},{:.2f} {:.2f},{:.2f}", x, y, x + 26, y), n) +
+           Text(x + 34, y + 5, Shortened(rows[n].label), "start");
+  }
+  return svg;
+}
+
 }  // namespace
 
 double TickStep(double low, double high, int count) {
@@ -172,15 +195,13 @@ std::string RankPlotSvg(std::vector<RankedLabel> treatments, double critical_dif
 std::string CumulativePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label) {
   constexpr double kTop = 20, kBottom = 340, kLeft = 60;
   const Axis axis(rows, kLeft);
-  std::string svg = Open(kBottom + 64 + 22 * static_cast<double>((rows.size() + 1) / 2)) +
-                    axis.Draw(kTop, kBottom, axis_label);
+  std::string svg = Open(kBottom + 64 + LegendHeight(rows)) + axis.Draw(kTop, kBottom, axis_label);
   for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
     const double y = kBottom - share * (kBottom - kTop);
     svg += Line(kLeft, y, kWidth - kRight, y, "#dfe3e8", 1);
     svg += Text(kLeft - 8, y + 5, fmt::format("{:.0f} %", 100 * share), "end");
   }
   for (std::size_t n = 0; n < rows.size(); ++n) {
-    const char* colour = kColours[n % kColours.size()];
     std::vector<double> values = rows[n].values;
     std::sort(values.begin(), values.end());
     std::string points;
@@ -191,15 +212,46 @@ std::string CumulativePlotSvg(const std::vector<BoxRow>& rows, const std::string
                         kBottom - below / static_cast<double>(values.size()) * (kBottom - kTop));
       }
     }
-    svg +=
-        fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}/>\n",
-                    points, colour, n >= kColours.size() ? " stroke-dasharray=\"6 4\"" : "");
-    const double x = kLeft + (n % 2) * (kWidth - kLeft) / 2,
-                 y = kBottom + 68 + 22 * static_cast<double>(n / 2);
-    svg +=
-        Line(x, y, x + 26, y, colour, 3) + Text(x + 34, y + 5, Shortened(rows[n].label), "start");
+    svg += Polyline(points, n);
   }
-  return svg + "</svg>\n";
+  return svg + LineLegend(rows, kLeft, kBottom + 68) + "</svg>\n";
+}
+
+std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label) {
+  constexpr double kTop = 34, kBottom = 340, kLeft = 60;
+  double high = 0;
+  std::size_t most = 2;
+  for (const BoxRow& row : rows) {
+    for (const double value : row.values) {
+      high = std::max(high, value);
+    }
+    most = std::max(most, row.values.size());
+  }
+  const double step = TickStep(0, high > 0 ? high : 1, 6);
+  high = step * std::max(1.0, std::ceil(high / step));
+  const auto x = [&](std::size_t k) {
+    return kLeft +
+           static_cast<double>(k) / static_cast<double>(most - 1) * (kWidth - kRight - kLeft);
+  };
+  const auto y = [&](double value) { return kBottom - value / high * (kBottom - kTop); };
+  std::string svg = Open(kBottom + 64 + LegendHeight(rows)) + Text(kLeft, 20, axis_label, "start");
+  for (int n = 0; n * step <= high + 1e-9 * step; ++n) {
+    svg += Line(kLeft, y(n * step), kWidth - kRight, y(n * step), "#dfe3e8", 1);
+    svg += Text(kLeft - 8, y(n * step) + 5, fmt::format("{:.6g}", n * step), "end");
+  }
+  const std::size_t every = 1 + most / 24;
+  for (std::size_t k = 0; k < most; k += every) {
+    svg += Text(x(k), kBottom + 20, k == 0 ? "start" : std::to_string(k), "middle");
+  }
+  svg += Text((kLeft + kWidth - kRight) / 2, kBottom + 44, "step of the schedule", "middle");
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    std::string points;
+    for (std::size_t k = 0; k < rows[n].values.size(); ++k) {
+      points += fmt::format("{:.2f},{:.2f} ", x(k), y(rows[n].values[k]));
+    }
+    svg += Polyline(points, n);
+  }
+  return svg + LineLegend(rows, kLeft, kBottom + 68) + "</svg>\n";
 }
 
 }  // namespace semblance

@@ -28,6 +28,10 @@ std::string RankPlotSvg(std::vector<RankedLabel> treatments, double critical_dif
 // The cumulative share of values below each, one line a row.
 std::string CumulativePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
 
+// How a number falls step by step, one line a row: its values are those before the first step,
+// after it, after the second ...; the vertical axis starts at 0.
+std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
+
 // A round step for about `count` ticks over [low, high]: 1, 2 or 5 times a power of ten.
 double TickStep(double low, double high, int count);
 

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The 3-D view of a report: canvases side by side under one camera, and the panel that rules them.
+'use strict';
+(() => {
+  const root = document.getElementById('view3d');
+  const {scenes, blobs} = JSON.parse(document.getElementById('view3d-scenes').textContent);
+  const element = (tag, properties, ...children) => {
+    const made = Object.assign(document.createElement(tag), properties);
+    made.append(...children);
+    return made;
+  };
+
+  // What the first look shows: the face as glass over bone and dowels.
+  const SHOWN = ['skull', 'dowels', 'face'];
+  const OPACITY = {face: 0.6, implicit: 0.6, skin: 0.5};
+  const shared = {layers: new Map(), mapped: false, range_mm: 8, exaggeration: 1, camera: null};
+  const labels = new Map();
+  for (const layer of scenes.flatMap((scene) => scene.layers)) {
+    labels.set(layer.id, layer);
+    shared.layers.set(layer.id, {shown: SHOWN.includes(layer.id), opacity: OPACITY[layer.id] || 1});
+  }
+
+  const stages = [];
+  let due = false;
+  const drawSoon = () => {
+    if (!due) {
+      due = true;
+      requestAnimationFrame(() => {
+        due = false;
+        for (const stage of stages) { stage.draw(); }
+        drawCompass();
+      });
+    }
+  };
+  const updateAll = () => {
+    for (const stage of stages) { stage.update(); }
+    drawLegends();
+  };
+
+  // Canvases: two where there is something to compare.
+  const frames = element('div', {className: 'view3d-frames'});
+  const makeFrame = (name, first) => {
+    const canvas = element('canvas', {tabIndex: 0});
+    canvas.setAttribute('aria-label', `3-D view ${name}; arrow keys turn it`);
+    const tip = element('div', {className: 'view3d-tip', hidden: true});
+    const facts = element('div', {className: 'view3d-facts'});
+    const choice = element('select', {},
+        ...scenes.map((scene, n) => element('option', {value: n, textContent: scene.label, selected: n === first})));
+    const head = element('label', {className: 'view3d-head'}, scenes.length > 1 ? `${name} ` : '',
+        scenes.length > 1 ? choice : scenes[0].label);
+    frames.append(element('div', {className: 'view3d-frame'}, head, facts,
+                          element('div', {className: 'view3d-stage'}, canvas, tip)));
+    const stage = new SemblanceStage(canvas, tip, shared);
+    const show = () => {
+      const scene = scenes[Number(choice.value)];
+      facts.textContent = scene.facts.join(' \u00b7 ');
+      stage.show(scene, blobs);
+    };
+    choice.addEventListener('change', show);
+    return {stage, canvas, show};
+  };
+
+  // Panel.
+  const panel = element('div', {className: 'view3d-panel'});
+  const button = (text, title, act) => {
+    const made = element('button', {type: 'button', textContent: text, title});
+    made.addEventListener('click', act);
+    return made;
+  };
+  const group = (title, ...children) =>
+      element('fieldset', {}, element('legend', {textContent: title}), ...children);
+  const select = (label, values, chosen, act) => {
+    const made = element('select', {}, ...values.map(([value, text]) =>
+        element('option', {value, textContent: text, selected: value === chosen})));
+    made.addEventListener('change', () => { act(made.value); updateAll(); });
+    return element('label', {className: 'view3d-choice'}, `${label} `, made);
+  };
+
+  const layerRow = (id, layer) => {
+    const state = shared.layers.get(id);
+    const box = element('input', {type: 'checkbox', checked: state.shown});
+    box.dataset.layer = id;
+    box.addEventListener('change', () => { state.shown = box.checked; updateAll(); });
+    const row = element('div', {className: 'view3d-layer'},
+        element('label', {}, box, element('i', {style: `background:${layer.colour}`}), layer.label));
+    if (layer.mesh) {
+      const slider = element('input', {type: 'range', min: 0.1, max: 1, step: 0.05, value: state.opacity, title: 'opacity'});
+      slider.setAttribute('aria-label', `opacity of ${layer.label}`);
+      slider.addEventListener('input', () => { state.opacity = Number(slider.value); updateAll(); });
+      row.append(slider);
+    }
+    return row;
+  };
+
+  const savePicture = () => {
+    stages.forEach((stage, n) => {
+      stage.draw();
+      element('a', {href: stage.canvas.toDataURL('image/png'), download: `view-${'AB'[n]}.png`}).click();
+    });
+  };
+
+  const compass = element('canvas', {className: 'view3d-compass', width: 224, height: 224});
+  const legends = element('div', {className: 'view3d-legends'});
+
+  const drawCompass = () => {
+    const pen = compass.getContext('2d'), middle = compass.width / 2;
+    const turn = shared.camera.camera.quaternion.clone().inverse();
+    pen.clearRect(0, 0, compass.width, compass.height);
+    pen.font = '20px system-ui, sans-serif';
+    pen.textAlign = 'center';
+    pen.textBaseline = 'middle';
+    const axes = [['left', 1, 0, 0], ['right', -1, 0, 0], ['front', 0, -1, 0], ['back', 0, 1, 0],
+                  ['up', 0, 0, 1], ['down', 0, 0, -1]]
+        .map(([name, ...to]) => ({name, at: new THREE.Vector3(...to).applyQuaternion(turn)}))
+        .sort((a, b) => a.at.z - b.at.z);
+    for (const {name, at} of axes) {
+      const x = middle + 62 * at.x, y = middle - 62 * at.y;
+      pen.globalAlpha = at.z > -0.3 ? 1 : 0.3;
+      pen.strokeStyle = pen.fillStyle = '#3b444d';
+      pen.beginPath();
+      pen.moveTo(middle, middle);
+      pen.lineTo(x, y);
+      pen.stroke();
+      if (Math.abs(at.z) < 0.93) { pen.fillText(name, middle + 84 * at.x, middle - 84 * at.y); }
+    }
+  };
+
+  const legendOf = (map) => {
+    const [low, high] = SemblanceGeometry.domainOf(map, shared.range_mm);
+    const bar = element('div', {className: 'view3d-bar'});
+    bar.style.background = `linear-gradient(to right, ${map.colours.join(',')})`;
+    const ticks = element('div', {className: 'view3d-ticks'});
+    for (let k = 0; k <= 4; ++k) {
+      const value = low + (high - low) * k / 4, sign = low < 0 && value > 0 ? '+' : '';
+      ticks.append(element('span', {textContent: `${sign}${+value.toFixed(2)}`.replace('-', '\u2212')}));
+    }
+    const none = element('i', {style: `background:${map.no_data}`});
+    return element('div', {className: 'view3d-legend'}, element('div', {textContent: `${map.title} (mm)`}),
+                   bar, ticks, element('small', {}, none, 'no data'));
+  };
+
+  // A legend for each map that is on show.
+  const drawLegends = () => {
+    const used = new Set();
+    for (const [id, layer] of labels) {
+      if (layer.map && shared.layers.get(id).shown && (layer.always_mapped || shared.mapped)) { used.add(layer.map); }
+    }
+    legends.replaceChildren(...[...used].map((name) => legendOf(scenes[0].maps[name])));
+  };
+
+  const hasError = [...labels.values()].some((layer) => layer.map === 'error');
+  const faceViews = [['Front', 0, 0], ['Three-quarter', 35, 8], ['Left side', 90, 0], ['Right side', -90, 0],
+                     ['Back', 180, 0], ['Top', 0, 89]];
+  panel.append(
+      group('Look from', element('div', {className: 'view3d-buttons'}, ...faceViews.map(([name, turn, rise]) =>
+          button(name, `look from ${name.toLowerCase()}`, () => shared.camera.look(turn, rise))))),
+      group('Show', ...[...labels].map(([id, layer]) => layerRow(id, layer))),
+      group('Colours',
+            ...(hasError ? [
+              select('faces by', [['skin', 'plain'], ['error', 'signed error']], 'skin', (value) => {
+                shared.mapped = value === 'error';
+              }),
+              select('error up to', [[2, '\u00b1 2 mm'], [4, '\u00b1 4 mm'], [8, '\u00b1 8 mm'], [16, '\u00b1 16 mm']], 8,
+                     (value) => { shared.range_mm = Number(value); })] : []),
+            select('dowel residuals', [[1, 'true length'], [5, '5 times'], [10, '10 times']], 1,
+                   (value) => { shared.exaggeration = Number(value); })),
+      legends, compass, button('Save picture', 'as PNG', savePicture));
+  root.append(frames, panel);
+
+  try {
+    const made = [makeFrame('A', 0)];
+    if (scenes.length > 1) { made.push(makeFrame('B', 1)); }
+    const box = new THREE.Box3();
+    for (const id of new Set(scenes[0].layers.filter((layer) => layer.mesh).map((layer) => layer.mesh))) {
+      const geometry = SemblanceGeometry.geometryOf(blobs[id]);
+      geometry.computeBoundingBox();
+      box.union(geometry.boundingBox);
+    }
+    shared.camera = new SemblanceCamera(box, drawSoon);
+    for (const {stage, canvas, show} of made) {
+      stages.push(stage);
+      show();
+      shared.camera.attach(canvas);
+    }
+    drawLegends();
+    shared.camera.look(35, 8);
+    new ResizeObserver(drawSoon).observe(frames);
+  } catch (error) {
+    root.replaceChildren(element('p', {
+      textContent: `No 3-D view: this browser has no WebGL (${error.message}). The pictures below show the same.`}));
+  }
+})();

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The 3-D view of a report: from a scene's blobs to three.js objects, and from millimetres to colours.
+'use strict';
+const SemblanceGeometry = (() => {
+  const NO_VALUE = -32768;
+
+  const bytesOf = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0)).buffer;
+
+  const pointsOf = (blob) => {
+    const numbers = new Uint16Array(bytesOf(blob.points)), positions = new Float32Array(numbers.length);
+    for (let k = 0; k < numbers.length; ++k) { positions[k] = blob.low[k % 3] + blob.step * numbers[k]; }
+    return positions;
+  };
+
+  const indexOf = (base64, points) => {
+    const bytes = bytesOf(base64);
+    return points <= 65536 ? new Uint16Array(bytes) : new Uint32Array(bytes);
+  };
+
+  // A mesh, or lines; its normals are those of the decimated triangles, smoothed.
+  const geometryOf = (blob) => {
+    const geometry = new THREE.BufferGeometry(), positions = pointsOf(blob);
+    geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+    geometry.setIndex(new THREE.BufferAttribute(
+        indexOf(blob.triangles || blob.segments, positions.length / 3), 1));
+    if (blob.triangles) { geometry.computeVertexNormals(); }
+    return geometry;
+  };
+
+  // One number in mm a vertex, NaN where there is none.
+  const valuesOf = (blob) =>
+      Float32Array.from(new Int16Array(bytesOf(blob.values)), (n) => n === NO_VALUE ? NaN : n / 100);
+
+  // range_mm, where given, takes the place of both ends of a map about 0.
+  const domainOf = (map, range_mm) =>
+      map.low_mm < 0 && range_mm ? [-range_mm, range_mm] : [map.low_mm, map.high_mm];
+
+  const coloursOf = (values, map, range_mm) => {
+    const [low, high] = domainOf(map, range_mm), steps = map.colours.length - 1;
+    const control = map.colours.map((c) => new THREE.Color(c)), noData = new THREE.Color(map.no_data);
+    const colours = new Float32Array(3 * values.length), mixed = new THREE.Color();
+    for (let v = 0; v < values.length; ++v) {
+      if (isNaN(values[v])) {
+        mixed.copy(noData);
+      } else {
+        const t = steps * Math.min(1, Math.max(0, (values[v] - low) / (high - low)));
+        const k = Math.min(steps - 1, Math.floor(t));
+        mixed.copy(control[k]).lerp(control[k + 1], t - k);
+      }
+      mixed.toArray(colours, 3 * v);
+    }
+    return new THREE.BufferAttribute(colours, 3);
+  };
+
+  const vector = (numbers) => new THREE.Vector3().fromArray(numbers);
+
+  const cylinder = (from, to, radius, material) => {
+    const along = to.clone().sub(from), length = along.length();
+    const mesh = new THREE.Mesh(new THREE.CylinderBufferGeometry(radius, radius, length, 12), material);
+    mesh.position.copy(from).addScaledVector(along, 0.5);
+    if (length > 0) {
+      mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
+    }
+    return mesh;
+  };
+
+  const ball = (at, radius, material) => {
+    const mesh = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, 16, 12), material);
+    mesh.position.copy(at);
+    return mesh;
+  };
+
+  return {geometryOf, valuesOf, domainOf, coloursOf, vector, cylinder, ball};
+})();

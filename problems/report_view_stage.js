@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One canvas of the 3-D view with one scene on it.
+'use strict';
+class SemblanceStage {
+  // settings: what the panel says, shared by all stages; see report_view.js.
+  constructor(canvas, tip, shared) {
+    this.canvas = canvas;
+    this.tip = tip;
+    this.shared = shared;
+    // The buffer is kept so that a picture can be saved at any time.
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
+    this.renderer.setClearColor(0xffffff);
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.ray = new THREE.Raycaster();
+    this.material = {
+      dowel: new THREE.MeshPhongMaterial({color: 0xb3261e, shininess: 25}),
+      end: new THREE.MeshPhongMaterial({color: 0x1d2126, shininess: 25}),
+      residual: new THREE.MeshPhongMaterial({color: 0x7b1fa2, shininess: 25}),
+    };
+    canvas.addEventListener('pointermove', (event) => this.point(event));
+    canvas.addEventListener('pointerleave', () => { this.tip.hidden = true; });
+  }
+
+  // Lights go with the camera: what is looked at is lit.
+  lights() {
+    const group = new THREE.Group();
+    const add = (colour, strength, x, y, z) => {
+      const light = new THREE.DirectionalLight(colour, strength);
+      light.position.set(x, y, z);
+      group.add(light, light.target);
+    };
+    add(0xffffff, 0.55, -0.7, 0.9, 1);
+    add(0xfff4e6, 0.22, 1, 0.1, 0.6);
+    group.add(new THREE.AmbientLight(0xffffff, 0.42));
+    return group;
+  }
+
+  show(description, blobs) {
+    this.description = description;
+    this.scene = new THREE.Scene();
+    this.rig = this.lights();
+    this.scene.add(this.rig);
+    this.layers = new Map();
+    for (const [order, layer] of description.layers.entries()) {
+      const object = layer.mesh ? this.surface(layer, blobs) : layer.lines ? this.lines(layer, blobs)
+                                                                           : new THREE.Group();
+      object.renderOrder = order;  // translucent layers are drawn from the inside out
+      this.layers.set(layer.id, {layer, object});
+      this.scene.add(object);
+    }
+    this.update();
+  }
+
+  surface(layer, blobs) {
+    const material = new THREE.MeshPhongMaterial({side: THREE.DoubleSide, shininess: 12, specular: 0x222222});
+    const mesh = new THREE.Mesh(SemblanceGeometry.geometryOf(blobs[layer.mesh]), material);
+    mesh.userData.values = layer.values && SemblanceGeometry.valuesOf(blobs[layer.values]);
+    return mesh;
+  }
+
+  lines(layer, blobs) {
+    return new THREE.LineSegments(SemblanceGeometry.geometryOf(blobs[layer.lines]),
+                                  new THREE.LineBasicMaterial({color: layer.colour}));
+  }
+
+  // Rods from base to end point, and from there to the fitted face, drawn `exaggeration` times as long.
+  dowels(layer, object, exaggeration) {
+    const {vector, cylinder, ball} = SemblanceGeometry;
+    object.clear ? object.clear() : object.remove(...object.children);
+    for (const dowel of layer.dowels) {
+      const tip = vector(dowel.tip), parts = [
+        cylinder(vector(dowel.base), tip, 0.9, this.material.dowel), ball(tip, 1.5, this.material.end)];
+      if (dowel.on_face) {
+        const end = tip.clone().lerp(vector(dowel.on_face), exaggeration);
+        parts.push(cylinder(tip, end, 0.7, this.material.residual), ball(end, 0.9, this.material.residual));
+      }
+      const residual = dowel.on_face ? `, residual ${dowel.residual_mm.toFixed(2)} mm` : ', not fitted';
+      for (const part of parts) {
+        part.userData.text = `dowel ${dowel.site}: depth ${dowel.depth_mm.toFixed(2)} mm${residual}`;
+        object.add(part);
+      }
+    }
+  }
+
+  // Takes over what the panel says.
+  update() {
+    for (const {layer, object} of this.layers.values()) {
+      const state = this.shared.layers.get(layer.id);
+      object.visible = state.shown;
+      if (layer.dowels && object.userData.exaggeration !== this.shared.exaggeration) {
+        object.userData.exaggeration = this.shared.exaggeration;
+        this.dowels(layer, object, this.shared.exaggeration);
+      }
+      if (object.material) {
+        object.material.opacity = state.opacity;
+        object.material.transparent = state.opacity < 1;
+        object.material.needsUpdate = true;
+      }
+      if (layer.mesh) { this.paint(layer, object); }
+    }
+    this.draw();
+  }
+
+  paint(layer, mesh) {
+    const mapped = mesh.userData.values && (layer.always_mapped || this.shared.mapped);
+    if (mapped) {
+      const map = this.description.maps[layer.map];
+      mesh.geometry.setAttribute('color', SemblanceGeometry.coloursOf(mesh.userData.values, map, this.shared.range_mm));
+    }
+    // Colours that carry numbers are shown matte.
+    mesh.material.specular.set(mapped ? 0x000000 : 0x222222);
+    mesh.material.vertexColors = mapped ? THREE.VertexColors : THREE.NoColors;
+    mesh.material.color.set(mapped ? '#ffffff' : layer.colour);
+    mesh.material.side = mesh.material.transparent ? THREE.FrontSide : THREE.DoubleSide;
+  }
+
+  draw() {
+    const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (!this.scene || width === 0 || height === 0) { return; }
+    const camera = this.shared.camera.camera, size = this.renderer.getSize(new THREE.Vector2());
+    if (size.x !== width || size.y !== height) { this.renderer.setSize(width, height, false); }
+    camera.aspect = width / height;
+    camera.updateProjectionMatrix();
+    this.rig.quaternion.copy(camera.quaternion);
+    this.renderer.render(this.scene, camera);
+  }
+
+  // Says what is under the pointer.
+  point(event) {
+    if (event.buttons || !this.scene) { this.tip.hidden = true; return; }
+    const box = this.canvas.getBoundingClientRect();
+    const at = new THREE.Vector2(2 * (event.clientX - box.left) / box.width - 1,
+                                 1 - 2 * (event.clientY - box.top) / box.height);
+    this.ray.setFromCamera(at, this.shared.camera.camera);
+    const shown = this.scene.children.filter((child) => child.visible && !child.isLineSegments && child !== this.rig);
+    const hit = this.ray.intersectObjects(shown, true)[0];
+    this.tip.hidden = !hit;
+    if (hit) {
+      this.tip.textContent = this.textOf(hit);
+      this.tip.style.left = `${event.clientX - box.left + 14}px`;
+      this.tip.style.top = `${event.clientY - box.top + 10}px`;
+    }
+  }
+
+  textOf(hit) {
+    if (hit.object.userData.text) { return hit.object.userData.text; }
+    const found = [...this.layers.values()].find(({object}) => object === hit.object);
+    const values = hit.object.userData.values;
+    if (!values) { return found.layer.label; }
+    const value = values[hit.face.a], sign = value > 0 && found.layer.map === 'error' ? '+' : '';
+    return `${found.layer.label}: ${isNaN(value) ? 'no value here' : `${sign}${value.toFixed(1)} mm`}`;
+  }
+}
