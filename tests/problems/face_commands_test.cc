@@ -106,8 +106,7 @@ TEST_F(FaceCommands, ExportRefusesWhatItCannotDo) {
 TEST_F(FaceCommands, AFeatureGoesFromFaceToFace) {
   ExpectDone("feature extract face.json --u 0.2 0.8 --levels 2 3 --name nose --library lib");
   const Feature nose = ReadFeature(folder_ / "lib/nose.json");
-  const FeatureRegion region{
-      .lowest_u = 0.2, .highest_u = 0.8, .first_level = 2, .last_level = 3};
+  const FeatureRegion region{.lowest_u = 0.2, .highest_u = 0.8, .first_level = 2, .last_level = 3};
   EXPECT_EQ(nose, ExtractFeature(face_, "nose", region));
   HSplineSurface smooth = testing::SmoothSurface(face_.shape(), 1);
   WriteHSpline(folder_ / "smooth.json", smooth);
