@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <set>
 #include <string>
 
 #include "fitting/seeding.h"
 #include "surfaces/error.h"
+#include "surfaces/feature.h"
 
 namespace semblance {
 namespace {
@@ -93,8 +93,7 @@ PatchGrid GridOf(const HSplineShape& shape, int level) {
 Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
   Observation o{.uv = point.uv, .position = point.position, .weight = point.weight};
   if (aim == FitAim::kSurface && level < surface.shape().max_level) {
-    const Vec3 coarse = surface.StencilAt(level, point.uv).Apply(surface.Net(level));
-    o.position -= surface.Point(point.uv) - coarse;
+    o.position -= surface.Point(point.uv) - surface.LevelDerivative(level, point.uv);
   }
   return o;
 }
@@ -162,12 +161,8 @@ LevelSummary FitStep(const LevelFit& step, const HSplineSurface& rest, const Fit
 
 int RestoreFeatures(const HSplineSurface& rest, std::span<const VertexId> features,
                     HSplineSurface& surface) {
-  std::map<VertexId, std::optional<Vec3>> offsets;
-  for (const VertexId& feature : features) {
-    offsets[feature] = rest.Offset(feature);
-  }
-  surface.SetOffsets(offsets);
-  return static_cast<int>(offsets.size());
+  RestoreFeature(ExtractFeature(rest, "rest", features), features, surface);
+  return static_cast<int>(std::set(features.begin(), features.end()).size());
 }
 
 // known_rms_mm: of all points, if the surface is as the last step left it; else NaN.

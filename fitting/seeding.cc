@@ -67,10 +67,8 @@ bool IsMasked(const Vec3& p, std::span<const Sphere> masks) {
 // radius of its concave parts (under the lip, beside the nose: a few mm), so that rays of 10 mm and
 // more would land in the wrong order; the coarse levels of a face have no such parts.
 Vec3 SmoothNormal(const HSplineSurface& surface, int level, const Vec2& uv) {
-  const ControlNet& net = surface.Net(level);
-  const Vec3 du = StencilAt(surface.shape(), level, uv, {.u = 1, .v = 0}).Apply(net);
-  const Vec3 dv = StencilAt(surface.shape(), level, uv, {.u = 0, .v = 1}).Apply(net);
-  return du.cross(dv).normalized();  // zero where the surface has no tangent plane
+  const SurfaceFrame frame = surface.LevelFrame(level, uv);
+  return frame.du.cross(frame.dv).normalized();  // zero where the surface has no tangent plane
 }
 
 class Seeder {

@@ -9,14 +9,13 @@
 #include <thread>
 
 #include "problems/config.h"
-#include "problems/edit_script.h"
+#include "problems/face_commands.h"
 #include "problems/face_metrics_json.h"
 #include "problems/progress.h"
 #include "problems/run_folder.h"
 #include "problems/study_report.h"
 #include "problems/study_run.h"
 #include "problems/study_submit.h"
-#include "surfaces/hspline_io.h"
 #include "surfaces/mesh_check.h"
 #include "surfaces/mesh_io.h"
 
@@ -29,7 +28,7 @@ constexpr int kDone = 0, kNotUsable = 1, kBadInput = 2;
 struct Arguments {
   std::vector<std::string> files;
   std::vector<std::string> overrides;
-  std::string out, inverse;
+  std::string out;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   bool force = false, quiet = false, schema = false, list = false, slurm = false;
   StudyRunOptions study;
@@ -251,17 +250,6 @@ int ReportCommand(const Arguments& arguments) {
   return kDone;
 }
 
-int EditCommand(const Arguments& arguments) {
-  HSplineSurface face = ReadHSpline(arguments.files.at(0));
-  const EditScript inverse = ApplyEdits(ReadEditScript(arguments.files.at(1)), face);
-  if (!arguments.inverse.empty()) {
-    WriteFileAtomically(arguments.inverse, WriteConfig(inverse));
-  }
-  WriteHSpline(arguments.out, face);
-  fmt::print("{}: {} vertices changed\n", arguments.out, inverse.edits.size());
-  return kDone;
-}
-
 using Command = int (*)(const Arguments&);
 
 // Declares the commands; the one that is named on the line sets `chosen`.
@@ -344,12 +332,6 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
       ->required()
       ->expected(2);
   add_work(evaluate);
-  CLI::App* edit = add("edit", "move vertices of an H-spline face, as a script says", &EditCommand);
-  edit->add_option("FACE SCRIPT", a.files, "H-spline (.json) and script (.yaml)")
-      ->required()
-      ->expected(2);
-  edit->add_option("--out", a.out, "file for the edited face")->required();
-  edit->add_option("--inverse", a.inverse, "file for the script that takes the edits back");
   CLI::App* report = add("report", "build the report of a run anew", &ReportCommand);
   report->add_option("DIR", a.files, "folder of a run")->required()->expected(1);
 }
@@ -359,14 +341,16 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   Arguments arguments;
   Command chosen = nullptr;
+  std::function<int()> face_command;
   Declare(app, arguments, chosen);
+  DeclareFaceCommands(app, face_command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kBadInput;
   }
   try {
-    return chosen(arguments);
+    return face_command ? face_command() : chosen(arguments);
   } catch (const Error& e) {
     fmt::print(stderr, "semblance: {}\n", e.what());
     return kBadInput;

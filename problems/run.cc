@@ -36,7 +36,7 @@ Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& dowels,
 TemplateFace Placed(const TemplateFace& generic, const Similarity& face_from_template) {
   TemplateFace placed = generic;
   placed.surface = Transformed(generic.surface, face_from_template);
-  for (Feature& feature : placed.features) {
+  for (TemplateFeature& feature : placed.features) {
     if (feature.region) {
       feature.region = Transformed(*feature.region, face_from_template);
     }

@@ -141,9 +141,8 @@ std::vector<VertexId> VerticesInside(const HSplineSurface& surface, const Sphere
   const HSplineShape& shape = surface.shape();
   std::vector<VertexId> inside;
   for (int level = 1; level <= shape.max_level; ++level) {
-    const ControlNet& net = surface.Net(level);
-    for (int i = 0; i < net.columns; ++i) {
-      for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < shape.Columns(level); ++i) {
+      for (int j = 0; j < shape.Rows(level); ++j) {
         const VertexId id{level, i, j};
         if (region.Contains(surface.Point(ParameterOf(shape, id)))) {
           inside.push_back(id);
@@ -173,7 +172,8 @@ TemplateFace MakeTemplateFace(const TemplateOptions& options) {
   CheckOptions(options);
   const HSplineShape shape{.patches_u = options.patches_u,
                            .patches_v = options.patches_v,
-                           .max_level = options.max_level};
+                           .max_level = options.max_level,
+                           .reference = options.reference};
   ControlNet coarse = FitFormula(shape, 0);
   MakeSymmetric(coarse);
   HSplineSurface surface(shape, coarse);
@@ -189,7 +189,7 @@ TemplateFace MakeTemplateFace(const TemplateOptions& options) {
 
 std::vector<VertexId> FeatureVertices(const TemplateFace& face) {
   std::set<VertexId> vertices;
-  for (const Feature& feature : face.features) {
+  for (const TemplateFeature& feature : face.features) {
     vertices.insert(feature.vertices.begin(), feature.vertices.end());
   }
   return {vertices.begin(), vertices.end()};
@@ -197,7 +197,7 @@ std::vector<VertexId> FeatureVertices(const TemplateFace& face) {
 
 std::vector<Sphere> TemplateMasks(const TemplateFace& face) {
   std::vector<Sphere> masks;
-  for (const Feature& feature : face.features) {
+  for (const TemplateFeature& feature : face.features) {
     if (feature.region) {
       masks.push_back(*feature.region);
     }

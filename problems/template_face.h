@@ -18,6 +18,7 @@ struct TemplateOptions {
   int patches_v = 8;                 // of level 0, from throat to crown
   int max_level = 3;                 // finest level that holds detail
   double detail_tolerance_mm = 0.1;  // a level keeps a vertex that moves by more than this
+  OffsetReference reference = OffsetReference::kFrame;
 };
 
 template <class Visitor>
@@ -46,10 +47,14 @@ void Fields(Visitor& visit, TemplateOptions& o) {
                   .doc = "a level stores an offset only where it moves a control vertex by more; "
                          "larger is sparser and less exact"},
         o.detail_tolerance_mm);
+  visit(FieldInfo{.name = "reference",
+                  .doc = "axes in which detail is kept; frame: of the next coarser surface, so "
+                         "that detail turns with it (thesis 4.1); world: fixed, to compare"},
+        o.reference);
 }
 
 // A part of the face whose detail a fit may free and then restore (thesis 4.3).
-struct Feature {
+struct TemplateFeature {
   std::string name;                // nose, mouth, eye_l, eye_r
   std::vector<VertexId> vertices;  // of levels >= 1, sorted
   std::optional<Sphere> region;    // in the frame of the template, mm; where no dowels are seeded
@@ -58,7 +63,7 @@ struct Feature {
 struct TemplateFace {
   HSplineSurface surface;               // LPS, mm, nasion near the origin, normals outward
   std::map<std::string, Vec2> site_uv;  // by site code, e.g. "g", "zy_l"
-  std::vector<Feature> features;
+  std::vector<TemplateFeature> features;
 };
 
 // The generic face by formula (HeadPoint) as an H-spline: level 0 is its least-squares fit, each

@@ -42,7 +42,7 @@ void CheckSites(const TemplateFace& face) {
   }
 }
 
-void CheckVertex(const Feature& feature, const VertexId& id, const HSplineShape& shape) {
+void CheckVertex(const TemplateFeature& feature, const VertexId& id, const HSplineShape& shape) {
   if (id.level < 1 || id.level > shape.max_level || id.i < 0 || id.i >= shape.Columns(id.level) ||
       id.j < 0 || id.j >= shape.Rows(id.level)) {
     throw InputError(
@@ -53,7 +53,7 @@ void CheckVertex(const Feature& feature, const VertexId& id, const HSplineShape&
 }
 
 void CheckFeatures(const TemplateFace& face) {
-  for (const Feature& feature : face.features) {
+  for (const TemplateFeature& feature : face.features) {
     for (const VertexId& id : feature.vertices) {
       CheckVertex(feature, id, face.surface.shape());
     }
@@ -75,7 +75,7 @@ std::filesystem::path SurfaceName(const std::filesystem::path& path) {
   return path.stem().string() + ".hspline.json";
 }
 
-Json ToJson(const Feature& feature) {
+Json ToJson(const TemplateFeature& feature) {
   Json vertices = Json::array();
   for (const VertexId& id : feature.vertices) {
     vertices.push_back({id.level, id.i, id.j});
@@ -94,7 +94,7 @@ Json ToJson(const TemplateFace& face, const std::string& surface_name) {
     sites[code] = {uv.x(), uv.y()};
   }
   Json features = Json::array();
-  for (const Feature& feature : face.features) {
+  for (const TemplateFeature& feature : face.features) {
     features.push_back(ToJson(feature));
   }
   return {{"format", kFormat},
@@ -122,8 +122,8 @@ std::array<Number, count> Numbers(const Json& json, const std::string& what) {
   return json.get<std::array<Number, count>>();
 }
 
-Feature FeatureFrom(const Json& json) {
-  Feature feature{.name = json.at("name").get<std::string>(), .vertices = {}, .region = {}};
+TemplateFeature FeatureFrom(const Json& json) {
+  TemplateFeature feature{.name = json.at("name").get<std::string>(), .vertices = {}, .region = {}};
   const std::string what = fmt::format("feature '{}': ", feature.name);
   for (const Json& vertex : json.at("vertices")) {
     const auto [level, i, j] = Numbers<int, 3>(vertex, what + "a vertex (level, i, j)");

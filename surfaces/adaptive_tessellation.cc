@@ -25,7 +25,7 @@ using Cell = PatchId;  // of any depth, deeper than the finest level too
 // second differences of the vertices, of which the derivatives are convex sums.
 double ChordBound(const HSplineSurface& surface, const Cell& cell) {
   const int level = std::min(cell.level, surface.shape().max_level), finer = cell.level - level;
-  const std::array<Vec3, 16> p = PatchVertices(surface, {level, cell.i >> finer, cell.j >> finer});
+  const std::array<Vec3, 16> p = surface.PatchVertices({level, cell.i >> finer, cell.j >> finer});
   double uu = 0, uv = 0, vv = 0;
   for (int b = 0; b < 4; ++b) {
     for (int a = 0; a < 2; ++a) {

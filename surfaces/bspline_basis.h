@@ -5,6 +5,8 @@
 
 #include <array>
 
+#include "surfaces/geometry.h"
+
 namespace semblance {
 
 // The four weights, or their derivatives of the given order (0, 1 or 2), at t in [0,1] on a patch
@@ -37,6 +39,19 @@ constexpr RefinementRow RefineRow(int i) {
     return {{c - 1, c, c + 1}, {0.125, 0.75, 0.125}};
   }
   return {{i / 2, i / 2 + 1, i / 2}, {0.5, 0.5, 0}};
+}
+
+// The vertex that two rows make together; coarse(a, b): that at (u.index[a], v.index[b]). One order
+// of sums, so that a vertex has the same bytes however it was come by.
+template <class Coarse>
+Vec3 RefinedVertex(const RefinementRow& u, const RefinementRow& v, const Coarse& coarse) {
+  Vec3 sum = Vec3::Zero();
+  for (int b = 0; b < 3; ++b) {
+    for (int a = 0; a < 3; ++a) {
+      sum += u.weight[a] * v.weight[b] * coarse(a, b);
+    }
+  }
+  return sum;
 }
 
 }  // namespace semblance

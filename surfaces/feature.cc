@@ -89,13 +89,34 @@ Feature ExtractFeature(const HSplineSurface& surface, std::string name,
   return feature;
 }
 
+Feature ExtractFeature(const HSplineSurface& surface, std::string name,
+                       std::span<const VertexId> vertices) {
+  CheckName(name);
+  Feature feature{std::move(name), surface.shape(), {}};
+  for (const VertexId& vertex : vertices) {
+    if (const std::optional<Vec3> offset = surface.Offset(vertex)) {
+      feature.offsets.emplace(vertex, *offset);
+    }
+  }
+  return feature;
+}
+
 void ApplyFeature(const Feature& feature, HSplineSurface& surface) {
+  RestoreFeature(feature, {}, surface);
+}
+
+void RestoreFeature(const Feature& feature, std::span<const VertexId> vertices,
+                    HSplineSurface& surface) {
   CheckFits(feature, surface.shape(), "the face");
-  std::map<VertexId, std::optional<Vec3>> offsets;
-  for (const auto& [vertex, offset] : feature.offsets) {
-    offsets.emplace(vertex, offset);
+  std::map<VertexId, std::optional<Vec3>> offsets(feature.offsets.begin(), feature.offsets.end());
+  for (const VertexId& vertex : vertices) {
+    offsets.emplace(vertex, std::nullopt);
   }
   surface.SetOffsets(offsets);
+}
+
+Feature ReadFeature(const std::filesystem::path& path) {
+  return FeatureFromJson(ReadFileBytes(path), path.string());
 }
 
 FeatureBlend BlendFeatures(std::string name, std::span<const Feature> features,
@@ -191,7 +212,7 @@ std::map<std::string, Feature> ReadFeatureLibrary(const std::filesystem::path& f
     if (path.extension() != ".json") {
       continue;
     }
-    Feature feature = FeatureFromJson(ReadFileBytes(path), path.string());
+    Feature feature = ReadFeature(path);
     if (feature.name != path.stem()) {
       throw IoError(fmt::format("{}: it holds the feature {}; name the file {}.json", path.string(),
                                 feature.name, feature.name));

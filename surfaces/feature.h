@@ -33,10 +33,22 @@ struct FeatureRegion {
 Feature ExtractFeature(const HSplineSurface& surface, std::string name,
                        const FeatureRegion& region = {});
 
+// The offsets of these vertices; those without one are not in the feature.
+Feature ExtractFeature(const HSplineSurface& surface, std::string name,
+                       std::span<const VertexId> vertices);
+
 // Gives the feature's vertices its offsets; all others keep theirs. Throws InputError if the
 // feature was taken from a surface of other patches, closure or offset reference, or has vertices
 // of a level that the surface has not; the surface is then as before.
 void ApplyFeature(const Feature& feature, HSplineSurface& surface);
+
+// The same, and those of `vertices` that the feature has not lose their offsets: what a fit did to
+// them is undone (thesis 4.3).
+void RestoreFeature(const Feature& feature, std::span<const VertexId> vertices,
+                    HSplineSurface& surface);
+
+// Reads the file of one feature. Throws IoError.
+Feature ReadFeature(const std::filesystem::path& path);
 
 struct FeatureBlend {
   Feature feature;

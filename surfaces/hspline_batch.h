@@ -27,18 +27,21 @@ class HSplineBatch {
   // finite.
   std::vector<Vec3> Points(std::span<const Vec2> uv, int threads = 1) const;
   SurfaceSamples PointsAndNormals(std::span<const Vec2> uv, int threads = 1) const;
+  // The same into `samples`, whose memory is used again.
+  void PointsAndNormals(std::span<const Vec2> uv, int threads, SurfaceSamples& samples) const;
 
   std::size_t Bytes() const;  // of memory held
 
-  // S(s,t) = sum of power[d][a + 4 b] s^a t^b, s and t in [0,1] on the patch.
-  struct Polynomial {
-    double power[3][16];
-    double scale_u;  // from derivatives along s and t to those along u and v
-    double scale_v;
+  // S(s,t) = sum of power[a + 4 b] s^a t^b, s and t in [0,1] on the patch; x, y, z and a zero.
+  struct alignas(64) Polynomial {
+    double power[16][4];
+    double scale_u, scale_v;  // s = u * scale_u - first_u, t likewise
+    double first_u, first_v;
   };
 
  private:
-  std::int64_t Sample(std::span<const Vec2> uv, int threads, Vec3* points, Vec3* normals) const;
+  void Sample(std::span<const Vec2> uv, int threads, Vec3* points, Vec3* normals,
+              std::int64_t* degenerate) const;
 
   PatchTree tree_;
   std::vector<Polynomial> polynomials_;  // one a leaf

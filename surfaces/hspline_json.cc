@@ -43,7 +43,8 @@ std::string HSplineToJson(const HSplineSurface& surface) {
   json["units"] = "mm";
   ShapeToJson(shape, json);
   json["level0"] = Json::array();
-  for (const Vec3& p : surface.Net(0).vertices) {
+  const ControlNet level0 = surface.Net(0);
+  for (const Vec3& p : level0.vertices) {
     json["level0"].push_back({p.x(), p.y(), p.z()});
   }
   json["offsets"] = OffsetsToJson(surface.Offsets());

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "surfaces/error.h"
+#include "surfaces/patch_tree.h"
 
 namespace semblance {
 namespace {
@@ -125,7 +126,13 @@ double LengthOf(const Vec2& step, const Mat2& squares) {
 }
 
 int GridLevel(const HSplineSurface& surface) {
-  return surface.Offsets().empty() ? 0 : surface.Offsets().rbegin()->first.level;
+  constexpr int kMostPatches = 65536;
+  const HSplineShape& shape = surface.shape();
+  int level = surface.Offsets().empty() ? 0 : surface.Offsets().rbegin()->first.level;
+  while (level > 0 && shape.PatchesU(level) * shape.PatchesV(level) > kMostPatches) {
+    --level;
+  }
+  return level;
 }
 
 }  // namespace
@@ -168,6 +175,14 @@ SurfaceProjector::SurfaceProjector(const HSplineSurface& surface, const ProjectO
       samples_.push_back(surface.Point({double(i) / quads_u, double(j) / (rows_ - 1)}));
     }
   }
+  const PatchTree tree(surface);
+  for (const PatchId& leaf : tree.leaves()) {
+    if (leaf.level > level) {
+      fine_uv_.emplace_back((leaf.i + 0.5) / shape.PatchesU(leaf.level),
+                            (leaf.j + 0.5) / shape.PatchesV(leaf.level));
+      fine_.push_back(surface.Point(fine_uv_.back()));
+    }
+  }
 }
 
 std::vector<Vec2> SurfaceProjector::Starts(const Vec3& point) const {
@@ -196,6 +211,13 @@ std::vector<Vec2> SurfaceProjector::Starts(const Vec3& point) const {
   for (std::size_t k = 0; k < count; ++k) {
     const int i = valleys[k].second % columns_, j = valleys[k].second / columns_;
     starts.emplace_back(double(i) / quads_u, double(j) / (rows_ - 1));
+  }
+  const auto nearest =
+      std::min_element(fine_.begin(), fine_.end(), [&](const Vec3& a, const Vec3& b) {
+        return (a - point).squaredNorm() < (b - point).squaredNorm();
+      });
+  if (nearest != fine_.end()) {
+    starts.push_back(fine_uv_[nearest - fine_.begin()]);
   }
   return starts;
 }

@@ -9,8 +9,8 @@
 namespace semblance {
 
 struct ProjectOptions {
-  int samples_per_patch = 3;   // >= 1; along a side of a patch of the finest level with edits; more
-                               // finds narrower valleys of the distance
+  int samples_per_patch = 3;   // >= 1; along a side of a patch of the finest level with edits, of
+                               // those with at most 65536 patches; more finds narrower valleys
   int starts = 4;              // >= 1; how many of the best valleys are descended into
   int max_iterations = 50;     // >= 1; of Newton's method, from each start
   double tolerance_mm = 1e-9;  // > 0; a step shorter than this has converged
@@ -32,8 +32,9 @@ SurfaceProjection ProjectFrom(const HSplineSurface& surface, const Vec3& point, 
                               const ProjectOptions& options = {});
 
 // Keeps a grid of samples of a surface, to project many points: ProjectFrom from the samples that
-// are nearest among their neighbours; the closest result counts. It does not see later changes of
-// the surface, which must outlive it.
+// are nearest among their neighbours, and from the nearest of those patches that are finer than the
+// grid; the closest result counts. It does not see later changes of the surface, which must outlive
+// it.
 class SurfaceProjector {
  public:
   explicit SurfaceProjector(const HSplineSurface& surface, const ProjectOptions& options = {});
@@ -46,6 +47,8 @@ class SurfaceProjector {
   ProjectOptions options_;
   int columns_ = 0, rows_ = 0;  // of the grid
   std::vector<Vec3> samples_;   // rows_ x columns_
+  std::vector<Vec2> fine_uv_;   // the middles of patches finer than the grid
+  std::vector<Vec3> fine_;
 };
 
 }  // namespace semblance

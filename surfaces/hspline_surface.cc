@@ -4,71 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
-#include "surfaces/bspline_basis.h"
 #include "surfaces/error.h"
+#include "surfaces/patch_layout.h"
 
 namespace semblance {
 namespace {
 
-// Where a parameter falls along one direction of a level: the patch and the place in it.
-struct Place {
-  int patch;
-  double t;
-};
-
-Place Locate(double x, int patches, Closure closure) {
-  x = closure == Closure::kPeriodicU ? x - std::floor(x) : std::clamp(x, 0.0, 1.0);
-  const int patch = std::min(static_cast<int>(x * patches), patches - 1);
-  return {patch, x * patches - patch};
-}
-
-int WrapColumn(const HSplineShape& shape, int level, int i) {
-  return shape.closure == Closure::kOpen ? i : (i + shape.Columns(level)) % shape.Columns(level);
-}
-
-double Power(double x, int order) { return order == 0 ? 1 : order == 1 ? x : x * x; }
-
-void CheckLevel(const HSplineShape& shape, int level) {
-  if (level < 0 || level > shape.max_level) {
-    throw InputError(
-        fmt::format("H-spline: there is no level {}; levels are 0..{}", level, shape.max_level));
-  }
-}
-
-void CheckPlace(const HSplineShape& shape, int level, const Vec2& uv) {
-  CheckLevel(shape, level);
-  if (!uv.allFinite()) {
-    throw InputError(fmt::format(
-        "H-spline: (u,v) = ({}, {}) is not finite; the domain is [0,1] x [0,1]", uv.x(), uv.y()));
-  }
-}
-
-ControlNet EmptyNet(const HSplineShape& shape, int level) {
-  ControlNet net{shape.Columns(level), shape.Rows(level), {}};
-  net.vertices.resize(static_cast<std::size_t>(net.columns) * net.rows, Vec3::Zero());
-  return net;
-}
-
-void CheckShape(const HSplineShape& shape) {
-  constexpr int kMostLevels = 8, kMostPatches = 8192;  // a side of the finest level
-  const int least_u = shape.closure == Closure::kPeriodicU ? 4 : 1;
-  if (shape.max_level < 0 || shape.max_level > kMostLevels) {
-    throw InputError(fmt::format("H-spline: the finest level is {}; it must be in 0..{}",
-                                 shape.max_level, kMostLevels));
-  }
-  const int most = kMostPatches >> shape.max_level;
-  if (shape.patches_u < least_u || shape.patches_v < 1 || shape.patches_u > most ||
-      shape.patches_v > most) {
-    throw InputError(fmt::format(
-        "H-spline: {} x {} patches are not allowed; with finest level {}, use {}..{} x 1..{}",
-        shape.patches_u, shape.patches_v, shape.max_level, least_u, most, most));
-  }
-}
-
 void CheckNet(const HSplineShape& shape, int level, const ControlNet& net) {
-  CheckLevel(shape, level);
+  CheckPlace(shape, level, Vec2::Zero());
   const std::size_t expected = static_cast<std::size_t>(shape.Columns(level)) * shape.Rows(level);
   if (net.columns != shape.Columns(level) || net.rows != shape.Rows(level) ||
       net.vertices.size() != expected) {
@@ -85,11 +30,8 @@ void CheckNet(const HSplineShape& shape, int level, const ControlNet& net) {
   }
 }
 
-SurfaceFrame FrameOf(const HSplineShape& shape, int level, const ControlNet& net, const Vec2& uv) {
-  SurfaceFrame frame;
-  frame.point = StencilAt(shape, level, uv).Apply(net);
-  frame.du = StencilAt(shape, level, uv, {1, 0}).Apply(net);
-  frame.dv = StencilAt(shape, level, uv, {0, 1}).Apply(net);
+// The axes, where the tangents span a plane.
+void OrientFrame(const HSplineShape& shape, int level, SurfaceFrame& frame) {
   const Vec3 normal = frame.du.cross(frame.dv);
   // Parallel tangents, judged relative to the tangents' own size, and vanishing ones, judged by
   // what rounding leaves of differences of vertices.
@@ -103,7 +45,6 @@ SurfaceFrame FrameOf(const HSplineShape& shape, int level, const ControlNet& net
     const Vec3 n = normal.normalized(), t = frame.du.normalized();
     frame.axes << t, n.cross(t), n;
   }
-  return frame;
 }
 
 void CheckOffset(const HSplineShape& shape, const VertexId& vertex, const Vec3& offset) {
@@ -127,11 +68,10 @@ struct Reference {
   Mat3 axes;
 };
 
-Reference ReferenceOf(const HSplineShape& shape, const ControlNet& coarser,
-                      const VertexId& vertex) {
-  const Vec2 uv = ParameterOf(shape, vertex);
-  const SurfaceFrame frame = FrameOf(shape, vertex.level - 1, coarser, uv);
-  if (shape.reference == OffsetReference::kWorld) {
+Reference ReferenceOf(const HSplineSurface& surface, const VertexId& vertex) {
+  const Vec2 uv = surface.ParameterOf(vertex);
+  const SurfaceFrame frame = surface.LevelFrame(vertex.level - 1, uv);
+  if (surface.shape().reference == OffsetReference::kWorld) {
     return {frame.point, Mat3::Identity()};
   }
   if (!frame.regular) {
@@ -143,80 +83,101 @@ Reference ReferenceOf(const HSplineShape& shape, const ControlNet& coarser,
   return {frame.point, frame.axes};
 }
 
+Vec3 Sum(const std::array<double, 16>& weights, const std::array<const Vec3*, 4>& columns) {
+  Vec3 sum = Vec3::Zero();
+  for (int k = 0; k < 16; ++k) {
+    sum += weights[k] * columns[k % 4][k / 4];
+  }
+  return sum;
+}
+
 }  // namespace
 
-Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order) {
-  CheckPlace(shape, level, uv);
-  const Place u = Locate(uv.x(), shape.PatchesU(level), shape.closure);
-  const Place v = Locate(uv.y(), shape.PatchesV(level), Closure::kOpen);
-  const std::array<double, 4> wu = CubicWeights(u.t, order.u), wv = CubicWeights(v.t, order.v);
-  const double scale =
-      Power(shape.PatchesU(level), order.u) * Power(shape.PatchesV(level), order.v);
-  Stencil stencil;
-  for (int a = 0; a < 4; ++a) {
-    const int column = WrapColumn(shape, level, u.patch + a);
-    for (int b = 0; b < 4; ++b) {
-      stencil.index[a + 4 * b] = column + shape.Columns(level) * (v.patch + b);
-      stencil.weight[a + 4 * b] = scale * wu[a] * wv[b];
-    }
-  }
-  return stencil;
-}
-
-Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex) {
-  const double u = (vertex.i - 1.0) / shape.PatchesU(vertex.level);
-  const double v = (vertex.j - 1.0) / shape.PatchesV(vertex.level);
-  const double u_in =
-      shape.closure == Closure::kPeriodicU ? u - std::floor(u) : std::clamp(u, 0.0, 1.0);
-  return {u_in, std::clamp(v, 0.0, 1.0)};
-}
-
-ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level) {
-  ControlNet fine = EmptyNet(shape, level + 1);
-  for (int j = 0; j < fine.rows; ++j) {
-    const RefinementRow v = RefineRow(j);
-    for (int i = 0; i < fine.columns; ++i) {
-      const RefinementRow u = RefineRow(i);
-      Vec3 sum = Vec3::Zero();
-      for (int b = 0; b < 3; ++b) {
-        for (int a = 0; a < 3; ++a) {
-          sum +=
-              u.weight[a] * v.weight[b] * net.At(WrapColumn(shape, level, u.index[a]), v.index[b]);
-        }
-      }
-      fine.At(i, j) = sum;
-    }
-  }
-  return fine;
-}
-
-HSplineSurface::HSplineSurface(const HSplineShape& shape, ControlNet level0) : shape_(shape) {
+HSplineSurface::HSplineSurface(const HSplineShape& shape, const ControlNet& level0)
+    : shape_(shape) {
   CheckShape(shape);
   CheckNet(shape, 0, level0);
-  nets_.resize(shape.max_level + 1);
-  nets_[0] = std::move(level0);
-  RebuildFrom(1);
+  levels_.resize(shape.max_level + 1);
+  levels_[0] = {RowTable(LayoutOf(shape, {})[0].reached), SparseNet::WholeNet(level0)};
 }
 
-Vec3 HSplineSurface::Point(const Vec2& uv) const { return Derivative(uv, {}); }
+PatchPlace HSplineSurface::FinestPatch(int level, const Vec2& uv) const {
+  CheckPlace(shape_, level, uv);
+  for (;; --level) {
+    const PatchPlace place = Locate(shape_, level, uv);
+    if (levels_[level].reached.Find(place.patch.i, place.patch.j) >= 0) {
+      return place;  // at the latest on level 0
+    }
+  }
+}
 
-Vec3 HSplineSurface::Derivative(const Vec2& uv, DerivativeOrder order) const {
-  return StencilAt(shape_.max_level, uv, order).Apply(nets_.back());
+HSplineSurface::Columns4 HSplineSurface::StoredColumns(const PatchId& patch) const {
+  Columns4 columns;
+  for (int a = 0; a < 4; ++a) {
+    columns[a] = levels_[patch.level].net.Find(shape_.Column(patch.level, patch.i + a), patch.j, 4);
+  }
+  return columns;
+}
+
+Vec3 HSplineSurface::LevelDerivative(int level, const Vec2& uv, DerivativeOrder order) const {
+  const PatchPlace place = FinestPatch(level, uv);
+  return Sum(PatchWeights(shape_, place, order), StoredColumns(place.patch));
 }
 
 SecondDerivatives HSplineSurface::Second(const Vec2& uv) const {
-  return {Derivative(uv, {2, 0}), Derivative(uv, {1, 1}), Derivative(uv, {0, 2})};
+  const PatchPlace place = FinestPatch(shape_.max_level, uv);
+  const Columns4 columns = StoredColumns(place.patch);
+  const auto derivative = [&](DerivativeOrder order) {
+    return Sum(PatchWeights(shape_, place, order), columns);
+  };
+  return {derivative({2, 0}), derivative({1, 1}), derivative({0, 2})};
 }
 
-SurfaceFrame HSplineSurface::Frame(const Vec2& uv) const {
-  return FrameOf(shape_, shape_.max_level, nets_.back(), uv);
+SurfaceFrame HSplineSurface::LevelFrame(int level, const Vec2& uv) const {
+  const PatchPlace place = FinestPatch(level, uv);
+  const Columns4 columns = StoredColumns(place.patch);
+  SurfaceFrame frame;
+  frame.point = Sum(PatchWeights(shape_, place), columns);
+  frame.du = Sum(PatchWeights(shape_, place, {1, 0}), columns);
+  frame.dv = Sum(PatchWeights(shape_, place, {0, 1}), columns);
+  OrientFrame(shape_, place.patch.level, frame);
+  return frame;
+}
+
+ControlNet HSplineSurface::Net(int level) const {
+  CheckPlace(shape_, level, Vec2::Zero());
+  int l = level;  // the finest level of which all vertices are stored
+  while (levels_[l].net.size() < static_cast<std::size_t>(Columns(l)) * Rows(l)) {
+    --l;
+  }
+  ControlNet net{Columns(l), Rows(l), {}};
+  net.vertices.resize(levels_[l].net.size());
+  levels_[l].net.CopyTo(net);
+  for (; l < level; ++l) {
+    net = Refine(shape_, net, l);
+    levels_[l + 1].net.CopyTo(net);
+  }
+  return net;
+}
+
+std::array<Vec3, 16> HSplineSurface::PatchVertices(const PatchId& patch) const {
+  const Columns4 columns = StoredColumns(patch);
+  if (std::find(columns.begin(), columns.end(), nullptr) != columns.end()) {
+    return RefinePatch(PatchVertices({patch.level - 1, patch.i / 2, patch.j / 2}), patch.i % 2,
+                       patch.j % 2);
+  }
+  std::array<Vec3, 16> vertices;
+  for (int k = 0; k < 16; ++k) {
+    vertices[k] = columns[k % 4][k / 4];
+  }
+  return vertices;
 }
 
 void HSplineSurface::SetNet(int level, const ControlNet& net) {
   CheckNet(shape_, level, net);
   HSplineSurface next = *this;  // so that a failure leaves the surface as it was
   if (level == 0) {
-    next.nets_[0] = net;
+    next.levels_[0].net = SparseNet::WholeNet(net);
   } else {
     for (const auto& [vertex, offset] : OffsetsThatGive(level, net)) {
       next.offsets_[vertex] = offset;
@@ -227,11 +188,12 @@ void HSplineSurface::SetNet(int level, const ControlNet& net) {
 }
 
 std::map<VertexId, Vec3> HSplineSurface::OffsetsThatGive(int level, const ControlNet& net) const {
+  const ControlNet present = Net(level);
   std::map<VertexId, Vec3> edits;
   for (int j = 0; j < net.rows; ++j) {
     for (int i = 0; i < net.columns; ++i) {
-      if (net.At(i, j) != nets_[level].At(i, j)) {
-        const Reference reference = ReferenceOf(shape_, nets_[level - 1], {level, i, j});
+      if (net.At(i, j) != present.At(i, j)) {
+        const Reference reference = ReferenceOf(*this, {level, i, j});
         edits[{level, i, j}] = reference.axes.transpose() * (net.At(i, j) - reference.origin);
       }
     }
@@ -265,16 +227,29 @@ void HSplineSurface::SetOffsets(const std::map<VertexId, std::optional<Vec3>>& o
 }
 
 void HSplineSurface::RebuildFrom(int level) {
-  for (int l = level; l <= shape_.max_level; ++l) {
-    const ControlNet& coarser = nets_[l - 1];
-    ControlNet net = Refine(shape_, coarser, l - 1);
+  const std::vector<LevelLayout> layout = LayoutOf(shape_, offsets_);
+  for (int l = 1; l <= shape_.max_level; ++l) {
+    RowTable reached(layout[l].reached), rows(VerticesOf(shape_, l, layout[l].needed));
+    if (l < level && reached == levels_[l].reached && rows == levels_[l].net.rows()) {
+      continue;
+    }
+    SparseNet net = Refined(shape_, l - 1, levels_[l - 1].net, std::move(rows));
     for (auto it = offsets_.lower_bound({l, 0, 0}); it != offsets_.end() && it->first.level == l;
          ++it) {
-      const Reference reference = ReferenceOf(shape_, coarser, it->first);
-      net.At(it->first.i, it->first.j) = reference.origin + reference.axes * it->second;
+      const Reference reference = ReferenceOf(*this, it->first);
+      *net.Find(it->first.i, it->first.j) = reference.origin + reference.axes * it->second;
     }
-    nets_[l] = std::move(net);
+    levels_[l] = {std::move(reached), std::move(net)};
   }
+}
+
+std::size_t HSplineSurface::Bytes() const {
+  constexpr std::size_t kNode = 96;  // of the map of offsets, with what its allocation takes
+  std::size_t bytes = sizeof(*this) + kNode * offsets_.size() + levels_.capacity() * sizeof(Level);
+  for (const Level& level : levels_) {
+    bytes += level.reached.Bytes() + level.net.Bytes();
+  }
+  return bytes;
 }
 
 }  // namespace semblance

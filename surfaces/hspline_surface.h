@@ -4,49 +4,15 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <map>
 #include <optional>
-#include <string_view>
 #include <vector>
 
-#include "surfaces/control_net.h"
+#include "surfaces/hspline_shape.h"
+#include "surfaces/sparse_net.h"
 
 namespace semblance {
-
-enum class Closure { kOpen, kPeriodicU };
-constexpr auto EnumNames(Closure) {
-  return std::to_array<std::string_view>({"open", "periodic_u"});
-}
-
-// In what axes an offset is kept: the frame of the next coarser surface, so that detail turns with
-// it, or the world's.
-enum class OffsetReference { kFrame, kWorld };
-constexpr auto EnumNames(OffsetReference) {
-  return std::to_array<std::string_view>({"frame", "world"});
-}
-
-// The domain is [0,1] x [0,1]; level L has patches_u 2^L x patches_v 2^L patches.
-struct HSplineShape {
-  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (periodic); at most 8192 on the finest level
-  int patches_v = 8;  // of level 0; >= 1; likewise
-  int max_level = 3;  // finest level that may hold detail; 0..8
-  Closure closure = Closure::kOpen;
-  OffsetReference reference = OffsetReference::kFrame;
-
-  int PatchesU(int level) const { return patches_u << level; }
-  int PatchesV(int level) const { return patches_v << level; }
-  int Columns(int level) const { return PatchesU(level) + (closure == Closure::kOpen ? 3 : 0); }
-  int Rows(int level) const { return PatchesV(level) + 3; }
-  bool operator==(const HSplineShape&) const = default;
-};
-
-// A control vertex of one level; (i, j) along u and v.
-struct VertexId {
-  int level = -1;
-  int i = -1;
-  int j = -1;
-  auto operator<=>(const VertexId&) const = default;
-};
 
 struct SurfaceFrame {
   Vec3 point = Vec3::Constant(kNaN);
@@ -66,31 +32,13 @@ struct SecondDerivatives {  // with respect to u and v in [0,1], mm
   Vec3 dvv = Vec3::Constant(kNaN);
 };
 
-// Orders of derivation along u and v.
-struct DerivativeOrder {
-  int u = 0;  // 0, 1 or 2
-  int v = 0;
-};
-
-// The sixteen vertices of `level` that make the point of the plain B-spline at uv, or its
-// derivative with respect to u, v in [0,1]. uv: u is clamped (open) or wrapped (periodic), v is
-// clamped to [0,1]. level: 0..shape.max_level. Throws InputError for a level that is not there or a
-// (u,v) that is not finite.
-Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order = {});
-
-// Where a control vertex has the greatest influence, clamped (open) or wrapped (periodic) into the
-// domain.
-Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex);
-
-// The net of the same surface one level finer (knot insertion at every midpoint).
-ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level);
-
-// Stored are the vertices of level 0 and the offsets of edited ones; the nets of all levels are
-// derived at each change, so that const calls may run at the same time.
+// Stored are the vertices of level 0 and the offsets of edited ones; from them follow, at each
+// change, the vertices of the patches that the offsets reach, and no others: memory grows with the
+// edits, not with 4^level. Const calls may run at the same time.
 class HSplineSurface {
  public:
   // level0: Columns(0) x Rows(0) finite vertices, else InputError.
-  HSplineSurface(const HSplineShape& shape, ControlNet level0);
+  HSplineSurface(const HSplineShape& shape, const ControlNet& level0);
 
   const HSplineShape& shape() const { return shape_; }
   int Columns(int level) const { return shape_.Columns(level); }
@@ -100,16 +48,26 @@ class HSplineSurface {
     return semblance::StencilAt(shape_, level, uv, order);
   }
 
-  // The finest surface; all levels' detail included.
-  Vec3 Point(const Vec2& uv) const;
-  Vec3 Derivative(const Vec2& uv, DerivativeOrder order) const;
+  // The finest surface; all levels' detail included. (u,v) lies in the finest patch that an offset
+  // reaches; the patch's own level is evaluated. uv: as in Locate; InputError if not finite.
+  Vec3 Point(const Vec2& uv) const { return Derivative(uv, {}); }
+  Vec3 Derivative(const Vec2& uv, DerivativeOrder order) const {
+    return LevelDerivative(shape_.max_level, uv, order);
+  }
   SecondDerivatives Second(const Vec2& uv) const;
-  SurfaceFrame Frame(const Vec2& uv) const;
+  SurfaceFrame Frame(const Vec2& uv) const { return LevelFrame(shape_.max_level, uv); }
   Vec3 Normal(const Vec2& uv) const { return Frame(uv).Normal(); }  // unit; zero where degenerate
 
+  // The surface with the detail of levels 0..level alone.
+  Vec3 LevelDerivative(int level, const Vec2& uv, DerivativeOrder order = {}) const;
+  SurfaceFrame LevelFrame(int level, const Vec2& uv) const;
+
   // The absolute control vertices of one level; a plain B-spline that holds the detail of levels
-  // 0..level.
-  const ControlNet& Net(int level) const { return nets_.at(level); }
+  // 0..level. All of them, made anew: time and memory grow with 4^level.
+  ControlNet Net(int level) const;
+
+  // Those of one patch alone, [a + 4 b] with a along u; the same bytes. The patch must be there.
+  std::array<Vec3, 16> PatchVertices(const PatchId& patch) const;
 
   // Makes Net(level) equal to `net`. Vertices that do not differ, to the bit, keep their state; the
   // others become edits, kept as absolute positions (level 0) or offsets. Finer levels keep their
@@ -126,19 +84,31 @@ class HSplineSurface {
   std::optional<Vec3> Offset(const VertexId& vertex) const;
   // Sets the offsets of some vertices, or removes them (nullopt: the vertex follows the coarser
   // level again). All or, where one cannot be set (no such vertex, not finite, no frame:
-  // InputError), none. One call for many vertices is much faster than many calls: each rebuilds the
-  // nets from the coarsest level that it changes.
+  // InputError), none. One call for many vertices is much faster than many calls: each makes the
+  // stored vertices anew, from the coarsest level that it changes.
   void SetOffsets(const std::map<VertexId, std::optional<Vec3>>& offsets);
   void SetOffset(const VertexId& vertex, const Vec3& offset) { SetOffsets({{vertex, offset}}); }
   void RemoveOffset(const VertexId& vertex) { SetOffsets({{vertex, std::nullopt}}); }
 
+  std::size_t Bytes() const;  // of memory held; a node of the offsets counts 96
+
  private:
+  struct Level {
+    RowTable reached;  // patches
+    SparseNet net;     // vertices of the needed patches (patch_layout.h)
+  };
+
+  // The four columns of a patch's vertices, each four in a row; null where they are not stored.
+  using Columns4 = std::array<const Vec3*, 4>;
+
+  PatchPlace FinestPatch(int level, const Vec2& uv) const;
+  Columns4 StoredColumns(const PatchId& patch) const;
   std::map<VertexId, Vec3> OffsetsThatGive(int level, const ControlNet& net) const;
   void RebuildFrom(int level);
 
   HSplineShape shape_;
-  std::map<VertexId, Vec3> offsets_;  // the truth, with nets_[0]
-  std::vector<ControlNet> nets_;      // one a level; those above 0 follow from offsets_
+  std::map<VertexId, Vec3> offsets_;  // the truth, with level 0
+  std::vector<Level> levels_;         // those above 0 follow from offsets_
 };
 
 }  // namespace semblance

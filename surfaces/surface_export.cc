@@ -51,7 +51,7 @@ void AppendArray(std::string& text, const char* attributes, std::size_t count, c
 }
 
 std::string PatchPointsText(const HSplineSurface& surface, const PatchId& patch) {
-  const std::array<Vec3, 16> points = BezierPoints(PatchVertices(surface, patch));
+  const std::array<Vec3, 16> points = BezierPoints(surface.PatchVertices(patch));
   std::string text;
   for (const int k : kVtkOrder) {
     fmt::format_to(std::back_inserter(text), "{} {} {} ", points[k].x(), points[k].y(),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Batch evaluation of H-splines against OpenCASCADE's B-spline of the same dense net and a plain de
-// Boor, one thread, in one run; and the memory that the patches need against that of the dense net.
+// Boor, one thread, in one run; and the memory of a surface with local detail against that of its
+// dense net.
 #include <fmt/format.h>
 
 #include <Geom_BSplineSurface.hxx>
@@ -129,11 +130,12 @@ int Main() {
     uv.emplace_back(random.Uniform(0, 1), random.Uniform(0, 1));
   }
   const HSplineBatch batch(surface);
+  const ControlNet net = surface.Net(level);
   const Handle(Geom_BSplineSurface) occt = OcctOf(surface);
   SurfaceSamples ours;
   std::vector<Vec3> points(kCount), normals(kCount), plain(kCount);
   const auto [batch_normals, occt_normals] =
-      Rates([&] { ours = batch.PointsAndNormals(uv); },
+      Rates([&] { batch.PointsAndNormals(uv, 1, ours); },
             [&] {
               for (int k = 0; k < kCount; ++k) {
                 gp_Pnt p;
@@ -144,13 +146,12 @@ int Main() {
                     Vec3(du.X(), du.Y(), du.Z()).cross(Vec3(dv.X(), dv.Y(), dv.Z())).normalized();
               }
             });
-  const auto [batch_points, plain_points] =
-      Rates([&] { ours.points = batch.Points(uv); },
-            [&] {
-              for (int k = 0; k < kCount; ++k) {
-                plain[k] = DeBoorPoint(surface.Net(level), m, n, uv[k]);
-              }
-            });
+  const auto [batch_points, plain_points] = Rates([&] { ours.points = batch.Points(uv); },
+                                                  [&] {
+                                                    for (int k = 0; k < kCount; ++k) {
+                                                      plain[k] = DeBoorPoint(net, m, n, uv[k]);
+                                                    }
+                                                  });
   constexpr double kSame = 1e-10;  // the peers must have been asked the same
   if (Largest(ours.points, points) > kSame || Largest(ours.normals, normals) > kSame ||
       Largest(ours.points, plain) > kSame) {
@@ -161,13 +162,17 @@ int Main() {
   }
   Print("hspline.point_normal_vs_occt", batch_normals, occt_normals, 5, "million a second");
   Print("hspline.point_vs_deboor", batch_points, plain_points, 1, "million a second");
-  // One vertex edited on level 7: our patches against the vertices of the dense net.
-  HSplineSurface sparse =
-      testing::SmoothSurface({.patches_u = 8, .patches_v = 8, .max_level = 7}, 1);
-  sparse.SetOffset({7, 512, 512}, Vec3(0, 0, 1));
-  const ControlNet& dense = sparse.Net(7);
-  Print("hspline.memory_vs_dense", HSplineBatch(sparse).Bytes() / 1e6,
-        dense.vertices.size() * sizeof(Vec3) / 1e6, 10, "MB", true);
+  // A wrinkle, 1000 vertices of level 8: all that our surface holds against the vertices of the
+  // dense net.
+  const HSplineShape deep{.patches_u = 8, .patches_v = 8, .max_level = 8};
+  HSplineSurface sparse = testing::SmoothSurface(deep, 1);
+  std::map<VertexId, std::optional<Vec3>> wrinkle;
+  for (int k = 0; k < 1000; ++k) {
+    wrinkle[{8, 600 + k % 200, 900 + k % 200 / 3 + k / 200}] = Vec3(0, 0, 0.1);
+  }
+  sparse.SetOffsets(wrinkle);
+  Print("hspline.memory_vs_dense", sparse.Bytes() / 1e6,
+        sizeof(Vec3) * double(deep.Columns(8)) * deep.Rows(8) / 1e6, 10, "MB", true);
   return 0;
 }
 

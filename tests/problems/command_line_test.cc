@@ -13,12 +13,10 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "surfaces/hspline_io.h"
 #include "surfaces/mesh_io.h"
 #include "surfaces/whole_file.h"
-#include "tests/testing/scratch_folder.h"
+#include "tests/testing/program_call.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
@@ -36,18 +34,9 @@ const std::string kQuick =
 
 class CommandLine : public ::testing::Test {
  protected:
-  struct Outcome {
-    int code = -1;
-    std::string out, err;
-  };
+  using Outcome = testing::Outcome;
 
-  Outcome Call(const std::string& arguments) {
-    const std::string command = fmt::format("cd '{}' && '{}' {} > stdout.txt 2> stderr.txt",
-                                            folder_.Path().string(), kProgram, arguments);
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadFileBytes(folder_ / "stdout.txt"),
-            ReadFileBytes(folder_ / "stderr.txt")};
-  }
+  Outcome Call(const std::string& arguments) { return testing::CallProgram(folder_, arguments); }
 
   // One line of error, exit code 2, and no folder `out`.
   void ExpectRefused(const std::string& arguments, const std::string& words) {
@@ -189,19 +178,6 @@ TEST_F(CommandLine, AKilledRunLeavesNoBrokenFile) {
   ::waitpid(child, nullptr, 0);
   EXPECT_NO_THROW(ReadMesh(fs::path(out) / "face.ply"));
   EXPECT_FALSE(fs::exists(fs::path(out) / "manifest.json"));
-}
-
-TEST_F(CommandLine, EditMovesVerticesAndItsInverseMovesThemBack) {
-  const HSplineSurface face = testing::RandomSurface({.patches_u = 4, .patches_v = 4}, 1);
-  WriteHSpline(folder_ / "face.json", face);
-  WriteFileAtomically(folder_ / "script.yaml",
-                      "edits:\n  - {level: 2, i: 5, j: 6, offset: [0.5, 0, -1]}\n");
-  const Outcome edit = Call("edit face.json script.yaml --out edited.json --inverse inverse.yaml");
-  EXPECT_EQ(edit.code, 0) << edit.err;
-  EXPECT_EQ(ReadHSpline(folder_ / "edited.json").Offset({2, 5, 6}), Vec3(0.5, 0, -1));
-  EXPECT_EQ(Call("edit edited.json inverse.yaml --out back.json").code, 0);
-  EXPECT_EQ(ReadFileBytes(folder_ / "back.json"), ReadFileBytes(folder_ / "face.json"));
-  EXPECT_EQ(Call("edit face.json missing.yaml --out x.json").code, 2);
 }
 
 }  // namespace

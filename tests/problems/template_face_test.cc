@@ -126,7 +126,7 @@ TEST(TemplateFace, SitesDoNotDependOnThePatches) {
 
 TEST(TemplateFace, FeaturesHaveVerticesOfTheirRegion) {
   std::vector<std::string> names;
-  for (const Feature& feature : Face().features) {
+  for (const TemplateFeature& feature : Face().features) {
     names.push_back(feature.name);
     EXPECT_GE(feature.vertices.size(), 40u) << feature.name;
     EXPECT_TRUE(std::is_sorted(feature.vertices.begin(), feature.vertices.end()));

@@ -107,5 +107,16 @@ TEST(HSplineProject, RefusesWhatCannotBeUsed) {
   EXPECT_THROW(SurfaceProjector(surface, {.samples_per_patch = 0}), InputError);
 }
 
+TEST(HSplineProject, FindsDetailOfLevelEight) {
+  HSplineSurface surface = SmoothSurface({.patches_u = 4, .patches_v = 4, .max_level = 8}, 5);
+  const VertexId spike{8, 402, 555};
+  surface.SetOffset(spike, Vec3(0, 0, 4));
+  const Vec2 top = surface.ParameterOf(spike);
+  const Vec3 outside = surface.Point(top) + 0.01 * surface.LevelFrame(0, top).Normal();
+  const SurfaceProjection found = SurfaceProjector(surface).Project(outside);
+  EXPECT_TRUE(found.converged);
+  EXPECT_LE(found.distance_mm, 0.01 + 1e-9);
+}
+
 }  // namespace
 }  // namespace semblance

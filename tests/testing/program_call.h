@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Calls of the program, from a folder of the test's own. Define SEMBLANCE_PROGRAM.
+#pragma once
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "surfaces/whole_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance::testing {
+
+struct Outcome {
+  int code = -1;
+  std::string out, err;
+};
+
+inline Outcome CallProgram(const ScratchFolder& folder, const std::string& arguments) {
+  const std::string command = fmt::format("cd '{}' && '{}' {} > stdout.txt 2> stderr.txt",
+                                          folder.Path().string(), SEMBLANCE_PROGRAM, arguments);
+  const int status = std::system(command.c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadFileBytes(folder / "stdout.txt"),
+          ReadFileBytes(folder / "stderr.txt")};
+}
+
+}  // namespace semblance::testing
