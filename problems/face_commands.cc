@@ -43,9 +43,11 @@ void RefuseToReplace(const fs::path& path, const FaceArguments& a) {
 }
 
 int Edit(const FaceArguments& a) {
+  RefuseToReplace(a.out, a);
   HSplineSurface face = ReadHSpline(a.face);
   const EditScript inverse = ApplyEdits(ReadEditScript(a.script), face);
   if (!a.inverse.empty()) {
+    RefuseToReplace(a.inverse, a);
     WriteFileAtomically(a.inverse, WriteConfig(inverse));
   }
   WriteHSpline(a.out, face);
@@ -158,6 +160,7 @@ void DeclareEdit(CLI::App& app, Declarer& declarer) {
   edit->add_option("SCRIPT", a.script, "what to reset and to move (.yaml)")->required();
   edit->add_option("--out", a.out, "file for the edited face")->required();
   edit->add_option("--inverse", a.inverse, "file for the script that takes the edits back");
+  declarer.AddForce(edit);
 }
 
 void DeclareExport(CLI::App& app, Declarer& declarer) {

@@ -98,7 +98,8 @@ HSplineSurface::HSplineSurface(const HSplineShape& shape, const ControlNet& leve
   CheckShape(shape);
   CheckNet(shape, 0, level0);
   levels_.resize(shape.max_level + 1);
-  levels_[0] = {RowTable(LayoutOf(shape, {})[0].reached), SparseNet::WholeNet(level0)};
+  levels_[0] = {RowTable(LayoutOf(shape, {})[0].reached, shape.patches_v),
+                SparseNet::WholeNet(level0)};
 }
 
 PatchPlace HSplineSurface::FinestPatch(int level, const Vec2& uv) const {
@@ -229,7 +230,8 @@ void HSplineSurface::SetOffsets(const std::map<VertexId, std::optional<Vec3>>& o
 void HSplineSurface::RebuildFrom(int level) {
   const std::vector<LevelLayout> layout = LayoutOf(shape_, offsets_);
   for (int l = 1; l <= shape_.max_level; ++l) {
-    RowTable reached(layout[l].reached), rows(VerticesOf(shape_, l, layout[l].needed));
+    RowTable reached(layout[l].reached, shape_.PatchesV(l)),
+        rows(VerticesOf(shape_, l, layout[l].needed), Rows(l));
     if (l < level && reached == levels_[l].reached && rows == levels_[l].net.rows()) {
       continue;
     }

@@ -12,7 +12,7 @@ PatchTree::PatchTree(const HSplineSurface& surface) : shape_(surface.shape()) {
   std::vector<RowTable> split;  // by level: patches with finer detail inside
   const std::vector<LevelLayout> layout = LayoutOf(shape_, surface.Offsets());
   for (int level = 0; level < shape_.max_level; ++level) {
-    split.emplace_back(Parents(layout[level + 1].needed));
+    split.emplace_back(Parents(layout[level + 1].needed), shape_.PatchesV(level));
   }
   split.emplace_back();
   std::vector<PatchId> patches;  // one a node

@@ -25,7 +25,7 @@ std::vector<RowSpan> Merged(std::vector<RowSpan> spans) {
   return spans;
 }
 
-RowTable::RowTable(const ColumnSpans& columns) {
+RowTable::RowTable(const ColumnSpans& columns, int rows) {
   std::size_t count = 0;
   for (const std::vector<RowSpan>& spans : columns) {
     count += spans.size();
@@ -40,6 +40,11 @@ RowTable::RowTable(const ColumnSpans& columns) {
     spans_.insert(spans_.end(), spans.begin(), spans.end());
   }
   starts_.push_back(static_cast<std::int32_t>(spans_.size()));
+  const bool whole = spans_.size() == columns.size() &&
+                     std::all_of(columns.begin(), columns.end(), [&](const auto& spans) {
+                       return spans == std::vector<RowSpan>{{0, rows}};
+                     });
+  whole_ = whole ? rows : 0;
 }
 
 std::size_t RowTable::Bytes() const {
@@ -56,7 +61,7 @@ SparseNet::SparseNet(RowTable rows) : rows_(std::move(rows)) {
 }
 
 SparseNet SparseNet::WholeNet(const ControlNet& net) {
-  SparseNet whole(RowTable(ColumnSpans(net.columns, {{0, net.rows}})));
+  SparseNet whole(RowTable(ColumnSpans(net.columns, {{0, net.rows}}), net.rows));
   for (int i = 0; i < net.columns; ++i) {
     for (int j = 0; j < net.rows; ++j) {
       whole.vertices_[static_cast<std::size_t>(i) * net.rows + j] = net.At(i, j);

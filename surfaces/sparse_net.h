@@ -27,10 +27,14 @@ std::vector<RowSpan> Merged(std::vector<RowSpan> spans);
 class RowTable {
  public:
   RowTable() = default;
-  explicit RowTable(const ColumnSpans& columns);
+  // rows: of the grid, in each column.
+  RowTable(const ColumnSpans& columns, int rows);
 
-  // The span, as an index, that holds (i, j), or -1. i: a column, any j.
+  // The span, as an index, that holds (i, j) of the grid, or -1.
   int Find(int i, int j) const {
+    if (whole_ > 0) {
+      return j < whole_ ? i : -1;
+    }
     if (starts_.empty()) {
       return -1;
     }
@@ -49,6 +53,7 @@ class RowTable {
   }
   const RowSpan& Span(int index) const { return spans_[index]; }
   int First(int i) const { return starts_[i]; }  // the column's spans are First(i)..First(i + 1)
+  int whole() const { return whole_; }           // rows, if all of every column are there; else 0
   int columns() const { return starts_.empty() ? 0 : static_cast<int>(starts_.size()) - 1; }
 
   std::size_t Bytes() const;
@@ -57,6 +62,7 @@ class RowTable {
  private:
   std::vector<std::int32_t> starts_;  // one a column and one more, or none
   std::vector<RowSpan> spans_;
+  int whole_ = 0;
 };
 
 class SparseNet {
@@ -68,8 +74,11 @@ class SparseNet {
   const RowTable& rows() const { return rows_; }
   std::size_t size() const { return vertices_.size(); }
 
-  // The vertices (i, j) to (i, j + count - 1), contiguous; null unless all exist.
+  // The vertices (i, j) to (i, j + count - 1) of the level, contiguous; null unless all exist.
   const Vec3* Find(int i, int j, int count) const {
+    if (rows_.whole() > 0) {
+      return vertices_.data() + static_cast<std::size_t>(i) * rows_.whole() + j;
+    }
     const int span = rows_.Find(i, j);
     return span < 0 || j + count > rows_.Span(span).end
                ? nullptr

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Batch evaluation of H-splines against OpenCASCADE's B-spline of the same dense net and a plain de
-// Boor, one thread, in one run; and the memory of a surface with local detail against that of its
-// dense net.
+// Boor, closest points against OpenCASCADE's, one thread, in one run; and the memory of a surface
+// with local detail against that of its dense net.
 #include <fmt/format.h>
 
+#include <Extrema_ExtPS.hxx>
+#include <GeomAdaptor_Surface.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <TColStd_Array1OfInteger.hxx>
 #include <TColStd_Array1OfReal.hxx>
 #include <TColgp_Array2OfPnt.hxx>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <gp_Pnt.hxx>
 #include <gp_Vec.hxx>
 
 #include "surfaces/hspline_batch.h"
+#include "surfaces/hspline_project.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -23,13 +27,13 @@ namespace {
 constexpr int kCount = 1'000'000;
 constexpr int kRepeats = 5;  // the fastest counts
 
-// Million calls a second of processor time, of both, taken in turns.
+// Million answers a second of processor time, of both, taken in turns.
 template <class Ours, class Peer>
-std::pair<double, double> Rates(const Ours& ours, const Peer& peer) {
-  const auto rate = [](const auto& body) {
+std::pair<double, double> Rates(const Ours& ours, const Peer& peer, int count = kCount) {
+  const auto rate = [&](const auto& body) {
     const std::clock_t start = std::clock();
     body();
-    return kCount * (double(CLOCKS_PER_SEC) / double(std::clock() - start)) / 1e6;
+    return count * (double(CLOCKS_PER_SEC) / double(std::clock() - start)) / 1e6;
   };
   std::pair<double, double> best{0, 0};
   for (int r = 0; r < kRepeats; ++r) {
@@ -112,6 +116,42 @@ void Print(const char* name, double ours, double peer, double goal, const char* 
       name, ours, peer, ratio, goal, ratio >= goal, unit);
 }
 
+// Closest points, from 5 mm off the surface: ours against OpenCASCADE's extrema.
+void ProjectBoth(const HSplineSurface& surface, const Handle(Geom_BSplineSurface) & occt) {
+  constexpr int kPoints = 100;
+  testing::Random random(4);
+  std::vector<Vec3> points;
+  for (int k = 0; k < kPoints; ++k) {
+    const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
+    points.push_back(surface.Point(uv) + random.Uniform(-5, 5) * surface.Normal(uv));
+  }
+  const SurfaceProjector projector(surface);
+  const GeomAdaptor_Surface adaptor(occt, 0, 1, 0, 1);
+  Extrema_ExtPS extrema;
+  extrema.Initialize(adaptor, 0, 1, 0, 1, 1e-9, 1e-9);
+  double further = 0;  // that ours is, of any point
+  std::vector<double> distances(kPoints);
+  const auto [ours, peer] = Rates(
+      [&] {
+        for (int k = 0; k < kPoints; ++k) {
+          distances[k] = projector.Project(points[k]).distance_mm;
+        }
+      },
+      [&] {
+        for (int k = 0; k < kPoints; ++k) {
+          extrema.Perform(gp_Pnt(points[k].x(), points[k].y(), points[k].z()));
+          for (int e = 1; extrema.IsDone() && e <= extrema.NbExt(); ++e) {
+            further = std::max(further, distances[k] - std::sqrt(extrema.SquareDistance(e)));
+          }
+        }
+      },
+      kPoints);
+  if (further > 1e-6) {
+    fmt::print(stderr, "hspline_bench: a closest point is further by {} mm\n", further);
+  }
+  Print("hspline.projection_vs_occt", 1e6 * ours, 1e6 * peer, 1, "a second");
+}
+
 double Largest(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   double largest = 0;
   for (std::size_t k = 0; k < a.size(); ++k) {
@@ -162,6 +202,7 @@ int Main() {
   }
   Print("hspline.point_normal_vs_occt", batch_normals, occt_normals, 5, "million a second");
   Print("hspline.point_vs_deboor", batch_points, plain_points, 1, "million a second");
+  ProjectBoth(surface, occt);
   // A wrinkle, 1000 vertices of level 8: all that our surface holds against the vertices of the
   // dense net.
   const HSplineShape deep{.patches_u = 8, .patches_v = 8, .max_level = 8};

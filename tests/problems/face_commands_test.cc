@@ -57,6 +57,10 @@ TEST_F(FaceCommands, EditMovesVerticesAndItsInverseMovesThemBack) {
   ExpectDone("edit edited.json inverse.yaml --out back.json");
   EXPECT_EQ(Bytes("back.json"), Bytes("face.json"));
   ExpectRefused("edit face.json missing.yaml --out x.json", "missing.yaml");
+  ExpectRefused("edit face.json script.yaml --out back.json", "--force");
+  ExpectRefused("edit face.json script.yaml --out x.json --inverse inverse.yaml", "--force");
+  EXPECT_FALSE(fs::exists(folder_ / "x.json"));
+  ExpectDone("edit face.json script.yaml --out back.json --inverse inverse.yaml --force");
 }
 
 TEST_F(FaceCommands, EditResetsARegionAndItsInverseBringsItBack) {

@@ -177,6 +177,17 @@ TEST(TemplateFace, ALargerToleranceStoresLessDetail) {
   EXPECT_LT(detail(0), detail(1));
 }
 
+TEST(TemplateFace, OffsetsInWorldAxesMakeTheSameFace) {
+  const TemplateFace world = MakeTemplateFace({.reference = OffsetReference::kWorld});
+  EXPECT_EQ(world.surface.shape().reference, OffsetReference::kWorld);
+  EXPECT_NE(world.surface.Offsets(), Face().surface.Offsets());
+  for (double u = 0.02; u < 1; u += 0.08) {
+    for (double v = 0.02; v < 1; v += 0.08) {
+      EXPECT_LT((world.surface.Point({u, v}) - Face().surface.Point({u, v})).norm(), 1e-9);
+    }
+  }
+}
+
 TEST(TemplateFace, OptionsOutOfRangeAreNamed) {
   try {
     MakeTemplateFace({.patches_u = 3});
