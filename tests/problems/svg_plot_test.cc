@@ -36,6 +36,18 @@ TEST(CumulativePlot, HasALineARow) {
   EXPECT_EQ(Count(CumulativePlotSvg(kRows, "rms (mm)"), "polyline"), 6);  // and one in the legend
 }
 
+TEST(QuantilePlot, EndsAtTheQuantileBelowTheLargestValue) {
+  std::vector<double> quantiles;
+  for (int k = 0; k <= 20; ++k) {
+    quantiles.push_back(k < 20 ? 0.5 * k : 1000);
+  }
+  const std::string svg = QuantilePlotSvg({{"a", quantiles}}, "distance (mm)");
+  EXPECT_EQ(Count(svg, "polyline"), 2);
+  EXPECT_THAT(svg, HasSubstr(">10<"));  // the axis: 9.5 rounded up, not 1000
+  EXPECT_THAT(svg, HasSubstr("60.00,340.00 "));
+  EXPECT_THAT(svg, HasSubstr("829.50,36.00 \""));  // 9.5 of 10 mm, 95 %
+}
+
 TEST(ConvergencePlot, GoesFromTheStartToTheLastStepOnOneScale) {
   const std::string svg = ConvergencePlotSvg({{"a", {4, 2, 1}}, {"b", {3, 0}}}, "rms (mm)");
   EXPECT_EQ(Count(svg, "polyline"), 4);
