@@ -38,7 +38,7 @@ struct FaceMetrics {
   std::map<std::string, DistanceSummary> regions;  // truth_to_face by part of the face
   std::vector<double> quantiles_mm;  // of the absolute truth_to_face, by area: the k-th of 21 is
                                      // not exceeded on k/20 of it
-  std::vector<double> signed_mm;  // one a vertex of the true skin, NaN where not scored
+  std::vector<double> signed_mm;     // one a vertex of the true skin, NaN where not scored
 };
 
 // Area-weighted, closest-point distances (not along a normal); no alignment is done.

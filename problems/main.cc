@@ -295,6 +295,11 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
   study->add_option("--out", a.out, "folder for the trials; a study there goes on");
   study->add_option("--jobs", a.study.jobs, "trials at a time")->check(CLI::Range(1, 1024));
   study->add_option("--shard", a.shard, "I/N: every N-th trial from the I-th (from 0) alone");
+  study->add_option("--cache", a.study.cache,
+                    "folder for implicit faces that other calls can take");
+  study->add_option("--cache-limit-mb", a.study.cache_limit_mb, "above it the oldest go")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
   study->add_flag("--list", a.list, "print the plan and run nothing");
   study->add_flag("--retry-failed", a.study.retry_failed, "run again what failed before");
   study->add_flag("--quiet", a.quiet, "no progress");

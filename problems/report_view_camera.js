@@ -5,7 +5,8 @@
 class SemblanceCamera {
   // onChange is called after each move.
   constructor(box, onChange) {
-    this.camera = new THREE.PerspectiveCamera(22, 1, 1, 5000);
+    this.angle = 22;  // degrees across the shorter side: a long lens, as portraits are taken
+    this.camera = new THREE.PerspectiveCamera(this.angle, 1, 1, 5000);
     this.camera.up.set(0, 0, 1);
     this.centre = box.getCenter(new THREE.Vector3());
     this.extent = box.getSize(new THREE.Vector3()).length();

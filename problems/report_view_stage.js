@@ -120,6 +120,9 @@ class SemblanceStage {
     const camera = this.shared.camera.camera, size = this.renderer.getSize(new THREE.Vector2());
     if (size.x !== width || size.y !== height) { this.renderer.setSize(width, height, false); }
     camera.aspect = width / height;
+    // A narrow canvas shows as much as a square one.
+    const half = Math.tan(this.shared.camera.angle * Math.PI / 360) / Math.min(1, camera.aspect);
+    camera.fov = 360 / Math.PI * Math.atan(half);
     camera.updateProjectionMatrix();
     this.rig.quaternion.copy(camera.quaternion);
     this.renderer.render(this.scene, camera);

@@ -153,11 +153,10 @@ ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
       ReportImageFromFile(folder.Root() / "pictures/truth.png", "",
                           "the true skin from three sides")};
   section.images.push_back(
-      {CumulativePlotSvg(
-           {{"H-spline face", Numbers(result.at("face").at("quantiles_mm"))},
-            {"implicit face", Numbers(result.at("implicit_face").at("quantiles_mm"))}},
-           "distance from the true skin (mm)"),
-       "Share of the scored skin within each distance.",
+      {QuantilePlotSvg({{"H-spline face", Numbers(result.at("face").at("quantiles_mm"))},
+                        {"implicit face", Numbers(result.at("implicit_face").at("quantiles_mm"))}},
+                       "distance from the true skin (mm)"),
+       "Share of the scored skin within each distance, up to 95 %.",
        "cumulative distribution of the errors of both faces"});
   section.tables = {MetricsTable("H-spline face", result.at("face")),
                     MetricsTable("Implicit face", result.at("implicit_face"))};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/skull_stage.h"
 
+#include "problems/implicit_cache.h"
 #include "problems/shell_dowels.h"
 #include "problems/stage_key.h"
 
@@ -32,7 +33,7 @@ SkullStage Make(const Experiment& e, StageCache& cache, StepClock& step,
   DepthField depth =
       step("interpolate depth", [&] { return FindDepth(e, subject, *shell, context); });
   ImplicitFace implicit = step("implicit face", [&] {
-    return BuildImplicitFace(*shell, depth.depth_mm, e.implicit, context);
+    return CachedImplicitFace(*shell, depth.depth_mm, e.implicit, cache.disk(), context);
   });
   return {std::move(subject), *shell, std::move(depth), std::move(implicit)};
 }

@@ -10,13 +10,19 @@
 #include <mutex>
 #include <string>
 
+#include "problems/disk_cache.h"
+
 namespace semblance {
 
 // Safe from several threads: the first that asks for a key makes its value, the others wait for it.
 // Keeps the `capacity` (>= 1) values that were asked for last; those in use live on without it.
 class StageCache {
  public:
-  explicit StageCache(int capacity) : capacity_(capacity) {}
+  // disk: for what is worth keeping between processes; may be null.
+  explicit StageCache(int capacity, std::shared_ptr<const DiskCache> disk = nullptr)
+      : disk_(std::move(disk)), capacity_(capacity) {}
+
+  const DiskCache* disk() const { return disk_.get(); }
 
   // The value of `key`, made by make() if it is not there. What make() throws reaches all who wait,
   // and is not kept. A key stands for one type T only.
@@ -32,6 +38,7 @@ class StageCache {
   using Value = std::shared_ptr<const void>;
   Value GetAny(const std::string& key, const std::function<Value()>& make);
 
+  std::shared_ptr<const DiskCache> disk_;
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_future<Value>> values_;
   std::deque<std::string> order_;  // of keys, that asked for longest ago first

@@ -187,8 +187,9 @@ ReportSection CurvesSection(const StudyResults& results, const std::vector<Treat
   const auto steps = MeanCurves(results, ranked, &TrialRow::step_rms_mm);
   if (!errors.empty()) {
     section.images.push_back(
-        {CumulativePlotSvg(errors, "distance of the H-spline face from the true skin (mm)"),
-         "Share of the scored skin within each distance; quantiles averaged over subjects.",
+        {QuantilePlotSvg(errors, "distance of the H-spline face from the true skin (mm)"),
+         "Share of the scored skin within each distance, quantiles averaged over subjects, up to "
+         "95 %.",
          "cumulative distribution of the face's error, one line a treatment"});
   }
   if (!steps.empty()) {

@@ -81,6 +81,13 @@ std::string TimingJson(const RunResult& result, double cpu_s) {
   return json.dump(2) + "\n";
 }
 
+std::shared_ptr<const DiskCache> CacheOnDisk(const StudyRunOptions& options) {
+  constexpr std::uintmax_t kMegabyte = 1'000'000;
+  return options.cache.empty()
+             ? nullptr
+             : std::make_shared<const DiskCache>(options.cache, kMegabyte * options.cache_limit_mb);
+}
+
 class StudyRunner {
  public:
   StudyRunner(const StudyPlan& plan, fs::path folder, const StudyRunOptions& options,
@@ -89,7 +96,7 @@ class StudyRunner {
         folder_(std::move(folder)),
         options_(options),
         context_(context),
-        cache_(3 * options.jobs + 6) {}
+        cache_(3 * options.jobs + 6, CacheOnDisk(options)) {}
 
   StudySummary Run() {
     for (std::size_t n = 0; n < plan_.trials.size(); ++n) {

@@ -18,7 +18,9 @@ struct StudyRunOptions {
   int jobs = 1;   // trials at a time, each on one thread
   int shard = 0;  // of shards: trials n with n % shards == shard
   int shards = 1;
-  bool retry_failed = false;  // run again what failed before
+  bool retry_failed = false;         // run again what failed before
+  std::filesystem::path cache = {};  // folder for implicit faces, shared by processes; empty: none
+  int cache_limit_mb = 2000;
   // May be empty. Called from one thread at a time after each trial; text: subject, values, status.
   std::function<void(const StudyPace&, const std::string& text)> on_trial = {};
 };

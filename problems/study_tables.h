@@ -17,8 +17,8 @@ struct TrialRow {
   std::string status;                     // done, unusable, failed, missing
   std::string reason;                     // of a failure
   std::map<std::string, double> metrics;  // by dotted path in result.json; finite ones only
-  std::vector<double> quantiles_mm;       // of the face's error (FaceMetrics); empty: none
-  std::vector<double> step_rms_mm;        // before the first step of the fit, after each
+  std::vector<double> quantiles_mm = {};  // of the face's error (FaceMetrics); empty: none
+  std::vector<double> step_rms_mm = {};   // before the first step of the fit, after each
 };
 
 struct StudyResults {

@@ -129,6 +129,22 @@ std::string LineLegend(const std::vector<BoxRow>& rows, double left, double top)
   return svg;
 }
 
+constexpr double kShareTop = 20, kShareBottom = 340, kShareLeft = 60;
+
+double ShareAt(double share) { return kShareBottom - share * (kShareBottom - kShareTop); }
+
+// A plot of shares over an axis of numbers, without its lines.
+std::string OpenShares(const std::vector<BoxRow>& rows, const Axis& axis,
+                       const std::string& axis_label) {
+  std::string svg =
+      Open(kShareBottom + 64 + LegendHeight(rows)) + axis.Draw(kShareTop, kShareBottom, axis_label);
+  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+    svg += Line(kShareLeft, ShareAt(share), kWidth - kRight, ShareAt(share), "#dfe3e8", 1);
+    svg += Text(kShareLeft - 8, ShareAt(share) + 5, fmt::format("{:.0f} %", 100 * share), "end");
+  }
+  return svg;
+}
+
 }  // namespace
 
 double TickStep(double low, double high, int count) {
@@ -193,28 +209,41 @@ std::string RankPlotSvg(std::vector<RankedLabel> treatments, double critical_dif
 }
 
 std::string CumulativePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label) {
-  constexpr double kTop = 20, kBottom = 340, kLeft = 60;
-  const Axis axis(rows, kLeft);
-  std::string svg = Open(kBottom + 64 + LegendHeight(rows)) + axis.Draw(kTop, kBottom, axis_label);
-  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-    const double y = kBottom - share * (kBottom - kTop);
-    svg += Line(kLeft, y, kWidth - kRight, y, "#dfe3e8", 1);
-    svg += Text(kLeft - 8, y + 5, fmt::format("{:.0f} %", 100 * share), "end");
-  }
+  const Axis axis(rows, kShareLeft);
+  std::string svg = OpenShares(rows, axis, axis_label);
   for (std::size_t n = 0; n < rows.size(); ++n) {
     std::vector<double> values = rows[n].values;
     std::sort(values.begin(), values.end());
     std::string points;
     for (std::size_t k = 0; k < values.size(); ++k) {
       for (const double below : {static_cast<double>(k), static_cast<double>(k + 1)}) {
-        points +=
-            fmt::format("{:.2f},{:.2f} ", axis.At(values[k]),
-                        kBottom - below / static_cast<double>(values.size()) * (kBottom - kTop));
+        points += fmt::format("{:.2f},{:.2f} ", axis.At(values[k]),
+                              ShareAt(below / static_cast<double>(values.size())));
       }
     }
     svg += Polyline(points, n);
   }
-  return svg + LineLegend(rows, kLeft, kBottom + 68) + "</svg>\n";
+  return svg + LineLegend(rows, kShareLeft, kShareBottom + 68) + "</svg>\n";
+}
+
+std::string QuantilePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label) {
+  std::vector<BoxRow> shown = rows;
+  for (BoxRow& row : shown) {
+    if (!row.values.empty()) {
+      row.values.pop_back();
+    }
+  }
+  const Axis axis(shown, kShareLeft);
+  std::string svg = OpenShares(rows, axis, axis_label);
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    std::string points;
+    for (std::size_t k = 0; k < shown[n].values.size(); ++k) {
+      const double share = static_cast<double>(k) / static_cast<double>(rows[n].values.size() - 1);
+      points += fmt::format("{:.2f},{:.2f} ", axis.At(shown[n].values[k]), ShareAt(share));
+    }
+    svg += Polyline(points, n);
+  }
+  return svg + LineLegend(rows, kShareLeft, kShareBottom + 68) + "</svg>\n";
 }
 
 std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label) {

@@ -81,14 +81,15 @@ TEST(Html, EveryImageIsInsideTheFileAndHasAltText) {
 
 TEST(Html, NeedsNothingElse) {
   const std::string html = ReportHtml(Full());
-  EXPECT_EQ(Count(html, "://|url\\(|@import|<script|<link|<iframe"), 0);
+  EXPECT_EQ(Count(html, "://|url\\(|@import|<script[^>]*src|<link|<iframe"), 0);
   EXPECT_EQ(Count(html, "src=\"(?!data:)"), 0);
   EXPECT_EQ(Count(html, "href=\"(?!#s)"), 0);
 }
 
 TEST(Html, TagsAreBalanced) {
   // With its void elements closed, the page is XML, which a strict parser can check.
-  const std::string html = ReportHtml(Full());
+  std::string html = ReportHtml(Full());
+  html.erase(html.find("<script>"), html.find("</script>") + 9 - html.find("<script>"));
   const std::string xml = std::regex_replace(html.substr(html.find("<html")),
                                              std::regex("<((meta|img)[^>]*)>"), "<$1/>");
   pugi::xml_document document;

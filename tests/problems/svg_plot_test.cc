@@ -10,6 +10,8 @@
 namespace semblance {
 namespace {
 
+using ::testing::HasSubstr;
+
 // Numbers of elements of a name; fails if the text is no XML.
 int Count(const std::string& svg, const char* name) {
   pugi::xml_document document;
@@ -31,7 +33,28 @@ TEST(BoxPlot, HasEachValueAndABoxARow) {
 }
 
 TEST(CumulativePlot, HasALineARow) {
-  EXPECT_EQ(Count(CumulativePlotSvg(kRows, "rms (mm)"), "polyline"), 3);
+  EXPECT_EQ(Count(CumulativePlotSvg(kRows, "rms (mm)"), "polyline"), 6);  // and one in the legend
+}
+
+TEST(QuantilePlot, EndsAtTheQuantileBelowTheLargestValue) {
+  std::vector<double> quantiles;
+  for (int k = 0; k <= 20; ++k) {
+    quantiles.push_back(k < 20 ? 0.5 * k : 1000);
+  }
+  const std::string svg = QuantilePlotSvg({{"a", quantiles}}, "distance (mm)");
+  EXPECT_EQ(Count(svg, "polyline"), 2);
+  EXPECT_THAT(svg, HasSubstr(">10<"));  // the axis: 9.5 rounded up, not 1000
+  EXPECT_THAT(svg, HasSubstr("60.00,340.00 "));
+  EXPECT_THAT(svg, HasSubstr("829.50,36.00 \""));  // 9.5 of 10 mm, 95 %
+}
+
+TEST(ConvergencePlot, GoesFromTheStartToTheLastStepOnOneScale) {
+  const std::string svg = ConvergencePlotSvg({{"a", {4, 2, 1}}, {"b", {3, 0}}}, "rms (mm)");
+  EXPECT_EQ(Count(svg, "polyline"), 4);
+  // From the left edge to the right one, a third step is as far again; 4 mm at the top, 0 below.
+  EXPECT_THAT(svg, HasSubstr("points=\"60.00,34.00 465.00,187.00 870.00,263.50 \""));
+  EXPECT_THAT(svg, HasSubstr("points=\"60.00,110.50 465.00,340.00 \""));
+  EXPECT_THAT(svg, HasSubstr(">start<"));
 }
 
 TEST(RankPlot, PutsTheBestFirst) {
