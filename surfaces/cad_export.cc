@@ -83,7 +83,7 @@ TopoDS_Shell Faces(const HSplineSurface& surface) {
   const BRep_Builder builder;
   TopoDS_Shell shell;
   builder.MakeShell(shell);
-  for (const PatchRegion& region : UniformRegions(PatchTree(surface))) {
+  for (const PatchRegion& region : FewRegions(surface.shape(), PatchTree(surface))) {
     BRepBuilderAPI_MakeFace face(RegionSurface(surface, region), kTolerance_mm);
     if (!face.IsDone()) {
       throw InputError("CAD export: a part of the surface has no area; move its vertices apart");

@@ -11,7 +11,8 @@ namespace semblance {
 
 bool HasCad();  // whether this build can write STEP and IGES
 
-// One face a uniform region (patch_regions.h), each a bicubic B-spline surface with clamped knots,
+// One face for all, or where detail is rare and fine one a uniform region (FewRegions in
+// patch_regions.h); each a bicubic B-spline surface with clamped knots,
 // whose parameters are the H-spline's own (u,v); in mm. The faces meet exactly but are not sewn: a
 // finer one's edge is part of a coarser one's. No byte depends on when it was written. Throws
 // InputError in a build without the component.

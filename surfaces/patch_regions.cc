@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/patch_regions.h"
 
+#include <algorithm>
 #include <set>
 
 namespace semblance {
@@ -42,6 +43,16 @@ std::vector<PatchRegion> UniformRegions(const PatchTree& tree) {
     regions.push_back(region);
   }
   return regions;
+}
+
+std::vector<PatchRegion> FewRegions(const HSplineShape& shape, const PatchTree& tree) {
+  int level = 0;
+  for (const PatchId& leaf : tree.leaves()) {
+    level = std::max(level, leaf.level);
+  }
+  const int columns = shape.PatchesU(level), rows = shape.PatchesV(level);
+  const bool few = static_cast<std::size_t>(columns) * rows <= 4 * tree.leaves().size();
+  return few ? std::vector{PatchRegion{level, 0, 0, columns, rows}} : UniformRegions(tree);
 }
 
 ControlNet RegionNet(const HSplineSurface& surface, const PatchRegion& region) {
