@@ -131,15 +131,15 @@ std::string TreatmentLabel(const std::vector<std::string>& axes,
 
 std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric) {
   std::vector<Treatment> treatments;
+  std::map<std::vector<std::string>, std::size_t> index;
   for (const TrialRow& row : results.trials) {
-    auto it = std::find_if(treatments.begin(), treatments.end(),
-                           [&](const Treatment& t) { return t.values == row.values; });
-    if (it == treatments.end()) {
-      it = treatments.insert(it, {row.values, TreatmentLabel(results.axes, row.values), {}});
+    const auto [it, is_new] = index.try_emplace(row.values, treatments.size());
+    if (is_new) {
+      treatments.push_back({row.values, TreatmentLabel(results.axes, row.values), {}});
     }
     const auto value = row.metrics.find(metric);
     if (row.status == "done" && value != row.metrics.end()) {
-      it->by_subject[row.subject] = value->second;
+      treatments[it->second].by_subject[row.subject] = value->second;
     }
   }
   return treatments;

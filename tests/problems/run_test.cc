@@ -97,14 +97,27 @@ TEST(Run, TheFolderHoldsWhatItsManifestLists) {
   for (const auto& [name, bytes] : files) {
     names.push_back(name);
   }
-  EXPECT_THAT(
-      names,
-      UnorderedElementsAreArray(
-          {"depth.ply", "dowels.csv", "face.hspline.json", "face.ply", "implicit.ply",
-           "manifest.json", "pictures/depth.png", "pictures/error.png",
-           "pictures/error_implicit.png", "pictures/face.png", "pictures/face_over_skull.png",
-           "pictures/implicit.png", "pictures/overview.png", "pictures/skull_dowels.png",
-           "pictures/truth.png", "report.html", "resolved.yaml", "result.json", "seeds.csv"}));
+  EXPECT_THAT(names, UnorderedElementsAreArray({"depth.ply",
+                                                "dowels.csv",
+                                                "face.hspline.json",
+                                                "face.ply",
+                                                "implicit.ply",
+                                                "manifest.json",
+                                                "provenance.json",
+                                                "scene.json",
+                                                "pictures/depth.png",
+                                                "pictures/error.png",
+                                                "pictures/error_implicit.png",
+                                                "pictures/face.png",
+                                                "pictures/face_over_skull.png",
+                                                "pictures/implicit.png",
+                                                "pictures/overview.png",
+                                                "pictures/skull_dowels.png",
+                                                "pictures/truth.png",
+                                                "report.html",
+                                                "resolved.yaml",
+                                                "result.json",
+                                                "seeds.csv"}));
   const auto manifest = nlohmann::json::parse(files.at("manifest.json"));
   EXPECT_EQ(manifest.at("outputs").size(), files.size() - 1);
   EXPECT_EQ(manifest.at("random_seed"), 1);
