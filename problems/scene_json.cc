@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "problems/run_pictures.h"
 #include "problems/scene_blobs.h"
@@ -81,19 +82,40 @@ Json Numbers(const Vec3& p) {
   return {rounded(p.x()), rounded(p.y()), rounded(p.z())};
 }
 
+// The meshes of a run, thinned out.
+struct ViewMeshes {
+  TriMesh skull, shell, implicit, face, skin;
+};
+
+ViewMeshes MakeViewMeshes(const RunResult& result, int threads) {
+  ViewMeshes view;
+  const std::array<std::pair<const TriMesh*, TriMesh*>, 5> jobs = {
+      {{&result.subject.skull, &view.skull},
+       {result.subject.skin ? &*result.subject.skin : nullptr, &view.skin},
+       {&result.shell, &view.shell},
+       {&result.implicit.mesh, &view.implicit},
+       {&result.face.mesh, &view.face}}};
+  ParallelFor(jobs.size(), threads, 1, [&jobs](std::size_t k) {
+    if (jobs[k].first != nullptr) {
+      *jobs[k].second = ForView(*jobs[k].first);
+    }
+  });
+  return view;
+}
+
 class SceneWriter {
  public:
   SceneWriter(const RunResult& result, const RunContext& context)
-      : result_(result), context_(context) {}
+      : result_(result), context_(context), view_(MakeViewMeshes(result, context.threads)) {}
 
   std::string Write() {
-    Mesh("skull", "Skull", ForView(result_.subject.skull), "#e8dcc4");
+    Mesh("skull", "Skull", view_.skull, "#e8dcc4");
     Dowels();
     Depth();
-    Face("implicit", "Implicit face", ForView(result_.implicit.mesh), "#d9b38c");
-    Face("face", "H-spline face", ForView(result_.face.mesh), "#d8a58a");
+    Face("implicit", "Implicit face", view_.implicit, "#d9b38c");
+    Face("face", "H-spline face", view_.face, "#d8a58a");
     if (result_.subject.skin) {
-      Mesh("skin", "True skin", ForView(*result_.subject.skin), "#b9c7d6");
+      Mesh("skin", "True skin", view_.skin, "#b9c7d6");
     }
     for (int level = 0; level <= result_.fit.surface.shape().max_level; ++level) {
       Net(level);
@@ -122,7 +144,7 @@ class SceneWriter {
 
   // The depth of the nearest vertex of the shell that was not thinned out.
   void Depth() {
-    const TriMesh mesh = ForView(result_.shell);
+    const TriMesh& mesh = view_.shell;
     const MeshQuery query(result_.shell);
     std::vector<double> depth(mesh.points.size());
     ParallelFor(depth.size(), context_.threads, 256, [&](std::size_t v) {
@@ -205,6 +227,7 @@ class SceneWriter {
 
   const RunResult& result_;
   const RunContext& context_;
+  const ViewMeshes view_;
   SceneBlobs blobs_;
   Json layers_ = Json::array();
 };

@@ -118,12 +118,13 @@ class SplitKernel {
 
 // The integral: by the centroid where the triangle is small against its distance, by the three edge
 // midpoints (exact for quadratics) where it is less so. Where it is near, in closed form for a
-// whole decay, unless the point lies flat beside it; else by four smaller triangles.
+// whole decay, else by four smaller triangles.
 class FlatKernel {
  public:
   explicit FlatKernel(const FlatEmitter& o)
       : k_(o.decay),
         closed_(o.decay == std::floor(o.decay) ? static_cast<int>(o.decay) + 1 : -1),
+        flat_share_(std::pow(kLostDigits, 2.0 / closed_)),
         power_(o.decay + 3) {}
   double Gain(const EmitterTriangle& t) const {
     return (k_ + 1) / (2 * std::numbers::pi) * std::pow(t.depth_mm, k_) * t.area_mm2;
@@ -133,12 +134,14 @@ class FlatKernel {
     if (t.longest2_mm2 <= kCentroidShare * r2) {
       return t.gain * height * power_(r2);
     }
-    const double height2 = height * height, floor2 = t.Floor2(1);
-    const bool closed = closed_ > 0 && t.longest2_mm2 > kMidpointShare * r2 && height2 >= floor2 &&
-                        (height2 >= kFlatShare * r2 || ProjectsOnto(t, p));
-    return t.gain * height *
-           (closed ? ClosedForm(t, p, height) / t.area_mm2
-                   : Mean(p, t.a, t.b, t.c, t.longest2_mm2, floor2));
+    const double floor2 = t.Floor2(1);
+    if (closed_ < 0 || t.longest2_mm2 <= kMidpointShare * r2) {
+      return t.gain * height * Mean(p, t.a, t.b, t.c, t.longest2_mm2, floor2);
+    }
+    // Lower than that, right on the triangle or flat beside it, the integral is taken as from
+    // there.
+    const double lowest = std::sqrt(std::max(floor2, flat_share_ * r2));
+    return t.gain * height * ClosedForm(t, p, std::max(height, lowest)) / t.area_mm2;
   }
   bool Batches() const { return closed_ > 0; }
   // All emissions of a batch whose first triangle is given.
@@ -156,7 +159,7 @@ class FlatKernel {
 
  private:
   // of the squared distance
-  static constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06, kFlatShare = 0.001;
+  static constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06;
 
   double Near(const EmitterTriangle& t, const Vec3& p) const {
     return std::min(Emission(t, p, (p - t.a).dot(t.normal)), kMostEmission);
@@ -192,7 +195,9 @@ class FlatKernel {
   }
 
   double k_;
-  int closed_;  // n of IntegrateInversePower; -1 where there is no closed form
+  static constexpr double kLostDigits = 1e-13;  // of 1e-16, what cancellation leaves is 0.1 %
+  int closed_;         // n of IntegrateInversePower; -1 where there is no closed form
+  double flat_share_;  // height^2 over distance^2 that the closed form needs
   InversePower power_;
 };
 
