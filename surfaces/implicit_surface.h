@@ -28,8 +28,8 @@ void Fields(Visitor& visit, ImplicitOptions& o) {
 }
 
 // Value(p) = sum of emissions - 1: positive inside. Bounded: each emission is capped at
-// 1e12, and at distances below 5 % of the depth it is that at 5 %, so that it is finite on
-// vertices, edges and planes of emitters.
+// 1e12, and at distances (for `flat` with a whole decay: heights) below 5 % of the depth it is
+// taken as from 5 %, so that it is finite on vertices, edges and planes of emitters.
 class ImplicitSurface {
  public:
   // depth_mm: one a vertex; a triangle emits with the mean of its three (thesis 3.1), and not at

@@ -149,6 +149,21 @@ TEST(Fit, EveryStepComesNearer) {
 }
 
 // Whatever detail finer levels hold, a template that meets its target is left in peace.
+// The terms by default allow both ways; they minimise the same sum.
+TEST(Fit, TheSolverIsTheOneAskedForAndChangesNoSurface) {
+  const HSplineSurface start = RandomSurface(Shape(), 2);
+  const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 400);
+  const FitResult ceres = Fit(start, target, {}, {.solver = LevelSolver::kCeres}, {});
+  const FitResult direct = Fit(start, target, {}, {.solver = LevelSolver::kFastest}, {});
+  for (std::size_t k = 0; k < ceres.levels.size(); ++k) {
+    EXPECT_EQ(ceres.levels[k].solver, "ceres");
+    EXPECT_EQ(direct.levels[k].solver, "direct");
+  }
+  for (const FitPoint& p : target.points) {
+    EXPECT_LT((ceres.surface.Point(p.uv) - direct.surface.Point(p.uv)).norm(), 1e-6);
+  }
+}
+
 TEST(Fit, ATemplateThatFitsStays) {
   const HSplineSurface start = RandomSurface(Shape(), 3, 60);
   const FitTarget target = TargetOn(start, 300);
