@@ -35,7 +35,7 @@ std::string PaceText(const StudyPace& pace) {
 
 std::string BarText(const StudyPace& pace, int width) {
   const int full = pace.trials > 0 ? width * pace.finished / pace.trials : width;
-  return "[" + std::string(full, '#') + std::string(width - full, '.') + "]";
+  return fmt::format("[{:#<{}}{:.<{}}]", "", full, "", width - full);
 }
 
 StudyProgress::StudyProgress(std::FILE* stream, std::chrono::milliseconds interval)

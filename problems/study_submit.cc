@@ -30,7 +30,7 @@ std::string SubmitScript(const SubmitOptions& o) {
   const std::string name = Quoted("semblance-" + o.study.stem().string());
   std::string extra;
   for (const std::string& option : o.sbatch) {
-    extra += " " + Quoted(option);
+    extra += fmt::format(" {}", Quoted(option));
   }
   // The number of shards is fixed here: Slurm's own count is smaller when only some elements of the
   // array are run again.
