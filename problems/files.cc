@@ -83,8 +83,8 @@ fs::path OutputFolder::PathOf(std::string_view name) const {
   return path;
 }
 
-void OutputFolder::Write(std::string_view name, std::string_view bytes) {
-  WriteFileAtomically(PathOf(name), bytes);
+void OutputFolder::Write(std::string_view name, std::string_view bytes, Outlasts outlasts) {
+  WriteFileAtomically(PathOf(name), bytes, outlasts);
   written_.emplace_back(name);
 }
 

@@ -32,8 +32,9 @@ class OutputFolder {
   // if `name` is empty, absolute or leads out of the folder, IoError if a folder cannot be created.
   std::filesystem::path PathOf(std::string_view name) const;
 
-  // WriteFileAtomically(PathOf(name), bytes).
-  void Write(std::string_view name, std::string_view bytes);
+  // WriteFileAtomically(PathOf(name), bytes, outlasts).
+  void Write(std::string_view name, std::string_view bytes,
+             Outlasts outlasts = Outlasts::kPowerFailure);
 
  private:
   std::vector<std::string> written_;

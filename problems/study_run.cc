@@ -113,6 +113,7 @@ class StudyRunner {
       std::rethrow_exception(broken_);
     }
     context_.ThrowIfStopped();
+    summary_.shared_made = cache_.made();
     return summary_;
   }
 
@@ -168,15 +169,18 @@ class StudyRunner {
              double cpu_s) {
     const RunContext quiet;
     OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
+    // A broken trial.json counts as none. With other files beside it, it must not outlast them.
+    const Outlasts outlasts =
+        plan_.keep == StudyKeep::kSummary ? Outlasts::kProcess : Outlasts::kPowerFailure;
     if (result && plan_.keep == StudyKeep::kRun) {
       WriteRun(trial.experiment, *result, output, quiet);
     } else if (result) {
-      output.Write("timing.json", TimingJson(*result, cpu_s));
+      output.Write("timing.json", TimingJson(*result, cpu_s), Outlasts::kProcess);
       if (plan_.keep == StudyKeep::kView) {
         output.Write("scene.json", SceneJson(*result, quiet));
       }
     }
-    output.Write("trial.json", json.dump(1) + "\n");  // last: it says that the trial is whole
+    output.Write("trial.json", json.dump(1) + "\n", outlasts);  // last: the trial is whole
   }
 
   void Tell(const StudyTrial& trial, const Json& json) {

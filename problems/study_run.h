@@ -29,6 +29,8 @@ struct StudySummary {
   int trials = 0;   // of this shard
   int skipped = 0;  // were there already
   int done = 0, failed = 0;
+  int shared_made = 0;  // subjects, shells, skulls with their implicit face, and generic faces that
+                        // were made; each serves all trials that have it in common
 };
 
 // In `folder`: plan.json (all trials), trials/<id>/trial.json (status, axes, metrics, resolved

@@ -53,8 +53,9 @@ class TemporaryFile {
   }
 
   // The last step: from here on the target holds the new bytes.
-  void Rename() {
-    if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0 ||
+  void Rename(Outlasts outlasts) {
+    const bool sync = outlasts == Outlasts::kPowerFailure;
+    if ((sync && ::fsync(descriptor_) != 0) || ::close(std::exchange(descriptor_, -1)) != 0 ||
         ::rename(temporary_.c_str(), target_.c_str()) != 0) {
       Fail();
     }
@@ -94,11 +95,13 @@ void SyncFolder(const fs::path& folder) {
 
 }  // namespace
 
-void WriteFileAtomically(const fs::path& path, std::string_view bytes) {
+void WriteFileAtomically(const fs::path& path, std::string_view bytes, Outlasts outlasts) {
   TemporaryFile file(path, TemporaryBeside(path));
   file.Write(bytes);
-  file.Rename();
-  SyncFolder(path.parent_path());
+  file.Rename(outlasts);
+  if (outlasts == Outlasts::kPowerFailure) {
+    SyncFolder(path.parent_path());
+  }
 }
 
 std::string ReadFileBytes(const fs::path& path) {

@@ -206,6 +206,22 @@ TEST_F(StudyTest, ResultsAreThoseOfSingleRuns) {
   }
 }
 
+TEST_F(StudyTest, TwelveFitsOnOneImplicitFaceMakeItOnce) {
+  const StudyPlan one = Plan("list: [{fit.schedule: [{level: 0, fraction: 0.05}]}]\n");
+  const StudyPlan twelve = Plan(
+      "zip: {fit.schedule: [[{level: 0, fraction: 0.1}], [{level: 0, fraction: 0.2}],\n"
+      "  [{level: 0, fraction: 0.3}], [{level: 0, fraction: 0.4}], [{level: 0, fraction: 0.5}],\n"
+      "  [{level: 0, fraction: 0.6}], [{level: 0, fraction: 0.7}], [{level: 0, fraction: 0.8}],\n"
+      "  [{level: 0, fraction: 0.9}], [{level: 0, fraction: 1}], [{level: 1, fraction: 0.5}],\n"
+      "  [{level: 1, fraction: 1}]]}\n");
+  const StudySummary alone = RunStudy(one, folder_ / "one", {}, {});
+  const StudySummary all = RunStudy(twelve, folder_ / "twelve", {.jobs = 2}, {});
+  EXPECT_EQ(all.done, 12);
+  EXPECT_EQ(all.shared_made, alone.shared_made);
+  const StudyPlan other = Plan("grid: {implicit.resolution: [20, 21]}\n");
+  EXPECT_GT(RunStudy(other, folder_ / "other", {}, {}).shared_made, alone.shared_made);
+}
+
 TEST(StageCache, MakesEachValueOnceAndForgetsWhatWasAskedForLongestAgo) {
   StageCache cache(2);
   int calls = 0;
