@@ -59,11 +59,20 @@ ConfigNode ConfigTreeOf(const T& value) {
   return config_internal::ToTree(value);
 }
 
-// The value of a tree; entries that are wrong are added to `errors` and keep their defaults.
+// The value of a tree; entries that are wrong are added to `errors` and keep their defaults. Where
+// none is wrong, and there is a FaultsBetween(T), its faults are.
 template <class T>
 T ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors) {
   T value{};
+  const std::size_t errors_before = errors.size();
   config_internal::ReadValue(errors, {tree, "", FieldInfo{}}, value);
+  if constexpr (requires { FaultsBetween(value); }) {
+    if (errors.size() == errors_before) {
+      for (const OptionFault& fault : FaultsBetween(value)) {
+        errors.Add(PlaceOf(tree, fault.path), fault.path, fault.what);
+      }
+    }
+  }
   return value;
 }
 

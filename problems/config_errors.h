@@ -10,6 +10,11 @@
 
 namespace semblance {
 
+// What is wrong with the entry at a path, in the words of ConfigErrors::Add.
+struct OptionFault {
+  std::string path, what;
+};
+
 class ConfigErrors {
  public:
   // `path` is that of the entry ("a.b[0].c"), empty for the document as a whole; `what` is one

@@ -187,6 +187,20 @@ ConfigNode MergeTrees(ConfigNode base, const ConfigNode& over) {
   return base;
 }
 
+ConfigPlace PlaceOf(const ConfigNode& tree, std::string_view path) {
+  const ConfigNode* node = &tree;
+  for (const Step& step : ParsePath(path)) {
+    const bool has_item = step.index && *step.index < node->items.size();
+    const ConfigNode* child = step.index ? (has_item ? &node->items[*step.index] : nullptr)
+                                         : node->Find(step.key);
+    if (!child) {
+      break;
+    }
+    node = child;
+  }
+  return node->place;
+}
+
 void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
              const ConfigNode* defaults) {
   const std::vector<Step> steps = ParsePath(path);

@@ -74,6 +74,10 @@ struct ConfigNode::Entry {
 // gives options to that type.
 ConfigNode MergeTrees(ConfigNode base, const ConfigNode& over);
 
+// Where the entry at `path` ("a.b[0].c") stands; where the tree does not hold it, the last entry on
+// the way to it.
+ConfigPlace PlaceOf(const ConfigNode& tree, std::string_view path);
+
 // Sets the entry at `path` ("a.b[0].c"; an index counts from 0) to `value`, merging as MergeTrees
 // does. Maps on the way are made where they are missing; a list must have the item already.
 // `defaults`, where given, is the tree of the default values: an entry that the path goes through

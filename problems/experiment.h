@@ -13,6 +13,7 @@
 #include "fitting/seeding.h"
 #include "interp/depth_scheme.h"
 #include "interp/outside_rule.h"
+#include "problems/config_errors.h"
 #include "problems/dowel_depths.h"
 #include "problems/face_region.h"
 #include "problems/import_ct.h"
@@ -116,5 +117,9 @@ void Fields(Visitor& visit, Experiment& o) {
   visit(FieldInfo{.name = "fit", .doc = "the level-by-level fit"}, o.fit);
   visit(FieldInfo{.name = "region", .doc = "which part of the true skin is scored"}, o.region);
 }
+
+// Options that are right each by itself but not together, e.g. a step of the schedule at a level
+// that the generic face does not have. Told with the other faults when a configuration is read.
+std::vector<OptionFault> FaultsBetween(const Experiment& experiment);
 
 }  // namespace semblance

@@ -246,6 +246,23 @@ std::string QuantilePlotSvg(const std::vector<BoxRow>& rows, const std::string& 
   return svg + LineLegend(rows, kShareLeft, kShareBottom + 68) + "</svg>\n";
 }
 
+std::string CalibrationPlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label) {
+  const Axis axis({{"", {0, 100}}}, kShareLeft);
+  std::string svg = OpenShares(rows, axis, axis_label);
+  svg += Line(axis.At(0), ShareAt(0), axis.At(100), ShareAt(1), "#9aa4af", 2);
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    const auto count = static_cast<double>(rows[n].values.size());
+    std::string points = fmt::format("{:.2f},{:.2f} ", axis.At(0), ShareAt(0));
+    for (std::size_t k = 0; k < rows[n].values.size(); ++k) {
+      const double stated = 100 * static_cast<double>(k + 1) / (count + 1);
+      points += fmt::format("{:.2f},{:.2f} ", axis.At(stated), ShareAt(rows[n].values[k]));
+    }
+    points += fmt::format("{:.2f},{:.2f}", axis.At(100), ShareAt(1));
+    svg += Polyline(points, n);
+  }
+  return svg + LineLegend(rows, kShareLeft, kShareBottom + 68) + "</svg>\n";
+}
+
 std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label) {
   constexpr double kTop = 34, kBottom = 340, kLeft = 60;
   double high = 0;

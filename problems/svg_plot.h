@@ -36,6 +36,11 @@ std::string QuantilePlotSvg(const std::vector<BoxRow>& rows, const std::string& 
 // after it, after the second ...; the vertical axis starts at 0.
 std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
 
+// How often stated uncertainties hold: row values are the shares observed within the intervals that
+// should hold 1/(n+1), 2/(n+1), .. n/(n+1). On the diagonal the statement is right; below it, too
+// bold.
+std::string CalibrationPlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
+
 // A round step for about `count` ticks over [low, high]: 1, 2 or 5 times a power of ten.
 double TickStep(double low, double high, int count);
 

@@ -57,6 +57,15 @@ TEST(ConvergencePlot, GoesFromTheStartToTheLastStepOnOneScale) {
   EXPECT_THAT(svg, HasSubstr(">start<"));
 }
 
+TEST(CalibrationPlot, TrueStatementsLieOnTheDiagonal) {
+  const std::string svg = CalibrationPlotSvg({{"true", {0.25, 0.5, 0.75}}, {"bold", {0.1}}}, "%");
+  EXPECT_EQ(Count(svg, "polyline"), 4);
+  EXPECT_THAT(svg, HasSubstr("x1=\"60.00\" y1=\"340.00\" x2=\"870.00\" y2=\"20.00\""));
+  EXPECT_THAT(svg, HasSubstr("points=\"60.00,340.00 262.50,260.00 465.00,180.00 667.50,100.00 "
+                             "870.00,20.00\""));
+  EXPECT_THAT(svg, HasSubstr("60.00,340.00 465.00,308.00 870.00,20.00\""));  // 10 % where 50 % is due
+}
+
 TEST(RankPlot, PutsTheBestFirst) {
   const std::string svg = RankPlotSvg({{"worse", 1.8}, {"better", 1.2}}, 0.4);
   EXPECT_EQ(Count(svg, "circle"), 2);
