@@ -8,6 +8,7 @@
 
 #include "problems/report.h"
 #include "problems/results_sqlite.h"
+#include "problems/study_breakdown.h"
 #include "problems/svg_plot.h"
 
 namespace semblance {
@@ -233,6 +234,24 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
   return scenes.empty() ? SceneCollection{} : CollectScenes(scenes, kLimit_bytes);
 }
 
+// The depth maps that the trials left, best treatment first.
+std::vector<ReportImage> DepthMaps(const StudyResults& results, const std::filesystem::path& root) {
+  std::vector<ReportImage> maps;
+  for (const Treatment& treatment : Ranked(Treatments(results, results.metric))) {
+    for (const TrialRow& row : results.trials) {
+      const std::filesystem::path file = root / "trials" / row.id / "depth.png";
+      if (row.values == treatment.values && row.status == "done" && std::filesystem::exists(file) &&
+          maps.size() < kMostScenes) {
+        maps.push_back(
+            ReportImageFromFile(file, fmt::format("{}, {}", treatment.label, row.subject),
+                                fmt::format("tissue depth on the skull of {} by {}, and its error",
+                                            row.subject, treatment.label)));
+      }
+    }
+  }
+  return maps;
+}
+
 std::string SceneNote(const StudyResults& results, const SceneCollection& scenes) {
   const int left = results.Count("done") - scenes.count;
   return scenes.count == 0 || left == 0
@@ -245,7 +264,8 @@ std::string SceneNote(const StudyResults& results, const SceneCollection& scenes
 
 }  // namespace
 
-std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes) {
+std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes,
+                            const std::vector<ReportImage>& maps) {
   const std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
   Report report;
   report.title = results.title;
@@ -276,7 +296,15 @@ std::string StudyReportHtml(const StudyResults& results, const SceneCollection& 
     }
     report.sections.push_back(treatments);
     report.sections.push_back(RankSection(ranked));
+    report.sections.push_back({.heading = "Behind the metric",
+                               .paragraphs = {},
+                               .images = {},
+                               .tables = BreakdownTables(results, ranked)});
     report.sections.push_back(CurvesSection(results, ranked));
+    report.sections.push_back({.heading = "Depth maps", .paragraphs = {}, .images = maps});
+    std::erase_if(report.sections, [](const ReportSection& section) {
+      return section.paragraphs.empty() && section.images.empty() && section.tables.empty();
+    });
   }
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
@@ -290,7 +318,8 @@ StudyResults WriteStudyTables(OutputFolder& folder) {
   folder.Write("trials.csv", TrialsCsv(results));
   folder.Write("summary.csv", SummaryCsv(results));
   folder.Write("results.sqlite", ResultsSqlite(results));
-  folder.Write("report.html", StudyReportHtml(results, Scenes(results, folder.Root())));
+  folder.Write("report.html", StudyReportHtml(results, Scenes(results, folder.Root()),
+                                              DepthMaps(results, folder.Root())));
   return results;
 }
 
