@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <random>
 
+#include "interp/calibration.h"
 #include "surfaces/error.h"
 #include "surfaces/mesh_query.h"
 #include "surfaces/parallel.h"
@@ -43,6 +46,14 @@ Shown Without(const DepthInput& input, const std::vector<std::size_t>& fold) {
   return shown;
 }
 
+// What the scheme gives, before the rule. A scheme on the network of which the fold leaves no area
+// knows no depth anywhere.
+DepthField Interpolated(const DepthScheme& scheme, const DepthInput& input, const RunContext& run) {
+  return NeedsNetwork(scheme) && input.network.areas.empty()
+             ? EmptyDepthField(input.skull.points.size())
+             : InterpolateDepth(scheme, input, run);
+}
+
 // At one vertex a left-out dowel, for schemes in space.
 DepthField FieldAtBases(const DepthScheme& scheme, const OutsideRule& rule, const Shown& shown,
                         std::span<const Dowel> dowels, const std::vector<std::size_t>& fold,
@@ -54,30 +65,43 @@ DepthField FieldAtBases(const DepthScheme& scheme, const OutsideRule& rule, cons
     normals.push_back(dowels[i].direction);
   }
   const DepthInput input{points, normals, shown.dowels, shown.network};
-  return ApplyOutsideRule(rule, input, InterpolateDepth(scheme, input, run), run);
+  return ApplyOutsideRule(rule, input, Interpolated(scheme, input, run), run);
 }
 
-std::size_t NearestCorner(const TriMesh& mesh, const MeshQuery& query, const Vec3& p) {
-  const Triangle& t = mesh.triangles[query.Closest(p).triangle];
-  return *std::ranges::min_element(
-      t, {}, [&](int i) { return std::pair((mesh.points[i] - p).squaredNorm(), i); });
+// Of each dowel the skull's vertex at which a field on the skull is asked for its depth.
+std::vector<std::size_t> NearestCorners(const DepthInput& input) {
+  if (input.skull.triangles.empty()) {
+    return {};  // which the scheme will say, by its name
+  }
+  const MeshQuery query(input.skull);
+  std::vector<std::size_t> corners;
+  for (const Dowel& dowel : input.dowels) {
+    const Triangle& t = input.skull.triangles[query.Closest(dowel.base).triangle];
+    corners.push_back(*std::ranges::min_element(t, {}, [&](int i) {
+      return std::pair((input.skull.points[i] - dowel.base).squaredNorm(), i);
+    }));
+  }
+  return corners;
 }
 
 // The same from a field on the whole skull.
 DepthField FieldAtCorners(const DepthScheme& scheme, const OutsideRule& rule, const Shown& shown,
                           const DepthInput& all, const std::vector<std::size_t>& fold,
-                          const RunContext& run) {
-  const DepthInput input{all.skull, all.normals, shown.dowels, shown.network};
-  const DepthField field = ApplyOutsideRule(rule, input, InterpolateDepth(scheme, input, run), run);
-  const MeshQuery query(all.skull);
+                          const std::vector<std::size_t>& corners, const RunContext& run) {
+  const DepthField field =
+      Interpolated(scheme, {all.skull, all.normals, shown.dowels, shown.network}, run);
+  TriMesh points;
+  std::vector<Vec3> normals;
   DepthField at = EmptyDepthField(fold.size());
   for (std::size_t k = 0; k < fold.size(); ++k) {
-    const std::size_t corner = NearestCorner(all.skull, query, all.dowels[fold[k]].base);
+    const std::size_t corner = corners[fold[k]];
+    points.points.push_back(all.skull.points[corner]);
+    normals.push_back(all.normals[corner]);
     at.depth_mm[k] = field.depth_mm[corner];
     at.sd_mm[k] = field.sd_mm[corner];
     at.status[k] = field.status[corner];
   }
-  return at;
+  return ApplyOutsideRule(rule, {points, normals, shown.dowels, shown.network}, at, run);
 }
 
 LeftOut Compared(const Dowel& dowel, const DepthField& field, std::size_t k) {
@@ -96,10 +120,10 @@ LeftOut Compared(const Dowel& dowel, const DepthField& field, std::size_t k) {
 
 std::vector<LeftOut> LeaveOut(const DepthScheme& scheme, const OutsideRule& rule,
                               const DepthInput& input, const std::vector<std::size_t>& fold,
-                              const RunContext& run) {
+                              const std::vector<std::size_t>& corners, const RunContext& run) {
   const Shown shown = Without(input, fold);
   const DepthField field = NeedsSurface(scheme)
-                               ? FieldAtCorners(scheme, rule, shown, input, fold, run)
+                               ? FieldAtCorners(scheme, rule, shown, input, fold, corners, run)
                                : FieldAtBases(scheme, rule, shown, input.dowels, fold, run);
   std::vector<LeftOut> left_out;
   for (std::size_t k = 0; k < fold.size(); ++k) {
@@ -110,10 +134,10 @@ std::vector<LeftOut> LeaveOut(const DepthScheme& scheme, const OutsideRule& rule
 
 void Summarise(CrossValidation& result) {
   double sum = 0, absolute = 0, squares = 0, most = 0;
-  int stated = 0, within = 0;
+  std::vector<double> errors_mm, sds_mm;
   for (const LeftOut& out : result.left_out) {
-    stated += out.within_90.has_value() ? 1 : 0;
-    within += out.within_90.value_or(false) ? 1 : 0;
+    errors_mm.push_back(out.error_mm);
+    sds_mm.push_back(out.sd_mm);
     if (std::isfinite(out.error_mm)) {
       ++result.predicted;
       sum += out.error_mm;
@@ -128,9 +152,8 @@ void Summarise(CrossValidation& result) {
     result.mean_absolute_mm = absolute / result.predicted;
     result.most_mm = most;
   }
-  if (stated > 0) {
-    result.coverage_90 = static_cast<double>(within) / stated;
-  }
+  result.coverage = Coverage(errors_mm, sds_mm);
+  result.coverage_90 = CoverageAt90(result.coverage);
 }
 
 void CheckFolds(const Folds& folds, std::size_t dowels) {
@@ -178,16 +201,56 @@ Folds EachLandmark(std::span<const Dowel> dowels) {
   return folds;
 }
 
+Folds EachSide(std::span<const Dowel> dowels) {
+  Folds folds;
+  for (const char* side : {"_l", "_r"}) {
+    std::vector<std::size_t> fold;
+    for (std::size_t i = 0; i < dowels.size(); ++i) {
+      if (dowels[i].site.ends_with(side)) {
+        fold.push_back(i);
+      }
+    }
+    if (!fold.empty() && fold.size() < dowels.size()) {
+      folds.push_back(std::move(fold));
+    }
+  }
+  return folds;
+}
+
+Folds RandomFolds(std::span<const Dowel> dowels, int count, std::uint64_t random_seed) {
+  if (count < 2) {
+    throw InputError(fmt::format(
+        "cross-validation: {} folds; at least 2 are needed, as each is left out in turn", count));
+  }
+  std::vector<std::size_t> order(dowels.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t i) { return dowels[i].site; });
+  std::mt19937_64 engine(random_seed);
+  for (std::size_t k = order.size(); k > 1; --k) {
+    std::swap(order[k - 1], order[(engine() >> 11) % k]);
+  }
+  Folds folds(std::min<std::size_t>(count, order.size()));
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    folds[k % folds.size()].push_back(order[k]);
+  }
+  for (auto& fold : folds) {
+    std::ranges::sort(fold);
+  }
+  return folds;
+}
+
 CrossValidation CrossValidate(const DepthScheme& scheme, const OutsideRule& rule,
                               const DepthInput& input, const Folds& folds, const RunContext& run) {
   CheckDepthInput(input);
   CheckFolds(folds, input.dowels.size());
   RunContext of_fold;  // silent: events must not come from several threads
   of_fold.stop_token = run.stop_token;
+  const std::vector<std::size_t> corners =
+      NeedsSurface(scheme) ? NearestCorners(input) : std::vector<std::size_t>{};
   std::vector<std::vector<LeftOut>> left_out(folds.size());
   ParallelFor(folds.size(), run.threads, 1, [&](std::size_t f) {
     run.ThrowIfStopped();
-    left_out[f] = LeaveOut(scheme, rule, input, folds[f], of_fold);
+    left_out[f] = LeaveOut(scheme, rule, input, folds[f], corners, of_fold);
   });
   CrossValidation result;
   for (const std::vector<LeftOut>& of : left_out) {

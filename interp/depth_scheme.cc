@@ -26,4 +26,9 @@ bool NeedsSurface(const DepthScheme& scheme) {
   return std::visit([](const auto& options) { return GoesAlong(options); }, scheme);
 }
 
+bool NeedsNetwork(const DepthScheme& scheme) {
+  return std::holds_alternative<Barycentric>(scheme) ||
+         std::holds_alternative<NetworkSpline>(scheme);
+}
+
 }  // namespace semblance

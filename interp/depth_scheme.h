@@ -7,6 +7,7 @@
 
 #include "interp/barycentric.h"
 #include "interp/biharmonic.h"
+#include "interp/depth_map.h"
 #include "interp/harmonic.h"
 #include "interp/inverse_distance.h"
 #include "interp/kriging.h"
@@ -14,22 +15,27 @@
 #include "interp/moving_least_squares.h"
 #include "interp/natural_neighbour.h"
 #include "interp/nearest.h"
+#include "interp/network_spline.h"
 #include "interp/radial_basis.h"
 
 namespace semblance {
 
 using DepthScheme =
     std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis, MovingLeastSquares,
-                 Kriging, Harmonic, Biharmonic, NaturalNeighbour>;
+                 Kriging, Harmonic, Biharmonic, NaturalNeighbour, NetworkSpline, DepthMap>;
 
 // One entry a vertex. Where the status is kAssigned the depth is finite and within the range of the
-// dowels' depths (without a scheme's `clamp`: above 0); elsewhere it is NaN, for an OutsideRule to
-// fill. The result does not depend on run.threads nor on the order of the dowels (beyond rounding).
-// Throws InputError where the scheme cannot use the input, Cancelled if stopped.
+// dowels' depths (without a scheme's `clamp`: above 0; depth_map's are the map's); elsewhere it is
+// NaN, for an OutsideRule to fill. The result does not depend on run.threads nor on the order of
+// the dowels (beyond rounding). Throws InputError where the scheme cannot use the input, Cancelled
+// if stopped.
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run);
 
 // Does the scheme work along the skull's surface, so that points alone do not do?
 bool NeedsSurface(const DepthScheme& scheme);
+
+// Does the scheme work on the dowel network, so that one without an area will not do?
+bool NeedsNetwork(const DepthScheme& scheme);
 
 }  // namespace semblance

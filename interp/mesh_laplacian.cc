@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace semblance {
 namespace {
@@ -44,16 +45,17 @@ Eigen::SparseMatrix<double> EdgeWeights(const TriMesh& mesh) {
   return weights;
 }
 
-Eigen::VectorXd VertexAreas(const TriMesh& mesh) {
-  Eigen::VectorXd areas = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(mesh.points.size()));
-  for (const Triangle& t : mesh.triangles) {
-    const double third = TriangleAreaVector(mesh, t).norm() / 3;
-    for (const int v : t) {
-      areas[v] += third;
-    }
+// Above 0, also of a vertex without a triangle.
+Eigen::VectorXd PositiveAreas(const TriMesh& mesh) {
+  const std::vector<double> areas = VertexAreas(mesh);
+  const auto count = static_cast<double>(std::max<std::size_t>(areas.size(), 1));
+  const double mean = std::accumulate(areas.begin(), areas.end(), 0.0) / count;
+  const double least = mean > 0 ? kLeastArea * mean : 1;
+  Eigen::VectorXd positive(static_cast<Eigen::Index>(areas.size()));
+  for (Eigen::Index i = 0; i < positive.size(); ++i) {
+    positive[i] = std::max(areas[i], least);
   }
-  const double mean = areas.size() > 0 ? areas.mean() : 0;
-  return areas.cwiseMax(mean > 0 ? kLeastArea * mean : 1);
+  return positive;
 }
 
 }  // namespace
@@ -74,7 +76,7 @@ MeshLaplacian BuildLaplacian(const TriMesh& mesh) {
   Eigen::SparseMatrix<double> sums(matrix.rows(), matrix.cols());
   sums.setFromTriplets(diagonal.begin(), diagonal.end());
   matrix += sums;
-  laplacian.area_mm2 = VertexAreas(mesh);
+  laplacian.area_mm2 = PositiveAreas(mesh);
   return laplacian;
 }
 

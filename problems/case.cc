@@ -123,6 +123,11 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
   if (experiment.tissue.depths == DepthSource::kTable) {
     subject.inputs.push_back(experiment.tissue.table);
   }
+  if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
+    subject.inputs.push_back(map->file);
+    subject.inputs.push_back(map->mesh);
+    std::erase(subject.inputs, std::filesystem::path());
+  }
   return subject;
 }
 

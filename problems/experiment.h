@@ -11,7 +11,9 @@
 #include "fitting/fit.h"
 #include "fitting/placement.h"
 #include "fitting/seeding.h"
+#include "interp/depth_direction.h"
 #include "interp/depth_scheme.h"
+#include "interp/depth_truth.h"
 #include "interp/outside_rule.h"
 #include "problems/config_errors.h"
 #include "problems/dowel_depths.h"
@@ -59,6 +61,23 @@ void Fields(Visitor& visit, CtSubject& o) {
         o.import);
 }
 
+// How dowels are left out to see how well the others foretell them (`semblance depth`, and studies
+// with `job: depth`): a landmark of both sides, a side, and one of `folds` random parts at a time.
+struct CrossValidationOptions {
+  int folds = 5;
+  std::uint64_t random_seed = 1;
+};
+template <class Visitor>
+void Fields(Visitor& visit, CrossValidationOptions& o) {
+  visit(FieldInfo{.name = "folds",
+                  .min = 2,
+                  .max = 1000,
+                  .doc = "random parts of the dowels, each left out in turn; at most one a dowel"},
+        o.folds);
+  visit(FieldInfo{.name = "random_seed", .doc = "which dowels are left out together"},
+        o.random_seed);
+}
+
 using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
 struct Experiment {
@@ -79,6 +98,9 @@ struct Experiment {
   int rounds = 1;
   FitOptions fit = {.relaxation = {.mode = RelaxationMode::kFootpoint}};
   FaceRegionOptions region;
+  DepthDirection direction;
+  DepthTruthOptions depth_truth;
+  CrossValidationOptions cross_validation;
 };
 template <class Visitor>
 void Fields(Visitor& visit, Experiment& o) {
@@ -116,6 +138,14 @@ void Fields(Visitor& visit, Experiment& o) {
         o.rounds);
   visit(FieldInfo{.name = "fit", .doc = "the level-by-level fit"}, o.fit);
   visit(FieldInfo{.name = "region", .doc = "which part of the true skin is scored"}, o.region);
+  visit(FieldInfo{.name = "direction",
+                  .doc = "along which a depth is taken where it is compared with the true one, and "
+                         "where its end is: p + depth * direction"},
+        o.direction);
+  visit(FieldInfo{.name = "depth_truth", .doc = "what counts as a true depth"}, o.depth_truth);
+  visit(FieldInfo{.name = "cross_validation",
+                  .doc = "how dowels are left out, in `semblance depth` and studies of depth"},
+        o.cross_validation);
 }
 
 // Options that are right each by itself but not together, e.g. a step of the schedule at a level

@@ -141,15 +141,24 @@ std::vector<bool> ComparableTriangles(const TriMesh& truth, const FaceRegion& re
   return comparable;
 }
 
-std::vector<double> VertexAreas(const TriMesh& mesh) {
-  std::vector<double> areas(mesh.points.size(), 0);
-  for (const Triangle& t : mesh.triangles) {
-    const double third = TriangleAreaVector(mesh, t).norm() / 3;
-    for (const std::int32_t v : t) {
-      areas[v] += third;
+DistanceSummary SummarizeDistances(const std::vector<double>& signed_mm,
+                                   const std::vector<double>& areas_mm2,
+                                   const std::function<bool(std::size_t)>& take) {
+  return Summarize(TakeSamples(signed_mm, areas_mm2, take));
+}
+
+std::map<std::string, DistanceSummary> SummarizeParts(const std::vector<double>& signed_mm,
+                                                      const std::vector<double>& areas_mm2,
+                                                      const FaceRegion& region) {
+  std::map<std::string, DistanceSummary> parts;
+  for (int part = 0; part < static_cast<int>(kFaceParts.size()); ++part) {
+    const auto samples =
+        TakeSamples(signed_mm, areas_mm2, [&](std::size_t v) { return region.part[v] == part; });
+    if (!samples.empty()) {
+      parts[kFaceParts[part]] = Summarize(samples);
     }
   }
-  return areas;
+  return parts;
 }
 
 FaceRegion WholeSurface(const TriMesh& truth) {
@@ -167,19 +176,13 @@ FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const T
       TakeSamples(metrics.signed_mm, truth_areas, [](std::size_t) { return true; });
   metrics.truth_to_face = Summarize(all);
   metrics.quantiles_mm = Quantiles(all);
-  for (int part = 0; part < static_cast<int>(kFaceParts.size()); ++part) {
-    const auto samples = TakeSamples(metrics.signed_mm, truth_areas,
-                                     [&](std::size_t v) { return region.part[v] == part; });
-    if (!samples.empty()) {
-      metrics.regions[kFaceParts[part]] = Summarize(samples);
-    }
-  }
+  metrics.regions = SummarizeParts(metrics.signed_mm, truth_areas, region);
   const std::vector<bool> over = FaceOverScoredSkin(truth, region, truth_query, face, context);
   // Seen from the face, the truth lies outside where the face lies inside: the sign turns.
   std::vector<double> back = SignedDistances(face, over, truth_query, context);
   std::transform(back.begin(), back.end(), back.begin(), [](double d) { return -d; });
   metrics.face_to_truth =
-      Summarize(TakeSamples(back, VertexAreas(face), [](std::size_t) { return true; }));
+      SummarizeDistances(back, VertexAreas(face), [](std::size_t) { return true; });
   metrics.hausdorff_mm = std::fmax(metrics.truth_to_face.max_mm, metrics.face_to_truth.max_mm);
   metrics.volume_between_cm3 =
       metrics.truth_to_face.mean_abs_mm * metrics.truth_to_face.area_cm2 / 10;

@@ -2,6 +2,7 @@
 // How far a reconstructed face is from the true skin.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -26,6 +27,17 @@ struct DistanceSummary {
   double within_2_5mm = kNaN;  // share of the area, 0..1
   double within_5mm = kNaN;
 };
+
+// Of the signed values at the vertices that are finite and for which take(v), weighted by the
+// areas; one value and area a vertex.
+DistanceSummary SummarizeDistances(const std::vector<double>& signed_mm,
+                                   const std::vector<double>& areas_mm2,
+                                   const std::function<bool(std::size_t)>& take);
+
+// The same by part of the face, without parts in which nothing is finite.
+std::map<std::string, DistanceSummary> SummarizeParts(const std::vector<double>& signed_mm,
+                                                      const std::vector<double>& areas_mm2,
+                                                      const FaceRegion& region);
 
 struct FaceMetrics {
   DistanceSummary
@@ -52,8 +64,5 @@ std::vector<bool> ComparableTriangles(const TriMesh& truth, const FaceRegion& re
 
 // All of `truth` as one region without parts.
 FaceRegion WholeSurface(const TriMesh& truth);
-
-// A third of the area of the triangles at each vertex, mm^2.
-std::vector<double> VertexAreas(const TriMesh& mesh);
 
 }  // namespace semblance

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 namespace semblance {
-namespace {
 
 using Json = nlohmann::ordered_json;  // writes NaN as null
 
@@ -20,8 +19,6 @@ Json SummaryToJson(const DistanceSummary& s) {
           {"within_5mm", s.within_5mm},
           {"area_cm2", s.area_cm2}};
 }
-
-}  // namespace
 
 Json MetricsToJson(const FaceMetrics& metrics) {
   Json json = SummaryToJson(metrics.truth_to_face);

@@ -10,6 +10,7 @@ namespace semblance {
 
 // {mean_abs_mm, rms_mm, median_mm, p95_mm, hausdorff_mm, within_2_5mm, volume_between_cm3, ...,
 // reverse{...}, regions{...}}; null for NaN.
+nlohmann::ordered_json SummaryToJson(const DistanceSummary& summary);
 nlohmann::ordered_json MetricsToJson(const FaceMetrics& metrics);
 
 }  // namespace semblance

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "problems/config.h"
+#include "problems/depth_study.h"
 #include "problems/face_commands.h"
 #include "problems/face_metrics_json.h"
 #include "problems/progress.h"
@@ -85,6 +86,17 @@ int RunCommand(const Arguments& arguments) {
   }
   fmt::print("report: {}\n",
              std::filesystem::absolute(folder.Root() / "report.html").lexically_normal().string());
+  return result.usable() ? kDone : kNotUsable;
+}
+
+int DepthCommand(const Arguments& arguments) {
+  const std::filesystem::path config = arguments.files.at(0);
+  const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
+  OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string() + "_depth");
+  const RunContext context = MakeContext(arguments);
+  const DepthResult result = MeasureDepth(experiment, context);
+  WriteDepth(experiment, result, folder, context);
+  fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
   return result.usable() ? kDone : kNotUsable;
 }
 
@@ -276,6 +288,13 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
       ->allow_extra_args(false);
   add_output(run);
   add_work(run);
+  CLI::App* depth =
+      add("depth", "interpolate depth alone: against the true skin, and with dowels left out",
+          &DepthCommand);
+  depth->add_option("CONFIG", a.files, "YAML file of the experiment")->required()->expected(1);
+  depth->add_option("--set", a.overrides, "path=value, as in run")->allow_extra_args(false);
+  add_output(depth);
+  add_work(depth);
   CLI::App* import =
       add("import-ct", "meshes of skull and skin from a CT volume, in mm", &ImportCtCommand);
   import->add_option("VOLUME", a.files, "InVesalius project (.inv3)")->required()->expected(1);

@@ -95,16 +95,17 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
   return std::move(*result);
 }
 
-std::optional<TruthComparison> Measure(const Experiment& experiment, const Case& subject,
-                                       const TriMesh& face, const TriMesh& implicit,
-                                       const RunContext& context) {
+std::optional<TruthComparison> Measure(const Experiment& experiment, const SkullStage& skull,
+                                       const TriMesh& face, const RunContext& context) {
+  const Case& subject = skull.depth_stage->subject;
   if (!subject.skin) {
     return std::nullopt;
   }
   TruthComparison truth;
   truth.region = FindFaceRegion(*subject.skin, subject.dowels, subject.network, experiment.region);
   truth.face = CompareFaces(*subject.skin, truth.region, face, context);
-  truth.implicit = CompareFaces(*subject.skin, truth.region, implicit, context);
+  truth.implicit = CompareFaces(*subject.skin, truth.region, skull.implicit.mesh, context);
+  truth.depth = CompareDepths(experiment, *skull.depth_stage, context);
   return truth;
 }
 
@@ -116,7 +117,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   StageCache own_cache(4);
   StageCache& shared = cache ? *cache : own_cache;
   const auto skull = MakeSkullStage(experiment, shared, step, context);
-  Case subject = skull->subject;
+  Case subject = skull->depth_stage->subject;
   const auto generic = step("make template", [&] {
     return shared.Get<TemplateFace>(StageKey("template", experiment.face_template),
                                     [&] { return MakeTemplateFace(experiment.face_template); });
@@ -130,21 +131,12 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   });
   Tessellation face =
       step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
-  std::optional<TruthComparison> truth = step("measure", [&] {
-    return Measure(experiment, subject, face.mesh, skull->implicit.mesh, context);
-  });
-  return {std::move(subject),
-          skull->shell,
-          skull->depth,
-          skull->implicit,
-          face_from_template,
-          std::move(placed),
-          std::move(fitted.seeding),
-          std::move(fitted.target),
-          std::move(fitted.fit),
-          std::move(face),
-          std::move(truth),
-          step.Take()};
+  std::optional<TruthComparison> truth =
+      step("measure", [&] { return Measure(experiment, *skull, face.mesh, context); });
+  return {std::move(subject),        skull->depth_stage->shell, skull->depth_stage->depth,
+          skull->implicit,           face_from_template,        std::move(placed),
+          std::move(fitted.seeding), std::move(fitted.target),  std::move(fitted.fit),
+          std::move(face),           std::move(truth),          step.Take()};
 }
 
 }  // namespace semblance

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "problems/case.h"
+#include "problems/depth_comparison.h"
 #include "problems/face_metrics.h"
 #include "problems/skull_stage.h"
 #include "surfaces/tessellate.h"
@@ -18,6 +19,7 @@ struct TruthComparison {
   FaceRegion region;  // of the skin's vertices
   FaceMetrics face;
   FaceMetrics implicit;
+  DepthComparison depth;  // of the shell's vertices
 };
 
 struct RunResult {

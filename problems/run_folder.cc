@@ -10,6 +10,7 @@
 
 #include "fitting/seeding.h"
 #include "problems/config.h"
+#include "problems/depth_json.h"
 #include "problems/face_metrics_json.h"
 #include "problems/manifest.h"
 #include "problems/run_pictures.h"
@@ -23,35 +24,6 @@ namespace semblance {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-int CountStatus(const DepthField& field, DepthStatus status) {
-  return static_cast<int>(std::count(field.status.begin(), field.status.end(), status));
-}
-
-Json DepthJson(const RunResult& result) {
-  std::vector<double> assigned;
-  for (std::size_t v = 0; v < result.depth.depth_mm.size(); ++v) {
-    if (result.depth.status[v] == DepthStatus::kAssigned) {
-      assigned.push_back(result.depth.depth_mm[v]);
-    }
-  }
-  Json json = {{"vertices", result.depth.depth_mm.size()},
-               {"assigned", CountStatus(result.depth, DepthStatus::kAssigned)},
-               {"outside", CountStatus(result.depth, DepthStatus::kOutside)},
-               {"not_facing", CountStatus(result.depth, DepthStatus::kNotFacing)},
-               {"min_mm", nullptr},
-               {"mean_mm", nullptr},
-               {"max_mm", nullptr},
-               {"dowels", result.subject.dowels.size()},
-               {"areas", result.subject.network.areas.size()}};
-  if (!assigned.empty()) {
-    json["min_mm"] = *std::min_element(assigned.begin(), assigned.end());
-    json["mean_mm"] = std::accumulate(assigned.begin(), assigned.end(), 0.0) /
-                      static_cast<double>(assigned.size());
-    json["max_mm"] = *std::max_element(assigned.begin(), assigned.end());
-  }
-  return json;
-}
 
 Json ImplicitJson(const ImplicitFace& face) {
   return {{"cell_mm", face.cell_mm},
@@ -190,9 +162,9 @@ std::string ReconstructionPly(const TriMesh& mesh, const RunResult& result,
     const MeshQuery skull(result.shell);
     ParallelFor(gap.size(), context.threads, 256,
                 [&](std::size_t v) { gap[v] = skull.Closest(mesh.points[v]).distance_mm; });
-    return MappedPly(mesh, "scalar_depth_mm", gap, DepthMap());
+    return MappedPly(mesh, "scalar_depth_mm", gap, DepthColours());
   }
-  return MappedPly(mesh, "scalar_error_mm", SignedErrorOf(mesh, result, context), ErrorMap());
+  return MappedPly(mesh, "scalar_error_mm", SignedErrorOf(mesh, result, context), ErrorColours());
 }
 
 void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext& context) {
@@ -200,7 +172,7 @@ void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext
   folder.Write("face.ply", ReconstructionPly(result.face.mesh, result, context));
   folder.Write("implicit.ply", ReconstructionPly(result.implicit.mesh, result, context));
   folder.Write("depth.ply",
-               MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthMap()));
+               MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthColours()));
 }
 
 std::string TimingJson(const std::vector<StepTime>& times) {
@@ -252,7 +224,8 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
       {"title", experiment.title}, {"subject", result.subject.name}, {"usable", result.usable()}};
   json["face"] = result.truth ? MetricsToJson(result.truth->face) : Json(nullptr);
   json["implicit_face"] = result.truth ? MetricsToJson(result.truth->implicit) : Json(nullptr);
-  json["depth"] = DepthJson(result);
+  json["depth"] = DepthToJson(result.depth, result.subject);
+  json["depth_truth"] = result.truth ? ComparisonToJson(result.truth->depth) : Json(nullptr);
   json["implicit"] = ImplicitJson(result.implicit);
   json["fit"] = FitJson(result);
   json["notes"] = result.subject.notes;

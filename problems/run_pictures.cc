@@ -62,11 +62,11 @@ void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
   const TriMesh& skin = *result.subject.skin;
   WriteViews({{SkinObject(skin)}}, result, {"True skin", {}, std::nullopt}, Lighting::kStudio,
              folder, "pictures/truth.png", threads);
-  const Legend legend{ErrorMap(), "H-spline face outside (+) or inside (-) the true skin"};
+  const Legend legend{ErrorColours(), "H-spline face outside (+) or inside (-) the true skin"};
   WriteViews({{MappedObject(skin, result.truth->face.signed_mm, legend.map)}}, result,
              {"Signed error on the true skin", {}, legend}, Lighting::kEven, folder,
              "pictures/error.png", threads);
-  const Legend implicit_legend{ErrorMap(), "implicit face outside (+) or inside (-) the true skin"};
+  const Legend implicit_legend{ErrorColours(), "implicit face outside (+) or inside (-) the true skin"};
   WriteViews({{MappedObject(skin, result.truth->implicit.signed_mm, implicit_legend.map)}}, result,
              {"Signed error of the implicit face", {}, implicit_legend}, Lighting::kEven, folder,
              "pictures/error_implicit.png", threads);
@@ -74,8 +74,8 @@ void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
 
 }  // namespace
 
-ColourMap DepthMap() { return SequentialMap(0, 25); }
-ColourMap ErrorMap() { return DivergingMap(8); }
+ColourMap DepthColours() { return SequentialMap(0, 25); }
+ColourMap ErrorColours() { return DivergingMap(8); }
 
 std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
                                   const RunContext& context) {
@@ -102,7 +102,7 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   WriteOverview(result, folder, threads);
   WriteViews(SkullScene(result), result, {"Skull and dowels", {}, std::nullopt}, Lighting::kStudio,
              folder, "pictures/skull_dowels.png", threads);
-  const Legend depth{DepthMap(), "tissue depth on the skull's shell"};
+  const Legend depth{DepthColours(), "tissue depth on the skull's shell"};
   WriteViews({{MappedObject(result.shell, result.depth.depth_mm, depth.map)}}, result,
              {"Interpolated tissue depth", {}, depth}, Lighting::kEven, folder,
              "pictures/depth.png", threads);

@@ -10,8 +10,8 @@
 
 namespace semblance {
 
-ColourMap DepthMap();  // 0 to 25 mm
-ColourMap ErrorMap();  // -8 to 8 mm
+ColourMap DepthColours();  // 0 to 25 mm
+ColourMap ErrorColours();  // -8 to 8 mm
 
 // Signed distance of each vertex to the true skin, positive outside it; NaN where the nearest skin
 // is not scored. result.truth must be there.

@@ -209,8 +209,8 @@ class SceneWriter {
   }
 
   Json Maps() const {
-    return {{"error", MapJson(ErrorMap(), "outside (+) or inside (\u2212) the true skin")},
-            {"depth", MapJson(DepthMap(), "tissue depth")}};
+    return {{"error", MapJson(ErrorColours(), "outside (+) or inside (\u2212) the true skin")},
+            {"depth", MapJson(DepthColours(), "tissue depth")}};
   }
 
   Json Facts() const {

@@ -8,19 +8,9 @@
 namespace semblance {
 namespace {
 
-DepthField FindDepth(const Experiment& experiment, Case& subject, const TriMesh& shell,
-                     const RunContext& context) {
-  constexpr double kLeastDepth_mm = 1;
-  const ShellDowels standing = StandOnShell(subject.dowels, shell, kLeastDepth_mm);
-  subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
-  const std::vector<Vec3> normals = VertexNormals(shell);
-  const DepthInput input{shell, normals, standing.dowels, subject.network};
-  return ApplyOutsideRule(experiment.outside, input,
-                          InterpolateDepth(experiment.interp, input, context), context);
-}
-
-SkullStage Make(const Experiment& e, StageCache& cache, StepClock& step,
+DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
                 const RunContext& context) {
+  constexpr double kLeastDepth_mm = 1;
   const auto data = step("load subject", [&] {
     return cache.Get<SubjectData>(StageKey("subject", e.subject),
                                   [&] { return LoadSubject(e.subject, context); });
@@ -30,21 +20,38 @@ SkullStage Make(const Experiment& e, StageCache& cache, StepClock& step,
     return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
                               [&] { return FillSkull(data->skull, e.fill, context); });
   });
-  DepthField depth =
-      step("interpolate depth", [&] { return FindDepth(e, subject, *shell, context); });
-  ImplicitFace implicit = step("implicit face", [&] {
-    return CachedImplicitFace(*shell, depth.depth_mm, e.implicit, cache.disk(), context);
+  ShellDowels standing = StandOnShell(subject.dowels, *shell, kLeastDepth_mm);
+  subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
+  DepthStage stage{
+      std::move(subject), *shell, VertexNormals(*shell), std::move(standing.dowels), {}};
+  stage.depth = step("interpolate depth", [&] {
+    return ApplyOutsideRule(e.outside, stage.Input(),
+                            InterpolateDepth(e.interp, stage.Input(), context), context);
   });
-  return {std::move(subject), *shell, std::move(depth), std::move(implicit)};
+  return stage;
 }
 
 }  // namespace
+
+std::shared_ptr<const DepthStage> MakeDepthStage(const Experiment& e, StageCache& cache,
+                                                 StepClock& step, const RunContext& context) {
+  return cache.Get<DepthStage>(StageKey("depth stage", e.subject, e.landmarks, e.tissue, e.network,
+                                        e.interp, e.outside, e.fill),
+                               [&] { return Make(e, cache, step, context); });
+}
 
 std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache& cache,
                                                  StepClock& step, const RunContext& context) {
   return cache.Get<SkullStage>(StageKey("skull stage", e.subject, e.landmarks, e.tissue, e.network,
                                         e.interp, e.outside, e.fill, e.implicit),
-                               [&] { return Make(e, cache, step, context); });
+                               [&] {
+                                 auto depth = MakeDepthStage(e, cache, step, context);
+                                 ImplicitFace implicit = step("implicit face", [&] {
+                                   return CachedImplicitFace(depth->shell, depth->depth.depth_mm,
+                                                             e.implicit, cache.disk(), context);
+                                 });
+                                 return SkullStage{std::move(depth), std::move(implicit)};
+                               });
 }
 
 }  // namespace semblance

@@ -52,8 +52,8 @@ class StudyReader {
 
  private:
   void ReadHead() {
-    const std::vector<std::string> known = {"title", "base", "set",    "subjects", "grid",
-                                            "zip",   "list", "sample", "metric",   "keep"};
+    const std::vector<std::string> known = {"title", "base",   "set",    "subjects", "grid", "zip",
+                                            "list",  "sample", "metric", "keep",     "job"};
     const FieldInfo info;
     RefuseUnknownKeys(errors_, {study_, "", info}, known);
     if (const ConfigNode* title = study_.Find("title")) {
@@ -62,11 +62,18 @@ class StudyReader {
     if (const ConfigNode* metric = study_.Find("metric")) {
       ReadScalar(errors_, {*metric, "metric", info}, plan_.metric);
     }
-    if (const ConfigNode* keep = study_.Find("keep")) {
-      constexpr auto kNames = EnumNames(StudyKeep{});
+    ReadChoice("keep", plan_.keep);
+    ReadChoice("job", plan_.job);
+  }
+
+  template <class Choice>
+  void ReadChoice(const char* key, Choice& choice) {
+    if (const ConfigNode* node = study_.Find(key)) {
+      constexpr auto kNames = EnumNames(Choice{});
       const std::vector<std::string> words(kNames.begin(), kNames.end());
-      plan_.keep = static_cast<StudyKeep>(
-          ReadWord(errors_, {*keep, "keep", info}, "word", words).value_or(0));
+      const FieldInfo info;
+      choice =
+          static_cast<Choice>(ReadWord(errors_, {*node, key, info}, "word", words).value_or(0));
     }
   }
 
@@ -267,6 +274,9 @@ class StudyReader {
     if (!faults_.empty()) {
       throw ConfigError(fmt::format("{}", fmt::join(faults_, "\n")));
     }
+    if (plan_.job == StudyJob::kDepth) {
+      ids += "depth";
+    }
     plan_.hash = Sha256OfText(ids).substr(0, 12);
   }
 
@@ -293,6 +303,10 @@ std::vector<fs::path> InputFilesOf(const Experiment& experiment) {
   files.push_back(experiment.network);
   if (experiment.tissue.depths == DepthSource::kTable) {
     files.push_back(experiment.tissue.table);
+  }
+  if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
+    files.push_back(map->file);
+    files.push_back(map->mesh);
   }
   std::erase(files, fs::path());
   return files;

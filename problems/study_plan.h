@@ -14,6 +14,8 @@
 //     sample: {method: lhs, n: 20, random_seed: 1, ranges: {seeds.weight: [0.1, 1.0]}}
 //     metric: face.rms_mm              # that the report ranks by; lower is better
 //     keep: summary                    # view: and what the report's 3-D view needs; run: all files
+//     job: face                        # depth: the interpolated depth alone, without a fit; then
+//                                      # view keeps pictures of the first subject's depth maps
 //
 // Each of grid, zip, list and sample gives rows; a trial is a subject with one row of each. A value
 // is any part of an experiment, be it a number or a whole strategy.
@@ -35,6 +37,9 @@ constexpr auto EnumNames(StudyKeep) {
   return std::to_array<std::string_view>({"summary", "view", "run"});
 }
 
+enum class StudyJob { kFace, kDepth };
+constexpr auto EnumNames(StudyJob) { return std::to_array<std::string_view>({"face", "depth"}); }
+
 struct StudyTrial {
   std::string id;       // 12 hex digits of the hash of the resolved experiment, its input files by
                         // content: the same on every machine
@@ -47,6 +52,7 @@ struct StudyPlan {
   std::string title = "untitled";
   std::string metric = "face.rms_mm";
   StudyKeep keep = StudyKeep::kSummary;
+  StudyJob job = StudyJob::kFace;
   std::vector<std::string> axes;   // option paths, in the order of the file
   std::vector<StudyTrial> trials;  // subject by subject
   std::vector<std::string> notes;  // e.g. subjects that were skipped

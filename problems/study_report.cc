@@ -8,6 +8,7 @@
 
 #include "problems/report.h"
 #include "problems/results_sqlite.h"
+#include "problems/study_breakdown.h"
 #include "problems/svg_plot.h"
 
 namespace semblance {
@@ -181,8 +182,29 @@ std::vector<BoxRow> MeanCurves(const StudyResults& results, const std::vector<Tr
   return rows;
 }
 
+// One plot of stated against observed shares, where a treatment states a standard deviation.
+std::vector<ReportImage> CalibrationPlots(const StudyResults& results,
+                                          const std::vector<Treatment>& ranked) {
+  std::vector<ReportImage> plots;
+  const auto add = [&](std::vector<double> TrialRow::*curve, const std::string& of_what) {
+    const auto rows = MeanCurves(results, ranked, curve);
+    if (!rows.empty()) {
+      plots.push_back(
+          {CalibrationPlotSvg(rows, "share that the stated standard deviation should hold (%)"),
+           fmt::format("Calibration: share of {} within what the stated standard deviation should "
+                       "hold, averaged over subjects. On the grey line it is right; below, too "
+                       "bold; above, too cautious.",
+                       of_what),
+           fmt::format("observed against stated share of {}, one line a treatment", of_what)});
+    }
+  };
+  add(&TrialRow::depth_coverage, "the true depths over the scored bone");
+  add(&TrialRow::left_out_coverage, "the dowels that were left out");
+  return plots;
+}
+
 ReportSection CurvesSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportSection section{.heading = "Errors and convergence"};
+  ReportSection section{.heading = "Errors, convergence, calibration"};
   const auto errors = MeanCurves(results, ranked, &TrialRow::quantiles_mm);
   const auto steps = MeanCurves(results, ranked, &TrialRow::step_rms_mm);
   if (!errors.empty()) {
@@ -198,6 +220,7 @@ ReportSection CurvesSection(const StudyResults& results, const std::vector<Treat
          "Convergence: after each step of the last round's schedule, averaged over subjects.",
          "root mean square distance by step of the schedule, one line a treatment"});
   }
+  std::ranges::move(CalibrationPlots(results, ranked), std::back_inserter(section.images));
   return section;
 }
 
@@ -233,6 +256,24 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
   return scenes.empty() ? SceneCollection{} : CollectScenes(scenes, kLimit_bytes);
 }
 
+// The depth maps that the trials left, best treatment first.
+std::vector<ReportImage> DepthMaps(const StudyResults& results, const std::filesystem::path& root) {
+  std::vector<ReportImage> maps;
+  for (const Treatment& treatment : Ranked(Treatments(results, results.metric))) {
+    for (const TrialRow& row : results.trials) {
+      const std::filesystem::path file = root / "trials" / row.id / "depth.png";
+      if (row.values == treatment.values && row.status == "done" && std::filesystem::exists(file) &&
+          maps.size() < kMostScenes) {
+        maps.push_back(
+            ReportImageFromFile(file, fmt::format("{}, {}", treatment.label, row.subject),
+                                fmt::format("tissue depth on the skull of {} by {}, and its error",
+                                            row.subject, treatment.label)));
+      }
+    }
+  }
+  return maps;
+}
+
 std::string SceneNote(const StudyResults& results, const SceneCollection& scenes) {
   const int left = results.Count("done") - scenes.count;
   return scenes.count == 0 || left == 0
@@ -245,7 +286,8 @@ std::string SceneNote(const StudyResults& results, const SceneCollection& scenes
 
 }  // namespace
 
-std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes) {
+std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes,
+                            const std::vector<ReportImage>& maps) {
   const std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
   Report report;
   report.title = results.title;
@@ -276,7 +318,15 @@ std::string StudyReportHtml(const StudyResults& results, const SceneCollection& 
     }
     report.sections.push_back(treatments);
     report.sections.push_back(RankSection(ranked));
+    report.sections.push_back({.heading = "Behind the metric",
+                               .paragraphs = {},
+                               .images = {},
+                               .tables = BreakdownTables(results, ranked)});
     report.sections.push_back(CurvesSection(results, ranked));
+    report.sections.push_back({.heading = "Depth maps", .paragraphs = {}, .images = maps});
+    std::erase_if(report.sections, [](const ReportSection& section) {
+      return section.paragraphs.empty() && section.images.empty() && section.tables.empty();
+    });
   }
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
@@ -290,7 +340,8 @@ StudyResults WriteStudyTables(OutputFolder& folder) {
   folder.Write("trials.csv", TrialsCsv(results));
   folder.Write("summary.csv", SummaryCsv(results));
   folder.Write("results.sqlite", ResultsSqlite(results));
-  folder.Write("report.html", StudyReportHtml(results, Scenes(results, folder.Root())));
+  folder.Write("report.html", StudyReportHtml(results, Scenes(results, folder.Root()),
+                                              DepthMaps(results, folder.Root())));
   return results;
 }
 

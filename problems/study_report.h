@@ -3,8 +3,10 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "problems/files.h"
+#include "problems/report.h"
 #include "problems/scene_json.h"
 #include "problems/study_tables.h"
 
@@ -17,6 +19,8 @@ StudyResults WriteStudyTables(OutputFolder& folder);
 // Ranks the treatments by the study's metric, shows their spread, and compares each with the best
 // over the subjects that have both: effect first, p-values last, and none below 6 subjects. scenes:
 // of the trials that the 3-D view offers side by side (CollectScenes); may be empty.
-std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes = {});
+// maps: pictures of the first subject's depth, one a treatment; may be empty.
+std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes = {},
+                            const std::vector<ReportImage>& maps = {});
 
 }  // namespace semblance

@@ -13,9 +13,11 @@
 #include <thread>
 
 #include "problems/config.h"
+#include "problems/depth_study.h"
 #include "problems/manifest.h"
 #include "problems/run_folder.h"
 #include "problems/scene_json.h"
+#include "problems/study_tables.h"
 #include "surfaces/whole_file.h"
 
 namespace semblance {
@@ -73,9 +75,9 @@ double ThreadCpu_s() {
 }
 
 // Wall time of each step and, of the whole, the processor's; what others made for it is not in it.
-std::string TimingJson(const RunResult& result, double cpu_s) {
+std::string TimingJson(const std::vector<StepTime>& times, double cpu_s) {
   Json json = {{"cpu_s", cpu_s}};
-  for (const StepTime& time : result.times) {
+  for (const StepTime& time : times) {
     json[time.step] = time.wall_s;
   }
   return json.dump(2) + "\n";
@@ -96,7 +98,7 @@ class StudyRunner {
         folder_(std::move(folder)),
         options_(options),
         context_(context),
-        cache_(3 * options.jobs + 6, CacheOnDisk(options)) {}
+        cache_(4 * options.jobs + 6, CacheOnDisk(options)) {}
 
   StudySummary Run() {
     for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
@@ -146,41 +148,72 @@ class StudyRunner {
     }
   }
 
+  // What a trial leaves beside trial.json.
+  using Files = std::function<void(OutputFolder&)>;
+
   void RunTrial(const StudyTrial& trial) {
-    RunContext quiet;
-    quiet.stop_token = context_.stop_token;
     Json json = TrialHead(plan_, trial);
-    std::optional<RunResult> result;
+    Files write = [](OutputFolder&) {};
     const double cpu_before_s = ThreadCpu_s();
     try {
-      result.emplace(semblance::Run(trial.experiment, quiet, &cache_));
-      json["status"] = result->usable() ? "done" : "unusable";
-      json["result"] = Json::parse(ResultJson(trial.experiment, *result));
+      write = plan_.job == StudyJob::kFace ? Face(trial, cpu_before_s, json)
+                                           : Depth(trial, cpu_before_s, json);
     } catch (const Error& error) {
       json["status"] = "failed";
       json["reason"] = error.what();
     }
     AppendProvenance(trial, json);
-    Write(trial, json, result, ThreadCpu_s() - cpu_before_s);
+    OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
+    write(output);
+    // Last: it says that the trial is whole. A broken one counts as none; with other files beside
+    // it, it must not outlast them.
+    output.Write("trial.json", json.dump(1) + "\n",
+                 plan_.keep == StudyKeep::kSummary ? Outlasts::kProcess : Outlasts::kPowerFailure);
     Tell(trial, json);
   }
 
-  void Write(const StudyTrial& trial, const Json& json, const std::optional<RunResult>& result,
-             double cpu_s) {
-    const RunContext quiet;
-    OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
-    // A broken trial.json counts as none. With other files beside it, it must not outlast them.
-    const Outlasts outlasts =
-        plan_.keep == StudyKeep::kSummary ? Outlasts::kProcess : Outlasts::kPowerFailure;
-    if (result && plan_.keep == StudyKeep::kRun) {
-      WriteRun(trial.experiment, *result, output, quiet);
-    } else if (result) {
-      output.Write("timing.json", TimingJson(*result, cpu_s), Outlasts::kProcess);
+  RunContext Quiet() const {
+    RunContext quiet;
+    quiet.stop_token = context_.stop_token;
+    return quiet;
+  }
+
+  Files Face(const StudyTrial& trial, double cpu_before_s, Json& json) {
+    auto result =
+        std::make_shared<const RunResult>(semblance::Run(trial.experiment, Quiet(), &cache_));
+    json["status"] = result->usable() ? "done" : "unusable";
+    json["result"] = Json::parse(ResultJson(trial.experiment, *result));
+    const double cpu_s = ThreadCpu_s() - cpu_before_s;
+    return [this, &trial, result, cpu_s](OutputFolder& output) {
+      const RunContext quiet;
+      if (plan_.keep == StudyKeep::kRun) {
+        WriteRun(trial.experiment, *result, output, quiet);
+        return;
+      }
+      output.Write("timing.json", TimingJson(result->times, cpu_s), Outlasts::kProcess);
       if (plan_.keep == StudyKeep::kView) {
         output.Write("scene.json", SceneJson(*result, quiet));
       }
-    }
-    output.Write("trial.json", json.dump(1) + "\n", outlasts);  // last: the trial is whole
+    };
+  }
+
+  Files Depth(const StudyTrial& trial, double cpu_before_s, Json& json) {
+    auto result =
+        std::make_shared<const DepthResult>(MeasureDepth(trial.experiment, Quiet(), &cache_));
+    json["status"] = result->usable() ? "done" : "unusable";
+    json["result"] = Json::parse(DepthResultJson(trial.experiment, *result));
+    const double cpu_s = ThreadCpu_s() - cpu_before_s;
+    return [this, &trial, result, cpu_s](OutputFolder& output) {
+      if (plan_.keep == StudyKeep::kRun) {
+        WriteDepth(trial.experiment, *result, output, {});
+      }
+      output.Write("timing.json", TimingJson(result->times, cpu_s), Outlasts::kProcess);
+      if (plan_.keep == StudyKeep::kView && trial.subject == plan_.trials.front().subject) {
+        const std::string title =
+            fmt::format("{}: {}", trial.subject, TreatmentLabel(plan_.axes, trial.values));
+        output.Write("depth.png", DepthPicture(*result, title, 1));
+      }
+    };
   }
 
   void Tell(const StudyTrial& trial, const Json& json) {

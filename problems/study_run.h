@@ -35,10 +35,10 @@ struct StudySummary {
 
 // In `folder`: plan.json (all trials), trials/<id>/trial.json (status, axes, metrics, resolved
 // experiment, versions; the same bytes whenever and wherever it ran) and timing.json; with
-// `keep: view` scene.json, with `keep: run` all files of a run beside them. A trial that cannot be
-// done is a trial.json with the reason. What trials have in common is made once. Throws IoError if
-// the folder cannot be written or holds another plan, Cancelled on request (after the trials at
-// hand).
+// `keep: view` scene.json (of a study of depth: the first subject's depth.png), with `keep: run`
+// all files of a run beside them. A trial that cannot be done is a trial.json with the reason. What
+// trials have in common is made once. Throws IoError if the folder cannot be written or holds
+// another plan, Cancelled on request (after the trials at hand).
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);
 

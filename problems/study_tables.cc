@@ -28,13 +28,22 @@ void Flatten(const Json& json, const std::string& path, std::map<std::string, do
   }
 }
 
+// A list of numbers; none where there is no list.
+std::vector<double> NumbersAt(const Json& result, const char* pointer) {
+  const Json list = result.value(Json::json_pointer(pointer), Json());
+  std::vector<double> numbers;
+  for (const Json& value : list.is_array() ? list : Json::array()) {
+    numbers.push_back(value.is_number() ? value.get<double>() : kNaN);
+  }
+  return numbers;
+}
+
 // What is drawn as a curve, where it is there.
 void ReadCurves(const Json& result, TrialRow& row) {
-  const Json quantiles = result.value(Json::json_pointer("/face/quantiles_mm"), Json());
+  row.quantiles_mm = NumbersAt(result, "/face/quantiles_mm");
+  row.depth_coverage = NumbersAt(result, "/depth_truth/along_direction/coverage");
+  row.left_out_coverage = NumbersAt(result, "/cross_validation/landmark/coverage");
   const Json levels = result.value(Json::json_pointer("/fit/levels"), Json());
-  for (const Json& value : quantiles.is_array() ? quantiles : Json::array()) {
-    row.quantiles_mm.push_back(value.is_number() ? value.get<double>() : kNaN);
-  }
   for (const Json& level : levels.is_array() ? levels : Json::array()) {
     const auto number = [&](const char* name) {
       return level.contains(name) && level[name].is_number() ? level[name].get<double>() : kNaN;

@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 
 #include <cstdint>
+#include <cstdlib>
+#include <cstring>
 #include <map>
 #include <sstream>
-#include <vector>
+
+#include "surfaces/error.h"
 
 namespace semblance {
 namespace {
@@ -14,6 +17,7 @@ namespace {
 struct Property {
   std::size_t size = 0;        // bytes of one value
   std::size_t count_size = 0;  // of a list's length; 0 for a plain value
+  std::string name = {}, type = {};
 };
 
 struct Element {
@@ -39,13 +43,14 @@ std::size_t SizeOf(const std::string& type) {
 }
 
 Property ReadProperty(std::istream& words) {
-  std::string type, count_type, item_type;
+  std::string type, count_type, item_type, name;
   words >> type;
   if (type != "list") {
-    return {SizeOf(type), 0};
+    words >> name;
+    return {SizeOf(type), 0, name, type};
   }
-  words >> count_type >> item_type;
-  return {SizeOf(item_type), SizeOf(count_type)};
+  words >> count_type >> item_type >> name;
+  return {SizeOf(item_type), SizeOf(count_type), name, item_type};
 }
 
 void ReadHeaderLine(const std::string& line, Header& header) {
@@ -138,7 +143,102 @@ std::string TextDefect(const Header& header, std::string_view bytes) {
                            found);
 }
 
+template <class T>
+double FromBits(std::uint64_t bits, std::size_t size) {
+  T value;
+  std::memcpy(&value, &bits, size);  // little-endian, as every machine this runs on
+  return static_cast<double>(value);
+}
+
+double ReadNumber(std::string_view bytes, std::size_t at, const Property& property,
+                  bool big_endian) {
+  const std::uint64_t bits = ReadCount(bytes, at, property.size, big_endian);
+  const std::string& type = property.type;
+  if (type.starts_with("float") || type == "double") {
+    return property.size == 4 ? FromBits<float>(bits, 4) : FromBits<double>(bits, 8);
+  }
+  if (type.starts_with("u")) {
+    return static_cast<double>(bits);
+  }
+  return property.size == 1   ? FromBits<std::int8_t>(bits, 1)
+         : property.size == 2 ? FromBits<std::int16_t>(bits, 2)
+                              : FromBits<std::int32_t>(bits, 4);
+}
+
+// Which property of a vertex has the name; its elements must be all plain values.
+std::size_t FindScalar(const Element& vertex, const std::string& name, const std::string& where) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < vertex.properties.size(); ++k) {
+    if (vertex.properties[k].count_size > 0) {
+      throw InputError(fmt::format("{}: a vertex has the list '{}'; write plain values", where,
+                                   vertex.properties[k].name));
+    }
+    if (vertex.properties[k].name == name) {
+      return k;
+    }
+    names.push_back(vertex.properties[k].name);
+  }
+  throw InputError(
+      fmt::format("{}: a vertex has no '{}'; it has {}", where, name, fmt::join(names, ", ")));
+}
+
+std::vector<double> TextScalar(std::string_view data, std::size_t count, std::size_t column,
+                               const std::string& where) {
+  std::vector<double> values;
+  std::istringstream lines{std::string(data)};
+  for (std::string line; values.size() < count && std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string word;
+    std::size_t k = 0;
+    while (k <= column && words >> word) {
+      ++k;
+    }
+    if (k == 0) {
+      continue;  // an empty line
+    }
+    char* end = nullptr;
+    values.push_back(std::strtod(word.c_str(), &end));
+    if (k <= column || end == word.c_str() || *end != 0) {
+      throw InputError(
+          fmt::format("{}: vertex {}: '{}' is no number", where, values.size() - 1, line));
+    }
+  }
+  return values;
+}
+
+std::vector<double> BinaryScalar(std::string_view data, const Element& vertex, std::size_t column,
+                                 bool big_endian) {
+  std::size_t stride = 0, offset = 0;
+  for (std::size_t k = 0; k < vertex.properties.size(); ++k) {
+    offset = k == column ? stride : offset;
+    stride += vertex.properties[k].size;
+  }
+  std::vector<double> values(vertex.count);
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    values[v] = ReadNumber(data, v * stride + offset, vertex.properties[column], big_endian);
+  }
+  return values;
+}
+
 }  // namespace
+
+std::vector<double> PlyVertexScalar(std::string_view bytes, const std::string& name,
+                                    const std::string& where) {
+  const std::string defect = PlyDefect(bytes);
+  if (!defect.empty()) {
+    throw IoError(fmt::format("{} {}", where, defect));
+  }
+  const Header header = ReadHeader(bytes);
+  if (header.elements.empty() || header.elements[0].name != "vertex") {
+    throw InputError(fmt::format("{}: the first element is not 'vertex'", where));
+  }
+  const Element& vertex = header.elements[0];
+  const std::size_t column = FindScalar(vertex, name, where);
+  const std::string_view data = bytes.substr(header.size);
+  return header.format == "ascii"
+             ? TextScalar(data, vertex.count, column, where)
+             : BinaryScalar(data, vertex, column, header.format == "binary_big_endian");
+}
 
 std::string PlyDefect(std::string_view bytes) {
   const Header header = ReadHeader(bytes);

@@ -88,6 +88,17 @@ std::vector<Vec3> VertexNormals(const TriMesh& mesh) {
   return normals;
 }
 
+std::vector<double> VertexAreas(const TriMesh& mesh) {
+  std::vector<double> areas(mesh.points.size(), 0);
+  for (const Triangle& t : mesh.triangles) {
+    const double third = TriangleAreaVector(mesh, t).norm() / 3;
+    for (const std::int32_t v : t) {
+      areas[v] += third;
+    }
+  }
+  return areas;
+}
+
 Components ConnectedComponents(const TriMesh& mesh) {
   std::vector<int> parent(mesh.points.size());
   std::iota(parent.begin(), parent.end(), 0);

@@ -33,6 +33,9 @@ double SignedVolume(
 // marching cubes have no say. Zero where a vertex has no triangle of positive area.
 std::vector<Vec3> VertexNormals(const TriMesh& mesh);
 
+// A third of the area of the triangles at each vertex, mm^2.
+std::vector<double> VertexAreas(const TriMesh& mesh);
+
 // Component of each triangle by shared vertices, numbered 0, 1, ... in order of the first triangle.
 struct Components {
   std::vector<int> of_triangle;

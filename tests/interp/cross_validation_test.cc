@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "surfaces/error.h"
@@ -39,6 +40,42 @@ TEST(Folds, AreDowelsOrLandmarksOfBothSides) {
                                                    ElementsAre(3), ElementsAre(4)));
   EXPECT_THAT(EachLandmark(scene.dowels),
               ElementsAre(ElementsAre(0), ElementsAre(1, 2), ElementsAre(3), ElementsAre(4)));
+}
+
+TEST(Folds, OfASideAreItsDowels) {
+  EXPECT_THAT(EachSide(DomeScene().dowels), ElementsAre(ElementsAre(1), ElementsAre(2)));
+  EXPECT_TRUE(EachSide(FlatScene().dowels).empty());
+  std::vector<Dowel> left = {DomeScene().dowels[1]};
+  EXPECT_TRUE(EachSide(left).empty());  // nothing would be left to predict from
+}
+
+TEST(Folds, DrawnOnesHoldEachDowelOnceAndNoOrderMatters) {
+  const DowelScene scene = ScatteredScene(23);
+  const Folds folds = RandomFolds(scene.dowels, 5, 3);
+  ASSERT_EQ(folds.size(), 5u);
+  std::vector<std::size_t> all;
+  for (const auto& fold : folds) {
+    EXPECT_GE(fold.size(), 4u);
+    EXPECT_LE(fold.size(), 5u);
+    all.insert(all.end(), fold.begin(), fold.end());
+  }
+  std::ranges::sort(all);
+  for (std::size_t i = 0; i < 23; ++i) {
+    EXPECT_EQ(all[i], i);
+  }
+  EXPECT_NE(RandomFolds(scene.dowels, 5, 4), folds);
+  EXPECT_EQ(RandomFolds(scene.dowels, 5, 3), folds);
+  std::vector<Dowel> turned(scene.dowels.rbegin(), scene.dowels.rend());
+  Folds back = RandomFolds(turned, 5, 3);
+  for (auto& fold : back) {
+    for (std::size_t& i : fold) {
+      i = 22 - i;
+    }
+    std::ranges::sort(fold);
+  }
+  EXPECT_EQ(back, folds);
+  EXPECT_EQ(RandomFolds(FlatScene().dowels, 9, 1).size(), 4u);
+  EXPECT_THROW(RandomFolds(scene.dowels, 1, 1), InputError);
 }
 
 TEST(CrossValidation, OfTheMeanIsTheMeanOfTheOthers) {  // depths 4, 7, 9, 5

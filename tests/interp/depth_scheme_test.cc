@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <type_traits>
 
 #include "surfaces/error.h"
 #include "tests/testing/dowel_scenes.h"
@@ -28,10 +29,13 @@ std::vector<DepthScheme> Defaults(std::index_sequence<Index...>) {
   return {std::variant_alternative_t<Index, DepthScheme>{}...};
 }
 
-// Every scheme with its defaults, and then the options that change its ways.
+constexpr std::size_t kAlternatives = std::variant_size_v<DepthScheme> - 1;
+static_assert(std::is_same_v<std::variant_alternative_t<kAlternatives, DepthScheme>, DepthMap>);
+
+// Every scheme with its defaults, but for a map, which comes from a file and not from dowels
+// (depth_map_test); and then the options that change their ways.
 std::vector<DepthScheme> Schemes() {
-  std::vector<DepthScheme> schemes =
-      Defaults(std::make_index_sequence<std::variant_size_v<DepthScheme>>{});
+  std::vector<DepthScheme> schemes = Defaults(std::make_index_sequence<kAlternatives>{});
   const DowelDistance along = DowelDistance::kGeodesic;
   schemes.emplace_back(Nearest{.distance = along});
   schemes.emplace_back(InverseDistance{.distance = along});
@@ -62,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(DepthScheme, EveryScheme, ::testing::ValuesIn(Schemes()
                          [](const auto& each) {
                            const auto name =
                                std::visit([](const auto& o) { return o.kName; }, each.param);
-                           return each.index < std::variant_size_v<DepthScheme>
+                           return each.index < kAlternatives
                                       ? std::string(name)
                                       : fmt::format("{}_{}", name, each.index);
                          });

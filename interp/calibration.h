@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Do stated standard deviations hold?
+#pragma once
+
+#include <span>
+#include <vector>
+
+namespace semblance {
+
+// Shares, 0..1, of the errors that lie within the central interval of a normal distribution of the
+// stated sd which should hold 5 %, 10 %, .. 95 % of them: 19 values, rising. Over the errors for
+// which both error and sd are finite; weights: one an error, >= 0, or none for equal ones. Empty
+// where nothing counts. An sd of 0 holds an error of 0 and no other.
+std::vector<double> Coverage(std::span<const double> errors, std::span<const double> sds,
+                             std::span<const double> weights = {});
+
+// The share at 90 % of such a curve; NaN for an empty one.
+double CoverageAt90(const std::vector<double>& coverage);
+
+}  // namespace semblance
