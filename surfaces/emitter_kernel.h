@@ -82,38 +82,61 @@ inline bool ProjectsOnto(const EmitterTriangle& t, const Vec3& p) {
 
 // Each kernel: Gain(t) sets EmitterTriangle::gain; Emission(t, p, height) at a height > 0 is at
 // most gain / distance^Falloff(), distances taken to the triangle less Advance(t).
-class ThesisKernel {
+// gain / distance^k of the thesis's emitters; 0 where that is less than the cut.
+class DistanceFalloff {
  public:
-  explicit ThesisKernel(const ThesisEmitter& o) : k_(o.decay), power_(o.decay) {}
-  double Gain(const EmitterTriangle& t) const { return std::pow(t.depth_mm, k_); }
-  double Emission(const EmitterTriangle& t, const Vec3& p, double) const {
-    return t.gain * power_(std::max(SquaredDistance(t, p), t.Floor2(1)));
+  DistanceFalloff(double decay, double cut_below) : k_(decay), cut_(cut_below), power_(decay) {}
+  double Decay() const { return k_; }
+  double At(const EmitterTriangle& t, double squared, double depth_share) const {
+    const double emission = t.gain * power_(std::max(squared, t.Floor2(depth_share)));
+    return emission < cut_ ? 0 : std::min(emission, kMostEmission);
   }
-  double Falloff() const { return k_; }
-  double Advance(const EmitterTriangle&) const { return 0; }
 
  private:
-  double k_;
+  double k_, cut_;
   InversePower power_;
+};
+
+class ThesisKernel {
+ public:
+  explicit ThesisKernel(const ThesisEmitter& o) : falloff_(o.decay, o.cut_below) {}
+  double Gain(const EmitterTriangle& t) const { return std::pow(t.depth_mm, falloff_.Decay()); }
+  double Emission(const EmitterTriangle& t, const Vec3& p, double) const {
+    return falloff_.At(t, SquaredDistance(t, p), 1);
+  }
+  double AtDistance(const EmitterTriangle& t, double d) const { return falloff_.At(t, d * d, 1); }
+  double Falloff() const { return falloff_.Decay(); }
+  double Advance(const EmitterTriangle&) const { return 0; }
+  double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
+
+ private:
+  DistanceFalloff falloff_;
 };
 
 class SplitKernel {
  public:
-  explicit SplitKernel(const SplitEmitter& o) : k_(o.decay), t_(o.split), power_(o.decay) {}
-  double Gain(const EmitterTriangle& t) const { return std::pow((1 - t_) * t.depth_mm, k_); }
+  explicit SplitKernel(const SplitEmitter& o) : t_(o.split), falloff_(o.decay, o.cut_below) {}
+  double Gain(const EmitterTriangle& t) const {
+    return std::pow(EmittingDepth(t), falloff_.Decay());
+  }
   double Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
-    const double shift = t_ * t.depth_mm;
+    const double shift = Advance(t);
     if (height < shift) {
       return ProjectsOnto(t, p) ? kMostEmission : 0;
     }
-    return t.gain * power_(std::max(SquaredDistance(t, p - shift * t.normal), t.Floor2(1 - t_)));
+    return falloff_.At(t, SquaredDistance(t, p - shift * t.normal), 1 - t_);
   }
-  double Falloff() const { return k_; }
+  // From the moved triangle.
+  double AtDistance(const EmitterTriangle& t, double d) const {
+    return falloff_.At(t, d * d, 1 - t_);
+  }
+  double Falloff() const { return falloff_.Decay(); }
   double Advance(const EmitterTriangle& t) const { return t_ * t.depth_mm; }
+  double EmittingDepth(const EmitterTriangle& t) const { return (1 - t_) * t.depth_mm; }
 
  private:
-  double k_, t_;
-  InversePower power_;
+  double t_;
+  DistanceFalloff falloff_;
 };
 
 // The integral: by the centroid where the triangle is small against its distance, by the three edge
@@ -124,7 +147,7 @@ class FlatKernel {
   explicit FlatKernel(const FlatEmitter& o)
       : k_(o.decay),
         closed_(o.decay == std::floor(o.decay) ? static_cast<int>(o.decay) + 1 : -1),
-        flat_share_(std::pow(kLostDigits, 2.0 / closed_)),
+        flat_share_(closed_ > 0 ? std::pow(kLostDigits, 2.0 / closed_) : 0),
         power_(o.decay + 3) {}
   double Gain(const EmitterTriangle& t) const {
     return (k_ + 1) / (2 * std::numbers::pi) * std::pow(t.depth_mm, k_) * t.area_mm2;
@@ -156,6 +179,15 @@ class FlatKernel {
   }
   double Falloff() const { return k_ + 2; }  // height <= distance
   double Advance(const EmitterTriangle&) const { return 0; }
+  double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
+  // What the whole triangle would emit if all of it were this far, at most kMostEmission.
+  double Above(const EmitterTriangle& t, double height, double distance) const {
+    return std::min(t.gain * height * power_(distance * distance), kMostEmission);
+  }
+  // A distance that is not less than what `distance` counts as low over the triangle.
+  double Lowered(const EmitterTriangle& t, double distance) const {
+    return std::sqrt((1 + flat_share_) * distance * distance + t.Floor2(1));
+  }
 
  private:
   // of the squared distance

@@ -90,7 +90,8 @@ PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
     const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
     const std::vector<std::int64_t> seeds = FindSeeds(shell, depth_mm, field, grid);
-    PolygonizeResult result = PolygonizeFrom(field, grid, seeds, options.edges, context);
+    PolygonizeResult result =
+        PolygonizeSurface(options.polygonizer, surface, grid, seeds, options.edges, context);
     cell_mm = grid.cell_mm.x();
     if (!result.touches_border && !result.mesh.triangles.empty()) {
       return result;

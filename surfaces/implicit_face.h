@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "surfaces/implicit_surface.h"
-#include "surfaces/polygonize.h"
+#include "surfaces/polygonizer.h"
 #include "surfaces/run_context.h"
 
 namespace semblance {
@@ -16,6 +16,7 @@ namespace semblance {
 struct ImplicitFaceOptions {
   ImplicitOptions field = {};
   int resolution = 150;
+  Polygonizer polygonizer = NarrowBand{};
   EdgeSearchOptions edges = {};
   int target_triangles = 14000;
 };
@@ -28,6 +29,9 @@ void Fields(Visitor& visit, ImplicitFaceOptions& o) {
                   .doc = "n: cells along the longest side of the shell with its depth; the "
                          "thesis's runs use 150"},
         o.resolution);
+  visit(FieldInfo{.name = "polygonizer",
+                  .doc = "how the surface is found in the grid; the mesh is the same"},
+        o.polygonizer);
   visit(FieldInfo{.name = "edges", .doc = "how crossings are found"}, o.edges);
   visit(FieldInfo{.name = "target_triangles",
                   .min = 100,

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "surfaces/emitter_kernel.h"
+#include "surfaces/emitter_bounds.h"
 #include "surfaces/error.h"
 
 namespace semblance {
@@ -61,6 +61,10 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   }
   return emitters;
 }
+
+// Integrals of a flat emitter by two numerical ways, each within 1 %.
+constexpr double kFlatShare = 0.025;
+constexpr double kRounding = 1e-9;
 
 // Bounding boxes over runs of emitters, for leaving out those whose emission is too small to count.
 struct Node {
@@ -205,9 +209,16 @@ struct ImplicitSurface::Impl {
   }
 
   template <class EmitterKernel>
-  double Sum(const EmitterKernel& k, const Vec3& p) const {
+  double Emission(const EmitterKernel& k, int e, const Vec3& p) const {
+    const double height = (p - emitters[e].a).dot(emitters[e].normal);
+    return height > 0 ? std::min(k.Emission(emitters[e], p, height), kMostEmission) : 0;
+  }
+
+  template <class EmitterKernel>
+  double Sum(const EmitterKernel& k, const Vec3& p, std::int64_t& evaluations) const {
     double sum = 0;
     const auto add = [&](const Node& leaf) {
+      evaluations += leaf.end - leaf.begin;
       if constexpr (std::is_same_v<EmitterKernel, FlatKernel>) {
         if (leaf.batch >= 0) {
           sum += k.Batch(batches[leaf.batch], &emitters[leaf.begin], p);
@@ -215,10 +226,7 @@ struct ImplicitSurface::Impl {
         }
       }
       for (int e = leaf.begin; e < leaf.end; ++e) {
-        const double height = (p - emitters[e].a).dot(emitters[e].normal);
-        if (height > 0) {
-          sum += std::min(k.Emission(emitters[e], p, height), kMostEmission);
-        }
+        sum += Emission(k, e, p);
       }
     };
     Near(
@@ -241,14 +249,71 @@ ImplicitSurface::~ImplicitSurface() = default;
 ImplicitSurface::ImplicitSurface(ImplicitSurface&&) noexcept = default;
 
 double ImplicitSurface::Value(const Vec3& p) const {
-  return std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p); }, impl_->kernel) - 1;
+  std::int64_t evaluations = 0;
+  return std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p, evaluations); },
+                    impl_->kernel) -
+         1;
 }
 
 double ImplicitSurface::Flattened(const Vec3& p) const {
+  std::int64_t evaluations = 0;
+  return Flattened(p, evaluations);
+}
+
+double ImplicitSurface::Flattened(const Vec3& p, std::int64_t& emitters) const {
+  return Flatten(std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p, emitters); },
+                            impl_->kernel));
+}
+
+double ImplicitSurface::Flatten(double emission) const {
   constexpr double kLowest = -10;
-  const double emission = Value(p) + 1;
   return emission > 0 ? std::max(1 - std::pow(emission, -1 / impl_->decay), kLowest) : kLowest;
 }
+
+double ImplicitSurface::SumOf(std::span<const std::int32_t> emitters, const Vec3& p) const {
+  return std::visit(
+      [&](const auto& kernel) {
+        double sum = 0;
+        for (const std::int32_t e : emitters) {
+          sum += impl_->Emission(kernel, e, p);
+        }
+        return sum;
+      },
+      impl_->kernel);
+}
+
+double ImplicitSurface::SumShare() const {
+  return std::holds_alternative<FlatKernel>(impl_->kernel) ? kFlatShare : 0;
+}
+
+void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> emitters,
+                               std::span<EmissionBounds> bounds) const {
+  const BoxView view(box);
+  const double share = SumShare() + kRounding;
+  std::visit(
+      [&](const auto& kernel) {
+        for (std::size_t n = 0; n < emitters.size(); ++n) {
+          const EmissionBounds exact = BoundsOn(kernel, impl_->emitters[emitters[n]], view);
+          bounds[n] = {(1 - share) * exact.least, (1 + share) * exact.most};
+        }
+      },
+      impl_->kernel);
+}
+
+Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
+  const EmitterTriangle& t = impl_->emitters[emitter];
+  Box3 box;
+  box.extend(t.a).extend(t.b).extend(t.c);
+  const auto [advance, depth] = std::visit(
+      [&t](const auto& kernel) { return std::pair(kernel.Advance(t), kernel.EmittingDepth(t)); },
+      impl_->kernel);
+  const Box3 moved = box.translated(advance * t.normal);
+  box.extend(moved);  // with the prism
+  const Vec3 reach = Vec3::Constant(depth * std::pow(m, 1 / impl_->decay));
+  return {box.min() - reach, box.max() + reach};
+}
+
+double ImplicitSurface::TailError() const { return impl_->tail_error; }
 
 std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
   std::int64_t count = 0;
