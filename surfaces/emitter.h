@@ -4,6 +4,7 @@
 // 0.
 #pragma once
 
+#include <array>
 #include <string_view>
 #include <variant>
 
@@ -30,9 +31,18 @@ struct SplitEmitter {
 // (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the integral
 // is 2 pi h^(-k) / (k+1), so coplanar triangles of one depth sum to (l/h)^k: their surface is flat,
 // at exactly l, whatever the mesh.
+//
+// With the depth linear over T, l^k stands under the integral: no steps where depth changes from
+// triangle to triangle. (The thesis's emitters know but one depth a triangle.)
+enum class EmitterDepth { kMean, kLinear };
+constexpr auto EnumNames(EmitterDepth) {
+  return std::to_array<std::string_view>({"mean", "linear"});
+}
+
 struct FlatEmitter {
   static constexpr std::string_view kName = "flat";
   double decay = 6;
+  EmitterDepth depth = EmitterDepth::kMean;
 };
 
 using Emitter = std::variant<FlatEmitter, SplitEmitter, ThesisEmitter>;
@@ -71,6 +81,10 @@ void Fields(Visitor& visit, SplitEmitter& o) {
 template <class Visitor>
 void Fields(Visitor& visit, FlatEmitter& o) {
   visit(emitter_internal::kDecay, o.decay);
+  visit(FieldInfo{.name = "depth",
+                  .doc = "of a triangle: the mean of its corners' (thesis 3.1), or linear between "
+                         "them"},
+        o.depth);
 }
 
 }  // namespace semblance

@@ -88,12 +88,13 @@ inline EmissionBounds BoundsOn(const FlatKernel& kernel, const EmitterTriangle& 
   const double nearest =
       std::max(above, LeastDistance(t, 0, box, std::sqrt(SquaredDistance(t, box.center))));
   EmissionBounds bounds;
-  bounds.most = nearest > 0 ? kernel.Above(t, std::clamp(nearest, above, height.most), nearest)
-                            : kMostEmission;
+  bounds.most =
+      nearest > 0 ? kernel.Above(t, t.most_share, std::clamp(nearest, above, height.most), nearest)
+                  : kMostEmission;
   if (above > 0) {
     const double furthest =
         (box.center - t.centroid).norm() + box.radius_mm + std::sqrt(t.longest2_mm2);
-    bounds.least = kernel.Above(t, above, kernel.Lowered(t, furthest));
+    bounds.least = kernel.Above(t, t.least_share, above, kernel.Lowered(t, furthest));
   }
   return bounds;
 }

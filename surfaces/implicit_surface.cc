@@ -13,28 +13,86 @@
 namespace semblance {
 namespace {
 
-EmitterTriangle MakeTriangle(const TriMesh& skull, const Triangle& t, double depth_mm,
-                             const Kernel& kernel) {
+double DecayOf(const Kernel& kernel) {
+  return std::visit([](const auto& k) { return k.Decay(); }, kernel);
+}
+
+EmitterDepth DepthOver(const Emitter& emitter) {
+  const auto* flat = std::get_if<FlatEmitter>(&emitter);
+  return flat ? flat->depth : EmitterDepth::kMean;
+}
+
+// A triangle with the depths of its corners.
+struct DeepTriangle {
+  std::array<Vec3, 3> corner;
+  std::array<double, 3> depth_mm;
+
+  double MeanDepth() const { return (depth_mm[0] + depth_mm[1] + depth_mm[2]) / 3; }
+  Vec3 AreaVector() const { return 0.5 * (corner[1] - corner[0]).cross(corner[2] - corner[0]); }
+};
+
+// The gradient of the depth over its mean, in the plane.
+Vec3 RelativeSlope(const DeepTriangle& t, const Vec3& normal, double area_mm2) {
+  Vec3 sum = Vec3::Zero();
+  for (int c = 0; c < 3; ++c) {
+    sum += t.depth_mm[c] * normal.cross(t.corner[(c + 2) % 3] - t.corner[(c + 1) % 3]);
+  }
+  return sum / (2 * area_mm2 * t.MeanDepth());
+}
+
+EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel) {
   EmitterTriangle e;
-  e.a = skull.points[t[0]];
-  e.b = skull.points[t[1]];
-  e.c = skull.points[t[2]];
+  e.a = t.corner[0];
+  e.b = t.corner[1];
+  e.c = t.corner[2];
   e.centroid = (e.a + e.b + e.c) / 3;
-  const Vec3 area_vector = TriangleAreaVector(skull, t);
+  const Vec3 area_vector = t.AreaVector();
   e.area_mm2 = area_vector.norm();
   e.normal = area_vector / e.area_mm2;
-  e.depth_mm = depth_mm;
+  e.depth_mm = t.MeanDepth();
   e.longest2_mm2 =
       std::max({(e.b - e.a).squaredNorm(), (e.c - e.b).squaredNorm(), (e.a - e.c).squaredNorm()});
   e.edge_normal_a = (e.b - e.a).cross(e.normal);
   e.edge_normal_b = (e.c - e.b).cross(e.normal);
   e.edge_normal_c = (e.a - e.c).cross(e.normal);
-  e.gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
+  e.gain = e.most_gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
+  if (depth == EmitterDepth::kLinear) {
+    const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
+    e.least_share = *least / e.depth_mm;
+    e.most_share = *most / e.depth_mm;
+    e.slope = RelativeSlope(t, e.normal, e.area_mm2);
+    e.most_gain *= std::pow(e.most_share, DecayOf(kernel));
+  }
   return e;
 }
 
+// Appends the triangle, or, where the depth is linear and changes much, its quarters.
+void AppendEmitters(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel,
+                    std::vector<EmitterTriangle>& emitters) {
+  constexpr double kMostChange = 0.15;  // of the mean
+  const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
+  if (depth == EmitterDepth::kMean || *most - *least <= kMostChange * t.MeanDepth()) {
+    emitters.push_back(MakeTriangle(t, depth, kernel));
+    return;
+  }
+  DeepTriangle middle;
+  for (int c = 0; c < 3; ++c) {
+    middle.corner[c] = 0.5 * (t.corner[(c + 1) % 3] + t.corner[(c + 2) % 3]);
+    middle.depth_mm[c] = 0.5 * (t.depth_mm[(c + 1) % 3] + t.depth_mm[(c + 2) % 3]);
+  }
+  AppendEmitters(middle, depth, kernel, emitters);
+  for (int c = 0; c < 3; ++c) {
+    DeepTriangle quarter = middle;
+    quarter.corner[c] = t.corner[c];
+    quarter.depth_mm[c] = t.depth_mm[c];
+    std::swap(quarter.corner[(c + 1) % 3], quarter.corner[(c + 2) % 3]);
+    std::swap(quarter.depth_mm[(c + 1) % 3], quarter.depth_mm[(c + 2) % 3]);
+    AppendEmitters(quarter, depth, kernel, emitters);
+  }
+}
+
 std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
-                                          const Kernel& kernel) {
+                                          EmitterDepth over_triangle, const Kernel& kernel) {
   if (depth_mm.size() != skull.points.size()) {
     throw InputError(
         fmt::format("implicit surface: {} depths for {} vertices; one a vertex is needed",
@@ -50,9 +108,13 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   }
   std::vector<EmitterTriangle> emitters;
   for (const Triangle& t : skull.triangles) {
-    const double depth = (depth_mm[t[0]] + depth_mm[t[1]] + depth_mm[t[2]]) / 3;
-    if (std::isfinite(depth) && TriangleAreaVector(skull, t).norm() > 0) {
-      emitters.push_back(MakeTriangle(skull, t, depth, kernel));
+    DeepTriangle deep;
+    for (int c = 0; c < 3; ++c) {
+      deep.corner[c] = skull.points[t[c]];
+      deep.depth_mm[c] = depth_mm[t[c]];
+    }
+    if (std::isfinite(deep.MeanDepth()) && deep.AreaVector().norm() > 0) {
+      AppendEmitters(deep, over_triangle, kernel, emitters);
     }
   }
   if (emitters.empty()) {
@@ -124,7 +186,7 @@ class Tree {
     for (int e = begin; e < end; ++e) {
       box.extend(emitters[e].a).extend(emitters[e].b).extend(emitters[e].c);
       centers.extend(emitters[e].centroid);
-      nodes_[self].gain += emitters[e].gain;
+      nodes_[self].gain += emitters[e].most_gain;
     }
     nodes_[self].box = box;
     if (end - begin > kLeaf) {
@@ -158,6 +220,9 @@ std::vector<FlatBatch> MakeBatches(const EmitterKernel& kernel,
         for (int e = leaf.begin; e < leaf.end; ++e) {
           const EmitterTriangle& t = emitters[e];
           batch.Set(e - leaf.begin, t.a, t.b, t.c, t.normal, t.gain);
+          if (t.IsSloped()) {
+            batch.SetSlope(e - leaf.begin, t.slope);
+          }
         }
       });
     }
@@ -170,12 +235,12 @@ std::vector<FlatBatch> MakeBatches(const EmitterKernel& kernel,
 struct ImplicitSurface::Impl {
   Impl(const TriMesh& skull, std::span<const double> depth_mm, const ImplicitOptions& options)
       : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
-        emitters(MakeEmitters(skull, depth_mm, kernel)),
+        emitters(MakeEmitters(skull, depth_mm, DepthOver(options.emitter), kernel)),
         tree(emitters),
         batches(
             std::visit([this](const auto& k) { return MakeBatches(k, emitters, tree); }, kernel)),
         tail_error(options.tail_error),
-        decay(std::visit([](const auto& o) { return o.decay; }, options.emitter)) {
+        decay(DecayOf(kernel)) {
     std::visit(
         [this](const auto& k) {
           for (const EmitterTriangle& t : emitters) {

@@ -37,9 +37,10 @@ struct EmissionBounds {
 // taken as from 5 %, so that it is finite on vertices, edges and planes of emitters.
 class ImplicitSurface {
  public:
-  // depth_mm: one a vertex; a triangle emits with the mean of its three (thesis 3.1), and not at
-  // all where one is NaN. Throws InputError if nothing emits, if a depth is not positive, or if the
-  // sizes differ.
+  // depth_mm: one a vertex; a triangle emits with the mean of its three (thesis 3.1), or, if the
+  // emitter says so, linear between them, and not at all where one is NaN. With linear depths a
+  // triangle over which the depth changes by more than 15 % counts as several emitters. Throws
+  // InputError if nothing emits, if a depth is not positive, or if the sizes differ.
   ImplicitSurface(const TriMesh& skull, std::span<const double> depth_mm,
                   const ImplicitOptions& options);
   ~ImplicitSurface();

@@ -50,6 +50,7 @@ ImplicitFace Face(const ImplicitFaceOptions& options) {
 
 const std::vector<Emitter> kEmitters = {FlatEmitter{},
                                         FlatEmitter{3},
+                                        FlatEmitter{6, EmitterDepth::kLinear},
                                         SplitEmitter{},
                                         ThesisEmitter{},
                                         ThesisEmitter{.cut_below = 0.002},
@@ -102,7 +103,9 @@ class Bounds : public ::testing::TestWithParam<Emitter> {
  protected:
   // A triangle with a depth, and boxes of all sizes around it.
   void Check(const TriMesh& triangle, double depth_mm, const Box3& box, Random& random) const {
-    const ImplicitSurface surface(triangle, std::vector<double>(3, depth_mm), {GetParam(), 0});
+    const std::vector<double> depths = {0.97 * depth_mm, depth_mm, 1.03 * depth_mm};
+    const ImplicitSurface surface(triangle, depths, {GetParam(), 0});
+    ASSERT_EQ(surface.EmitterCount(), 1);
     const std::int32_t only = 0;
     EmissionBounds bounds;
     surface.BoundsIn(box, {&only, 1}, {&bounds, 1});
