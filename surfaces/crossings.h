@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a march over a grid finds, and the mesh that marching cubes makes of it. For the
-// polygonizers alone.
+// What a march over a grid finds, and the mesh that marching cubes makes of it.
 #pragma once
 
 #include <cstdint>

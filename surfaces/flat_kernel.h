@@ -54,6 +54,7 @@ class FlatKernel {
   }
   double Decay() const { return k_; }
   double Falloff() const { return k_ + 2; }  // height <= distance
+  double Cut() const { return 0; }
   double Advance(const EmitterTriangle&) const { return 0; }
   double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
   // What the triangle would emit if all of it were this far and had this share of its depth, at

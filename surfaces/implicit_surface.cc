@@ -135,6 +135,7 @@ struct Node {
   int left = -1, right = -1;  // -1 in a leaf
   int batch = -1;             // of a leaf, if there are batches
   double gain = 0;            // sum over its emitters
+  double greatest_gain = 0;
 };
 
 class Tree {
@@ -187,6 +188,7 @@ class Tree {
       box.extend(emitters[e].a).extend(emitters[e].b).extend(emitters[e].c);
       centers.extend(emitters[e].centroid);
       nodes_[self].gain += emitters[e].most_gain;
+      nodes_[self].greatest_gain = std::max(nodes_[self].greatest_gain, emitters[e].most_gain);
     }
     nodes_[self].box = box;
     if (end - begin > kLeaf) {
@@ -256,13 +258,15 @@ struct ImplicitSurface::Impl {
   void Near(const EmitterKernel& k, const Vec3& p, const Begin& begin, const Visit& visit) const {
     constexpr double kFirstShare = 1.0 / 128;
     const InversePower falloff(k.Falloff());
+    const double cut = (1 - kRounding) * k.Cut();
     const auto bound = [&](const Node& node) {
       const double distance2 = node.box.squaredExteriorDistance(p);
       if (distance2 <= advance_mm * advance_mm) {
         return std::numeric_limits<double>::infinity();
       }
-      return node.gain *
-             falloff(advance_mm == 0 ? distance2 : std::pow(std::sqrt(distance2) - advance_mm, 2));
+      const double share =
+          falloff(advance_mm == 0 ? distance2 : std::pow(std::sqrt(distance2) - advance_mm, 2));
+      return node.greatest_gain * share < cut ? 0 : node.gain * share;
     };
     double least = kFirstShare * tail_error;
     double left_out = 0;

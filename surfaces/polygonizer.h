@@ -20,7 +20,8 @@ struct NarrowBand {
 template <class Visitor>
 void Fields(Visitor&, NarrowBand&) {}
 
-// Every corner of the grid: PolygonizeAll (thesis 3.2.1). All threads.
+// Every corner of the grid: PolygonizeAll (thesis 3.2.1). At each, emitters too far to count are
+// left out as in NarrowBand. All threads.
 struct BruteForce {
   static constexpr std::string_view kName = "brute_force";
 };
