@@ -34,7 +34,9 @@ Json ImplicitJson(const ImplicitFace& face) {
           {"dropped_components", face.dropped_components},
           {"crossed_cells", face.counts.active_cells},
           {"corner_evaluations", face.counts.corner_evaluations},
-          {"edge_evaluations", face.counts.edge_evaluations}};
+          {"edge_evaluations", face.counts.edge_evaluations},
+          {"emitter_evaluations", face.counts.emitter_evaluations},
+          {"bound_evaluations", face.counts.bound_evaluations}};
 }
 
 Json LevelJson(const LevelSummary& level) {

@@ -4,6 +4,7 @@
 // 0.
 #pragma once
 
+#include <array>
 #include <string_view>
 #include <variant>
 
@@ -16,6 +17,7 @@ namespace semblance {
 struct ThesisEmitter {
   static constexpr std::string_view kName = "thesis";
   double decay = 6;
+  double cut_below = 0;
 };
 
 // Eq. 3.2: T moved out by t l emits with depth (1 - t) l; the prism under it is solid.
@@ -23,14 +25,24 @@ struct SplitEmitter {
   static constexpr std::string_view kName = "split";
   double decay = 6;
   double split = 0.5;
+  double cut_below = 0;
 };
 
 // (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the integral
 // is 2 pi h^(-k) / (k+1), so coplanar triangles of one depth sum to (l/h)^k: their surface is flat,
 // at exactly l, whatever the mesh.
+//
+// With the depth linear over T, l^k stands under the integral: no steps where depth changes from
+// triangle to triangle. (The thesis's emitters know but one depth a triangle.)
+enum class EmitterDepth { kMean, kLinear };
+constexpr auto EnumNames(EmitterDepth) {
+  return std::to_array<std::string_view>({"mean", "linear"});
+}
+
 struct FlatEmitter {
   static constexpr std::string_view kName = "flat";
   double decay = 6;
+  EmitterDepth depth = EmitterDepth::kMean;
 };
 
 using Emitter = std::variant<FlatEmitter, SplitEmitter, ThesisEmitter>;
@@ -42,10 +54,18 @@ inline constexpr FieldInfo kDecay{.name = "decay",
                                   .doc =
                                       "k: how fast emission falls with distance; more blends less "
                                       "and follows the skull's shape more (thesis: 3, 6, 15)"};
-}
+inline constexpr FieldInfo kCutBelow{
+    .name = "cut_below",
+    .min = 0,
+    .max = 0.1,
+    .doc =
+        "a triangle emits nothing where it would emit less than this; the thesis's boxes (3.2.2, "
+        "m = 500), but round: 0.002. What is lost adds up where the mesh is dense; 0 cuts nothing"};
+}  // namespace emitter_internal
 template <class Visitor>
 void Fields(Visitor& visit, ThesisEmitter& o) {
   visit(emitter_internal::kDecay, o.decay);
+  visit(emitter_internal::kCutBelow, o.cut_below);
 }
 template <class Visitor>
 void Fields(Visitor& visit, SplitEmitter& o) {
@@ -56,10 +76,15 @@ void Fields(Visitor& visit, SplitEmitter& o) {
                   .doc = "t: share of the depth by which the triangle is moved out before it "
                          "emits; 0 is the thesis's first emitter"},
         o.split);
+  visit(emitter_internal::kCutBelow, o.cut_below);
 }
 template <class Visitor>
 void Fields(Visitor& visit, FlatEmitter& o) {
   visit(emitter_internal::kDecay, o.decay);
+  visit(FieldInfo{.name = "depth",
+                  .doc = "of a triangle: the mean of its corners' (thesis 3.1), or linear between "
+                         "them"},
+        o.depth);
 }
 
 }  // namespace semblance

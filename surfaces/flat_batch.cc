@@ -93,11 +93,27 @@ SEMBLANCE_INLINE void Raise(Lanes& value, Lanes& square, int exponent) {
   }
 }
 
+// Multiplies by the depth over its mean, to the power k: at the part's centroid, and how it changes
+// from there with the integrand (tilt) and on its own (bow).
+SEMBLANCE_INLINE void Weigh(const FlatBatch& batch, const Part& part, double smaller, int k,
+                            const Lanes& tilt, Lanes& value, Lanes& bend) {
+  Lanes share{}, weight{};
+  for (int l = 0; l < kLanes; ++l) {
+    share[l] = 1 + part.u * batch.rise_ab[l] + part.v * batch.rise_ac[l];
+    weight[l] = 1;
+    bend[l] += smaller * k * (tilt[l] / share[l] + 0.5 * (k - 1) * batch.bow[l]);
+  }
+  Raise(weight, share, k);
+  for (int l = 0; l < kLanes; ++l) {
+    value[l] *= weight[l];
+  }
+}
+
 // Adds each triangle's integrand at one part's centroid, corrected by half the trace of its Hessian
 // times the part's covariance, which is `smaller` times the triangle's.
 SEMBLANCE_INLINE void AddPart(const FlatBatch& batch, const Seen& seen, const Part& part,
                               double smaller, int power, Lanes& sum) {
-  Lanes value{}, square{}, bend{};
+  Lanes value{}, square{}, bend{}, tilt{};
   for (int l = 0; l < kLanes; ++l) {
     const double dx = seen.from[0][l] - part.u * batch.ab[0][l] - part.v * batch.ac[0][l];
     const double dy = seen.from[1][l] - part.u * batch.ab[1][l] - part.v * batch.ac[1][l];
@@ -111,6 +127,8 @@ SEMBLANCE_INLINE void AddPart(const FlatBatch& batch, const Seen& seen, const Pa
                       ((power + 2) * along2 * inverse2 - batch.spread_mm2[l]);
     value[l] = inverse2;
     square[l] = inverse2;
+    tilt[l] = power * inverse2 *
+              (dx * batch.tilt_mm[0][l] + dy * batch.tilt_mm[1][l] + dz * batch.tilt_mm[2][l]);
   }
   if ((power & 1) != 0) {
     for (int l = 0; l < kLanes; ++l) {
@@ -119,6 +137,9 @@ SEMBLANCE_INLINE void AddPart(const FlatBatch& batch, const Seen& seen, const Pa
     Raise(value, square, power >> 1);
   } else {
     Raise(value, square, (power >> 1) - 1);
+  }
+  if (batch.sloped) {
+    Weigh(batch, part, smaller, power - 3, tilt, value, bend);
   }
   for (int l = 0; l < kLanes; ++l) {
     sum[l] += value[l] * bend[l];
@@ -140,6 +161,21 @@ void FlatBatch::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c, const
   gain[lane] = lane_gain;
   spread_mm2[lane] = (to_b.squaredNorm() + to_c.squaredNorm() + bc2) / 36;
   longest_mm2[lane] = std::max({to_b.squaredNorm(), to_c.squaredNorm(), bc2});
+}
+
+void FlatBatch::SetSlope(int lane, const Vec3& slope) {
+  const Vec3 to_b(ab[0][lane], ab[1][lane], ab[2][lane]),
+      to_c(ac[0][lane], ac[1][lane], ac[2][lane]);
+  sloped = true;
+  rise_ab[lane] = to_b.dot(slope);
+  rise_ac[lane] = to_c.dot(slope);
+  const Vec3 tilt = (to_b * rise_ab[lane] + to_c * rise_ac[lane] +
+                     (to_c - to_b) * (rise_ac[lane] - rise_ab[lane])) /
+                    36;
+  for (int k = 0; k < 3; ++k) {
+    tilt_mm[k][lane] = tilt[k];
+  }
+  bow[lane] = tilt.dot(slope);
 }
 
 SEMBLANCE_WIDE unsigned EmitFlat(const FlatBatch& batch, const Vec3& p, int power,

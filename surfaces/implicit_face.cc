@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surfaces/crossings.h"
 #include "surfaces/decimate.h"
 #include "surfaces/error.h"
+#include "surfaces/parallel.h"
 
 namespace semblance {
 namespace {
@@ -90,7 +92,8 @@ PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
     const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
     const std::vector<std::int64_t> seeds = FindSeeds(shell, depth_mm, field, grid);
-    PolygonizeResult result = PolygonizeFrom(field, grid, seeds, options.edges, context);
+    PolygonizeResult result =
+        PolygonizeSurface(options.polygonizer, surface, grid, seeds, options.edges, context);
     cell_mm = grid.cell_mm.x();
     if (!result.touches_border && !result.mesh.triangles.empty()) {
       return result;
@@ -121,7 +124,55 @@ void AppendNotes(const ImplicitFaceOptions& options, std::span<const double> dep
   }
 }
 
+// The crossing nearest to `p` along `normal`, within reach; p itself if there is none.
+Vec3 OnSurface(const ImplicitSurface& surface, const Vec3& p, const Vec3& normal, double reach_mm) {
+  constexpr int kSteps = 8;
+  const EdgeSearchOptions search{.method = EdgeSearch::kRegulaFalsi, .tolerance = 1e-3};
+  double from = surface.Flattened(p);
+  const Vec3 step = (from > 0 ? 1 : -1) * reach_mm / kSteps * normal;
+  for (int n = 0; n < kSteps; ++n) {
+    const Vec3 start = p + n * step;
+    const double to = surface.Flattened(start + step);
+    if ((from > 0) != (to > 0)) {
+      std::int64_t evaluations = 0;
+      return start + SearchCrossing(
+                         from, to, search,
+                         [&](double t) { return surface.Flattened(start + t * step); },
+                         evaluations) *
+                         step;
+    }
+    from = to;
+  }
+  return p;
+}
+
+// Puts back the corners of triangles that have turned by a right angle or more, until none has.
+void Unturn(const TriMesh& before, TriMesh& mesh) {
+  bool turned = true;
+  while (turned) {
+    turned = false;
+    for (const Triangle& t : mesh.triangles) {
+      if (TriangleAreaVector(mesh, t).dot(TriangleAreaVector(before, t)) <= 0) {
+        for (const std::int32_t v : t) {
+          turned |= mesh.points[v] != before.points[v];
+          mesh.points[v] = before.points[v];
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
+
+void ProjectOnto(const ImplicitSurface& surface, double reach_mm, const RunContext& context,
+                 TriMesh& mesh) {
+  const TriMesh before = mesh;
+  const std::vector<Vec3> normals = VertexNormals(before);
+  ParallelFor(mesh.points.size(), context.threads, 64, [&](std::size_t v) {
+    mesh.points[v] = OnSurface(surface, before.points[v], normals[v], reach_mm);
+  });
+  Unturn(before, mesh);
+}
 
 TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
   if (mesh.triangles.empty()) {
@@ -156,6 +207,9 @@ ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> dep
   face.dense = KeepOutermost(polygonized.mesh, face.dropped_components);
   context.Report("decimate");
   face.mesh = Decimate(face.dense, options.target_triangles);
+  if (options.project) {
+    ProjectOnto(surface, face.cell_mm, context, face.mesh);
+  }
   AppendNotes(options, depth_mm, face);
   return face;
 }

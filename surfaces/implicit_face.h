@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "surfaces/implicit_surface.h"
-#include "surfaces/polygonize.h"
+#include "surfaces/polygonizer.h"
 #include "surfaces/run_context.h"
 
 namespace semblance {
@@ -16,8 +16,10 @@ namespace semblance {
 struct ImplicitFaceOptions {
   ImplicitOptions field = {};
   int resolution = 150;
+  Polygonizer polygonizer = NarrowBand{};
   EdgeSearchOptions edges = {};
   int target_triangles = 14000;
+  bool project = false;
 };
 template <class Visitor>
 void Fields(Visitor& visit, ImplicitFaceOptions& o) {
@@ -28,17 +30,24 @@ void Fields(Visitor& visit, ImplicitFaceOptions& o) {
                   .doc = "n: cells along the longest side of the shell with its depth; the "
                          "thesis's runs use 150"},
         o.resolution);
+  visit(FieldInfo{.name = "polygonizer",
+                  .doc = "how the surface is found in the grid; the mesh is the same"},
+        o.polygonizer);
   visit(FieldInfo{.name = "edges", .doc = "how crossings are found"}, o.edges);
   visit(FieldInfo{.name = "target_triangles",
                   .min = 100,
                   .max = 10000000,
                   .doc = "of the decimated face; the thesis: 14000"},
         o.target_triangles);
+  visit(FieldInfo{.name = "project",
+                  .doc = "lay the decimated face's vertices onto the implicit surface again, which "
+                         "decimation leaves by some hundredths of a millimetre"},
+        o.project);
 }
 
 struct ImplicitFace {
   TriMesh dense;  // as polygonised: closed, manifold, outward
-  TriMesh mesh;   // decimated
+  TriMesh mesh;   // decimated and, if asked for, projected
   double cell_mm = kNaN;
   std::int64_t emitters = -1;
   double emitters_per_square_depth = kNaN;  // see ImplicitSurface
@@ -52,6 +61,11 @@ struct ImplicitFace {
 // there the component with the largest volume is kept. Throws InputError as ImplicitSurface does.
 ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> depth_mm,
                                const ImplicitFaceOptions& options, const RunContext& context);
+
+// Moves each vertex along its normal onto the surface, by at most reach_mm: where it is not within
+// that, and where a triangle would turn by a right angle or more, vertices stay.
+void ProjectOnto(const ImplicitSurface& surface, double reach_mm, const RunContext& context,
+                 TriMesh& mesh);
 
 // The component with the largest enclosed volume; `dropped` counts the others. Throws InputError
 // for an empty mesh.

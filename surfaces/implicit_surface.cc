@@ -7,34 +7,92 @@
 #include <cmath>
 #include <numeric>
 
-#include "surfaces/emitter_kernel.h"
+#include "surfaces/emitter_bounds.h"
 #include "surfaces/error.h"
 
 namespace semblance {
 namespace {
 
-EmitterTriangle MakeTriangle(const TriMesh& skull, const Triangle& t, double depth_mm,
-                             const Kernel& kernel) {
+double DecayOf(const Kernel& kernel) {
+  return std::visit([](const auto& k) { return k.Decay(); }, kernel);
+}
+
+EmitterDepth DepthOver(const Emitter& emitter) {
+  const auto* flat = std::get_if<FlatEmitter>(&emitter);
+  return flat ? flat->depth : EmitterDepth::kMean;
+}
+
+// A triangle with the depths of its corners.
+struct DeepTriangle {
+  std::array<Vec3, 3> corner;
+  std::array<double, 3> depth_mm;
+
+  double MeanDepth() const { return (depth_mm[0] + depth_mm[1] + depth_mm[2]) / 3; }
+  Vec3 AreaVector() const { return 0.5 * (corner[1] - corner[0]).cross(corner[2] - corner[0]); }
+};
+
+// The gradient of the depth over its mean, in the plane.
+Vec3 RelativeSlope(const DeepTriangle& t, const Vec3& normal, double area_mm2) {
+  Vec3 sum = Vec3::Zero();
+  for (int c = 0; c < 3; ++c) {
+    sum += t.depth_mm[c] * normal.cross(t.corner[(c + 2) % 3] - t.corner[(c + 1) % 3]);
+  }
+  return sum / (2 * area_mm2 * t.MeanDepth());
+}
+
+EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel) {
   EmitterTriangle e;
-  e.a = skull.points[t[0]];
-  e.b = skull.points[t[1]];
-  e.c = skull.points[t[2]];
+  e.a = t.corner[0];
+  e.b = t.corner[1];
+  e.c = t.corner[2];
   e.centroid = (e.a + e.b + e.c) / 3;
-  const Vec3 area_vector = TriangleAreaVector(skull, t);
+  const Vec3 area_vector = t.AreaVector();
   e.area_mm2 = area_vector.norm();
   e.normal = area_vector / e.area_mm2;
-  e.depth_mm = depth_mm;
+  e.depth_mm = t.MeanDepth();
   e.longest2_mm2 =
       std::max({(e.b - e.a).squaredNorm(), (e.c - e.b).squaredNorm(), (e.a - e.c).squaredNorm()});
   e.edge_normal_a = (e.b - e.a).cross(e.normal);
   e.edge_normal_b = (e.c - e.b).cross(e.normal);
   e.edge_normal_c = (e.a - e.c).cross(e.normal);
-  e.gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
+  e.gain = e.most_gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
+  if (depth == EmitterDepth::kLinear) {
+    const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
+    e.least_share = *least / e.depth_mm;
+    e.most_share = *most / e.depth_mm;
+    e.slope = RelativeSlope(t, e.normal, e.area_mm2);
+    e.most_gain *= std::pow(e.most_share, DecayOf(kernel));
+  }
   return e;
 }
 
+// Appends the triangle, or, where the depth is linear and changes much, its quarters.
+void AppendEmitters(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel,
+                    std::vector<EmitterTriangle>& emitters) {
+  constexpr double kMostChange = 0.15;  // of the mean
+  const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
+  if (depth == EmitterDepth::kMean || *most - *least <= kMostChange * t.MeanDepth()) {
+    emitters.push_back(MakeTriangle(t, depth, kernel));
+    return;
+  }
+  DeepTriangle middle;
+  for (int c = 0; c < 3; ++c) {
+    middle.corner[c] = 0.5 * (t.corner[(c + 1) % 3] + t.corner[(c + 2) % 3]);
+    middle.depth_mm[c] = 0.5 * (t.depth_mm[(c + 1) % 3] + t.depth_mm[(c + 2) % 3]);
+  }
+  AppendEmitters(middle, depth, kernel, emitters);
+  for (int c = 0; c < 3; ++c) {
+    DeepTriangle quarter = middle;
+    quarter.corner[c] = t.corner[c];
+    quarter.depth_mm[c] = t.depth_mm[c];
+    std::swap(quarter.corner[(c + 1) % 3], quarter.corner[(c + 2) % 3]);
+    std::swap(quarter.depth_mm[(c + 1) % 3], quarter.depth_mm[(c + 2) % 3]);
+    AppendEmitters(quarter, depth, kernel, emitters);
+  }
+}
+
 std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
-                                          const Kernel& kernel) {
+                                          EmitterDepth over_triangle, const Kernel& kernel) {
   if (depth_mm.size() != skull.points.size()) {
     throw InputError(
         fmt::format("implicit surface: {} depths for {} vertices; one a vertex is needed",
@@ -50,9 +108,13 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   }
   std::vector<EmitterTriangle> emitters;
   for (const Triangle& t : skull.triangles) {
-    const double depth = (depth_mm[t[0]] + depth_mm[t[1]] + depth_mm[t[2]]) / 3;
-    if (std::isfinite(depth) && TriangleAreaVector(skull, t).norm() > 0) {
-      emitters.push_back(MakeTriangle(skull, t, depth, kernel));
+    DeepTriangle deep;
+    for (int c = 0; c < 3; ++c) {
+      deep.corner[c] = skull.points[t[c]];
+      deep.depth_mm[c] = depth_mm[t[c]];
+    }
+    if (std::isfinite(deep.MeanDepth()) && deep.AreaVector().norm() > 0) {
+      AppendEmitters(deep, over_triangle, kernel, emitters);
     }
   }
   if (emitters.empty()) {
@@ -62,6 +124,10 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   return emitters;
 }
 
+// Integrals of a flat emitter by two numerical ways, each within 1 %.
+constexpr double kFlatShare = 0.025;
+constexpr double kRounding = 1e-9;
+
 // Bounding boxes over runs of emitters, for leaving out those whose emission is too small to count.
 struct Node {
   Box3 box;
@@ -69,6 +135,7 @@ struct Node {
   int left = -1, right = -1;  // -1 in a leaf
   int batch = -1;             // of a leaf, if there are batches
   double gain = 0;            // sum over its emitters
+  double greatest_gain = 0;
 };
 
 class Tree {
@@ -120,7 +187,8 @@ class Tree {
     for (int e = begin; e < end; ++e) {
       box.extend(emitters[e].a).extend(emitters[e].b).extend(emitters[e].c);
       centers.extend(emitters[e].centroid);
-      nodes_[self].gain += emitters[e].gain;
+      nodes_[self].gain += emitters[e].most_gain;
+      nodes_[self].greatest_gain = std::max(nodes_[self].greatest_gain, emitters[e].most_gain);
     }
     nodes_[self].box = box;
     if (end - begin > kLeaf) {
@@ -154,6 +222,9 @@ std::vector<FlatBatch> MakeBatches(const EmitterKernel& kernel,
         for (int e = leaf.begin; e < leaf.end; ++e) {
           const EmitterTriangle& t = emitters[e];
           batch.Set(e - leaf.begin, t.a, t.b, t.c, t.normal, t.gain);
+          if (t.IsSloped()) {
+            batch.SetSlope(e - leaf.begin, t.slope);
+          }
         }
       });
     }
@@ -166,12 +237,12 @@ std::vector<FlatBatch> MakeBatches(const EmitterKernel& kernel,
 struct ImplicitSurface::Impl {
   Impl(const TriMesh& skull, std::span<const double> depth_mm, const ImplicitOptions& options)
       : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
-        emitters(MakeEmitters(skull, depth_mm, kernel)),
+        emitters(MakeEmitters(skull, depth_mm, DepthOver(options.emitter), kernel)),
         tree(emitters),
         batches(
             std::visit([this](const auto& k) { return MakeBatches(k, emitters, tree); }, kernel)),
         tail_error(options.tail_error),
-        decay(std::visit([](const auto& o) { return o.decay; }, options.emitter)) {
+        decay(DecayOf(kernel)) {
     std::visit(
         [this](const auto& k) {
           for (const EmitterTriangle& t : emitters) {
@@ -187,13 +258,15 @@ struct ImplicitSurface::Impl {
   void Near(const EmitterKernel& k, const Vec3& p, const Begin& begin, const Visit& visit) const {
     constexpr double kFirstShare = 1.0 / 128;
     const InversePower falloff(k.Falloff());
+    const double cut = (1 - kRounding) * k.Cut();
     const auto bound = [&](const Node& node) {
       const double distance2 = node.box.squaredExteriorDistance(p);
       if (distance2 <= advance_mm * advance_mm) {
         return std::numeric_limits<double>::infinity();
       }
-      return node.gain *
-             falloff(advance_mm == 0 ? distance2 : std::pow(std::sqrt(distance2) - advance_mm, 2));
+      const double share =
+          falloff(advance_mm == 0 ? distance2 : std::pow(std::sqrt(distance2) - advance_mm, 2));
+      return node.greatest_gain * share < cut ? 0 : node.gain * share;
     };
     double least = kFirstShare * tail_error;
     double left_out = 0;
@@ -205,9 +278,16 @@ struct ImplicitSurface::Impl {
   }
 
   template <class EmitterKernel>
-  double Sum(const EmitterKernel& k, const Vec3& p) const {
+  double Emission(const EmitterKernel& k, int e, const Vec3& p) const {
+    const double height = (p - emitters[e].a).dot(emitters[e].normal);
+    return height > 0 ? std::min(k.Emission(emitters[e], p, height), kMostEmission) : 0;
+  }
+
+  template <class EmitterKernel>
+  double Sum(const EmitterKernel& k, const Vec3& p, std::int64_t& evaluations) const {
     double sum = 0;
     const auto add = [&](const Node& leaf) {
+      evaluations += leaf.end - leaf.begin;
       if constexpr (std::is_same_v<EmitterKernel, FlatKernel>) {
         if (leaf.batch >= 0) {
           sum += k.Batch(batches[leaf.batch], &emitters[leaf.begin], p);
@@ -215,10 +295,7 @@ struct ImplicitSurface::Impl {
         }
       }
       for (int e = leaf.begin; e < leaf.end; ++e) {
-        const double height = (p - emitters[e].a).dot(emitters[e].normal);
-        if (height > 0) {
-          sum += std::min(k.Emission(emitters[e], p, height), kMostEmission);
-        }
+        sum += Emission(k, e, p);
       }
     };
     Near(
@@ -241,14 +318,71 @@ ImplicitSurface::~ImplicitSurface() = default;
 ImplicitSurface::ImplicitSurface(ImplicitSurface&&) noexcept = default;
 
 double ImplicitSurface::Value(const Vec3& p) const {
-  return std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p); }, impl_->kernel) - 1;
+  std::int64_t evaluations = 0;
+  return std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p, evaluations); },
+                    impl_->kernel) -
+         1;
 }
 
 double ImplicitSurface::Flattened(const Vec3& p) const {
+  std::int64_t evaluations = 0;
+  return Flattened(p, evaluations);
+}
+
+double ImplicitSurface::Flattened(const Vec3& p, std::int64_t& emitters) const {
+  return Flatten(std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p, emitters); },
+                            impl_->kernel));
+}
+
+double ImplicitSurface::Flatten(double emission) const {
   constexpr double kLowest = -10;
-  const double emission = Value(p) + 1;
   return emission > 0 ? std::max(1 - std::pow(emission, -1 / impl_->decay), kLowest) : kLowest;
 }
+
+double ImplicitSurface::SumOf(std::span<const std::int32_t> emitters, const Vec3& p) const {
+  return std::visit(
+      [&](const auto& kernel) {
+        double sum = 0;
+        for (const std::int32_t e : emitters) {
+          sum += impl_->Emission(kernel, e, p);
+        }
+        return sum;
+      },
+      impl_->kernel);
+}
+
+double ImplicitSurface::SumShare() const {
+  return std::holds_alternative<FlatKernel>(impl_->kernel) ? kFlatShare : 0;
+}
+
+void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> emitters,
+                               std::span<EmissionBounds> bounds) const {
+  const BoxView view(box);
+  const double share = SumShare() + kRounding;
+  std::visit(
+      [&](const auto& kernel) {
+        for (std::size_t n = 0; n < emitters.size(); ++n) {
+          const EmissionBounds exact = BoundsOn(kernel, impl_->emitters[emitters[n]], view);
+          bounds[n] = {(1 - share) * exact.least, (1 + share) * exact.most};
+        }
+      },
+      impl_->kernel);
+}
+
+Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
+  const EmitterTriangle& t = impl_->emitters[emitter];
+  Box3 box;
+  box.extend(t.a).extend(t.b).extend(t.c);
+  const auto [advance, depth] = std::visit(
+      [&t](const auto& kernel) { return std::pair(kernel.Advance(t), kernel.EmittingDepth(t)); },
+      impl_->kernel);
+  const Box3 moved = box.translated(advance * t.normal);
+  box.extend(moved);  // with the prism
+  const Vec3 reach = Vec3::Constant(depth * std::pow(m, 1 / impl_->decay));
+  return {box.min() - reach, box.max() + reach};
+}
+
+double ImplicitSurface::TailError() const { return impl_->tail_error; }
 
 std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
   std::int64_t count = 0;

@@ -50,15 +50,33 @@ double Flux(const Edge& e, double height, int n) {
   return e.d * sum + (odd ? AngleLeft(e, height) : 0);
 }
 
+Edge Seen(const EdgeFromFoot& edge, double height) {
+  const double a2 = height * height + edge.distance * edge.distance;
+  return {edge.distance, edge.begin, edge.end, std::sqrt(a2 + edge.begin * edge.begin),
+          std::sqrt(a2 + edge.end * edge.end)};
+}
+
 }  // namespace
+
+double IntegrateAlong(const EdgeFromFoot& edge, double height, int n) {
+  const Edge e = Seen(edge, height);
+  const bool odd = (n & 1) != 0;
+  const double a2 = height * height + e.d * e.d;
+  const double inverse0 = 1 / (e.r0 * e.r0), inverse1 = 1 / (e.r1 * e.r1);
+  double length = FirstLength(e, a2, odd);
+  double end0 = e.t0 * inverse0 / (odd ? e.r0 : 1), end1 = e.t1 * inverse1 / (odd ? e.r1 : 1);
+  for (int j = odd ? 3 : 2; j < n; j += 2) {
+    length = ((end1 - end0) + (j - 1) * length) / (j * a2);
+    end0 *= inverse0;
+    end1 *= inverse1;
+  }
+  return length;
+}
 
 double IntegrateInversePower(std::span<const EdgeFromFoot> edges, double height, int n) {
   double flux = 0;
   for (const EdgeFromFoot& edge : edges) {
-    const double a2 = height * height + edge.distance * edge.distance;
-    flux += Flux({edge.distance, edge.begin, edge.end, std::sqrt(a2 + edge.begin * edge.begin),
-                  std::sqrt(a2 + edge.end * edge.end)},
-                 height, n);
+    flux += Flux(Seen(edge, height), height, n);
   }
   const double inverse2 = 1 / (height * height);
   double scale = (n & 1) != 0 ? 1 / height : 1;

@@ -20,4 +20,7 @@ struct EdgeFromFoot {
 // 1e-16 times the n-th power of distance over height. Throws nothing.
 double IntegrateInversePower(std::span<const EdgeFromFoot> edges, double height, int n);
 
+// The integral over one edge of |p - q|^-n dq; n >= 2; mm^(1-n).
+double IntegrateAlong(const EdgeFromFoot& edge, double height, int n);
+
 }  // namespace semblance

@@ -34,6 +34,9 @@ struct SampleGrid {
   std::int64_t CornerCount() const { return std::int64_t{counts[0]} * counts[1] * counts[2]; }
 };
 
+// Throws InputError unless origin and cell are usable and there are 2 corners each way.
+void CheckGrid(const SampleGrid& grid);
+
 // Positive inside, negative outside; called from several threads at once.
 using ScalarField = std::function<double(const Vec3&)>;
 
@@ -59,10 +62,14 @@ void Fields(Visitor& visit, EdgeSearchOptions& o) {
         o.tolerance);
 }
 
+// What it took. Evaluations of the field at a corner of the grid and in searches along edges; those
+// of single emitters and of bounds on single emitters, where the field is a sum of emitters.
 struct PolygonizeSummary {
-  std::int64_t active_cells = -1;
-  std::int64_t corner_evaluations = -1;
-  std::int64_t edge_evaluations = -1;
+  std::int64_t active_cells = 0;
+  std::int64_t corner_evaluations = 0;
+  std::int64_t edge_evaluations = 0;
+  std::int64_t emitter_evaluations = 0;
+  std::int64_t bound_evaluations = 0;
 };
 
 struct PolygonizeResult {
@@ -71,13 +78,15 @@ struct PolygonizeResult {
   PolygonizeSummary summary;
 };
 
-// All cells of the grid: every corner is evaluated. The reference for the faster way.
+// All cells of the grid, layer by layer: every corner is evaluated, two layers of them are kept
+// (thesis 3.2.1). The reference for the faster ways.
 PolygonizeResult PolygonizeAll(const ScalarField& field, const SampleGrid& grid,
                                const EdgeSearchOptions& options, const RunContext& context);
 
 // Only the cells that the surface crosses, found from the given cells (index of their lowest
 // corner) by going on across every face that the surface crosses (Wyvill et al. 1986; Bloomenthal
-// 1988). Finds the components that touch a seed cell, whole, and no others.
+// 1988). Finds the components that touch a seed cell, whole, and no others. Memory grows with the
+// surface, not with the grid.
 PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
                                 std::span<const std::int64_t> seed_cells,
                                 const EdgeSearchOptions& options, const RunContext& context);

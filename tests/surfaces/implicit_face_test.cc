@@ -78,6 +78,27 @@ TEST(ImplicitFace, AnOpenShellStillGivesAClosedFace) {
   ExpectClosedManifold(face.dense);
 }
 
+TEST(ImplicitFace, ProjectedVerticesLieOnTheSurface) {
+  const TriMesh sphere = SphereMesh({3, 2, 1}, 80, 20);
+  std::vector<double> depth;
+  for (const Vec3& p : sphere.points) {
+    depth.push_back(8 + 2 * std::sin(0.05 * p.x()));
+  }
+  const ImplicitSurface surface(sphere, depth, {});
+  const auto rms = [&](bool project) {
+    const ImplicitFace face = BuildImplicitFace(
+        sphere, depth, {.resolution = 50, .target_triangles = 1500, .project = project}, {});
+    ExpectClosedManifold(face.mesh);
+    double sum = 0;
+    for (const Vec3& p : face.mesh.points) {
+      sum += std::pow(8 * surface.Flattened(p), 2);  // about mm
+    }
+    return std::sqrt(sum / static_cast<double>(face.mesh.points.size()));
+  };
+  EXPECT_LT(rms(true), 0.005);
+  EXPECT_GT(rms(false), 0.02);
+}
+
 TEST(KeepOutermost, DropsInnerSheetsAndFragments) {
   TriMesh inner = SphereMesh({0, 0, 0}, 5, 8);
   for (Triangle& t : inner.triangles) {

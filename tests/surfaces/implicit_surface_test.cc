@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+#include <numeric>
+
 #include "surfaces/error.h"
 #include "surfaces/mesh_query.h"
 #include "tests/testing/shapes.h"
@@ -78,6 +81,7 @@ INSTANTIATE_TEST_SUITE_P(BCalc, PlateTable,
 class EmitterLaws : public ::testing::TestWithParam<Emitter> {};
 INSTANTIATE_TEST_SUITE_P(All, EmitterLaws,
                          ::testing::Values(Emitter(FlatEmitter{}), Emitter(FlatEmitter{4.5}),
+                                           Emitter(FlatEmitter{6, EmitterDepth::kLinear}),
                                            Emitter(SplitEmitter{}), Emitter(ThesisEmitter{})));
 
 TEST_P(EmitterLaws, NothingIsInfiniteOrNaN) {
@@ -143,36 +147,78 @@ TEST_P(EmitterLaws, TheTailLeftOutIsWithinItsBound) {
   }
 }
 
-// Far, near, beside and over the triangle; 4^7 parts, each by its centroid, are the oracle.
-TEST(FlatEmitter, ATriangleAloneIsItsIntegral) {
-  const TriMesh triangle{{{0, 0, 0}, {4, 0, 0}, {1, 3, 0}}, {{0, 1, 2}}};
+// The emission of a triangle by 4^7 parts, each by its centroid. Depths of its corners.
+double EmissionByParts(const TriMesh& t, const Vec3& depth_mm, double decay, const Vec3& p) {
   const int parts = 128;
-  const double depth = 7, pi = std::acos(-1.0);
-  Random random(8);
-  for (const double decay : {6.0, 5.0, 4.5}) {
-    const ImplicitSurface surface = Surface(triangle, depth, FlatEmitter{decay}, 0);
-    for (int n = 0; n < 60; ++n) {
-      const double reach = n % 2 == 0 ? 3 : 20;
-      const Vec3 p(random.Uniform(-reach, reach), random.Uniform(-reach, reach),
-                   random.Uniform(0.4, reach));
-      double sum = 0;
-      for (int i = 0; i < parts; ++i) {
-        for (int j = 0; i + j < parts; ++j) {
-          for (const double third : {1.0 / 3, 2.0 / 3}) {
-            if (third > 0.5 && i + j + 1 >= parts) {
-              continue;
-            }
-            const double s = (i + third) / parts, t = (j + third) / parts;
-            sum += std::pow((p - Vec3(4 * s + t, 3 * t, 0)).norm(), -(decay + 3));
-          }
+  const Vec3 ab = t.points[1] - t.points[0], ac = t.points[2] - t.points[0];
+  double sum = 0;
+  for (int i = 0; i < parts; ++i) {
+    for (int j = 0; i + j < parts; ++j) {
+      for (const double third : {1.0 / 3, 2.0 / 3}) {
+        if (third < 0.5 || i + j + 1 < parts) {
+          const double u = (i + third) / parts, v = (j + third) / parts;
+          sum += std::pow(depth_mm.dot(Vec3(1 - u - v, u, v)), decay) *
+                 std::pow((p - t.points[0] - u * ab - v * ac).norm(), -(decay + 3));
         }
       }
-      const double integral = sum * 6.0 / (parts * parts);
-      const double emission = (decay + 1) / (2 * pi) * std::pow(depth, decay) * p.z() * integral;
-      EXPECT_NEAR((surface.Value(p) + 1) / emission, 1, decay == 4.5 ? 0.03 : 0.01)
-          << decay << ": " << p.transpose();
     }
   }
+  return (decay + 1) / (2 * std::numbers::pi) * p.z() * sum * 0.5 * ab.cross(ac).norm() /
+         (parts * parts);
+}
+
+// Far, near, beside and over the triangle, which lies in the plane z = 0.
+void ExpectEmissionByParts(const FlatEmitter& emitter, const Vec3& depth_mm, double within) {
+  const TriMesh triangle{{{0, 0, 0}, {4, 0, 0}, {1, 3, 0}}, {{0, 1, 2}}};
+  const ImplicitSurface surface(
+      triangle, std::vector<double>{depth_mm[0], depth_mm[1], depth_mm[2]}, {emitter, 0});
+  std::vector<std::int32_t> all(surface.EmitterCount());
+  std::iota(all.begin(), all.end(), 0);
+  Random random(8);
+  for (int n = 0; n < 60; ++n) {
+    const double reach = n % 2 == 0 ? 3 : 20;
+    const Vec3 p(random.Uniform(-reach, reach), random.Uniform(-reach, reach),
+                 random.Uniform(0.4, reach));
+    const double emission = EmissionByParts(triangle, depth_mm, emitter.decay, p);
+    EXPECT_NEAR((surface.Value(p) + 1) / emission, 1, within)
+        << emitter.decay << ": " << p.transpose();
+    EXPECT_NEAR(surface.SumOf(all, p) / emission, 1, within) << p.transpose();
+  }
+}
+
+TEST(FlatEmitter, ATriangleAloneIsItsIntegral) {
+  for (const double decay : {6.0, 5.0, 4.5}) {
+    ExpectEmissionByParts({decay}, Vec3(7, 7, 7), decay == 4.5 ? 0.03 : 0.012);
+  }
+}
+
+TEST(FlatEmitter, WithLinearDepthATriangleIsTheIntegralOfItsDepth) {
+  for (const double decay : {6.0, 5.0, 4.5}) {
+    for (const Vec3& depth : {Vec3(7.3, 7, 6.6), Vec3(4, 7, 9), Vec3(7, 7, 7)}) {
+      ExpectEmissionByParts({decay, EmitterDepth::kLinear}, depth, decay == 4.5 ? 0.04 : 0.015);
+    }
+  }
+}
+
+// Over a plate whose depth rises by a tenth of the way: in each triangle the mean makes a step.
+TEST(FlatEmitter, WithLinearDepthASlopeHasNoSteps) {
+  const TriMesh plate = Plate(160, 20);
+  std::vector<double> depth;
+  for (const Vec3& p : plate.points) {
+    depth.push_back(4 + 0.1 * p.x());
+  }
+  const auto roughness = [&](EmitterDepth over_triangle) {
+    const ImplicitSurface surface(plate, depth, {FlatEmitter{6, over_triangle}, 1e-4});
+    double most = 0;
+    for (double x = 20; x < 36; x += 0.5) {
+      const auto height = [&](double at) {
+        return CrossingHeight(surface, {at, 80, 0}, Vec3::UnitZ(), 12);
+      };
+      most = std::max(most, std::abs(height(x) - 2 * height(x + 2) + height(x + 4)));
+    }
+    return most;
+  };
+  EXPECT_LT(roughness(EmitterDepth::kLinear), 0.5 * roughness(EmitterDepth::kMean));
 }
 
 TEST(ThesisEmitter, ATriangleAloneIsExtrusionCylindersAndBalls) {

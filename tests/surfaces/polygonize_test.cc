@@ -18,7 +18,7 @@ SampleGrid CubeGrid(double half, int n) {
 double Ball(const Vec3& p) { return 10 - (p - Vec3(0.3, -0.2, 0.1)).norm(); }
 
 TEST(Polygonize, EveryRandomFieldIsWatertightManifoldAndConsistent) {
-  for (std::uint64_t random_seed = 0; random_seed < 400; ++random_seed) {
+  for (std::uint64_t random_seed = 0; random_seed < 1000; ++random_seed) {
     Random random(random_seed);
     const SampleGrid grid = CubeGrid(1, 7);
     std::vector<float> samples(grid.CornerCount(), -1);

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Values at some corners of a large grid, in blocks that exist only where one was asked for. For
+// polygonize.cc alone.
+#pragma once
+
+#include <array>
+#include <bitset>
+#include <memory>
+#include <vector>
+
+#include "surfaces/polygonize.h"
+
+namespace semblance {
+
+class CornerBlocks {
+ public:
+  using Place = std::array<int, 3>;
+
+  explicit CornerBlocks(const SampleGrid& grid) {
+    for (int axis = 0; axis < 3; ++axis) {
+      blocks_[axis] = (grid.counts[axis] + kEdge - 1) / kEdge;
+    }
+    block_.resize(std::size_t(blocks_[0]) * blocks_[1] * blocks_[2]);
+  }
+
+  // True the first time for a cell (by its lowest corner), or for a corner.
+  bool FirstVisit(const Place& cell) { return First(BlockOf(cell).visited, cell); }
+  bool FirstAsked(const Place& corner) { return First(BlockOf(corner).asked, corner); }
+
+  // Of corners that were asked for; different corners may be set from several threads at once.
+  void Set(const Place& corner, double value) {
+    block_[Number(corner)]->value[Within(corner)] = value;
+  }
+  double Get(const Place& corner) const { return block_[Number(corner)]->value[Within(corner)]; }
+
+ private:
+  static constexpr int kEdge = 8, kCorners = kEdge * kEdge * kEdge;
+  struct Block {
+    std::array<double, kCorners> value;
+    std::bitset<kCorners> asked, visited;
+  };
+
+  static std::size_t Within(const Place& at) {
+    return at[0] % kEdge + kEdge * (at[1] % kEdge + kEdge * (at[2] % kEdge));
+  }
+  std::size_t Number(const Place& at) const {
+    return at[0] / kEdge +
+           std::size_t(blocks_[0]) * (at[1] / kEdge + std::size_t(blocks_[1]) * (at[2] / kEdge));
+  }
+  Block& BlockOf(const Place& at) {
+    std::unique_ptr<Block>& block = block_[Number(at)];
+    if (!block) {
+      block = std::make_unique<Block>();
+    }
+    return *block;
+  }
+  static bool First(std::bitset<kCorners>& bits, const Place& at) {
+    const bool first = !bits[Within(at)];
+    bits.set(Within(at));
+    return first;
+  }
+
+  std::array<int, 3> blocks_{};
+  std::vector<std::unique_ptr<Block>> block_;
+};
+
+}  // namespace semblance
