@@ -14,14 +14,16 @@
 namespace semblance {
 
 // Each kernel: Gain(t) sets EmitterTriangle::gain; Emission(t, p, height) at a height > 0 is at
-// most gain / distance^Falloff(), distances taken to the triangle less Advance(t), and 0 where it
-// would be less than Cut(). gain / distance^k of the thesis's emitters; 0 where that is less than
-// the cut.
+// most most_gain * Most(distance^2, height), distances taken to the triangle and where it is moved
+// to, by Advance(t) along its normal, and 0 where it would be less than Cut().
+
+// gain / distance^k of the thesis's emitters; 0 where that is less than the cut.
 class DistanceFalloff {
  public:
   DistanceFalloff(double decay, double cut_below) : k_(decay), cut_(cut_below), power_(decay) {}
   double Decay() const { return k_; }
   double Cut() const { return cut_; }
+  double Power(double squared) const { return power_(squared); }
   double At(const EmitterTriangle& t, double squared, double depth_share) const {
     const double emission = t.gain * power_(std::max(squared, t.Floor2(depth_share)));
     return emission < cut_ ? 0 : std::min(emission, kMostEmission);
@@ -41,7 +43,7 @@ class ThesisKernel {
   }
   double AtDistance(const EmitterTriangle& t, double d) const { return falloff_.At(t, d * d, 1); }
   double Decay() const { return falloff_.Decay(); }
-  double Falloff() const { return falloff_.Decay(); }
+  double Most(double squared, double) const { return falloff_.Power(squared); }
   double Cut() const { return falloff_.Cut(); }
   double Advance(const EmitterTriangle&) const { return 0; }
   double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
@@ -68,7 +70,7 @@ class SplitKernel {
     return falloff_.At(t, d * d, 1 - t_);
   }
   double Decay() const { return falloff_.Decay(); }
-  double Falloff() const { return falloff_.Decay(); }
+  double Most(double squared, double) const { return falloff_.Power(squared); }
   double Cut() const { return falloff_.Cut(); }
   double Advance(const EmitterTriangle& t) const { return t_ * t.depth_mm; }
   double EmittingDepth(const EmitterTriangle& t) const { return (1 - t_) * t.depth_mm; }

@@ -41,6 +41,7 @@ struct EmitterTriangle {
   double longest2_mm2 = kNaN;  // squared length of the longest edge
   double gain = kNaN;          // the factor of its emission that does not depend on the point
   double most_gain = kNaN;     // with the most of its depths
+  Vec3 moved = Vec3::Zero();   // to where it is that it emits from
   // Where the depth is linear over the triangle: its least and most at the corners, as shares of
   // depth_mm, which is their mean, and its gradient over depth_mm, in the plane; 1 / mm.
   double least_share = 1, most_share = 1;

@@ -53,7 +53,9 @@ class FlatKernel {
     return sum;
   }
   double Decay() const { return k_; }
-  double Falloff() const { return k_ + 2; }  // height <= distance
+  double Most(double squared, double height) const {
+    return std::min(height, std::sqrt(squared)) * power_(squared);
+  }
   double Cut() const { return 0; }
   double Advance(const EmitterTriangle&) const { return 0; }
   double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }

@@ -55,6 +55,7 @@ EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth, const Ke
   e.edge_normal_a = (e.b - e.a).cross(e.normal);
   e.edge_normal_b = (e.c - e.b).cross(e.normal);
   e.edge_normal_c = (e.a - e.c).cross(e.normal);
+  e.moved = std::visit([&e](const auto& k) { return k.Advance(e); }, kernel) * e.normal;
   e.gain = e.most_gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
   if (depth == EmitterDepth::kLinear) {
     const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
@@ -128,14 +129,25 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
 constexpr double kFlatShare = 0.025;
 constexpr double kRounding = 1e-9;
 
-// Bounding boxes over runs of emitters, for leaving out those whose emission is too small to count.
+// Bounds over runs of emitters, for leaving out those whose emission is too small to count.
 struct Node {
-  Box3 box;
-  int begin = 0, end = 0;     // of emitters
-  int left = -1, right = -1;  // -1 in a leaf
-  int batch = -1;             // of a leaf, if there are batches
-  double gain = 0;            // sum over its emitters
+  Box3 box;  // of the triangles and of where they are moved to
+  Box3 normals;
+  double lowest_mm =
+      std::numeric_limits<double>::infinity();  // over planes through the box's center
+  int begin = 0, end = 0;                       // of emitters
+  int left = -1, right = -1;                    // -1 in a leaf
+  int batch = -1;                               // of a leaf, if there are batches
+  double gain = 0;                              // sum over its emitters
   double greatest_gain = 0;
+
+  // Not less than the height of p over the plane of any of its emitters.
+  double MostHeight(const Vec3& p) const {
+    const Vec3 from = p - box.center();
+    const double most =
+        normals.min().cwiseProduct(from).cwiseMax(normals.max().cwiseProduct(from)).sum();
+    return most - lowest_mm + kRounding * (from.cwiseAbs().sum() + std::abs(lowest_mm));
+  }
 };
 
 class Tree {
@@ -182,15 +194,25 @@ class Tree {
 
   int Split(std::vector<EmitterTriangle>& emitters, int begin, int end) {
     const int self = static_cast<int>(nodes_.size());
-    nodes_.push_back({.box = Box3(), .begin = begin, .end = end});
-    Box3 box, centers;
+    nodes_.emplace_back();
+    nodes_[self].begin = begin;
+    nodes_[self].end = end;
+    Box3 centers;
+    Node& node = nodes_[self];
     for (int e = begin; e < end; ++e) {
-      box.extend(emitters[e].a).extend(emitters[e].b).extend(emitters[e].c);
-      centers.extend(emitters[e].centroid);
-      nodes_[self].gain += emitters[e].most_gain;
-      nodes_[self].greatest_gain = std::max(nodes_[self].greatest_gain, emitters[e].most_gain);
+      const EmitterTriangle& t = emitters[e];
+      for (const Vec3& corner : {t.a, t.b, t.c}) {
+        node.box.extend(corner).extend(corner + t.moved);
+      }
+      centers.extend(t.centroid);
+      node.normals.extend(t.normal);
+      node.gain += t.most_gain;
+      node.greatest_gain = std::max(node.greatest_gain, t.most_gain);
     }
-    nodes_[self].box = box;
+    for (int e = begin; e < end; ++e) {
+      const EmitterTriangle& t = emitters[e];
+      node.lowest_mm = std::min(node.lowest_mm, t.normal.dot(t.a - node.box.center()));
+    }
     if (end - begin > kLeaf) {
       int axis = 0;
       centers.sizes().maxCoeff(&axis);
@@ -242,30 +264,24 @@ struct ImplicitSurface::Impl {
         batches(
             std::visit([this](const auto& k) { return MakeBatches(k, emitters, tree); }, kernel)),
         tail_error(options.tail_error),
-        decay(DecayOf(kernel)) {
-    std::visit(
-        [this](const auto& k) {
-          for (const EmitterTriangle& t : emitters) {
-            advance_mm = std::max(advance_mm, k.Advance(t));
-          }
-        },
-        kernel);
-  }
+        decay(DecayOf(kernel)) {}
 
   // Visits the emitters near p such that the others together emit at most the tail error. The first
   // guess at what a node may emit and be left out nearly always does.
   template <class EmitterKernel, class Begin, class Visit>
   void Near(const EmitterKernel& k, const Vec3& p, const Begin& begin, const Visit& visit) const {
-    constexpr double kFirstShare = 1.0 / 128;
-    const InversePower falloff(k.Falloff());
+    constexpr double kFirstShare = 1.0 / 64;
     const double cut = (1 - kRounding) * k.Cut();
     const auto bound = [&](const Node& node) {
+      const double height = node.MostHeight(p);
+      if (height <= 0) {
+        return 0.0;
+      }
       const double distance2 = node.box.squaredExteriorDistance(p);
-      if (distance2 <= advance_mm * advance_mm) {
+      if (distance2 <= 0) {
         return std::numeric_limits<double>::infinity();
       }
-      const double share =
-          falloff(advance_mm == 0 ? distance2 : std::pow(std::sqrt(distance2) - advance_mm, 2));
+      const double share = k.Most(distance2, height);
       return node.greatest_gain * share < cut ? 0 : node.gain * share;
     };
     double least = kFirstShare * tail_error;
@@ -308,7 +324,6 @@ struct ImplicitSurface::Impl {
   Tree tree;
   std::vector<FlatBatch> batches;  // of the tree's leaves
   double tail_error, decay;
-  double advance_mm = 0;  // the most of any emitter
 };
 
 ImplicitSurface::ImplicitSurface(const TriMesh& skull, std::span<const double> depth_mm,
@@ -373,10 +388,9 @@ Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
   const EmitterTriangle& t = impl_->emitters[emitter];
   Box3 box;
   box.extend(t.a).extend(t.b).extend(t.c);
-  const auto [advance, depth] = std::visit(
-      [&t](const auto& kernel) { return std::pair(kernel.Advance(t), kernel.EmittingDepth(t)); },
-      impl_->kernel);
-  const Box3 moved = box.translated(advance * t.normal);
+  const double depth =
+      std::visit([&t](const auto& kernel) { return kernel.EmittingDepth(t); }, impl_->kernel);
+  const Box3 moved = box.translated(t.moved);
   box.extend(moved);  // with the prism
   const Vec3 reach = Vec3::Constant(depth * std::pow(m, 1 / impl_->decay));
   return {box.min() - reach, box.max() + reach};
