@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "fitting/adaptive_fit.h"
 #include "fitting/seeding.h"
 #include "surfaces/error.h"
 #include "surfaces/feature.h"
@@ -79,7 +80,13 @@ void CheckInput(const HSplineSurface& start, const HSplineSurface& rest, const F
     Fail("the target has no point; give dowels or seed some");
   }
   CheckTarget(target);
-  CheckSchedule(StepsOf(options), start.shape().max_level);
+  const auto* const plan = std::get_if<AdaptivePlan>(&options.plan);
+  if (plan == nullptr) {
+    CheckSchedule(StepsOf(options), start.shape().max_level);
+  } else if (plan->finest > start.shape().max_level) {
+    Fail(fmt::format("the adaptive plan asks for level {}; the surface has levels 0..{}",
+                     plan->finest, start.shape().max_level));
+  }
   CheckFeatures(features, start.shape().max_level);
 }
 
@@ -185,6 +192,16 @@ void MeasurePoints(const FitTarget& target, double known_rms_mm, FitResult& resu
                               [](const LevelSummary& s) { return s.usable; });
 }
 
+// After the surface has changed; the points are where the result has them.
+void MeasureAnew(FitTarget target, FitResult& result) {
+  for (std::size_t k = 0; k < target.points.size(); ++k) {
+    target.points[k].uv = result.uv[k];
+  }
+  result.uv.clear();
+  result.residual_mm.clear();
+  MeasurePoints(target, kNaN, result);
+}
+
 // Takes the steps of a schedule, with the relaxation after each.
 class Fitter {
  public:
@@ -276,6 +293,14 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context) {
   CheckInput(start, rest, given, features, options);
+  if (std::holds_alternative<AdaptivePlan>(options.plan)) {
+    FitResult result = FitAdaptively(start, rest, given, options, context);
+    if (options.features == FeatureRule::kRestore && !features.empty()) {
+      result.restored_features = RestoreFeatures(rest, features, result.surface);
+      MeasureAnew(given, result);
+    }
+    return result;
+  }
   FitResult result{.surface = start};
   const std::vector<LevelFit> steps = StepsOf(options), sweep = SweepOf(steps);
   const auto* const until = std::get_if<UntilPlan>(&options.plan);

@@ -55,10 +55,13 @@ void Fields(Visitor& visit, FitOptions& o) {
   visit(FieldInfo{.name = "relaxation",
                   .doc = "whether and how the points' (u,v) move over the surface after each step"},
         o.relaxation);
-  visit(FieldInfo{.name = "plan",
-                  .doc = "listed: the steps of the schedule once; coarse_to_fine: level by level "
-                         "instead; until: the schedule again and again while that helps"},
-        o.plan);
+  visit(
+      FieldInfo{.name = "plan",
+                .doc =
+                    "listed: the steps of the schedule once; coarse_to_fine: level by level "
+                    "instead; until: the schedule again and again while that helps; adaptive: all "
+                    "levels at once, finer vertices only where they are needed"},
+      o.plan);
   visit(
       FieldInfo{.name = "sweeps",
                 .min = 0,
@@ -66,16 +69,18 @@ void Fields(Visitor& visit, FitOptions& o) {
                 .doc = "how often all levels that were fitted are fitted again at the end, coarse "
                        "to fine and whole (back-fitting)"},
       o.sweeps);
-  visit(FieldInfo{.name = "solver",
-                  .doc = "ceres: one problem a level, its parameter blocks the control vertices; "
-                         "fastest: one direct factorisation of the same least squares wherever no "
-                         "loss and no coupled term forbids it, the same surface to rounding"},
-        o.solver);
+  visit(
+      FieldInfo{.name = "solver",
+                .doc = "ceres: one problem a level, its parameter blocks the control vertices, in "
+                       "tiles of 3 x 3 where the terms are linear and treat x, y and z alike; "
+                       "fastest: one direct factorisation of the same least squares wherever no "
+                       "loss and no coupled term forbids it, the same surface to rounding"},
+      o.solver);
 }
 
 struct FitResult {
   HSplineSurface surface;
-  std::vector<LevelSummary> levels = {};            // one a step of the schedule
+  std::vector<LevelSummary> levels = {};            // one a step of the schedule, or a round
   std::vector<RelaxationSummary> relaxations = {};  // one a step, or none without relaxation
   std::vector<Vec2> uv = {};             // one a point of the target: where relaxation has left it
   std::vector<double> residual_mm = {};  // one a point of the target, in its order: distance of

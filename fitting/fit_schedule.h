@@ -81,6 +81,44 @@ void Fields(Visitor& visit, UntilPlan& o) {
       o.max_passes);
 }
 
-using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan>;
+// All levels at once, and finer ones only where they are needed: the surface is solved for as one
+// linear least-squares problem in the vertices of level 0 and the edited ones of finer levels;
+// where a patch then has a point farther off than the tolerance, it is overlaid with vertices of
+// the next finer level, and so on.
+struct AdaptivePlan {
+  static constexpr std::string_view kName = "adaptive";
+  double tolerance_mm = 0.5;
+  int finest = 4;
+  int margin = 0;
+  int min_points = 9;
+};
+template <class Visitor>
+void Fields(Visitor& visit, AdaptivePlan& o) {
+  visit(FieldInfo{.name = "tolerance_mm",
+                  .unit = "mm",
+                  .min = 1e-9,
+                  .max = 1e3,
+                  .doc = "a patch with a point farther from the surface than this gets finer "
+                         "vertices; at least about five times the points' noise"},
+        o.tolerance_mm);
+  visit(FieldInfo{.name = "finest",
+                  .min = 0,
+                  .max = 8,
+                  .doc = "finest level that may be overlaid; the list of steps is not used"},
+        o.finest);
+  visit(FieldInfo{.name = "margin",
+                  .min = 0,
+                  .max = 8,
+                  .doc = "rings of finer vertices beyond those over the patch itself"},
+        o.margin);
+  visit(FieldInfo{.name = "min_points",
+                  .min = 1,
+                  .max = 1e6,
+                  .doc = "a patch with fewer points is left as it is, so that single outliers are "
+                         "not chased"},
+        o.min_points);
+}
+
+using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan, AdaptivePlan>;
 
 }  // namespace semblance

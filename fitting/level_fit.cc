@@ -8,6 +8,7 @@
 #include <tuple>
 #include <utility>
 
+#include "fitting/auto_weight.h"
 #include "fitting/level_solver.h"
 #include "fitting/normal_equations.h"
 #include "fitting/sparse_factor.h"
@@ -18,7 +19,7 @@ namespace semblance {
 namespace {
 
 double WeightOf(const Term& term) {
-  return std::visit([](const auto& t) { return t.weight; }, term);
+  return std::visit([](const auto& t) -> double { return t.weight; }, term);
 }
 
 bool NeedsExtent(const Term& term) {
@@ -105,13 +106,15 @@ void Measure(const LevelView& view, std::span<const Term> terms, const SparseMat
 
 }  // namespace
 
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms, LevelSolver solver) {
-  CheckView(view, terms);
+LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver solver) {
+  CheckView(view, given);
   SortObservations(view.grid, view.observations);
   LevelSolution solution{.net = view.start, .summary = {}};
-  const bool direct = solver == LevelSolver::kFastest && AllSeparable(terms);
-  const SolverOutcome outcome =
-      direct ? SolveDirectly(view, terms, solution.net) : SolveByCeres(view, terms, solution.net);
+  const std::vector<Term> terms = WithChosenWeight(view, given, solution.summary.auto_weight);
+  const bool separable = AllSeparable(terms);
+  const bool direct = solver == LevelSolver::kFastest && separable;
+  const auto solve = direct ? SolveDirectly : separable ? SolveByTiles : SolveByCeres;
+  const SolverOutcome outcome = solve(view, terms, solution.net);
   solution.summary.solver = direct ? "direct" : "ceres";
   solution.summary.iterations = outcome.iterations;
   solution.summary.free_vertices = outcome.free_vertices;

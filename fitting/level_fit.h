@@ -49,6 +49,7 @@ struct LevelSummary {
   int rank = -1;  // estimated numerical rank of the observations' matrix; vertices - rank
                   // directions are left to the other terms, or stay
   double max_move_mm = kNaN;       // of a vertex, at the solution; Fit: as written back
+  double auto_weight = kNaN;       // what `weight: auto` became, if a term has it
   std::string solver = "not run";  // ceres or direct
   std::string termination = "not run";
   bool usable = false;  // the solver's solution can be used; else the net is unchanged
@@ -67,14 +68,15 @@ constexpr auto EnumNames(LevelSolver) {
   return std::to_array<std::string_view>({"ceres", "fastest"});
 }
 
-// Minimises the sum of the terms over the level's control vertices: by Ceres, 3 doubles a parameter
-// block, one thread; or, if the fastest way is asked for and all terms are linear and treat x, y
-// and z alike, with one sparse Cholesky factor for the three. Where the terms leave vertices
-// undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word on it; the
-// steps are damped by a multiple of the identity, a proximal-point iteration, which converges to
-// it). Observations are used in a canonical order, so their order has no effect. Throws InputError
-// if nothing can be solved: sizes that disagree, or a template without extent for a term that needs
-// it.
+// Minimises the sum of the terms over the level's control vertices: by Ceres, one thread (a
+// parameter block is a vertex, or, if all terms are linear and treat x, y and z alike, one
+// coordinate of 3 x 3 vertices); or, if the fastest way is asked for and all terms are linear and
+// treat x, y and z alike, with one sparse Cholesky factor for the three. Where the terms leave
+// vertices undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word on it;
+// the steps are damped by a multiple of the identity, a proximal-point iteration, which converges
+// to it). Observations are used in a canonical order, so their order has no effect. Throws
+// InputError if nothing can be solved: sizes that disagree, or a template without extent for a term
+// that needs it.
 LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
                        LevelSolver solver = LevelSolver::kCeres);
 

@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/level_solver.h"
 
-#include <ceres/solver.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <vector>
 
 #include "fitting/blas_threads.h"
+#include "fitting/level_cost.h"
 #include "fitting/normal_equations.h"
 #include "fitting/sparse_factor.h"
-#include "fitting/term_cost.h"
 
 namespace semblance {
 namespace {
@@ -20,7 +18,7 @@ constexpr int kMaxIterations = 50;
 constexpr double kStepTolerance = 1e-13;  // of the norm of all vertices
 
 double WeightOf(const Term& term) {
-  return std::visit([](const auto& t) { return t.weight; }, term);
+  return std::visit([](const auto& t) -> double { return t.weight; }, term);
 }
 
 // What the eigenvalues of the normal equations are measured by: residuals are means over points or
@@ -34,47 +32,6 @@ double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
 }
 
 double Radius(double stiffness) { return std::min(1e8 / stiffness, 1e16); }
-
-// Ceres damps by D / radius with D clamped to [min, max]; both at 1 give the identity, and a fixed
-// radius the proximal-point iteration x <- argmin cost(y) + |y - x|^2 / radius, which goes to the
-// least-squares solution nearest to the start. Damping by the diagonal, Ceres' default, would
-// instead move the least-held vertices most. Determined directions converge in two or three steps.
-ceres::Solver::Options SolverOptions(double stiffness) {
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
-  options.num_threads = 1;
-  options.logging_type = ceres::SILENT;
-  options.jacobi_scaling = false;
-  options.min_lm_diagonal = options.max_lm_diagonal = 1;
-  options.initial_trust_region_radius = Radius(stiffness);
-  options.max_trust_region_radius = options.initial_trust_region_radius;
-  options.max_num_iterations = kMaxIterations;
-  options.function_tolerance = 1e-15;
-  options.gradient_tolerance = 0;  // blind to weakly determined directions
-  options.parameter_tolerance = kStepTolerance;
-  return options;
-}
-
-std::string Lowercase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
-void AddAllRows(const LevelView& view, std::span<const Term> terms, RowSink& sink) {
-  for (const Term& term : terms) {
-    if (WeightOf(term) > 0) {
-      std::visit(
-          [&]<class T>(const T& t) {
-            if constexpr (RowTerm<T>) {
-              AddRows(t, view, sink);
-            }
-          },
-          term);
-    }
-  }
-}
 
 // Moves the vertices; returns the length of the step over that of all coordinates.
 double Step(const Eigen::MatrixX3d& step, ControlNet& net) {
@@ -130,6 +87,50 @@ void Descend(const LevelView& view, std::span<const Term> terms, const SparseMat
 
 }  // namespace
 
+// Ceres damps by D / radius with D clamped to [min, max]; both at 1 give the identity, and a fixed
+// radius the proximal-point iteration x <- argmin cost(y) + |y - x|^2 / radius, which goes to the
+// least-squares solution nearest to the start. Damping by the diagonal, Ceres' default, would
+// instead move the least-held vertices most. Determined directions converge in two or three steps.
+ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t vertices) {
+  UseOneBlasThread();
+  const double stiffness = TypicalStiffness(terms, vertices);
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  options.jacobi_scaling = false;
+  options.min_lm_diagonal = options.max_lm_diagonal = 1;
+  options.initial_trust_region_radius = Radius(stiffness);
+  options.max_trust_region_radius = options.initial_trust_region_radius;
+  options.max_num_iterations = kMaxIterations;
+  options.function_tolerance = 1e-15;
+  options.gradient_tolerance = 0;  // blind to weakly determined directions
+  options.parameter_tolerance = kStepTolerance;
+  return options;
+}
+
+std::string TerminationName(ceres::TerminationType type) {
+  std::string text = ceres::TerminationTypeToString(type);
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+void AddAllRows(const LevelView& view, std::span<const Term> terms, RowSink& sink) {
+  for (const Term& term : terms) {
+    if (WeightOf(term) > 0) {
+      std::visit(
+          [&]<class T>(const T& t) {
+            if constexpr (RowTerm<T>) {
+              AddRows(t, view, sink);
+            }
+          },
+          term);
+    }
+  }
+}
+
 bool AllSeparable(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
     return WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsSeparable(t); }, term);
@@ -147,12 +148,11 @@ SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, C
   if (outcome.free_vertices == 0) {
     return outcome;
   }
-  UseOneBlasThread();
   const ControlNet before = net;
   ceres::Solver::Summary summary;
-  ceres::Solve(SolverOptions(TypicalStiffness(terms, net.vertices.size())), &problem, &summary);
+  ceres::Solve(CeresOptions(terms, net.vertices.size()), &problem, &summary);
   outcome.iterations = static_cast<int>(summary.iterations.size()) - 1;
-  outcome.termination = Lowercase(ceres::TerminationTypeToString(summary.termination_type));
+  outcome.termination = TerminationName(summary.termination_type);
   outcome.usable = summary.IsSolutionUsable();
   if (!outcome.usable) {
     net = before;

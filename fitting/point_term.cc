@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fitting/linear_cost.h"
+#include "fitting/robust_loss.h"
 #include "fitting/term_cost.h"
 
 namespace semblance {
@@ -21,22 +22,6 @@ double WeightSum(const LevelView& view) {
     sum += o.weight;
   }
   return sum;
-}
-
-// rho(s); the same formulas as those of Ceres.
-double Rho(const PointTerm& term, double s) {
-  const double a = term.loss_width_mm;
-  switch (term.loss) {
-    case RobustLoss::kHuber:
-      return s <= a * a ? s : 2 * a * std::sqrt(s) - a * a;
-    case RobustLoss::kCauchy:
-      return a * a * std::log1p(s / (a * a));
-    case RobustLoss::kTukey:
-      return a * a / 3 * (1 - std::pow(std::max(1 - s / (a * a), 0.0), 3));
-    case RobustLoss::kNone:
-      break;
-  }
-  return s;
 }
 
 std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale) {

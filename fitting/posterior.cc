@@ -5,9 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <numbers>
 #include <numeric>
+#include <random>
 #include <variant>
 
+#include "fitting/auto_weight.h"
 #include "fitting/normal_equations.h"
 #include "fitting/sparse_factor.h"
 #include "fitting/term_cost.h"
@@ -69,46 +73,130 @@ double PriorScale(const LevelView& view, std::span<const double> sd_mm,
              : 1;
 }
 
-void AddPoints(LevelView view, std::span<const double> sd_mm, NormalMatrix& normal) {
+void AddPoints(LevelView view, std::span<const double> sd_mm, RowSink& sink) {
   std::vector<double> weights;
   for (std::size_t k = 0; k < sd_mm.size(); ++k) {
     weights.push_back(1 / (sd_mm[k] * sd_mm[k]));
     view.observations[k].weight = weights.back();
   }
   SortObservations(view.grid, view.observations);
-  AddRows(PointTerm{.weight = SortedSum(std::move(weights))}, view, normal);
+  AddRows(PointTerm{.weight = SortedSum(std::move(weights))}, view, sink);
 }
 
-void AddPrior(const LevelView& view, std::span<const Term> terms, double scale,
-              NormalMatrix& normal) {
+void AddPrior(const LevelView& view, std::span<const Term> terms, double scale, RowSink& sink) {
   for (const Term& term : terms) {
     std::visit(
         [&]<class T>(T t) {
-          t.weight *= scale;
+          t.weight = scale * t.weight;
           if constexpr (RowTerm<T> && !std::is_same_v<T, PointTerm>) {
-            AddRows(t, view, normal);
+            AddRows(t, view, sink);
           }
         },
         term);
   }
 }
 
-}  // namespace
-
-std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double> sd_mm,
-                                   std::span<const Term> terms, std::span<const Vec2> uv) {
-  Check(view, sd_mm, terms);
-  NormalMatrix normal(view.grid);
+// The rows whose sum of squares is minus twice the logarithm of the posterior's density.
+void AddModel(const LevelView& view, std::span<const double> sd_mm, std::span<const Term> terms,
+              RowSink& sink) {
   if (!view.observations.empty() && PointWeight(terms) > 0) {
-    AddPoints(view, sd_mm, normal);
+    AddPoints(view, sd_mm, sink);
   }
-  AddPrior(view, terms, PriorScale(view, sd_mm, terms), normal);
-  const SparseMatrix lower = normal.Lower();
+  AddPrior(view, terms, PriorScale(view, sd_mm, terms), sink);
+}
+
+// Keeps what nothing holds from being zero.
+SparseFactor FactorOf(const SparseMatrix& lower) {
   const double largest = std::max(lower.diagonal().maxCoeff(), 1e-12);
-  const SparseFactor factor(lower, 1e-11 * largest);  // keeps what nothing holds from being zero
+  return {lower, 1e-11 * largest};
+}
+
+void RequireFactor(const SparseFactor& factor) {
   if (!factor.usable()) {
     throw InputError("posterior: the normal matrix has no factor; add a prior or smoothness term");
   }
+}
+
+// Normally distributed numbers (Box & Muller 1958).
+class Normal {
+ public:
+  explicit Normal(std::uint64_t random_seed) : bits_(random_seed) {}
+  double operator()() {
+    const double r = std::sqrt(-2 * std::log(1 - Uniform()));
+    return r * std::cos(2 * std::numbers::pi * Uniform());
+  }
+
+ private:
+  double Uniform() { return static_cast<double>(bits_() >> 11) * 0x1p-53; }
+
+  std::mt19937_64 bits_;
+};
+
+// Sum of A^T x over the rows, x random of unit variance: its covariance is the normal matrix M, so
+// that of M^-1 times it is the posterior's, M^-1.
+class NoiseSink final : public RowSink {
+ public:
+  NoiseSink(Eigen::Index vertices, Normal& normal)
+      : normal_(normal), sum_(Eigen::MatrixX3d::Zero(vertices, 3)) {}
+
+  void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 /*b*/,
+           std::span<const int> vertices) override {
+    Rows3 noise(a->rows(), 3);
+    for (Eigen::Index k = 0; k < noise.size(); ++k) {
+      noise(k / 3, k % 3) = normal_();
+    }
+    const Eigen::MatrixX3d pull = a->transpose() * noise;
+    for (std::size_t k = 0; k < vertices.size(); ++k) {
+      sum_.row(vertices[k]) += pull.row(static_cast<Eigen::Index>(k));
+    }
+  }
+  const Eigen::MatrixX3d& Sum() const { return sum_; }
+
+ private:
+  Normal& normal_;
+  Eigen::MatrixX3d sum_;
+};
+
+// A level of a surface, with the points of its target.
+LevelView ViewOf(const HSplineSurface& surface, const HSplineSurface& rest, const FitTarget& target,
+                 int level) {
+  const HSplineShape& shape = surface.shape();
+  if (level < 0 || level > shape.max_level || !(shape == rest.shape())) {
+    throw InputError(fmt::format(
+        "posterior: level {} of a surface with levels 0..{}; give one of them, and a template of "
+        "the same shape",
+        level, shape.max_level));
+  }
+  CheckTarget(target);
+  const bool periodic = shape.closure == Closure::kPeriodicU;
+  LevelView view{
+      .grid = {.patches_u = shape.PatchesU(level),
+               .patches_v = shape.PatchesV(level),
+               .periodic_u = periodic},
+      .start = surface.Net(level),
+      .rest = rest.Net(level),
+      .lengths_mm = MeanLengths(
+          {.patches_u = shape.patches_u, .patches_v = shape.patches_v, .periodic_u = periodic},
+          rest.Net(0)),
+      .observations = {}};
+  for (const FitPoint& p : target.points) {
+    view.observations.push_back({.uv = p.uv, .position = p.position, .weight = p.weight});
+  }
+  return view;
+}
+
+}  // namespace
+
+std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double> sd_mm,
+                                   std::span<const Term> given, std::span<const Vec2> uv) {
+  Check(view, sd_mm, given);
+  double chosen = kNaN;
+  const std::vector<Term> terms = WithChosenWeight(view, given, chosen);
+  NormalMatrix normal(view.grid);
+  AddModel(view, sd_mm, terms, normal);
+  const SparseMatrix lower = normal.Lower();
+  const SparseFactor factor = FactorOf(lower);
+  RequireFactor(factor);
   constexpr std::size_t kAtOnce = 64;  // right-hand sides, to bound the memory
   std::vector<double> sigma;
   for (std::size_t begin = 0; begin < uv.size(); begin += kAtOnce) {
@@ -132,29 +220,45 @@ std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineS
                                    const FitTarget& target, std::span<const double> sd_mm,
                                    int level, std::span<const Term> terms,
                                    std::span<const Vec2> uv) {
-  const HSplineShape& shape = surface.shape();
-  if (level < 0 || level > shape.max_level || !(shape == rest.shape())) {
-    throw InputError(fmt::format(
-        "posterior: level {} of a surface with levels 0..{}; give one of them, and a template of "
-        "the same shape",
-        level, shape.max_level));
+  return PosteriorSigma(ViewOf(surface, rest, target, level), sd_mm, terms, uv);
+}
+
+std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const double> sd_mm,
+                                         std::span<const Term> given, int count,
+                                         std::uint64_t random_seed) {
+  Check(view, sd_mm, given);
+  double chosen = kNaN;
+  const std::vector<Term> terms = WithChosenWeight(view, given, chosen);
+  NormalMatrix matrix(view.grid);
+  AddModel(view, sd_mm, terms, matrix);
+  const SparseFactor factor = FactorOf(matrix.Lower());
+  RequireFactor(factor);
+  Normal normal(random_seed);
+  std::vector<ControlNet> samples;
+  for (int sample = 0; sample < count; ++sample) {
+    NoiseSink noise(static_cast<Eigen::Index>(view.start.vertices.size()), normal);
+    AddModel(view, sd_mm, terms, noise);
+    const Eigen::MatrixXd step = factor.Solve(noise.Sum());
+    samples.push_back(view.start);
+    for (std::size_t k = 0; k < view.start.vertices.size(); ++k) {
+      samples.back().vertices[k] += step.row(static_cast<Eigen::Index>(k)).transpose();
+    }
   }
-  CheckTarget(target);
-  const bool periodic = shape.closure == Closure::kPeriodicU;
-  LevelView view{
-      .grid = {.patches_u = shape.PatchesU(level),
-               .patches_v = shape.PatchesV(level),
-               .periodic_u = periodic},
-      .start = surface.Net(level),
-      .rest = rest.Net(level),
-      .lengths_mm = MeanLengths(
-          {.patches_u = shape.patches_u, .patches_v = shape.patches_v, .periodic_u = periodic},
-          rest.Net(0)),
-      .observations = {}};
-  for (const FitPoint& p : target.points) {
-    view.observations.push_back({.uv = p.uv, .position = p.position, .weight = p.weight});
+  return samples;
+}
+
+std::vector<HSplineSurface> PosteriorSamples(const HSplineSurface& surface,
+                                             const HSplineSurface& rest, const FitTarget& target,
+                                             std::span<const double> sd_mm, int level,
+                                             std::span<const Term> terms, int count,
+                                             std::uint64_t random_seed) {
+  std::vector<HSplineSurface> samples;
+  const LevelView view = ViewOf(surface, rest, target, level);
+  for (const ControlNet& net : PosteriorSamples(view, sd_mm, terms, count, random_seed)) {
+    samples.push_back(surface);
+    samples.back().SetNet(level, net);
   }
-  return PosteriorSigma(view, sd_mm, terms, uv);
+  return samples;
 }
 
 }  // namespace semblance

@@ -2,6 +2,7 @@
 // How well a fitted surface is known.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -29,5 +30,20 @@ std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineS
                                    const FitTarget& target, std::span<const double> sd_mm,
                                    int level, std::span<const Term> terms,
                                    std::span<const Vec2> uv);
+
+// Draws from the same model: nets of the level, view.start plus random vectors whose standard
+// deviation at each uv is PosteriorSigma's, correlated as the model has it (perturb and solve;
+// Papandreou & Yuille 2010). count >= 0; the same draws for the same random_seed. Where neither
+// points nor terms say anything they are wild. Throws as PosteriorSigma.
+std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const double> sd_mm,
+                                         std::span<const Term> terms, int count,
+                                         std::uint64_t random_seed);
+
+// Whole surfaces; finer detail rides along.
+std::vector<HSplineSurface> PosteriorSamples(const HSplineSurface& surface,
+                                             const HSplineSurface& rest, const FitTarget& target,
+                                             std::span<const double> sd_mm, int level,
+                                             std::span<const Term> terms, int count,
+                                             std::uint64_t random_seed);
 
 }  // namespace semblance

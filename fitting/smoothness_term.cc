@@ -4,27 +4,14 @@
 #include <cmath>
 #include <memory>
 
+#include "fitting/smoothness_form.h"
 #include "fitting/term_cost.h"
 
 namespace semblance {
 namespace {
 
-Vec2 PatchSize(const LevelView& view) {
-  return {view.lengths_mm.x() / view.grid.patches_u, view.lengths_mm.y() / view.grid.patches_v};
-}
-
-// weight * length^4 / area * energy of a patch.
-PatchForm ScaledForm(const SmoothnessTerm& term, const LevelView& view) {
-  const Vec2 size = PatchSize(view);
-  const double scale = term.weight * std::pow(term.length_mm, 4) / view.lengths_mm.prod();
-  return scale * ThinPlateForm(size.x(), size.y());
-}
-
-// weight * length^2 / area * energy of a patch.
-PatchForm ScaledForm(const MembraneTerm& term, const LevelView& view) {
-  const Vec2 size = PatchSize(view);
-  const double scale = term.weight * std::pow(term.length_mm, 2) / view.lengths_mm.prod();
-  return scale * MembraneForm(size.x(), size.y());
+PatchForm ScaledForm(const auto& term, const LevelView& view) {
+  return FormOf(term, view.lengths_mm, view.grid.patches_u, view.grid.patches_v);
 }
 
 // The net at which the energy is zero: the template, or nothing.
@@ -61,6 +48,18 @@ double Energy(const PatchForm& form, const ControlNet& origin, const PatchGrid& 
 }
 
 }  // namespace
+
+// weight * length^4 / area * energy of a patch.
+PatchForm FormOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u, int patches_v) {
+  const double scale = term.weight * std::pow(term.length_mm, 4) / lengths_mm.prod();
+  return scale * ThinPlateForm(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v);
+}
+
+// weight * length^2 / area * energy of a patch.
+PatchForm FormOf(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u, int patches_v) {
+  const double scale = term.weight * std::pow(term.length_mm, 2) / lengths_mm.prod();
+  return scale * MembraneForm(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v);
+}
 
 void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink) {
   AddForm(ScaledForm(term, view), Origin(term.of, view), view.grid, sink);

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <variant>
 
+#include "surfaces/auto_number.h"
 #include "surfaces/fields.h"
 
 namespace semblance {
@@ -20,6 +21,18 @@ void WeightField(Visitor& visit, double& weight) {
                   .min = 0,
                   .max = 1e6,
                   .doc = "factor of the mean squared residual; 0 switches the term off"},
+        weight);
+}
+
+// The same, or `auto`: then each solve chooses it by generalised cross-validation (auto_weight.h).
+template <class Visitor>
+void AutoWeightField(Visitor& visit, AutoNumber& weight) {
+  visit(FieldInfo{.name = "weight",
+                  .min = 0,
+                  .max = 1e6,
+                  .doc = "factor of the mean squared residual; 0 switches the term off; auto: "
+                         "chosen by generalised cross-validation, for points that are many and "
+                         "whose errors do not hang together"},
         weight);
 }
 
@@ -107,13 +120,13 @@ constexpr auto EnumNames(SmoothnessOf) {
 // the default keeps waves longer than about 20 mm.
 struct SmoothnessTerm {
   static constexpr std::string_view kName = "smoothness";
-  double weight = 0.01;
+  AutoNumber weight = 0.01;
   SmoothnessOf of = SmoothnessOf::kDisplacement;
   double length_mm = 10;
 };
 template <class Visitor>
 void Fields(Visitor& visit, SmoothnessTerm& o) {
-  WeightField(visit, o.weight);
+  AutoWeightField(visit, o.weight);
   visit(
       FieldInfo{.name = "of", .doc = "what is smooth: displacement from the template, or surface"},
       o.of);
@@ -130,13 +143,13 @@ void Fields(Visitor& visit, SmoothnessTerm& o) {
 // there is no point, the surface moves along with its neighbourhood.
 struct MembraneTerm {
   static constexpr std::string_view kName = "membrane";
-  double weight = 0.1;
+  AutoNumber weight = 0.1;
   SmoothnessOf of = SmoothnessOf::kDisplacement;
   double length_mm = 10;
 };
 template <class Visitor>
 void Fields(Visitor& visit, MembraneTerm& o) {
-  WeightField(visit, o.weight);
+  AutoWeightField(visit, o.weight);
   visit(FieldInfo{.name = "of",
                   .doc = "what resists stretching: displacement from the template, or "
                          "surface"},

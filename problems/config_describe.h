@@ -14,6 +14,7 @@ ConfigNode ScalarToTree(bool value);
 ConfigNode ScalarToTree(int value);
 ConfigNode ScalarToTree(std::uint64_t value);
 ConfigNode ScalarToTree(double value);
+ConfigNode ScalarToTree(const AutoNumber& value);
 ConfigNode ScalarToTree(const std::string& value);
 ConfigNode ScalarToTree(const std::filesystem::path& value);
 
@@ -98,6 +99,8 @@ constexpr ConfigType::Kind ScalarKind() {
     return Kind::kUnsigned;
   } else if constexpr (std::is_same_v<T, double>) {
     return Kind::kNumber;
+  } else if constexpr (std::is_same_v<T, AutoNumber>) {
+    return Kind::kAutoNumber;
   } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
     return Kind::kPath;
   } else {

@@ -184,6 +184,16 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, double& out) {
   }
 }
 
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoNumber& out) {
+  if (item.node.IsScalar() && !item.node.quoted && item.node.text == "auto") {
+    out.automatic = true;
+    return;
+  }
+  const std::size_t before = errors.size();
+  ReadScalar(errors, item, out.value);
+  out.automatic = out.automatic && errors.size() != before;
+}
+
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::string& out) {
   if (RequireScalar(errors, item, "a text")) {
     out = item.node.text;

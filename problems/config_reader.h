@@ -12,6 +12,7 @@
 
 #include "problems/config_errors.h"
 #include "problems/config_tree.h"
+#include "surfaces/auto_number.h"
 #include "surfaces/fields.h"
 
 namespace semblance {
@@ -34,6 +35,7 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, bool& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, int& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::uint64_t& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, double& out);
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoNumber& out);  // or `auto`
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::string& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::path& out);
 

@@ -21,6 +21,7 @@ struct ConfigType {
     kInteger,
     kUnsigned,
     kNumber,
+    kAutoNumber,  // a number or the word auto
     kText,
     kPath,
     kWord,      // an enum; words

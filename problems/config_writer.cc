@@ -133,6 +133,9 @@ ConfigNode ScalarToTree(std::uint64_t value) {
   return ConfigNode::Scalar(fmt::format("{}", value));
 }
 
+ConfigNode ScalarToTree(const AutoNumber& value) {
+  return value.automatic ? ConfigNode::Scalar("auto") : ScalarToTree(value.value);
+}
 ConfigNode ScalarToTree(double value) { return ConfigNode::Scalar(fmt::format("{}", value)); }
 
 ConfigNode ScalarToTree(const std::string& value) { return ConfigNode::Quoted(value); }

@@ -12,6 +12,7 @@
 #include "problems/depth_study.h"
 #include "problems/face_commands.h"
 #include "problems/face_metrics_json.h"
+#include "problems/point_fit.h"
 #include "problems/progress.h"
 #include "problems/run_folder.h"
 #include "problems/study_report.h"
@@ -29,7 +30,7 @@ constexpr int kDone = 0, kNotUsable = 1, kBadInput = 2;
 struct Arguments {
   std::vector<std::string> files;
   std::vector<std::string> overrides;
-  std::string out;
+  std::string out, config;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   bool force = false, quiet = false, schema = false, list = false, slurm = false;
   StudyRunOptions study;
@@ -98,6 +99,23 @@ int DepthCommand(const Arguments& arguments) {
   WriteDepth(experiment, result, folder, context);
   fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
   return result.usable() ? kDone : kNotUsable;
+}
+
+int FitCommand(const Arguments& arguments) {
+  const std::filesystem::path points = arguments.files.at(0), config = arguments.config;
+  const auto options = ReadConfig<PointFitOptions>(config, arguments.overrides);
+  const PointTable table = ReadPointTable(points);
+  OutputFolder folder = MakeFolder(arguments, fmt::format("out/{}", points.stem().string()));
+  const RunContext context = MakeContext(arguments);
+  const PointFit result = FitPoints(table, options, context);
+  WritePointFit(options, points, result, folder, context);
+  fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
+             table.positions.size(), result.parameters,
+             result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
+             result.fit.point_rms_mm,
+             *std::max_element(result.fit.residual_mm.begin(), result.fit.residual_mm.end()));
+  fmt::print("folder: {}\n", std::filesystem::absolute(folder.Root()).lexically_normal().string());
+  return result.fit.usable ? kDone : kNotUsable;
 }
 
 int CheckCommand(const Arguments& arguments) {
@@ -295,6 +313,15 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
   depth->add_option("--set", a.overrides, "path=value, as in run")->allow_extra_args(false);
   add_output(depth);
   add_work(depth);
+  CLI::App* fit = add("fit", "an H-spline surface through any scattered points", &FitCommand);
+  fit->add_option("POINTS", a.files, "CSV file with the columns x,y,z and, if known, u,v, weight")
+      ->required()
+      ->expected(1);
+  fit->add_option("CONFIG", a.config, "YAML file of the fit")->required();
+  fit->add_option("--set", a.overrides, "path=value, laid over the configuration; may be repeated")
+      ->allow_extra_args(false);
+  add_output(fit);
+  add_work(fit);
   CLI::App* import =
       add("import-ct", "meshes of skull and skin from a CT volume, in mm", &ImportCtCommand);
   import->add_option("VOLUME", a.files, "InVesalius project (.inv3)")->required()->expected(1);

@@ -30,6 +30,8 @@ std::string TypeText(const ConfigType& type) {
       return "whole number, not negative";
     case Kind::kNumber:
       return "number";
+    case Kind::kAutoNumber:
+      return "number or auto";
     case Kind::kText:
       return "text";
     case Kind::kPath:

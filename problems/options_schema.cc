@@ -60,6 +60,8 @@ Json ToJson(const ConfigNode& node, const ConfigType& type) {
     case Kind::kBool:
     case Kind::kInteger:
     case Kind::kUnsigned:
+    case Kind::kAutoNumber:
+      return Json::accept(node.text) ? Json::parse(node.text) : Json(node.text);
     case Kind::kNumber:  // a number that is not finite is no JSON
       return Json::accept(node.text) ? Json::parse(node.text) : Json(nullptr);
     default:
@@ -138,6 +140,8 @@ Json TypeSchema(const ConfigType& type, const FieldInfo& info) {
       return NumberSchema("integer", not_negative);
     case Kind::kNumber:
       return NumberSchema("number", info);
+    case Kind::kAutoNumber:
+      return {{"anyOf", {NumberSchema("number", info), {{"const", "auto"}}}}};
     case Kind::kWord:
       return {{"enum", type.words}};
     case Kind::kOptional:

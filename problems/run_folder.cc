@@ -12,6 +12,7 @@
 #include "problems/config.h"
 #include "problems/depth_json.h"
 #include "problems/face_metrics_json.h"
+#include "problems/fit_json.h"
 #include "problems/manifest.h"
 #include "problems/run_pictures.h"
 #include "problems/scene_json.h"
@@ -39,40 +40,6 @@ Json ImplicitJson(const ImplicitFace& face) {
           {"bound_evaluations", face.counts.bound_evaluations}};
 }
 
-Json LevelJson(const LevelSummary& level) {
-  Json json = {{"level", level.level},
-               {"fraction", level.fraction},
-               {"rms_before_mm", level.rms_before_mm},
-               {"rms_after_mm", level.rms_after_mm},
-               {"max_move_mm", level.max_move_mm},
-               {"free_vertices", level.free_vertices},
-               {"uncovered_vertices", level.uncovered_vertices},
-               {"rank", level.rank},
-               {"solver", level.solver},
-               {"iterations", level.iterations},
-               {"usable", level.usable},
-               {"terms", Json::array()}};
-  for (const TermCosts& term : level.terms) {
-    json["terms"].push_back({{"term", term.term}, {"before", term.before}, {"after", term.after}});
-  }
-  return json;
-}
-
-Json RelaxationJson(const RelaxationSummary& step) {
-  const auto penalties = [](const RelaxationPenalties& p) -> Json {
-    return {{"distance", p.distance},
-            {"bunching", p.bunching},
-            {"distortion", p.distortion},
-            {"crease", p.crease},
-            {"standard", p.standard}};
-  };
-  return {{"before", penalties(step.before)},
-          {"after", penalties(step.after)},
-          {"max_move_mm", step.max_move_mm},
-          {"flips_prevented", step.flips_prevented},
-          {"steps_shortened", step.steps_shortened}};
-}
-
 Json FitJson(const RunResult& result) {
   Json json = {{"dowel_rms_mm", result.fit.dowel_rms_mm},
                {"point_rms_mm", result.fit.point_rms_mm},
@@ -83,14 +50,8 @@ Json FitJson(const RunResult& result) {
                {"seeds_folded", result.seeding.folded},
                {"template_scale", result.face_from_template.scale},
                {"restored_features", result.fit.restored_features},
-               {"usable", result.fit.usable},
-               {"levels", Json::array()}};
-  for (const LevelSummary& level : result.fit.levels) {
-    json["levels"].push_back(LevelJson(level));
-  }
-  for (const RelaxationSummary& step : result.fit.relaxations) {
-    json["relaxations"].push_back(RelaxationJson(step));
-  }
+               {"usable", result.fit.usable}};
+  json.update(StepsToJson(result.fit));
   return json;
 }
 

@@ -133,6 +133,54 @@ TEST(Posterior, OfASurfaceIsThatOfItsLevel) {
   }
 }
 
+TEST(Posterior, SamplesSpreadAsSigmaSays) {
+  const Problem problem;
+  const std::vector<double> sigma =
+      PosteriorSigma(problem.view, problem.sd_mm, problem.terms, problem.uv);
+  constexpr int kDraws = 700;
+  const auto samples = PosteriorSamples(problem.view, problem.sd_mm, problem.terms, kDraws, 1);
+  for (std::size_t k = 0; k < problem.uv.size(); ++k) {
+    const Stencil s = problem.view.grid.StencilAt(problem.uv[k]);
+    double squares = 0;
+    for (const ControlNet& net : samples) {
+      squares += (s.Apply(net) - s.Apply(problem.view.start)).squaredNorm() / 3 / kDraws;
+    }
+    EXPECT_NEAR(std::sqrt(squares), sigma[k], 0.06 * sigma[k]) << k;
+  }
+  const auto again = PosteriorSamples(problem.view, problem.sd_mm, problem.terms, 3, 1);
+  EXPECT_EQ(again[2].vertices, samples[2].vertices);
+  EXPECT_NE(PosteriorSamples(problem.view, problem.sd_mm, problem.terms, 1, 2)[0].vertices,
+            samples[0].vertices);
+}
+
+// 90 % intervals of the fitted surface cover the true one nine times in ten.
+TEST(Posterior, NinetyPercentIntervalsCoverNineInTen) {
+  const Problem problem;
+  const std::vector<double> sigma =
+      PosteriorSigma(problem.view, problem.sd_mm, problem.terms, problem.uv);
+  Random random(11);
+  int inside = 0, all = 0;
+  for (int draw = 0; draw < 150; ++draw) {
+    const ControlNet truth = DrawTruth(problem, random);
+    LevelView view = problem.view;
+    for (std::size_t k = 0; k < view.observations.size(); ++k) {
+      Observation& o = view.observations[k];
+      const Vec3 noise(Gaussian(random), Gaussian(random), Gaussian(random));
+      o.position = view.grid.StencilAt(o.uv).Apply(truth) + problem.sd_mm[k] * noise;
+    }
+    const ControlNet fitted = FitLevel(view, problem.terms, LevelSolver::kFastest).net;
+    for (std::size_t k = 0; k < problem.uv.size(); ++k) {
+      const Stencil s = view.grid.StencilAt(problem.uv[k]);
+      const Vec3 off = s.Apply(fitted) - s.Apply(truth);
+      for (int axis = 0; axis < 3; ++axis, ++all) {
+        inside += std::abs(off[axis]) < 1.645 * sigma[k] ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(inside, 0.85 * all);
+  EXPECT_LT(inside, 0.95 * all);
+}
+
 TEST(Posterior, WrongInputIsNamed) {
   Problem problem;
   const auto message = [&]() -> std::string {

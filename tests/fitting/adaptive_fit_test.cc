@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/adaptive_fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "fitting/placement.h"
+#include "fitting/tree_system.h"
+#include "surfaces/error.h"
+#include "tests/testing/scattered_data.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+using testing::CleanError;
+using testing::ErrorAgainst;
+using testing::FrankePoint;
+using ::testing::HasSubstr;
+using testing::HeadPoint;
+using testing::PlainStart;
+using testing::Random;
+using testing::RandomSurface;
+using testing::Scattered;
+using testing::SmoothSurface;
+
+FitOptions Adaptive(double tolerance_mm, int finest, std::vector<Term> terms = {PointTerm{}}) {
+  return {.terms = std::move(terms),
+          .plan = AdaptivePlan{.tolerance_mm = tolerance_mm, .finest = finest}};
+}
+
+RunContext Threads(int count) {
+  RunContext context;
+  context.threads = count;
+  return context;
+}
+
+int VerticesOf(const HSplineSurface& surface) {
+  return surface.Columns(0) * surface.Rows(0) + static_cast<int>(surface.Offsets().size());
+}
+
+HSplineShape HeadShape(int finest = 4) {
+  return {.patches_u = 8, .patches_v = 8, .max_level = finest, .closure = Closure::kPeriodicU};
+}
+
+double LargestDistance(const HSplineSurface& a, const HSplineSurface& b,
+                       const Similarity& a_from_b = {}) {
+  double largest = 0;
+  for (int k = 0; k <= 40 * 40; ++k) {
+    const Vec2 uv(k % 41 / 40.0, k / 41 / 40.0);
+    largest = std::max(largest, (a.Point(uv) - a_from_b * b.Point(uv)).norm());
+  }
+  return largest;
+}
+
+FitTarget PointsOf(const HSplineSurface& surface, int count) {
+  return Scattered([&](const Vec2& uv) { return surface.Point(uv); }, count, 0, 5);
+}
+
+TEST(AdaptiveFit, ReproducesASurfaceWhoseVerticesAreKnown) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+    const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 3, .closure = closure};
+    const HSplineSurface truth = RandomSurface(shape, 1);
+    HSplineSurface start = truth;  // the same vertices, elsewhere
+    std::map<VertexId, std::optional<Vec3>> offsets;
+    for (const auto& [vertex, offset] : truth.Offsets()) {
+      offsets[vertex] = 0.3 * offset + Vec3(0.1, -0.2, 0.4);
+    }
+    start.SetOffsets(offsets);
+    const FitResult result = Fit(start, PointsOf(truth, 40000), {}, Adaptive(1, 3), {});
+    EXPECT_LT(LargestDistance(result.surface, truth), 1e-9);
+    EXPECT_LT(result.point_rms_mm, 1e-9);
+    EXPECT_EQ(result.surface.Offsets().size(), truth.Offsets().size());
+    EXPECT_TRUE(result.usable);
+  }
+}
+
+// The plain B-spline of one level, by the other path.
+TEST(AdaptiveFit, WithoutOverlaysItIsTheFitOfLevelZero) {
+  const std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{.weight = 0.05},
+                                   MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface}};
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+    const HSplineShape shape{.patches_u = 5, .patches_v = 4, .max_level = 0, .closure = closure};
+    const HSplineSurface start = SmoothSurface(shape, 2);
+    const FitTarget target = PointsOf(SmoothSurface(shape, 8), 300);
+    const FitResult adaptive = Fit(start, target, {}, Adaptive(1e-9, 0, terms), {});
+    const FitResult level = Fit(start, target, {}, {.schedule = {{0, 1}}, .terms = terms}, {});
+    EXPECT_LT(LargestDistance(adaptive.surface, level.surface), 3e-7);
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      const double expected = level.levels[0].terms[t].after;
+      EXPECT_NEAR(adaptive.levels.back().terms[t].after, expected, 1e-7 * expected);
+    }
+  }
+}
+
+// The gradient of the assembled system against differences of the cost, all levels' unknowns.
+TEST(AdaptiveFit, TheSystemIsTheGradientOfTheCost) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 3};
+  const HSplineSurface rest = RandomSurface(shape, 1), start = RandomSurface(shape, 1);
+  const PointCloud cloud(shape,
+                         Scattered([&](const Vec2& uv) { return rest.Point(uv); }, 500, 2, 6));
+  OffsetTree tree(start, rest, cloud);
+  const std::vector<Term> terms = {SmoothnessTerm{.weight = 0.5},
+                                   MembraneTerm{.weight = 3, .of = SmoothnessOf::kSurface}};
+  const std::vector<LevelForms> forms = FormsOf(shape, terms, {130, 80});
+  const double scale = 1 / cloud.weight_sum();
+  const auto cost = [&] {
+    tree.Measure({}, 1, nullptr);
+    return scale * tree.Squares() + EnergyOf(tree, forms);
+  };
+  Random random(3);
+  Eigen::MatrixX3d step(tree.unknowns().size(), 3);
+  for (Eigen::Index k = 0; k < step.size(); ++k) {
+    step(k / 3, k % 3) = random.Uniform(-1, 1);
+  }
+  cost();
+  const TreeSystem system = Assemble(tree, scale, forms);
+  const Eigen::MatrixXd normal = Eigen::MatrixXd(system.lower).selfadjointView<Eigen::Lower>();
+  const double here = cost();
+  tree.Move(step);
+  const double there = cost();
+  const double slope = -2 * step.cwiseProduct(system.right).sum();
+  const double bend = step.cwiseProduct(normal * step).sum();
+  EXPECT_NEAR(there, here + slope + bend, 1e-9 * there);
+}
+
+TEST(AdaptiveFit, HeadAsGoodAsTheAdaptivePeersWithAsFewVertices) {
+  const FitTarget target = Scattered(HeadPoint, 100000, 1e-4, 9);
+  const FitResult result = Fit(PlainStart(HeadShape()), target, {}, Adaptive(1e-3, 4), Threads(2));
+  const CleanError error = ErrorAgainst(HeadPoint, result.surface, 200);
+  EXPECT_LT(error.rms, 1.2e-4);
+  EXPECT_LT(error.largest, 1.3e-3);
+  EXPECT_LT(VerticesOf(result.surface), 2 * 1046);
+}
+
+TEST(AdaptiveFit, FrankesFunctionWithinItsNoise) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 4};
+  const FitTarget target = Scattered(FrankePoint, 20000, 1e-3, 9);
+  const FitResult result = Fit(PlainStart(shape), target, {}, Adaptive(6e-3, 4), {});
+  EXPECT_LT(ErrorAgainst(FrankePoint, result.surface, 100).rms, 8e-4);
+  EXPECT_LT(VerticesOf(result.surface), 400);
+  EXPECT_NEAR(result.point_rms_mm, 1e-3 * std::sqrt(3), 2e-4);
+}
+
+TEST(AdaptiveFit, VerticesAreFinerOnlyWhereTheyAreNeeded) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 5};
+  const auto bump = [](const Vec2& uv) {
+    return Vec3(uv.x(), uv.y(), 0.1 * std::exp(-(uv - Vec2(0.7, 0.3)).squaredNorm() / 0.002));
+  };
+  FitOptions options = Adaptive(1e-3, 5);
+  const FitTarget target = Scattered(bump, 20000, 0, 9);
+  const FitResult tight = Fit(PlainStart(shape), target, {}, options, {});
+  ASSERT_FALSE(tight.surface.Offsets(3).empty());
+  for (const auto& [vertex, offset] : tight.surface.Offsets(3)) {
+    EXPECT_LT((tight.surface.ParameterOf(vertex) - Vec2(0.7, 0.3)).norm(), 0.35);
+  }
+  std::get<AdaptivePlan>(options.plan).margin = 2;
+  const FitResult wide = Fit(PlainStart(shape), target, {}, options, {});
+  EXPECT_GT(VerticesOf(wide.surface), VerticesOf(tight.surface));
+  EXPECT_LE(ErrorAgainst(bump, wide.surface, 100).largest, 1.2e-3);
+  for (const FitResult& result : {tight, wide}) {
+    EXPECT_LT(*std::max_element(result.residual_mm.begin(), result.residual_mm.end()), 1e-3);
+  }
+}
+
+TEST(AdaptiveFit, CostFallsAndMisfitFallsFromRoundToRound) {
+  const FitResult result =
+      Fit(PlainStart(HeadShape()), Scattered(HeadPoint, 20000, 1e-4, 9), {},
+          Adaptive(1e-3, 3, {PointTerm{}, SmoothnessTerm{.weight = 1e-8, .length_mm = 1}}), {});
+  ASSERT_GT(result.levels.size(), 2u);
+  for (const LevelSummary& round : result.levels) {
+    double before = 0, after = 0;
+    for (const TermCosts& term : round.terms) {
+      before += term.before;
+      after += term.after;
+    }
+    EXPECT_LE(after, before * (1 + 1e-12));
+  }
+  EXPECT_LT(result.levels.back().rms_after_mm, 0.2 * result.levels.front().rms_after_mm);
+}
+
+TEST(AdaptiveFit, OrderOfPointsAndThreadsChangeNoByte) {
+  FitTarget target = Scattered(HeadPoint, 20000, 1e-4, 9);
+  target.points.push_back(target.points[7]);
+  target.points.push_back(target.points[7]);
+  target.points.back().position.x() += 1e-4;
+  const FitOptions options = Adaptive(2e-3, 3);
+  const FitResult a = Fit(PlainStart(HeadShape()), target, {}, options, {});
+  std::reverse(target.points.begin(), target.points.end());
+  FitResult b = Fit(PlainStart(HeadShape()), target, {}, options, Threads(3));
+  EXPECT_EQ(a.surface.Offsets(), b.surface.Offsets());
+  const ControlNet p = a.surface.Net(0), q = b.surface.Net(0);
+  EXPECT_EQ(std::memcmp(p.vertices.data(), q.vertices.data(), p.vertices.size() * sizeof(Vec3)), 0);
+  std::reverse(b.residual_mm.begin(), b.residual_mm.end());
+  EXPECT_EQ(a.residual_mm, b.residual_mm);
+  EXPECT_EQ(a.point_rms_mm, b.point_rms_mm);
+}
+
+TEST(AdaptiveFit, IsEquivariantUnderRigidMotion) {
+  const Similarity pose = {.scale = 1,
+                           .rotation = Eigen::AngleAxisd(1.1, Vec3(1, 2, -1).normalized()).matrix(),
+                           .translation = Vec3(3, -6, 0.9)};
+  const FitTarget target = Scattered(HeadPoint, 20000, 1e-4, 9);
+  FitTarget moved = target;
+  for (FitPoint& p : moved.points) {
+    p.position = pose * p.position;
+  }
+  const FitOptions options =
+      Adaptive(2e-3, 3, {PointTerm{}, SmoothnessTerm{.weight = 1e-8, .length_mm = 1}});
+  const HSplineSurface start = PlainStart(HeadShape());
+  const HSplineSurface a = Fit(start, target, {}, options, {}).surface;
+  const HSplineSurface b = Fit(Transformed(start, pose), moved, {}, options, {}).surface;
+  EXPECT_LT(LargestDistance(b, a, pose), 1e-9);
+}
+
+// One point in fifty is 0.3 off; a loss takes no notice of them, and none is overlaid.
+TEST(AdaptiveFit, OutliersDoNotBreakARobustFit) {
+  FitTarget target = Scattered(HeadPoint, 20000, 1e-4, 9);
+  for (std::size_t k = 0; k < target.points.size(); k += 50) {
+    target.points[k].position += Vec3(0.3, 0, 0);
+  }
+  for (const RobustLoss loss : {RobustLoss::kCauchy, RobustLoss::kTukey}) {
+    const PointTerm points{.loss = loss, .loss_width_mm = 0.05};
+    const FitResult robust =
+        Fit(PlainStart(HeadShape(3)), target, {}, Adaptive(8e-3, 3, {points}), {});
+    EXPECT_LT(ErrorAgainst(HeadPoint, robust.surface, 100).rms, 1.5e-3) << static_cast<int>(loss);
+  }
+  const FitResult plain = Fit(PlainStart(HeadShape(3)), target, {}, Adaptive(8e-3, 3), {});
+  EXPECT_GT(ErrorAgainst(HeadPoint, plain.surface, 100).rms, 5e-3);
+}
+
+// A hole of 30 % of the width: where no point is, the surface bridges and does not swing.
+TEST(AdaptiveFit, SmoothnessBridgesAHole) {
+  const HSplineShape shape{.patches_u = 16, .patches_v = 16, .max_level = 3};
+  FitTarget target = Scattered(FrankePoint, 20000, 1e-3, 9);
+  std::erase_if(target.points, [](const FitPoint& p) {
+    return (p.uv - Vec2(0.5, 0.5)).cwiseAbs().maxCoeff() < 0.15;
+  });
+  const std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-7, .length_mm = 1}};
+  const FitResult result = Fit(PlainStart(shape), target, {}, Adaptive(6e-3, 3, terms), {});
+  EXPECT_LT(ErrorAgainst(FrankePoint, result.surface, 100).largest, 0.1);
+}
+
+TEST(AdaptiveFit, FeaturesGetTheirOffsetsBack) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 2};
+  const HSplineSurface start = RandomSurface(shape, 2);
+  const std::vector<VertexId> features = {start.Offsets().begin()->first};
+  const FitTarget target = PointsOf(RandomSurface(shape, 1), 3000);
+  const FitResult result = Fit(start, target, features, Adaptive(0.5, 2), {});
+  EXPECT_EQ(result.surface.Offset(features[0]), start.Offset(features[0]));
+  EXPECT_EQ(result.restored_features, 1);
+  EXPECT_EQ(result.residual_mm.size(), target.points.size());
+  EXPECT_NEAR(result.residual_mm[5],
+              (result.surface.Point(target.points[5].uv) - target.points[5].position).norm(),
+              1e-12);
+}
+
+TEST(AdaptiveFit, WrongInputIsNamed) {
+  const FitTarget target = Scattered(HeadPoint, 100, 0, 9);
+  const auto message = [&](const FitOptions& options) -> std::string {
+    try {
+      Fit(PlainStart(HeadShape()), target, {}, options, {});
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(message(Adaptive(1, 5)), HasSubstr("level 5; the surface has levels 0..4"));
+  EXPECT_THAT(message(Adaptive(1, 1, {PointTerm{}, SymmetryTerm{}})), HasSubstr("'symmetry'"));
+  EXPECT_THAT(message(Adaptive(1, 1, {SmoothnessTerm{}})), HasSubstr("no term 'points'"));
+}
+
+}  // namespace
+}  // namespace semblance
