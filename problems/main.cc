@@ -15,9 +15,8 @@
 #include "problems/point_fit.h"
 #include "problems/progress.h"
 #include "problems/run_folder.h"
+#include "problems/study_commands.h"
 #include "problems/study_report.h"
-#include "problems/study_run.h"
-#include "problems/study_submit.h"
 #include "surfaces/mesh_check.h"
 #include "surfaces/mesh_io.h"
 
@@ -32,10 +31,7 @@ struct Arguments {
   std::vector<std::string> overrides;
   std::string out, config;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool force = false, quiet = false, schema = false, list = false, slurm = false;
-  StudyRunOptions study;
-  SubmitOptions submit;
-  std::string shard;
+  bool force = false, quiet = false, schema = false;
   CtImportOptions ct;
   std::string ct_edges = "threshold";
 };
@@ -156,105 +152,6 @@ int ImportCtCommand(const Arguments& arguments) {
   return kDone;
 }
 
-// "I/N", or what Slurm says of an array of jobs.
-void SetShard(const std::string& text, StudyRunOptions& options) {
-  const char *index = std::getenv("SLURM_ARRAY_TASK_ID"),
-             *count = std::getenv("SLURM_ARRAY_TASK_COUNT");
-  const std::string given =
-      text.empty() && index && count ? fmt::format("{}/{}", index, count) : text;
-  char rest = 0;
-  const bool read = given.empty() || std::sscanf(given.c_str(), "%d/%d%c", &options.shard,
-                                                 &options.shards, &rest) == 2;
-  if (!read || options.shards < 1 || options.shard < 0 || options.shard >= options.shards) {
-    throw InputError(fmt::format("--shard {}: write I/N with 0 <= I < N, e.g. 0/4", given));
-  }
-}
-
-int PrintPlan(const StudyPlan& plan) {
-  for (const StudyTrial& trial : plan.trials) {
-    fmt::print("{} {} | {}\n", trial.id, trial.subject, fmt::join(trial.values, " | "));
-  }
-  fmt::print("plan {}: {} trials over {}\n", plan.hash, plan.trials.size(),
-             fmt::join(plan.axes, ", "));
-  return kDone;
-}
-
-// What a study's folder holds, and how to go on.
-int PrintStudyState(const StudyResults& results, const std::filesystem::path& root) {
-  for (const TrialRow& row : results.trials) {
-    if (row.status == "failed" || row.status == "missing") {
-      fmt::print("{}: {} {} | {}{}{}\n", row.status, row.id, row.subject,
-                 fmt::join(row.values, " | "), row.reason.empty() ? "" : ": ", row.reason);
-    }
-  }
-  fmt::print("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
-             results.trials.size(), results.Count("unusable"), results.Count("failed"),
-             results.Count("missing"));
-  if (std::filesystem::exists(root / "report.html")) {
-    fmt::print("report: {}\n",
-               std::filesystem::absolute(root / "report.html").lexically_normal().string());
-  } else {
-    fmt::print("no report yet; semblance merge {} makes one of what is there\n", root.string());
-  }
-  return results.Count("done") == static_cast<int>(results.trials.size()) ? kDone : kNotUsable;
-}
-
-int StudyCommand(const Arguments& arguments) {
-  const std::filesystem::path file = arguments.files.at(0);
-  StudyRunOptions options = arguments.study;
-  SetShard(arguments.shard, options);
-  const StudyPlan plan = ReadStudy(file);
-  for (const std::string& note : plan.notes) {
-    fmt::print("note: {}\n", note);
-  }
-  if (arguments.list) {
-    return PrintPlan(plan);
-  }
-  const std::filesystem::path root =
-      arguments.out.empty() ? "out/" + file.stem().string() : arguments.out;
-  if (!arguments.quiet) {
-    options.on_trial = StudyProgress(stderr);
-  }
-  const StudySummary summary = RunStudy(plan, root, options, MakeContext(arguments));
-  if (options.shards > 1) {
-    fmt::print(
-        "shard {} of {}: {} trials, {} were there, {} done, {} failed; gather with "
-        "semblance merge\n",
-        options.shard, options.shards, summary.trials, summary.skipped, summary.done,
-        summary.failed);
-    return kDone;
-  }
-  OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
-  return PrintStudyState(WriteStudyTables(folder), root);
-}
-
-int MergeCommand(const Arguments& arguments) {
-  const std::filesystem::path root = arguments.files.at(0);
-  GatherTrials(root, {arguments.files.begin() + 1, arguments.files.end()});
-  if (!std::filesystem::exists(root / "plan.json")) {
-    throw IoError(fmt::format("{}: no folder of a study; it has no plan.json", root.string()));
-  }
-  OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
-  return PrintStudyState(WriteStudyTables(folder), root);
-}
-
-int StatusCommand(const Arguments& arguments) {
-  const std::filesystem::path root = arguments.files.at(0);
-  return PrintStudyState(ReadStudyResults(root), root);
-}
-
-int SubmitCommand(const Arguments& arguments) {
-  SubmitOptions options = arguments.submit;
-  options.program = std::filesystem::read_symlink("/proc/self/exe");
-  options.study = arguments.files.at(0);
-  options.folder = arguments.out.empty() ? "out/" + options.study.stem().string() : arguments.out;
-  ReadStudy(options.study);  // its faults are said here, not by every node
-  fmt::print("{}", SubmitScript(options));
-  std::fflush(stdout);
-  SubmitStudy(options);
-  return kDone;
-}
-
 int EvaluateCommand(const Arguments& arguments) {
   const TriMesh face = ReadMesh(arguments.files.at(0)), truth = ReadMesh(arguments.files.at(1));
   CheckHeadMesh(face, arguments.files.at(0));
@@ -336,41 +233,6 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
       ->capture_default_str();
   add_output(import);
   add_work(import);
-  CLI::App* study = add("study", "run every trial of a study that is not done yet", &StudyCommand);
-  study->add_option("CONFIG", a.files, "YAML file of the study")->required()->expected(1);
-  study->add_option("--out", a.out, "folder for the trials; a study there goes on");
-  study->add_option("--jobs", a.study.jobs, "trials at a time")->check(CLI::Range(1, 1024));
-  study->add_option("--shard", a.shard, "I/N: every N-th trial from the I-th (from 0) alone");
-  study->add_option("--cache", a.study.cache,
-                    "folder for implicit faces that other calls can take");
-  study->add_option("--cache-limit-mb", a.study.cache_limit_mb, "above it the oldest go")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  study->add_flag("--list", a.list, "print the plan and run nothing");
-  study->add_flag("--retry-failed", a.study.retry_failed, "run again what failed before");
-  study->add_flag("--quiet", a.quiet, "no progress");
-  CLI::App* merge = add("merge", "the tables and report of a study from its shards", &MergeCommand);
-  merge->add_option("DIR", a.files, "folder of the study, then folders to take trials from")
-      ->required();
-  CLI::App* submit =
-      add("submit", "run a study on a cluster: an array of shards, then the merge", &SubmitCommand);
-  submit->add_option("CONFIG", a.files, "YAML file of the study")->required()->expected(1);
-  submit->add_flag("--slurm", a.slurm, "the engine; the only one so far")->required();
-  submit->add_option("--out", a.out, "folder for the trials, which every node must see");
-  submit
-      ->add_option("--shards", a.submit.shards,
-                   "elements of the array; each should have work for 30 s or more")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  submit->add_option("--jobs", a.submit.jobs, "trials at a time in each")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  submit
-      ->add_option("--sbatch", a.submit.sbatch,
-                   "an option for sbatch, e.g. --sbatch=--partition=long; may be repeated")
-      ->allow_extra_args(false);
-  CLI::App* status = add("status", "how far a study has come", &StatusCommand);
-  status->add_option("DIR", a.files, "folder of the study")->required()->expected(1);
   CLI::App* check = add("check", "validate configurations and run nothing", &CheckCommand);
   check->add_option("CONFIG", a.files, "YAML files")->required();
   check->add_option("--set", a.overrides, "path=value, laid over each")->allow_extra_args(false);
@@ -392,16 +254,17 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   Arguments arguments;
   Command chosen = nullptr;
-  std::function<int()> face_command;
+  std::function<int()> other;
   Declare(app, arguments, chosen);
-  DeclareFaceCommands(app, face_command);
+  DeclareStudyCommands(app, StopSource().get_token(), other);
+  DeclareFaceCommands(app, other);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? kDone : kBadInput;
   }
   try {
-    return face_command ? face_command() : chosen(arguments);
+    return other ? other() : chosen(arguments);
   } catch (const Error& e) {
     fmt::print(stderr, "semblance: {}\n", e.what());
     return kBadInput;

@@ -66,6 +66,17 @@ class CommandLine : public ::testing::Test {
   ScratchFolder folder_;
 };
 
+TEST_F(CommandLine, AStudysPlanIsListedAndNothingRuns) {
+  Write("study.yaml", fmt::format("base: {}/phantom.yaml\ngrid: {{rounds: [1, 2]}}\n", kConfigs));
+  const Outcome plan = Call("study plan study.yaml --out out");
+  EXPECT_EQ(plan.code, 0) << plan.err;
+  EXPECT_EQ(std::count(plan.out.begin(), plan.out.end(), '\n'), 3) << plan.out;
+  EXPECT_THAT(plan.out, HasSubstr(": 2 trials over rounds"));
+  EXPECT_EQ(Call("study study.yaml --list --out out").out, plan.out);
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  ExpectRefused("study study.yaml study.yaml", "one study at a time");
+}
+
 TEST_F(CommandLine, HelpAndVersionAreNoErrors) {
   EXPECT_EQ(Call("--help").code, 0);
   EXPECT_THAT(Call("--version").out, HasSubstr("semblance "));
