@@ -10,6 +10,7 @@
 namespace semblance {
 
 inline constexpr double kMostEmission = 1e12;  // of one triangle
+inline constexpr double kRounding = 1e-9;      // share by which bounds are widened
 
 // r^-n from r^2. Whole n, the usual case, needs no pow.
 class InversePower {

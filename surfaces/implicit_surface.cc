@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "surfaces/emitter_bounds.h"
+#include "surfaces/emitter_tree.h"
 #include "surfaces/error.h"
 
 namespace semblance {
@@ -127,118 +128,16 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
 
 // Integrals of a flat emitter by two numerical ways, each within 1 %.
 constexpr double kFlatShare = 0.025;
-constexpr double kRounding = 1e-9;
-
-// Bounds over runs of emitters, for leaving out those whose emission is too small to count.
-struct Node {
-  Box3 box;  // of the triangles and of where they are moved to
-  Box3 normals;
-  double lowest_mm =
-      std::numeric_limits<double>::infinity();  // over planes through the box's center
-  int begin = 0, end = 0;                       // of emitters
-  int left = -1, right = -1;                    // -1 in a leaf
-  int batch = -1;                               // of a leaf, if there are batches
-  double gain = 0;                              // sum over its emitters
-  double greatest_gain = 0;
-
-  // Not less than the height of p over the plane of any of its emitters.
-  double MostHeight(const Vec3& p) const {
-    const Vec3 from = p - box.center();
-    const double most =
-        normals.min().cwiseProduct(from).cwiseMax(normals.max().cwiseProduct(from)).sum();
-    return most - lowest_mm + kRounding * (from.cwiseAbs().sum() + std::abs(lowest_mm));
-  }
-};
-
-class Tree {
- public:
-  explicit Tree(std::vector<EmitterTriangle>& emitters) {
-    Split(emitters, 0, static_cast<int>(emitters.size()));
-  }
-
-  // Calls visit(leaf) for each leaf that is not left out, in a fixed order. A node
-  // is left out where bound(node), the most that it emits at p, is at most `least`; returns the sum
-  // of those bounds.
-  template <class Bound, class Visit>
-  double Near(double least, const Bound& bound, const Visit& visit) const {
-    std::array<int, 64> stack;
-    int size = 0;
-    double left_out = 0;
-    stack[size++] = 0;
-    while (size > 0) {
-      const Node& node = nodes_[stack[--size]];
-      const double most = bound(node);
-      if (most <= least) {
-        left_out += most;
-      } else if (node.left < 0) {
-        visit(node);
-      } else {
-        stack[size++] = node.right;
-        stack[size++] = node.left;
-      }
-    }
-    return left_out;
-  }
-
-  template <class Visit>
-  void ForEachLeaf(const Visit& visit) {
-    for (Node& node : nodes_) {
-      if (node.left < 0) {
-        visit(node);
-      }
-    }
-  }
-
- private:
-  static constexpr int kLeaf = FlatBatch::kLanes;
-
-  int Split(std::vector<EmitterTriangle>& emitters, int begin, int end) {
-    const int self = static_cast<int>(nodes_.size());
-    nodes_.emplace_back();
-    nodes_[self].begin = begin;
-    nodes_[self].end = end;
-    Box3 centers;
-    Node& node = nodes_[self];
-    for (int e = begin; e < end; ++e) {
-      const EmitterTriangle& t = emitters[e];
-      for (const Vec3& corner : {t.a, t.b, t.c}) {
-        node.box.extend(corner).extend(corner + t.moved);
-      }
-      centers.extend(t.centroid);
-      node.normals.extend(t.normal);
-      node.gain += t.most_gain;
-      node.greatest_gain = std::max(node.greatest_gain, t.most_gain);
-    }
-    for (int e = begin; e < end; ++e) {
-      const EmitterTriangle& t = emitters[e];
-      node.lowest_mm = std::min(node.lowest_mm, t.normal.dot(t.a - node.box.center()));
-    }
-    if (end - begin > kLeaf) {
-      int axis = 0;
-      centers.sizes().maxCoeff(&axis);
-      const int middle = begin + ((end - begin) / 2 + kLeaf - 1) / kLeaf * kLeaf;  // full leaves
-      std::nth_element(emitters.begin() + begin, emitters.begin() + middle, emitters.begin() + end,
-                       [axis](const EmitterTriangle& a, const EmitterTriangle& b) {
-                         return a.centroid[axis] < b.centroid[axis];
-                       });
-      const int left = Split(emitters, begin, middle), right = Split(emitters, middle, end);
-      nodes_[self].left = left;
-      nodes_[self].right = right;
-    }
-    return self;
-  }
-
-  std::vector<Node> nodes_;
-};
 
 // One a leaf, if the kernel is taken by batches.
 template <class EmitterKernel>
 std::vector<FlatBatch> MakeBatches(const EmitterKernel& kernel,
-                                   const std::vector<EmitterTriangle>& emitters, Tree& tree) {
+                                   const std::vector<EmitterTriangle>& emitters,
+                                   EmitterTree& tree) {
   std::vector<FlatBatch> batches;
   if constexpr (std::is_same_v<EmitterKernel, FlatKernel>) {
     if (kernel.Batches()) {
-      tree.ForEachLeaf([&](Node& leaf) {
+      tree.ForEachLeaf([&](EmitterNode& leaf) {
         leaf.batch = static_cast<int>(batches.size());
         FlatBatch& batch = batches.emplace_back();
         for (int e = leaf.begin; e < leaf.end; ++e) {
@@ -272,7 +171,7 @@ struct ImplicitSurface::Impl {
   void Near(const EmitterKernel& k, const Vec3& p, const Begin& begin, const Visit& visit) const {
     constexpr double kFirstShare = 1.0 / 64;
     const double cut = (1 - kRounding) * k.Cut();
-    const auto bound = [&](const Node& node) {
+    const auto bound = [&](const EmitterNode& node) {
       const double height = node.MostHeight(p);
       if (height <= 0) {
         return 0.0;
@@ -302,7 +201,7 @@ struct ImplicitSurface::Impl {
   template <class EmitterKernel>
   double Sum(const EmitterKernel& k, const Vec3& p, std::int64_t& evaluations) const {
     double sum = 0;
-    const auto add = [&](const Node& leaf) {
+    const auto add = [&](const EmitterNode& leaf) {
       evaluations += leaf.end - leaf.begin;
       if constexpr (std::is_same_v<EmitterKernel, FlatKernel>) {
         if (leaf.batch >= 0) {
@@ -321,7 +220,7 @@ struct ImplicitSurface::Impl {
 
   Kernel kernel;
   std::vector<EmitterTriangle> emitters;
-  Tree tree;
+  EmitterTree tree;
   std::vector<FlatBatch> batches;  // of the tree's leaves
   double tail_error, decay;
 };
@@ -404,7 +303,7 @@ std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
       [&](const auto& kernel) {
         impl_->Near(
             kernel, p, [&count] { count = 0; },
-            [&count](const Node& leaf) { count += leaf.end - leaf.begin; });
+            [&count](const EmitterNode& leaf) { count += leaf.end - leaf.begin; });
       },
       impl_->kernel);
   return count;

@@ -10,7 +10,6 @@
 #include <chrono>
 #include <filesystem>
 #include <map>
-#include <numeric>
 
 #include "problems/phantom.h"
 #include "surfaces/decimate.h"
@@ -253,8 +252,8 @@ void Independence(const std::string& subject, const std::vector<Head>& coarse_to
   const std::map<std::string, Emitter> emitters = {
       {"flat", FlatEmitter{}},
       {"flat_linear", FlatEmitter{6, EmitterDepth::kLinear}},
-      {"split", SplitEmitter{}},
-      {"thesis", ThesisEmitter{}}};
+      {"split", SplitEmitter{.cut_below = 0.002}},
+      {"thesis", ThesisEmitter{.cut_below = 0.002}}};
   const Head& finest = coarse_to_fine.back();
   for (const auto& [name, emitter] : emitters) {
     const TriMesh reference = Build(finest, Options(emitter, NarrowBand{}, 150)).face.dense;

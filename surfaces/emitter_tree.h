@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A binary tree over emitters, for leaving out whole branches whose emission is too small to count.
+// For implicit_surface.cc alone.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "surfaces/emitter_triangle.h"
+#include "surfaces/flat_batch.h"
+
+namespace semblance {
+
+// Bounds over a run of emitters.
+struct EmitterNode {
+  Box3 box;  // of the triangles and of where they are moved to
+  Box3 normals;
+  double lowest_mm =
+      std::numeric_limits<double>::infinity();  // over planes through the box's center
+  int begin = 0, end = 0;                       // of emitters
+  int left = -1, right = -1;                    // -1 in a leaf
+  int batch = -1;                               // of a leaf, if there are batches
+  double gain = 0;                              // sum over its emitters
+  double greatest_gain = 0;
+
+  // Not less than the height of p over the plane of any of its emitters.
+  double MostHeight(const Vec3& p) const {
+    const Vec3 from = p - box.center();
+    const double most =
+        normals.min().cwiseProduct(from).cwiseMax(normals.max().cwiseProduct(from)).sum();
+    return most - lowest_mm + kRounding * (from.cwiseAbs().sum() + std::abs(lowest_mm));
+  }
+};
+
+class EmitterTree {
+ public:
+  explicit EmitterTree(std::vector<EmitterTriangle>& emitters) {
+    Split(emitters, 0, static_cast<int>(emitters.size()));
+  }
+
+  // Calls visit(leaf) for each leaf that is not left out, in a fixed order. A node
+  // is left out where bound(node), the most that it emits at p, is at most `least`; returns the sum
+  // of those bounds.
+  template <class Bound, class Visit>
+  double Near(double least, const Bound& bound, const Visit& visit) const {
+    std::array<int, 64> stack;
+    int size = 0;
+    double left_out = 0;
+    stack[size++] = 0;
+    while (size > 0) {
+      const EmitterNode& node = nodes_[stack[--size]];
+      const double most = bound(node);
+      if (most <= least) {
+        left_out += most;
+      } else if (node.left < 0) {
+        visit(node);
+      } else {
+        stack[size++] = node.right;
+        stack[size++] = node.left;
+      }
+    }
+    return left_out;
+  }
+
+  template <class Visit>
+  void ForEachLeaf(const Visit& visit) {
+    for (EmitterNode& node : nodes_) {
+      if (node.left < 0) {
+        visit(node);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kLeaf = FlatBatch::kLanes;
+
+  int Split(std::vector<EmitterTriangle>& emitters, int begin, int end) {
+    const int self = static_cast<int>(nodes_.size());
+    nodes_.emplace_back();
+    nodes_[self].begin = begin;
+    nodes_[self].end = end;
+    Box3 centers;
+    EmitterNode& node = nodes_[self];
+    for (int e = begin; e < end; ++e) {
+      const EmitterTriangle& t = emitters[e];
+      for (const Vec3& corner : {t.a, t.b, t.c}) {
+        node.box.extend(corner).extend(corner + t.moved);
+      }
+      centers.extend(t.centroid);
+      node.normals.extend(t.normal);
+      node.gain += t.most_gain;
+      node.greatest_gain = std::max(node.greatest_gain, t.most_gain);
+    }
+    for (int e = begin; e < end; ++e) {
+      const EmitterTriangle& t = emitters[e];
+      node.lowest_mm = std::min(node.lowest_mm, t.normal.dot(t.a - node.box.center()));
+    }
+    if (end - begin > kLeaf) {
+      int axis = 0;
+      centers.sizes().maxCoeff(&axis);
+      const int middle = begin + ((end - begin) / 2 + kLeaf - 1) / kLeaf * kLeaf;  // full leaves
+      std::nth_element(emitters.begin() + begin, emitters.begin() + middle, emitters.begin() + end,
+                       [axis](const EmitterTriangle& a, const EmitterTriangle& b) {
+                         return a.centroid[axis] < b.centroid[axis];
+                       });
+      const int left = Split(emitters, begin, middle), right = Split(emitters, middle, end);
+      nodes_[self].left = left;
+      nodes_[self].right = right;
+    }
+    return self;
+  }
+
+  std::vector<EmitterNode> nodes_;
+};
+
+}  // namespace semblance
