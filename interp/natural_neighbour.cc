@@ -31,9 +31,16 @@ struct Corner {
 };
 using Polygon = std::vector<Corner>;
 
-// What of the polygon has value(x) >= 0, for a linear value.
+// What of the polygon has value(x) >= 0, for a linear value. Most have it everywhere.
 template <class Value>
 void Clip(Polygon& polygon, const Value& value, int edge, Polygon& spare) {
+  double least = 0;
+  for (const Corner& corner : polygon) {
+    least = std::min(least, value(corner.at));
+  }
+  if (least >= 0) {
+    return;
+  }
   spare.clear();
   bool cut = false;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -64,74 +71,88 @@ double AreaOf(const Polygon& polygon) {
   return twice / 2;
 }
 
-// The cell that the vertex would have.
-Polygon CellOf(const std::vector<Site>& sites, double reach) {
-  Polygon cell = {{{-reach, -reach}}, {{reach, -reach}}, {{reach, reach}}, {{-reach, reach}}};
-  Polygon spare;
-  for (std::size_t k = 0; k < sites.size(); ++k) {
-    Clip(
-        cell, [&](const Vec2& x) { return sites[k].At(x); }, static_cast<int>(k), spare);
+double FurthestCorner2(const Polygon& polygon) {
+  double furthest2 = 0;
+  for (const Corner& corner : polygon) {
+    furthest2 = std::max(furthest2, corner.at.squaredNorm());
   }
-  return cell;
+  return furthest2;
+}
+
+// What one vertex needs.
+struct Workspace {
+  std::vector<Site> sites;
+  std::vector<double> least;
+  std::vector<int> owners;
+  Polygon cell, part, spare;
+};
+
+// The cell that the vertex would have. A site so far that its plane passes the furthest corner is
+// not looked at corner by corner.
+void FindCell(double reach, Workspace& work) {
+  work.cell.assign({{{-reach, -reach}}, {{reach, -reach}}, {{reach, reach}}, {{-reach, reach}}});
+  double furthest2 = FurthestCorner2(work.cell);
+  for (std::size_t k = 0; k < work.sites.size(); ++k) {
+    const Site& site = work.sites[k];
+    if (site.distance2 * site.distance2 >= 4 * site.place.squaredNorm() * furthest2) {
+      continue;
+    }
+    Clip(
+        work.cell, [&](const Vec2& x) { return site.At(x); }, static_cast<int>(k), work.spare);
+    furthest2 = FurthestCorner2(work.cell);
+  }
 }
 
 // Those that may keep a part of the cell now, also such as the vertex would swallow whole: the
 // lowest of the linear functions is nowhere in the cell above the least of their largest values.
-std::vector<int> Owners(const std::vector<Site>& sites, const Polygon& cell) {
-  std::vector<double> least(sites.size(), std::numeric_limits<double>::infinity());
+void FindOwners(Workspace& work) {
+  const std::size_t count = work.sites.size();
+  work.least.assign(count, std::numeric_limits<double>::infinity());
   double bound = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < sites.size(); ++k) {
+  for (std::size_t k = 0; k < count; ++k) {
     double most = 0;
-    for (const Corner& corner : cell) {
-      const double value = sites[k].At(corner.at);
-      least[k] = std::min(least[k], value);
+    for (const Corner& corner : work.cell) {
+      const double value = work.sites[k].At(corner.at);
+      work.least[k] = std::min(work.least[k], value);
       most = std::max(most, value);
     }
     bound = std::min(bound, most);
   }
-  std::vector<int> owners;
-  for (std::size_t k = 0; k < sites.size(); ++k) {
-    if (least[k] <= bound) {
-      owners.push_back(static_cast<int>(k));
+  work.owners.clear();
+  for (std::size_t k = 0; k < count; ++k) {
+    if (work.least[k] <= bound) {
+      work.owners.push_back(static_cast<int>(k));
     }
   }
-  return owners;
 }
 
-struct Weight {
-  int site = 0;
-  double weight = 0;
-};
-
-std::vector<Weight> SibsonWeights(const std::vector<Site>& sites, const Polygon& cell) {
-  const std::vector<int> owners = Owners(sites, cell);
-  std::vector<Weight> weights;
-  Polygon part, spare;
-  for (const int own : owners) {
-    part = cell;
-    for (const int other : owners) {
-      if (other != own && !part.empty()) {
+// use(site, weight) for each.
+template <class Use>
+void SibsonWeights(Workspace& work, const Use& use) {
+  FindOwners(work);
+  for (const int own : work.owners) {
+    work.part = work.cell;
+    for (const int other : work.owners) {
+      if (other != own && !work.part.empty()) {
+        const Site &a = work.sites[own], &b = work.sites[other];
         Clip(
-            part, [&](const Vec2& x) { return sites[other].At(x) - sites[own].At(x); }, other,
-            spare);
+            work.part, [&](const Vec2& x) { return b.At(x) - a.At(x); }, other, work.spare);
       }
     }
-    const double area = AreaOf(part);
+    const double area = AreaOf(work.part);
     if (area > 0) {
-      weights.push_back({own, area});
+      use(own, area);
     }
   }
-  return weights;
 }
 
-std::vector<Weight> LaplaceWeights(const std::vector<Site>& sites, const Polygon& cell) {
-  std::vector<Weight> weights;
+template <class Use>
+void LaplaceWeights(const Workspace& work, const Use& use) {
+  const Polygon& cell = work.cell;
   for (std::size_t i = 0; i < cell.size(); ++i) {
     const Vec2& next = cell[i + 1 < cell.size() ? i + 1 : 0].at;
-    weights.push_back(
-        {cell[i].edge, (next - cell[i].at).norm() / sites[cell[i].edge].place.norm()});
+    use(cell[i].edge, (next - cell[i].at).norm() / work.sites[cell[i].edge].place.norm());
   }
-  return weights;
 }
 
 const DepthSample& Nearest(const std::vector<DepthSample>& samples, const Vec3& p) {
@@ -140,18 +161,16 @@ const DepthSample& Nearest(const std::vector<DepthSample>& samples, const Vec3& 
 }
 
 // The first axis points to the nearest dowel, so that the reach turns with the skull.
-std::vector<Site> SitesAround(const std::vector<DepthSample>& samples, const Vec3& p,
-                              const Vec3& normal, const Vec3& nearest) {
+void FindSites(const std::vector<DepthSample>& samples, const Vec3& p, const Vec3& normal,
+               const Vec3& nearest, std::vector<Site>& sites) {
   Vec3 first = nearest - normal.dot(nearest) * normal;
   first = first.norm() > kAtBase_mm ? first.normalized() : normal.unitOrthogonal();
   const Vec3 second = normal.cross(first);
-  std::vector<Site> sites;
   sites.reserve(samples.size());
   for (const DepthSample& sample : samples) {
     const Vec3 x = sample.base - p;
     sites.push_back({{x.dot(first), x.dot(second)}, x.squaredNorm()});
   }
-  return sites;
 }
 
 DepthValue DepthAt(const std::vector<DepthSample>& samples, NeighbourWeights kind, const Vec3& p,
@@ -163,18 +182,23 @@ DepthValue DepthAt(const std::vector<DepthSample>& samples, NeighbourWeights kin
   if (normal.squaredNorm() == 0) {
     return {};  // no tangent plane
   }
-  const std::vector<Site> sites = SitesAround(samples, p, normal, nearest.base - p);
-  const double furthest = std::sqrt(std::ranges::max(sites, {}, &Site::distance2).distance2);
-  const Polygon cell = CellOf(sites, kReach * furthest);
-  if (cell.empty() || std::ranges::count(cell, kOpen, &Corner::edge) > 0) {
+  Workspace work;
+  FindSites(samples, p, normal, nearest.base - p, work.sites);
+  const double furthest = std::sqrt(std::ranges::max(work.sites, {}, &Site::distance2).distance2);
+  FindCell(kReach * furthest, work);
+  if (work.cell.empty() || std::ranges::count(work.cell, kOpen, &Corner::edge) > 0) {
     return {};
   }
   double sum = 0, depth = 0, sd = 0;
-  for (const Weight& of : kind == NeighbourWeights::kSibson ? SibsonWeights(sites, cell)
-                                                            : LaplaceWeights(sites, cell)) {
-    sum += of.weight;
-    depth += of.weight * samples[of.site].depth_mm;
-    sd += of.weight * samples[of.site].sd_mm;
+  const auto add = [&](int site, double weight) {
+    sum += weight;
+    depth += weight * samples[site].depth_mm;
+    sd += weight * samples[site].sd_mm;
+  };
+  if (kind == NeighbourWeights::kSibson) {
+    SibsonWeights(work, add);
+  } else {
+    LaplaceWeights(work, add);
   }
   return sum > 0 ? DepthValue{depth / sum, sd / sum} : DepthValue{};
 }

@@ -28,11 +28,15 @@ std::vector<std::pair<std::string, Folds>> KindsOfFolds(const CrossValidationOpt
   return kinds;
 }
 
-// A fold may leave too little for the scheme, e.g. no area of the network: it is then without a
-// prediction, which is what people should know of the scheme.
-CrossValidation LeaveOut(const Experiment& experiment, const DepthStage& stage, const Folds& folds,
-                         const RunContext& context) {
-  return CrossValidate(experiment.interp, experiment.outside, stage.Input(), folds, context);
+std::vector<std::pair<std::string, CrossValidation>> LeaveOut(const Experiment& experiment,
+                                                              const DepthStage& stage,
+                                                              const RunContext& context) {
+  std::vector<std::pair<std::string, CrossValidation>> left_out;
+  for (const auto& [kind, folds] : KindsOfFolds(experiment.cross_validation, stage.standing)) {
+    left_out.emplace_back(
+        kind, CrossValidate(experiment.interp, experiment.outside, stage.Input(), folds, context));
+  }
+  return left_out;
 }
 
 std::string Cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
@@ -77,12 +81,10 @@ DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context
   }
   result.directions = result.truth ? result.truth->directions
                                    : DepthDirections(experiment.direction, stage.Input(), context);
-  step("leave dowels out", [&] {
-    for (const auto& [kind, folds] : KindsOfFolds(experiment.cross_validation, stage.standing)) {
-      result.left_out.emplace_back(kind, LeaveOut(experiment, stage, folds, context));
-    }
-    return 0;
-  });
+  if (!std::holds_alternative<DepthMap>(experiment.interp)) {  // no dowel has a part in a map
+    result.left_out =
+        step("leave dowels out", [&] { return LeaveOut(experiment, stage, context); });
+  }
   result.times = step.Take();
   return result;
 }
@@ -123,7 +125,9 @@ std::string DepthText(const DepthResult& result) {
   if (result.truth) {
     text += TruthText(*result.truth);
   }
-  text += "dowels left out                  RMS   mean    max  signed  predicted  within 90 %\n";
+  if (!result.left_out.empty()) {
+    text += "dowels left out                  RMS   mean    max  signed  predicted  within 90 %\n";
+  }
   for (const auto& [kind, left_out] : result.left_out) {
     text += fmt::format("  {:<24} {:6.2f} {:6.2f} {:6.2f} {:7.2f} {:4} of {:3}  {}\n", kind,
                         left_out.rms_mm, left_out.mean_absolute_mm, left_out.most_mm,

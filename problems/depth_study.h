@@ -21,7 +21,7 @@ struct DepthResult {
   std::vector<Vec3> directions;          // one a vertex of the shell
   std::optional<DepthComparison> truth;  // where the true skin is known
   // What was left out together: "landmark" (both its sides), "side", "k_fold" (random parts).
-  // A kind for which there are not enough dowels is missing.
+  // A kind for which there are not enough dowels is missing; all are of a depth_map.
   std::vector<std::pair<std::string, CrossValidation>> left_out;
   std::vector<StepTime> times;  // not part of the result proper
 

@@ -66,7 +66,8 @@ void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
   WriteViews({{MappedObject(skin, result.truth->face.signed_mm, legend.map)}}, result,
              {"Signed error on the true skin", {}, legend}, Lighting::kEven, folder,
              "pictures/error.png", threads);
-  const Legend implicit_legend{ErrorColours(), "implicit face outside (+) or inside (-) the true skin"};
+  const Legend implicit_legend{ErrorColours(),
+                               "implicit face outside (+) or inside (-) the true skin"};
   WriteViews({{MappedObject(skin, result.truth->implicit.signed_mm, implicit_legend.map)}}, result,
              {"Signed error of the implicit face", {}, implicit_legend}, Lighting::kEven, folder,
              "pictures/error_implicit.png", threads);

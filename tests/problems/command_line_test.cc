@@ -93,6 +93,21 @@ TEST_F(CommandLine, RunWritesAReportAndSaysWhere) {
   EXPECT_TRUE(fs::exists(folder_ / "out" / "manifest.json"));
 }
 
+TEST_F(CommandLine, DepthSaysHowFarTheSchemeIsFromTheTruthAndFromLeftOutDowels) {
+  const Outcome outcome = Call("depth " + kConfigs +
+                               "/phantom.yaml --out depth --quiet --set subject.rings=30 "
+                               "--set interp=network_spline");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("along the direction"), HasSubstr("cheeks"),
+                                 HasSubstr("  k_fold"), HasSubstr("no sd stated")));
+  EXPECT_TRUE(fs::exists(folder_ / "depth" / "depth.ply"));
+  ExpectRefused("depth " + kConfigs +
+                    "/phantom.yaml --out map --quiet --set subject.rings=30 "
+                    "--set interp=depth_map",
+                "depth_map: no file is named");
+}
+
 TEST_F(CommandLine, AFolderThatExistsIsLeftAloneUnlessForced) {
   const std::string run = "run " + kConfigs + "/phantom.yaml --out out" + kQuick;
   fs::create_directories(folder_ / "out");

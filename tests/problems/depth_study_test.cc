@@ -63,6 +63,7 @@ TEST(DepthStudy, AMapOfTheTrueDepthHasNoErrorButThoseOfNormals) {
           {.normals = {}, .colors = {}, .scalars = {{"scalar_depth_mm", phantom.depth_mm}}}));
   const DepthResult map = Measured(
       {fmt::format("interp={{type: depth_map, file: {}}}", (folder / "true.ply").string())});
+  EXPECT_TRUE(map.left_out.empty());
   const double best = map.truth->along_direction.all.rms_mm;
   EXPECT_LT(best, 0.25);
   for (const char* scheme : {"barycentric", "network_spline", "mean"}) {
