@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "problems/config.h"
-#include "tests/testing/words_of.h"
+#include "tests/testing/scratch_file.h"
 
 namespace semblance {
 namespace {

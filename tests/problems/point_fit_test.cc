@@ -101,8 +101,9 @@ TEST(PointFit, PlaneParametersFindTheHeightField) {
   const auto surface = [&](const Vec2& uv) -> Vec3 {
     return turn * Vec3(150 * uv.x(), 100 * uv.y(), 8 * std::sin(5 * uv.x()) * std::cos(4 * uv.y()));
   };
-  const PointFitOptions options{
-      .fit = {.terms = {PointTerm{}}, .plan = AdaptivePlan{.tolerance_mm = 0.01, .finest = 3}}};
+  PointFitOptions options;
+  options.fit.terms = {PointTerm{}};
+  options.fit.plan = AdaptivePlan{.tolerance_mm = 0.01, .finest = 3};
   const PointFit result = FitPoints(TableOf(Scattered(surface, 5000, 0, 3)), options, {});
   EXPECT_EQ(result.parameters, "plane");
   const SurfaceProjector projector(result.fit.surface);
