@@ -19,6 +19,10 @@ namespace {
 
 constexpr int kSide = 3, kTile = kSide * kSide;
 
+// Of all residuals. Ceres stops where the vertices less their gradient are the vertices again, to
+// the last digit; in these units the gradient is larger by the square.
+constexpr double kScale = 1e4;
+
 struct Slot {
   int tile = -1;   // of the net; in a block of rows: which of its tiles
   int place = -1;  // in the tile
@@ -79,7 +83,10 @@ class TileSink final : public RowSink {
       a = std::make_shared<const Eigen::MatrixXd>(std::move(reduced.a));
       b = std::move(reduced.b);
     }
-    TileRows rows{.a = std::move(a), .b = std::move(b), .tiles = {}, .columns = {}};
+    TileRows rows{.a = std::make_shared<const Eigen::MatrixXd>(kScale * *a),
+                  .b = kScale * b,
+                  .tiles = {},
+                  .columns = {}};
     for (std::size_t k = 0; k < vertices.size(); ++k) {
       const Slot slot = SlotOf(vertices[k]);
       const auto at = std::find(rows.tiles.begin(), rows.tiles.end(), slot.tile);
@@ -145,7 +152,9 @@ SolverOutcome SolveByTiles(const LevelView& view, std::span<const Term> terms, C
     return outcome;
   }
   const ControlNet before = net;
-  const ceres::Solver::Options options = CeresOptions(terms, net.vertices.size());
+  ceres::Solver::Options options = CeresOptions(terms, net.vertices.size());
+  options.initial_trust_region_radius /= kScale * kScale;
+  options.max_trust_region_radius /= kScale * kScale;
   for (int coordinate = 0; coordinate < 3; ++coordinate) {
     const ceres::Solver::Summary summary = SolveCoordinate(sink, coordinate, options, net);
     const int steps = static_cast<int>(summary.iterations.size()) - 1;

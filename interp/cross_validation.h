@@ -41,7 +41,7 @@ struct CrossValidation {
   double rms_mm = kNaN;
   double mean_mm = kNaN;  // above 0: predicted too thick
   double mean_absolute_mm = kNaN;
-  double most_mm = kNaN;      // largest absolute error
+  double most_mm = kNaN;         // largest absolute error
   std::vector<double> coverage;  // of those with a stated sd_mm (calibration.h)
   double coverage_90 = kNaN;     // its share at 90 %; 0.9 where the sd is true
 };

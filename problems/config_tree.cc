@@ -191,8 +191,8 @@ ConfigPlace PlaceOf(const ConfigNode& tree, std::string_view path) {
   const ConfigNode* node = &tree;
   for (const Step& step : ParsePath(path)) {
     const bool has_item = step.index && *step.index < node->items.size();
-    const ConfigNode* child = step.index ? (has_item ? &node->items[*step.index] : nullptr)
-                                         : node->Find(step.key);
+    const ConfigNode* child =
+        step.index ? (has_item ? &node->items[*step.index] : nullptr) : node->Find(step.key);
     if (!child) {
       break;
     }

@@ -29,7 +29,7 @@ constexpr int kDone = 0, kNotUsable = 1, kBadInput = 2;
 struct Arguments {
   std::vector<std::string> files;
   std::vector<std::string> overrides;
-  std::string out, config;
+  std::string out;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   bool force = false, quiet = false, schema = false;
   CtImportOptions ct;
@@ -98,7 +98,7 @@ int DepthCommand(const Arguments& arguments) {
 }
 
 int FitCommand(const Arguments& arguments) {
-  const std::filesystem::path points = arguments.files.at(0), config = arguments.config;
+  const std::filesystem::path points = arguments.files.at(0), config = arguments.files.at(1);
   const auto options = ReadConfig<PointFitOptions>(config, arguments.overrides);
   const PointTable table = ReadPointTable(points);
   OutputFolder folder = MakeFolder(arguments, fmt::format("out/{}", points.stem().string()));
@@ -211,10 +211,11 @@ void Declare(CLI::App& app, Arguments& a, Command& chosen) {
   add_output(depth);
   add_work(depth);
   CLI::App* fit = add("fit", "an H-spline surface through any scattered points", &FitCommand);
-  fit->add_option("POINTS", a.files, "CSV file with the columns x,y,z and, if known, u,v, weight")
+  fit->add_option(
+         "POINTS CONFIG", a.files,
+         "CSV file with the columns x,y,z and, if known, u,v, weight; YAML file of the fit")
       ->required()
-      ->expected(1);
-  fit->add_option("CONFIG", a.config, "YAML file of the fit")->required();
+      ->expected(2);
   fit->add_option("--set", a.overrides, "path=value, laid over the configuration; may be repeated")
       ->allow_extra_args(false);
   add_output(fit);

@@ -8,9 +8,9 @@
 
 namespace semblance {
 
-// What a written file outlasts. kProcess: the end of the process, however it ends, but after a power
-// failure it may be empty; spares two waits for the disk, and is for what is checked when it is read
-// and can be made again.
+// What a written file outlasts. kProcess: the end of the process, however it ends, but after a
+// power failure it may be empty; spares two waits for the disk, and is for what is checked when it
+// is read and can be made again.
 enum class Outlasts { kPowerFailure, kProcess };
 
 // Writes a temporary file beside `path`, syncs it, and renames it to `path`, which then holds

@@ -34,7 +34,7 @@ TEST(Experiment, AStepAtALevelThatTheFaceLacksIsToldAtItsLine) {
 }
 
 TEST(Experiment, AllOptionsThatNameALevelAreLookedAt) {
-  EXPECT_THAT(Faults("first_fit: [{level: 4}]\n"), HasSubstr("1:20: first_fit[0].level: level 4"));
+  EXPECT_THAT(Faults("first_fit: [{level: 4}]\n"), HasSubstr("1:21: first_fit[0].level: level 4"));
   EXPECT_THAT(Faults("seeds: {direction_level: 5}\n"),
               HasSubstr("1:26: seeds.direction_level: level 5"));
   EXPECT_THAT(Faults("fit: {plan: {type: coarse_to_fine, finest: 6}}\n"),
