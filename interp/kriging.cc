@@ -1,245 +1,130 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/kriging.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+
+#include "interp/kriging_likelihood.h"
+#include "interp/kriging_process.h"
+#include "surfaces/mesh_query.h"
 
 namespace semblance {
 namespace {
 
-constexpr std::size_t kFitSamples = 200;  // enough for two numbers; the cost grows by the cube
-constexpr double kFirstJitter = 1e-10;    // of the variance, on the diagonal
-constexpr double kFlatDepths_mm = 1e-3;   // depths that spread less than this are one depth
+constexpr Eigen::Index kFitSamples = 200;  // enough for two numbers; the cost grows by the cube
 
-// 1 at distance 0. As usual, the Matern family is scaled so that the length means alike in all.
-double Correlation(Covariance covariance, double distance_mm, double length_mm) {
-  const double r = distance_mm / length_mm;
-  switch (covariance) {
-    case Covariance::kMatern12:
-      return std::exp(-r);
-    case Covariance::kMatern32: {
-      const double s = std::numbers::sqrt3 * r;
-      return (1 + s) * std::exp(-s);
+// The dowels' data and, along the bone, the way from each of them to each vertex.
+struct KrigingScene {
+  KrigingData data;
+  std::vector<Vec3> bases;
+  Eigen::MatrixXd to_vertex_mm;  // n x vertices; empty for straight distances
+
+  Eigen::VectorXd DistancesTo(const Vec3& p, std::size_t vertex) const {
+    if (to_vertex_mm.size() > 0) {
+      return to_vertex_mm.col(static_cast<Eigen::Index>(vertex));
     }
-    case Covariance::kMatern52: {
-      const double s = std::sqrt(5.0) * r;
-      return (1 + s + s * s / 3) * std::exp(-s);
+    Eigen::VectorXd distance_mm(data.depth_mm.size());
+    for (Eigen::Index k = 0; k < distance_mm.size(); ++k) {
+      distance_mm[k] = (bases[k] - p).norm();
     }
-    case Covariance::kSquaredExponential:
-      break;
+    return distance_mm;
   }
-  return std::exp(-r * r / 2);
+};
+
+// What each corner of its triangle counts at a point: barycentric, so none is below 0.
+Vec3 CornerShares(const TriMesh& mesh, const MeshPoint& at) {
+  const Triangle& triangle = mesh.triangles[at.triangle];
+  Vec3 area;
+  for (int corner = 0; corner < 3; ++corner) {
+    const Vec3 b = mesh.points[triangle[(corner + 1) % 3]] - at.position;
+    const Vec3 c = mesh.points[triangle[(corner + 2) % 3]] - at.position;
+    area[corner] = b.cross(c).norm();
+  }
+  return area.sum() > 0 ? Vec3(area / area.sum()) : Vec3(1, 0, 0);
 }
 
-struct Hyper {
-  double length_mm = 1;
-  double signal_mm = 1;
-};
-
-// The dowels' covariance V = signal^2 K + nugget, factored, and the mean that belongs to it.
-class Process {
- public:
-  Process(const Kriging& options, const std::vector<DepthSample>& samples, const Hyper& hyper)
-      : covariance_(options.covariance), hyper_(hyper) {
-    const auto n = static_cast<Eigen::Index>(samples.size());
-    Eigen::VectorXd depths(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      bases_.push_back(samples[i].base);
-      depths[i] = samples[i].depth_mm;
-    }
-    Factor(samples, options.nugget_share);
-    inverse_ones_ = factor_.solve(Eigen::VectorXd::Ones(n));
-    ones_ = inverse_ones_.sum();
-    mean_mm_ = inverse_ones_.dot(depths) / ones_;
-    const Eigen::VectorXd residual = depths.array() - mean_mm_;
-    weights_ = factor_.solve(residual);
-    misfit_ = residual.dot(weights_);
-  }
-
-  double Mean() const { return mean_mm_; }
-
-  // log |V| + log 1'V^-1 1 + r'V^-1 r: minus twice the restricted log likelihood, but for a
-  // constant.
-  double Deviance() const {
-    double log_root = 0;
-    for (Eigen::Index i = 0; i < weights_.size(); ++i) {
-      log_root += std::log(factor_.matrixLLT()(i, i));
-    }
-    return 2 * log_root + std::log(ones_) + misfit_;
-  }
-
-  // Before the first DepthAt with an sd.
-  void PrepareSd() {
-    const auto n = weights_.size();
-    inverse_root_ = factor_.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
-  }
-
-  DepthValue DepthAt(const Vec3& p) const {
-    Eigen::VectorXd with(weights_.size());
-    for (Eigen::Index i = 0; i < with.size(); ++i) {
-      with[i] = CovarianceAt((bases_[i] - p).norm());
-    }
-    return {mean_mm_ + with.dot(weights_), inverse_root_.size() > 0 ? Sd(with) : kNaN};
-  }
-
- private:
-  double CovarianceAt(double distance_mm) const {  // mm^2
-    return hyper_.signal_mm * hyper_.signal_mm *
-           Correlation(covariance_, distance_mm, hyper_.length_mm);
-  }
-
-  double Sd(const Eigen::VectorXd& with) const {
-    const double of_mean = 1 - inverse_ones_.dot(with);
-    const double variance = hyper_.signal_mm * hyper_.signal_mm -
-                            (inverse_root_ * with).squaredNorm() + of_mean * of_mean / ones_;
-    return std::sqrt(std::max(variance, 0.0));
-  }
-
-  void Factor(const std::vector<DepthSample>& samples, double nugget_share) {
-    const auto n = static_cast<Eigen::Index>(samples.size());
-    Eigen::MatrixXd matrix(n, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      for (Eigen::Index j = 0; j < n; ++j) {
-        matrix(i, j) = CovarianceAt((bases_[i] - bases_[j]).norm());
-      }
-      const double nugget = nugget_share * samples[i].sd_mm;
-      matrix(i, i) += std::isfinite(nugget) ? nugget * nugget : 0;
-    }
-    // Smooth covariances of near dowels are singular by rounding.
-    const double variance = hyper_.signal_mm * hyper_.signal_mm;
-    for (double jitter = kFirstJitter; jitter < 1; jitter *= 10) {
-      factor_.compute(matrix + jitter * variance * Eigen::MatrixXd::Identity(n, n));
-      if (factor_.info() == Eigen::Success) {
-        return;
+// To the surface's points at the dowels' bases, by what is known at the corners around them.
+void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samples,
+                   const RunContext& run, KrigingScene& scene) {
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  scene.to_vertex_mm.resize(n, static_cast<Eigen::Index>(input.skull.points.size()));
+  ForEachGeodesic(Kriging::kName, input.skull, samples, run,
+                  [&](std::size_t k, const std::vector<double>& distance_mm) {
+                    scene.to_vertex_mm.row(static_cast<Eigen::Index>(k)) =
+                        Eigen::Map<const Eigen::RowVectorXd>(distance_mm.data(),
+                                                             scene.to_vertex_mm.cols());
+                  });
+  const MeshQuery query(input.skull);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const MeshPoint at = query.Closest(samples[j].base);
+    const Vec3 share = CornerShares(input.skull, at);
+    scene.data.distance_mm.row(j).setZero();
+    for (int corner = 0; corner < 3; ++corner) {
+      if (share[corner] > 0) {  // none of an infinite way
+        const int vertex = input.skull.triangles[at.triangle][corner];
+        scene.data.distance_mm.row(j) += share[corner] * scene.to_vertex_mm.col(vertex).transpose();
       }
     }
+    scene.data.distance_mm(j, j) = 0;
   }
+}
 
-  Covariance covariance_;
-  Hyper hyper_;
-  std::vector<Vec3> bases_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd inverse_ones_, weights_;
-  Eigen::MatrixXd inverse_root_;  // empty without PrepareSd
-  double ones_ = 0, mean_mm_ = 0, misfit_ = 0;
-};
+KrigingScene SceneOf(const Kriging& options, const DepthInput& input,
+                     const std::vector<DepthSample>& samples, const RunContext& run) {
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  KrigingScene scene{{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd(n)}, {}, {}};
+  for (const DepthSample& sample : samples) {
+    const auto i = static_cast<Eigen::Index>(scene.bases.size());
+    const double nugget_mm = options.nugget_share * sample.sd_mm;
+    scene.data.depth_mm[i] = sample.depth_mm;
+    scene.data.nugget_mm2[i] = std::isfinite(nugget_mm) ? nugget_mm * nugget_mm : 0;
+    scene.bases.push_back(sample.base);
+  }
+  if (options.distance == DowelDistance::kGeodesic) {
+    FindGeodesics(input, samples, run, scene);
+  } else {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      scene.data.distance_mm.row(j) = scene.DistancesTo(scene.bases[j], 0).transpose();
+    }
+  }
+  return scene;
+}
 
 // `count` samples, each the furthest from those before it, beginning with the first.
-std::vector<DepthSample> FarApart(const std::vector<DepthSample>& samples, std::size_t count) {
-  if (samples.size() <= count) {
-    return samples;
-  }
-  std::vector<DepthSample> chosen;
-  std::vector<double> distance(samples.size(), std::numeric_limits<double>::infinity());
-  std::size_t next = 0;
-  while (chosen.size() < count) {
-    chosen.push_back(samples[next]);
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      distance[i] = std::min(distance[i], (samples[i].base - samples[next].base).norm());
+std::vector<Eigen::Index> FarApart(const KrigingScene& scene, Eigen::Index count) {
+  const Eigen::Index n = scene.data.depth_mm.size();
+  std::vector<Eigen::Index> chosen;
+  Eigen::VectorXd distance = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::infinity());
+  for (Eigen::Index next = 0; static_cast<Eigen::Index>(chosen.size()) < std::min(n, count);) {
+    chosen.push_back(next);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      distance[i] = std::min(distance[i], (scene.bases[i] - scene.bases[next]).norm());
     }
-    next = std::ranges::max_element(distance) - distance.begin();
+    distance.maxCoeff(&next);
   }
   return chosen;
 }
 
-double DepthSpread(const std::vector<DepthSample>& samples) {
-  double sum = 0, squares = 0;
-  for (const DepthSample& sample : samples) {
-    sum += sample.depth_mm;
+KrigingHyper HyperFor(const Kriging& options, const KrigingScene& scene, const RunContext& run) {
+  if (scene.data.depth_mm.size() <= kFitSamples) {
+    return FitHyper(options, scene.data, run);
   }
-  const double mean = sum / static_cast<double>(samples.size());
-  for (const DepthSample& sample : samples) {
-    squares += (sample.depth_mm - mean) * (sample.depth_mm - mean);
-  }
-  return std::max(std::sqrt(squares / static_cast<double>(samples.size())), kFlatDepths_mm);
-}
-
-// The two logarithms that are searched, each within bounds; equal bounds hold it fixed.
-struct Search {
-  Vec2 low, high, prior;
-
-  Search(const Kriging& options, const std::vector<DepthSample>& samples) {
-    const double spread = DepthSpread(samples);
-    prior = {std::log(options.length_prior_mm), 0};
-    low = {prior[0] - 3, std::log(spread / 30)};
-    high = {prior[0] + 3, std::log(spread * 10)};
-    if (options.length_mm) {
-      low[0] = high[0] = std::log(*options.length_mm);
-    }
-    if (options.signal_mm) {
-      low[1] = high[1] = std::log(*options.signal_mm);
-    }
-  }
-  bool Contains(const Vec2& x) const {
-    return (x.array() >= low.array()).all() && (x.array() <= high.array()).all();
-  }
-};
-
-Hyper HyperOf(const Vec2& logs) { return {std::exp(logs[0]), std::exp(logs[1])}; }
-
-template <class Cost>
-Vec2 BestOfGrid(const Search& search, const Cost& cost) {
-  constexpr int kSteps = 8;
-  Vec2 best = search.low;
-  double least = std::numeric_limits<double>::infinity();
-  const Vec2 range = search.high - search.low;
-  for (int i = 0; i <= (range[0] > 0 ? kSteps : 0); ++i) {
-    for (int j = 0; j <= (range[1] > 0 ? kSteps : 0); ++j) {
-      const Vec2 x = search.low + Vec2(range[0] * i / kSteps, range[1] * j / kSteps);
-      const double value = cost(x);
-      if (value < least) {
-        least = value;
-        best = x;
-      }
-    }
-  }
-  return best;
-}
-
-// Halves its steps wherever none of the four neighbours is better; to 1e-3 of the logarithms.
-template <class Cost>
-Vec2 CompassSearch(const Search& search, const Cost& cost, Vec2 best) {
-  double least = cost(best);
-  for (double step = 0.4; step > 1e-3;) {
-    bool better = false;
-    for (const Vec2& way : {Vec2(1, 0), Vec2(-1, 0), Vec2(0, 1), Vec2(0, -1)}) {
-      const Vec2 x = best + step * way;
-      const double value = search.Contains(x) ? cost(x) : least;
-      if (value < least) {
-        least = value;
-        best = x;
-        better = true;
-      }
-    }
-    step = better ? step : step / 2;
-  }
-  return best;
-}
-
-Hyper FitHyper(const Kriging& options, const std::vector<DepthSample>& all, const RunContext& run) {
-  if (options.length_mm && options.signal_mm) {
-    return {*options.length_mm, *options.signal_mm};
-  }
-  const std::vector<DepthSample> samples = FarApart(all, kFitSamples);
-  const Search search(options, samples);
-  const auto cost = [&](const Vec2& logs) {
-    run.ThrowIfStopped();
-    const double away = (logs[0] - search.prior[0]) / options.length_prior_spread;
-    return Process(options, samples, HyperOf(logs)).Deviance() + away * away;
-  };
-  return HyperOf(CompassSearch(search, cost, BestOfGrid(search, cost)));
+  const std::vector<Eigen::Index> some = FarApart(scene, kFitSamples);
+  return FitHyper(
+      options,
+      {scene.data.distance_mm(some, some), scene.data.depth_mm(some), scene.data.nugget_mm2(some)},
+      run);
 }
 
 }  // namespace
 
 KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run) {
   CheckDepthInput(input);
-  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
-  const Hyper hyper = FitHyper(options, samples, run);
-  return {hyper.length_mm, hyper.signal_mm, Process(options, samples, hyper).Mean()};
+  const KrigingScene scene = SceneOf(options, input, DepthSamples(input.dowels), run);
+  const KrigingHyper hyper = HyperFor(options, scene, run);
+  return {hyper.length_mm, hyper.signal_mm,
+          KrigingProcess(options.covariance, scene.data, hyper).mean_mm()};
 }
 
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
@@ -248,12 +133,17 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
   run.ThrowIfStopped();
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const DepthLimits limits(samples, options.clamp);
-  Process process(options, samples, FitHyper(options, samples, run));
+  const KrigingScene scene = SceneOf(options, input, samples, run);
+  KrigingProcess process(options.covariance, scene.data, HyperFor(options, scene, run));
   if (options.state_sd) {
     process.PrepareSd();
   }
   return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
-    const DepthValue value = process.DepthAt(input.skull.points[i]);
+    const Eigen::VectorXd distance_mm = scene.DistancesTo(input.skull.points[i], i);
+    if (!std::isfinite(distance_mm.minCoeff())) {
+      return DepthValue{};  // no dowel is reached along the bone
+    }
+    const DepthValue value = process.ValueAt(distance_mm);
     return DepthValue{limits(value.mm), value.sd_mm};
   });
 }

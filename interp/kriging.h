@@ -8,6 +8,7 @@
 
 #include "interp/depth_input.h"
 #include "interp/dowel_samples.h"
+#include "interp/surface_distance.h"
 
 namespace semblance {
 
@@ -20,6 +21,7 @@ constexpr auto EnumNames(Covariance) {
 struct Kriging {
   static constexpr std::string_view kName = "kriging";
   Covariance covariance = Covariance::kMatern32;
+  DowelDistance distance = DowelDistance::kEuclidean;
   std::optional<double> length_mm = std::nullopt;
   double length_prior_mm = 60;
   double length_prior_spread = 0.5;
@@ -32,10 +34,11 @@ struct Kriging {
 template <class Visitor>
 void Fields(Visitor& visit, Kriging& o) {
   visit(FieldInfo{.name = "covariance",
-                  .doc = "of two depths by the straight distance of their places, from rough "
+                  .doc = "of two depths by the distance of their places, from rough "
                          "(matern_1_2, an exponential) to very smooth (squared_exponential, which "
                          "oscillates between dowels that are far apart)"},
         o.covariance);
+  DistanceField(visit, o.distance);
   visit(FieldInfo{.name = "length_mm",
                   .unit = "mm",
                   .min = 1,
@@ -84,14 +87,15 @@ struct KrigingModel {
   double mean_mm = kNaN;  // the process's mean, by generalised least squares
 };
 
-// The maximum of the restricted likelihood times the prior, by a grid and a compass search. Of more
-// than 200 dowels it uses 200 that lie far apart. Throws InputError as CheckDepthInput.
+// The maximum of the restricted likelihood times the prior (kriging_likelihood.h). Of more than 200
+// dowels it uses 200 that lie far apart. Throws as InterpolateDepth.
 KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
 
 // Far from all dowels the depth is the process's mean. sd_mm is that of the process at the vertex,
 // given the dowels, the model and the uncertain mean; it does not hold the nugget of a further
-// measurement there, nor the uncertainty of length and signal. kNotFacing as AssignWhereFacing.
-// Throws InputError as CheckDepthInput.
+// measurement there, nor the uncertainty of length and signal. kNotFacing as AssignWhereFacing;
+// kOutside where no dowel is reached along the bone. Along the bone it keeps 8 bytes a vertex and
+// dowel. Throws InputError as CheckDepthInput, or if the skull has no triangle to go along.
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
 
 }  // namespace semblance

@@ -44,6 +44,7 @@ std::vector<DepthScheme> Schemes() {
   schemes.emplace_back(RadialBasis{.kernel = RadialKernel::kWendlandC2, .tail_degree = 0});
   schemes.emplace_back(Kriging{.covariance = Covariance::kSquaredExponential});
   schemes.emplace_back(Kriging{.covariance = Covariance::kMatern12, .state_sd = false});
+  schemes.emplace_back(Kriging{.distance = along});
   schemes.emplace_back(NaturalNeighbour{.weights = NeighbourWeights::kLaplace});
   return schemes;
 }

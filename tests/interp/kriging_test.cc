@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "interp/kriging_process.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -110,6 +111,59 @@ TEST(Kriging, WithoutStateSdGivesTheSameDepthsAndNone) {
   EXPECT_EQ(with.depth_mm, without.depth_mm);
   EXPECT_TRUE(std::isfinite(with.sd_mm[0]));
   EXPECT_TRUE(std::isnan(without.sd_mm[0]));
+}
+
+KrigingData DataOf(const DowelScene& scene) {
+  const auto n = static_cast<Eigen::Index>(scene.dowels.size());
+  KrigingData data{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd::Zero(n)};
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Dowel& dowel = scene.dowels[j];
+    data.depth_mm[j] = dowel.depth_mm;
+    data.nugget_mm2[j] = std::isfinite(dowel.sd_mm) ? dowel.sd_mm * dowel.sd_mm : 0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      data.distance_mm(j, k) = (dowel.base - scene.dowels[k].base).norm();
+    }
+  }
+  return data;
+}
+
+class EveryCovariance : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Kriging, EveryCovariance, ::testing::Range(0, 4));
+
+TEST_P(EveryCovariance, GradientOfTheDevianceEqualsItsNumericTwin) {
+  const auto covariance = static_cast<Covariance>(GetParam());
+  const DowelScene scene = ScatteredScene(20);
+  const KrigingData data = DataOf(scene);
+  const auto deviance = [&](const Vec2& logs) {
+    return KrigingProcess(covariance, data, {std::exp(logs[0]), std::exp(logs[1])}).Deviance();
+  };
+  const Vec2 logs(std::log(25.0), std::log(2.0));
+  const Vec2 exact =
+      KrigingProcess(covariance, data, {std::exp(logs[0]), std::exp(logs[1])}).DevianceGradient();
+  constexpr double kStep = 1e-4;
+  for (int k = 0; k < 2; ++k) {
+    const Vec2 step = kStep * Vec2::Unit(k);
+    const double numeric = (deviance(logs + step) - deviance(logs - step)) / (2 * kStep);
+    EXPECT_NEAR(exact[k], numeric, 1e-5 * (1 + std::abs(numeric)));
+  }
+}
+
+TEST_P(EveryCovariance, FitIsNoWorseThanAnyPointOfADenseGrid) {
+  const Kriging free{.covariance = static_cast<Covariance>(GetParam())};
+  DowelScene scene = ScatteredScene(25);
+  scene.network.areas.clear();
+  const KrigingModel best = ModelOf(free, scene);
+  const KrigingData data = DataOf(scene);
+  const auto cost = [&](double length_mm, double signal_mm) {
+    const double away = std::log(length_mm / free.length_prior_mm) / free.length_prior_spread;
+    return KrigingProcess(free.covariance, data, {length_mm, signal_mm}).Deviance() + away * away;
+  };
+  const double least = cost(best.length_mm, best.signal_mm);
+  for (double length_mm = 10; length_mm < 400; length_mm *= 1.1) {
+    for (double signal_mm = 0.2; signal_mm < 20; signal_mm *= 1.1) {
+      EXPECT_GE(cost(length_mm, signal_mm), least - 1e-6) << length_mm << " " << signal_mm;
+    }
+  }
 }
 
 TEST(KrigingFit, FindsTheLengthAndTheSignalOfManyDowels) {

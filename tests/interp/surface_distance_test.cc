@@ -5,7 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "interp/depth_scheme.h"
 #include "surfaces/error.h"
@@ -119,7 +121,8 @@ TEST(GeodesicSchemes, LeavePiecesWithoutADowel) {
   scene.dowels.pop_back();
   const DowelDistance along = DowelDistance::kGeodesic;
   for (const DepthScheme& scheme :
-       {DepthScheme{Nearest{.distance = along}}, DepthScheme{InverseDistance{.distance = along}}}) {
+       {DepthScheme{Nearest{.distance = along}}, DepthScheme{InverseDistance{.distance = along}},
+        DepthScheme{Kriging{.distance = along}}}) {
     const DepthField field = InterpolateDepth(scheme, scene.Input(), RunContext{});
     EXPECT_EQ(Count(field, DepthStatus::kAssigned), 441);
     EXPECT_EQ(Count(field, DepthStatus::kOutside), 441);
@@ -127,13 +130,30 @@ TEST(GeodesicSchemes, LeavePiecesWithoutADowel) {
   }
 }
 
+TEST(GeodesicSchemes, KrigingHonoursCertainDowelsAlongTheBone) {
+  DowelScene scene = BackToBack();
+  scene.dowels.push_back({"po", {10, 30, 0}, {0, 0, 1}, 7, kNaN});
+  const Kriging certain{.distance = DowelDistance::kGeodesic, .nugget_share = 0};
+  const DepthField field = InterpolateDepth(certain, scene.Input(), RunContext{});
+  for (const Dowel& dowel : scene.dowels) {
+    const auto at = std::ranges::find(scene.skull.points, dowel.base) - scene.skull.points.begin();
+    ASSERT_LT(at, 882);
+    EXPECT_NEAR(field.depth_mm[at], dowel.depth_mm, 1e-6) << dowel.site;
+    EXPECT_NEAR(field.sd_mm[at], 0, 0.1) << dowel.site;
+  }
+}
+
 TEST(GeodesicSchemes, OnAPlaneAreTheStraightOnes) {
   const DowelScene scene = FlatScene();
-  const DepthField straight = InterpolateDepth(InverseDistance{}, scene.Input(), RunContext{});
-  const DepthField along = InterpolateDepth(InverseDistance{.distance = DowelDistance::kGeodesic},
-                                            scene.Input(), RunContext{});
-  for (std::size_t i = 0; i < straight.depth_mm.size(); ++i) {
-    ASSERT_NEAR(straight.depth_mm[i], along.depth_mm[i], 0.05);
+  const DowelDistance along = DowelDistance::kGeodesic;
+  for (const auto& [straight, geodesic] :
+       {std::pair{DepthScheme{InverseDistance{}}, DepthScheme{InverseDistance{.distance = along}}},
+        std::pair{DepthScheme{Kriging{}}, DepthScheme{Kriging{.distance = along}}}}) {
+    const DepthField one = InterpolateDepth(straight, scene.Input(), RunContext{});
+    const DepthField other = InterpolateDepth(geodesic, scene.Input(), RunContext{});
+    for (std::size_t i = 0; i < one.depth_mm.size(); ++i) {
+      ASSERT_NEAR(one.depth_mm[i], other.depth_mm[i], 0.05);
+    }
   }
 }
 

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/kriging_process.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+
+namespace semblance {
+namespace {
+
+constexpr double kFirstJitter = 1e-10;  // of the variance, on the diagonal
+
+}  // namespace
+
+CorrelationValue CorrelationAt(Covariance covariance, double distance_mm, double length_mm) {
+  if (!std::isfinite(distance_mm)) {
+    return {0, 0};
+  }
+  const double r = distance_mm / length_mm;
+  switch (covariance) {
+    case Covariance::kMatern12:
+      return {std::exp(-r), r * std::exp(-r)};
+    case Covariance::kMatern32: {
+      const double s = std::numbers::sqrt3 * r;
+      return {(1 + s) * std::exp(-s), s * s * std::exp(-s)};
+    }
+    case Covariance::kMatern52: {
+      const double s = std::sqrt(5.0) * r;
+      return {(1 + s + s * s / 3) * std::exp(-s), s * s * (1 + s) / 3 * std::exp(-s)};
+    }
+    case Covariance::kSquaredExponential:
+      break;
+  }
+  const double value = std::exp(-r * r / 2);
+  return {value, r * r * value};
+}
+
+KrigingProcess::KrigingProcess(Covariance covariance, const KrigingData& data,
+                               const KrigingHyper& hyper)
+    : covariance_(covariance),
+      hyper_(hyper),
+      variance_mm2_(hyper.signal_mm * hyper.signal_mm),
+      nugget_mm2_(data.nugget_mm2) {
+  Factor(data);
+  const Eigen::Index n = data.depth_mm.size();
+  inverse_ones_ = factor_.solve(Eigen::VectorXd::Ones(n));
+  ones_ = inverse_ones_.sum();
+  mean_mm_ = inverse_ones_.dot(data.depth_mm) / ones_;
+  const Eigen::VectorXd residual = data.depth_mm.array() - mean_mm_;
+  inverse_residual_ = factor_.solve(residual);
+  misfit_ = residual.dot(inverse_residual_);
+  FindWeights(data);
+}
+
+void KrigingProcess::Factor(const KrigingData& data) {
+  const Eigen::Index n = data.depth_mm.size();
+  Eigen::MatrixXd matrix(n, n);
+  by_log_length_.resize(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index k = 0; k <= j; ++k) {
+      const double between_mm = (data.distance_mm(j, k) + data.distance_mm(k, j)) / 2;
+      const CorrelationValue c = CorrelationAt(covariance_, between_mm, hyper_.length_mm);
+      matrix(j, k) = matrix(k, j) = variance_mm2_ * c.value;
+      by_log_length_(j, k) = by_log_length_(k, j) = variance_mm2_ * c.by_log_length;
+    }
+  }
+  matrix.diagonal() += nugget_mm2_;
+  for (double jitter = kFirstJitter; jitter < 100; jitter *= 10) {
+    factor_.compute(matrix + jitter * variance_mm2_ * Eigen::MatrixXd::Identity(n, n));
+    if (factor_.info() == Eigen::Success) {
+      return;
+    }
+  }
+}
+
+// Distances that are not symmetric have weights of their own, by which the field still honours the
+// dowels.
+void KrigingProcess::FindWeights(const KrigingData& data) {
+  weights_ = inverse_residual_;
+  if (data.distance_mm == data.distance_mm.transpose()) {
+    return;
+  }
+  Eigen::MatrixXd with = data.distance_mm.unaryExpr([&](double distance_mm) {
+    return variance_mm2_ * CorrelationAt(covariance_, distance_mm, hyper_.length_mm).value;
+  });
+  with.diagonal() += nugget_mm2_;
+  weights_ = with.partialPivLu().solve((data.depth_mm.array() - mean_mm_).matrix());
+}
+
+double KrigingProcess::Deviance() const {
+  return 2 * factor_.matrixLLT().diagonal().array().log().sum() + std::log(ones_) + misfit_;
+}
+
+Vec2 KrigingProcess::DevianceGradient() const {
+  const Eigen::Index n = weights_.size();
+  const Eigen::MatrixXd inverse = factor_.solve(Eigen::MatrixXd::Identity(n, n));
+  const auto along = [&](const Eigen::MatrixXd& change) {  // of V
+    return inverse.cwiseProduct(change).sum() - inverse_ones_.dot(change * inverse_ones_) / ones_ -
+           inverse_residual_.dot(change * inverse_residual_);
+  };
+  Eigen::MatrixXd by_log_signal = 2 * factor_.reconstructedMatrix();
+  by_log_signal.diagonal() -= 2 * nugget_mm2_;
+  return {along(by_log_length_), along(by_log_signal)};
+}
+
+void KrigingProcess::PrepareSd() {
+  const Eigen::Index n = weights_.size();
+  inverse_root_ = factor_.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
+}
+
+DepthValue KrigingProcess::ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm) const {
+  Eigen::VectorXd with(distance_mm.size());
+  for (Eigen::Index k = 0; k < with.size(); ++k) {
+    with[k] = variance_mm2_ * CorrelationAt(covariance_, distance_mm[k], hyper_.length_mm).value;
+  }
+  return {mean_mm_ + with.dot(weights_), inverse_root_.size() > 0 ? Sd(with) : kNaN};
+}
+
+double KrigingProcess::Sd(const Eigen::VectorXd& with) const {
+  const double of_mean = 1 - inverse_ones_.dot(with);
+  const double variance =
+      variance_mm2_ - (inverse_root_ * with).squaredNorm() + of_mean * of_mean / ones_;
+  return std::sqrt(std::max(variance, 0.0));
+}
+
+}  // namespace semblance
