@@ -2,9 +2,9 @@
 #include "interp/natural_neighbour.h"
 
 #include <algorithm>
+#include <boost/container/small_vector.hpp>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "interp/dowel_samples.h"
 
@@ -29,7 +29,9 @@ struct Corner {
   Vec2 at;
   int edge = kOpen;
 };
-using Polygon = std::vector<Corner>;
+// Small ones live on the stack: a field asks for hundreds of thousands.
+constexpr std::size_t kUsualSites = 48, kUsualCorners = 24;
+using Polygon = boost::container::small_vector<Corner, kUsualCorners>;
 
 // What of the polygon has value(x) >= 0, for a linear value. Most have it everywhere.
 template <class Value>
@@ -81,16 +83,16 @@ double FurthestCorner2(const Polygon& polygon) {
 
 // What one vertex needs.
 struct Workspace {
-  std::vector<Site> sites;
-  std::vector<double> least;
-  std::vector<int> owners;
+  boost::container::small_vector<Site, kUsualSites> sites;
+  boost::container::small_vector<double, kUsualSites> least;
+  boost::container::small_vector<int, kUsualSites> owners;
   Polygon cell, part, spare;
 };
 
 // The cell that the vertex would have. A site so far that its plane passes the furthest corner is
 // not looked at corner by corner.
 void FindCell(double reach, Workspace& work) {
-  work.cell.assign({{{-reach, -reach}}, {{reach, -reach}}, {{reach, reach}}, {{-reach, reach}}});
+  work.cell = {{{-reach, -reach}}, {{reach, -reach}}, {{reach, reach}}, {{-reach, reach}}};
   double furthest2 = FurthestCorner2(work.cell);
   for (std::size_t k = 0; k < work.sites.size(); ++k) {
     const Site& site = work.sites[k];
@@ -160,17 +162,21 @@ const DepthSample& Nearest(const std::vector<DepthSample>& samples, const Vec3& 
       samples, {}, [&](const DepthSample& sample) { return (sample.base - p).squaredNorm(); });
 }
 
-// The first axis points to the nearest dowel, so that the reach turns with the skull.
-void FindSites(const std::vector<DepthSample>& samples, const Vec3& p, const Vec3& normal,
-               const Vec3& nearest, std::vector<Site>& sites) {
+// Gives the distance of the furthest. The first axis points to the nearest dowel, so that the reach
+// turns with the skull.
+double FindSites(const std::vector<DepthSample>& samples, const Vec3& p, const Vec3& normal,
+                 const Vec3& nearest, Workspace& work) {
   Vec3 first = nearest - normal.dot(nearest) * normal;
   first = first.norm() > kAtBase_mm ? first.normalized() : normal.unitOrthogonal();
   const Vec3 second = normal.cross(first);
-  sites.reserve(samples.size());
+  double furthest2 = 0;
+  work.sites.reserve(samples.size());
   for (const DepthSample& sample : samples) {
     const Vec3 x = sample.base - p;
-    sites.push_back({{x.dot(first), x.dot(second)}, x.squaredNorm()});
+    work.sites.push_back({{x.dot(first), x.dot(second)}, x.squaredNorm()});
+    furthest2 = std::max(furthest2, x.squaredNorm());
   }
+  return std::sqrt(furthest2);
 }
 
 DepthValue DepthAt(const std::vector<DepthSample>& samples, NeighbourWeights kind, const Vec3& p,
@@ -183,9 +189,7 @@ DepthValue DepthAt(const std::vector<DepthSample>& samples, NeighbourWeights kin
     return {};  // no tangent plane
   }
   Workspace work;
-  FindSites(samples, p, normal, nearest.base - p, work.sites);
-  const double furthest = std::sqrt(std::ranges::max(work.sites, {}, &Site::distance2).distance2);
-  FindCell(kReach * furthest, work);
+  FindCell(kReach * FindSites(samples, p, normal, nearest.base - p, work), work);
   if (work.cell.empty() || std::ranges::count(work.cell, kOpen, &Corner::edge) > 0) {
     return {};
   }
