@@ -30,22 +30,8 @@ class Database {
   Database(const Database&) = delete;
   Database& operator=(const Database&) = delete;
 
+  sqlite3* get() const { return database_; }
   void Do(const char* sql) { Check(sqlite3_exec(database_, sql, nullptr, nullptr, nullptr)); }
-
-  // One row; texts and numbers in the order of the table's columns.
-  template <class... Values>
-  void Insert(const char* table, const Values&... values) {
-    std::string marks;
-    ((marks += marks.empty() ? "?" : ", ?", static_cast<void>(values)), ...);
-    const std::string sql = fmt::format("INSERT INTO {} VALUES ({})", table, marks);
-    sqlite3_stmt* made = nullptr;
-    Check(sqlite3_prepare_v2(database_, sql.c_str(), -1, &made, nullptr));
-    const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement(made,
-                                                                               &sqlite3_finalize);
-    int column = 0;
-    (Bind(made, ++column, values), ...);
-    Check(sqlite3_step(made) == SQLITE_DONE ? SQLITE_OK : SQLITE_ERROR);
-  }
 
   std::string Bytes() const {
     sqlite3_int64 size = 0;
@@ -57,20 +43,6 @@ class Database {
     return {reinterpret_cast<const char*>(bytes.get()), static_cast<std::size_t>(size)};
   }
 
- private:
-  void Bind(sqlite3_stmt* statement, int column, const std::string& text) {
-    Check(sqlite3_bind_text(statement, column, text.data(), static_cast<int>(text.size()),
-                            SQLITE_TRANSIENT));
-  }
-  template <class Number>
-  requires std::is_arithmetic_v<Number>
-  void Bind(sqlite3_stmt* statement, int column, Number number) {
-    if constexpr (std::is_integral_v<Number>) {
-      Check(sqlite3_bind_int64(statement, column, static_cast<sqlite3_int64>(number)));
-    } else {
-      Check(sqlite3_bind_double(statement, column, number));
-    }
-  }
   void Check(int code) const {
     if (code != SQLITE_OK) {
       throw InputError(fmt::format("results.sqlite: {}; check the study's plan.json and trials",
@@ -81,6 +53,68 @@ class Database {
   sqlite3* database_ = nullptr;
 };
 
+// Puts rows into one table; compiled once, for a study has very many.
+class Inserter {
+ public:
+  Inserter(const Database& database, const char* table, int columns) : database_(database) {
+    std::string marks = "?";
+    for (int column = 1; column < columns; ++column) {
+      marks += ", ?";
+    }
+    const std::string sql = fmt::format("INSERT INTO {} VALUES ({})", table, marks);
+    sqlite3_stmt* made = nullptr;
+    database.Check(sqlite3_prepare_v2(database.get(), sql.c_str(), -1, &made, nullptr));
+    statement_.reset(made);
+  }
+
+  // Texts and numbers in the order of the table's columns.
+  template <class... Values>
+  void operator()(const Values&... values) {
+    int column = 0;
+    (Bind(++column, values), ...);
+    database_.Check(sqlite3_step(statement_.get()) == SQLITE_DONE ? SQLITE_OK : SQLITE_ERROR);
+    database_.Check(sqlite3_reset(statement_.get()));
+  }
+
+ private:
+  void Bind(int column, const std::string& text) {
+    database_.Check(sqlite3_bind_text(statement_.get(), column, text.data(),
+                                      static_cast<int>(text.size()), SQLITE_TRANSIENT));
+  }
+  template <class Number>
+  requires std::is_arithmetic_v<Number>
+  void Bind(int column, Number number) {
+    if constexpr (std::is_integral_v<Number>) {
+      database_.Check(
+          sqlite3_bind_int64(statement_.get(), column, static_cast<sqlite3_int64>(number)));
+    } else {
+      database_.Check(sqlite3_bind_double(statement_.get(), column, number));
+    }
+  }
+
+  const Database& database_;
+  std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement_{nullptr, &sqlite3_finalize};
+};
+
+void AddRows(const StudyResults& results, const Database& database) {
+  Inserter study(database, "study", 3), axis(database, "axis", 2), trial(database, "trial", 5),
+      setting(database, "setting", 3), metric(database, "metric", 3);
+  study(results.title, results.hash, results.metric);
+  for (std::size_t k = 0; k < results.axes.size(); ++k) {
+    axis(k, results.axes[k]);
+  }
+  for (std::size_t n = 0; n < results.trials.size(); ++n) {
+    const TrialRow& row = results.trials[n];
+    trial(row.id, n, row.subject, row.status, row.reason);
+    for (std::size_t k = 0; k < row.values.size(); ++k) {
+      setting(row.id, k, row.values[k]);
+    }
+    for (const auto& [name, value] : row.metrics) {
+      metric(row.id, name, value);
+    }
+  }
+}
+
 }  // namespace
 
 std::string ResultsSqlite(const StudyResults& results) {
@@ -88,20 +122,7 @@ std::string ResultsSqlite(const StudyResults& results) {
   database.Do("PRAGMA page_size = 4096");
   database.Do(kTables);
   database.Do("BEGIN");
-  database.Insert("study", results.title, results.hash, results.metric);
-  for (std::size_t k = 0; k < results.axes.size(); ++k) {
-    database.Insert("axis", k, results.axes[k]);
-  }
-  for (std::size_t n = 0; n < results.trials.size(); ++n) {
-    const TrialRow& row = results.trials[n];
-    database.Insert("trial", row.id, n, row.subject, row.status, row.reason);
-    for (std::size_t k = 0; k < row.values.size(); ++k) {
-      database.Insert("setting", row.id, k, row.values[k]);
-    }
-    for (const auto& [name, value] : row.metrics) {
-      database.Insert("metric", row.id, name, value);
-    }
-  }
+  AddRows(results, database);
   database.Do("COMMIT");
   return database.Bytes();
 }

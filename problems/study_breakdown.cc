@@ -25,9 +25,9 @@ double MeanOf(const StudyResults& results, const Treatment& treatment, const std
               double (*of)(double)) {
   double sum = 0;
   int count = 0;
-  for (const TrialRow& row : results.trials) {
-    const auto it = row.metrics.find(metric);
-    if (row.values == treatment.values && row.status == "done" && it != row.metrics.end()) {
+  for (const std::size_t n : treatment.trials) {
+    const auto& metrics = results.trials[n].metrics;
+    if (const auto it = metrics.find(metric); it != metrics.end()) {
       sum += of(it->second);
       ++count;
     }

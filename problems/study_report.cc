@@ -34,10 +34,18 @@ std::vector<double> ValuesOf(const Treatment& treatment) {
   return values;
 }
 
+double MeanOver(const std::map<std::string, double>& by_subject) {
+  double sum = 0;
+  for (const auto& [subject, value] : by_subject) {
+    sum += value;
+  }
+  return by_subject.empty() ? kNaN : sum / static_cast<double>(by_subject.size());
+}
+
 // Best mean first; those without values last.
 std::vector<Treatment> Ranked(std::vector<Treatment> treatments) {
-  std::stable_sort(treatments.begin(), treatments.end(), [](const auto& a, const auto& b) {
-    const double x = Summarize(ValuesOf(a)).mean, y = Summarize(ValuesOf(b)).mean;
+  std::ranges::stable_sort(treatments, [](const Treatment& a, const Treatment& b) {
+    const double x = MeanOver(a.by_subject), y = MeanOver(b.by_subject);
     return std::isfinite(x) && (!std::isfinite(y) || x < y);
   });
   return treatments;
@@ -244,10 +252,11 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
   std::vector<SceneText> scenes;
   for (const std::string& subject : subjects) {
     for (const Treatment& treatment : Ranked(Treatments(results, results.metric))) {
-      for (const TrialRow& row : results.trials) {
+      for (const std::size_t n : treatment.trials) {
+        const TrialRow& row = results.trials[n];
         const std::filesystem::path file = root / "trials" / row.id / "scene.json";
-        if (row.subject == subject && row.values == treatment.values && row.status == "done" &&
-            scenes.size() < kMostScenes && std::filesystem::exists(file)) {
+        if (row.subject == subject && scenes.size() < kMostScenes &&
+            std::filesystem::exists(file)) {
           scenes.push_back({fmt::format("{} | {}", treatment.label, subject), ReadFileBytes(file)});
         }
       }
@@ -260,10 +269,10 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
 std::vector<ReportImage> DepthMaps(const StudyResults& results, const std::filesystem::path& root) {
   std::vector<ReportImage> maps;
   for (const Treatment& treatment : Ranked(Treatments(results, results.metric))) {
-    for (const TrialRow& row : results.trials) {
+    for (const std::size_t n : treatment.trials) {
+      const TrialRow& row = results.trials[n];
       const std::filesystem::path file = root / "trials" / row.id / "depth.png";
-      if (row.values == treatment.values && row.status == "done" && std::filesystem::exists(file) &&
-          maps.size() < kMostScenes) {
+      if (maps.size() < kMostScenes && std::filesystem::exists(file)) {
         maps.push_back(
             ReportImageFromFile(file, fmt::format("{}, {}", treatment.label, row.subject),
                                 fmt::format("tissue depth on the skull of {} by {}, and its error",

@@ -95,6 +95,18 @@ std::string Cells(const std::vector<std::string>& texts) {
 
 std::string Number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
+std::map<std::string, double> BySubject(const StudyResults& results, const Treatment& treatment,
+                                        const std::string& metric) {
+  std::map<std::string, double> values;
+  for (const std::size_t n : treatment.trials) {
+    const TrialRow& row = results.trials[n];
+    if (const auto value = row.metrics.find(metric); value != row.metrics.end()) {
+      values[row.subject] = value->second;
+    }
+  }
+  return values;
+}
+
 }  // namespace
 
 int StudyResults::Count(const std::string& status) const {
@@ -141,15 +153,18 @@ std::string TreatmentLabel(const std::vector<std::string>& axes,
 std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric) {
   std::vector<Treatment> treatments;
   std::map<std::vector<std::string>, std::size_t> index;
-  for (const TrialRow& row : results.trials) {
+  for (std::size_t n = 0; n < results.trials.size(); ++n) {
+    const TrialRow& row = results.trials[n];
     const auto [it, is_new] = index.try_emplace(row.values, treatments.size());
     if (is_new) {
-      treatments.push_back({row.values, TreatmentLabel(results.axes, row.values), {}});
+      treatments.push_back({row.values, TreatmentLabel(results.axes, row.values), {}, {}});
     }
-    const auto value = row.metrics.find(metric);
-    if (row.status == "done" && value != row.metrics.end()) {
-      treatments[it->second].by_subject[row.subject] = value->second;
+    if (row.status == "done") {
+      treatments[it->second].trials.push_back(n);
     }
+  }
+  for (Treatment& treatment : treatments) {
+    treatment.by_subject = BySubject(results, treatment, metric);
   }
   return treatments;
 }
@@ -178,10 +193,11 @@ std::string SummaryCsv(const StudyResults& results) {
   }
   std::string csv =
       Cells(results.axes) + "metric,n,mean,sd,median,min,max,mean_low_95,mean_high_95\n";
+  const std::vector<Treatment> treatments = Treatments(results, results.metric);
   for (const std::string& metric : metrics) {
-    for (const Treatment& treatment : Treatments(results, metric)) {
+    for (const Treatment& treatment : treatments) {
       std::vector<double> values;
-      for (const auto& [subject, value] : treatment.by_subject) {
+      for (const auto& [subject, value] : BySubject(results, treatment, metric)) {
         values.push_back(value);
       }
       const SampleSummary s = Summarize(values);

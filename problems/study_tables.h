@@ -40,7 +40,8 @@ StudyResults ReadStudyResults(const std::filesystem::path& folder);
 struct Treatment {
   std::vector<std::string> values;           // one an axis
   std::string label;                         // TreatmentLabel of them
-  std::map<std::string, double> by_subject;  // the metric, of trials that are done
+  std::vector<std::size_t> trials;           // those that are done, in the order of the plan
+  std::map<std::string, double> by_subject;  // the metric, of these
 };
 // The title, where the study sets one, else all values that are not empty.
 std::string TreatmentLabel(const std::vector<std::string>& axes,
