@@ -173,6 +173,37 @@ TEST_P(EveryScheme, WorksWithTwoHundredDowels) {
   }
 }
 
+// More dowels than vertices, several in each triangle.
+TEST_P(EveryScheme, WorksWithTwoThousandDowels) {
+  constexpr int kDowels = 2000;
+  DowelScene scene;
+  scene.skull = testing::SphereMesh({0, 0, 0}, 90, 16);
+  scene.normals = VertexNormals(scene.skull);
+  testing::Random random(3);
+  for (int k = 0; k < kDowels; ++k) {
+    const Triangle& t = scene.skull.triangles[scene.skull.triangles.size() * k / kDowels];
+    const double a = random.Uniform(0, 0.5), b = random.Uniform(0, 0.5);
+    const Vec3 base = a * scene.skull.points[t[0]] + b * scene.skull.points[t[1]] +
+                      (1 - a - b) * scene.skull.points[t[2]];
+    scene.dowels.push_back(
+        {std::to_string(100000 + k), base, base.normalized(), 10 + base.z() / 20, kNaN});
+  }
+  for (int k = 0; k + 2 < kDowels; k += 3) {
+    scene.network.areas.push_back({k, k + 1, k + 2});
+  }
+  const DepthField field = FieldOf(scene);
+  EXPECT_GT(Count(field, DepthStatus::kAssigned), 50);
+  const auto [least, most] =
+      std::ranges::minmax(scene.dowels, {}, [](const Dowel& dowel) { return dowel.depth_mm; });
+  for (std::size_t i = 0; i < field.status.size(); ++i) {
+    ASSERT_EQ(std::isfinite(field.depth_mm[i]), field.status[i] == DepthStatus::kAssigned);
+    if (field.status[i] == DepthStatus::kAssigned) {
+      EXPECT_GE(field.depth_mm[i], least.depth_mm - 1);
+      EXPECT_LE(field.depth_mm[i], most.depth_mm + 1);
+    }
+  }
+}
+
 TEST_P(EveryScheme, WorksOnAPartialSkull) {
   DowelScene scene = DomeScene();
   scene.dowels.erase(scene.dowels.begin());  // sg
