@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "problems/config.h"
 #include "problems/depth_study.h"
+#include "problems/experiment_config.h"
 #include "problems/pictures.h"
 #include "surfaces/mesh_io.h"
 

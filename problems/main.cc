@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "problems/config.h"
 #include "problems/depth_study.h"
+#include "problems/experiment_config.h"
 #include "problems/face_commands.h"
 #include "problems/face_metrics_json.h"
 #include "problems/point_fit.h"

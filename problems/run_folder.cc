@@ -9,8 +9,8 @@
 #include <numeric>
 
 #include "fitting/seeding.h"
-#include "problems/config.h"
 #include "problems/depth_json.h"
+#include "problems/experiment_config.h"
 #include "problems/face_metrics_json.h"
 #include "problems/fit_json.h"
 #include "problems/manifest.h"

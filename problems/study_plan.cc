@@ -8,8 +8,8 @@
 #include <set>
 #include <sstream>
 
-#include "problems/config.h"
 #include "problems/config_reader.h"
+#include "problems/experiment_config.h"
 #include "problems/manifest.h"
 #include "problems/study_rows.h"
 #include "surfaces/whole_file.h"

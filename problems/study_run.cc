@@ -12,8 +12,8 @@
 #include <optional>
 #include <thread>
 
-#include "problems/config.h"
 #include "problems/depth_study.h"
+#include "problems/experiment_config.h"
 #include "problems/manifest.h"
 #include "problems/run_folder.h"
 #include "problems/scene_json.h"

@@ -8,7 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "problems/config.h"
+#include "problems/experiment_config.h"
 #include "problems/study_breakdown.h"
 #include "problems/study_report.h"
 #include "problems/study_run.h"

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "problems/config.h"
+#include "problems/experiment_config.h"
 #include "tests/testing/scratch_file.h"
 
 namespace semblance {

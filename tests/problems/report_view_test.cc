@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "problems/config.h"
+#include "problems/experiment_config.h"
 #include "problems/report.h"
 #include "problems/report_assets.h"
 #include "problems/scene_json.h"

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "problems/config.h"
+#include "problems/experiment_config.h"
 #include "problems/run_folder.h"
 #include "surfaces/whole_file.h"
 #include "tests/testing/scratch_file.h"
