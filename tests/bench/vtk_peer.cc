@@ -7,7 +7,6 @@
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPolyData.h>
-#include <vtkSMPTools.h>
 #include <vtkSampleFunction.h>
 
 namespace semblance::bench {
@@ -28,7 +27,6 @@ vtkStandardNewMacro(FieldFunction);
 }  // namespace
 
 std::size_t TrianglesByVtk(const ScalarField& field, const SampleGrid& grid) {
-  vtkSMPTools::Initialize(1);
   vtkNew<FieldFunction> function;
   function->field = &field;
   const Vec3 last = grid.Corner(grid.counts[0] - 1, grid.counts[1] - 1, grid.counts[2] - 1);

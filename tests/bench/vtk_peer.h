@@ -7,7 +7,7 @@
 
 namespace semblance::bench {
 
-// How many triangles the surface of the field's zeros has. On one thread.
+// How many triangles the surface of the field's zeros has.
 std::size_t TrianglesByVtk(const ScalarField& field, const SampleGrid& grid);
 
 }  // namespace semblance::bench
