@@ -11,7 +11,9 @@ namespace {
 struct Bracket {
   double a, fa, b, fb;
 
-  double SecantRoot() const { return a + (b - a) * fa / (fa - fb); }
+  double SecantRoot(double weight_a = 1, double weight_b = 1) const {
+    return a + (b - a) * (weight_a * fa) / (weight_a * fa - weight_b * fb);
+  }
   // Puts (x, f) in place of the end of its sign; true if that was the upper end.
   bool Narrow(double x, double f) {
     const bool lower = (f > 0) == (fa > 0);
@@ -32,25 +34,43 @@ double Bisect(Bracket e, double tolerance, const LineField& field, std::int64_t&
   return 0.5 * (e.a + e.b);
 }
 
-// Regula falsi as of Illinois: an end that stays twice counts half. Ends where the field is so
-// small that, by the slope of the bracket at hand, the crossing is within the tolerance.
+// What the ends and a point (x, f) between them say of the crossing: a function that bends one way
+// lies between its chords, so the crossing is between where those from both ends to the point have
+// the value 0.
+struct Estimate {
+  double at;            // where the parabola through the three, place over value, has value 0
+  double uncertain_by;  // NaN where the values neither rise nor fall throughout
+};
+
+Estimate Estimated(const Bracket& e, double x, double f) {
+  const double lower = (x - e.a) / (f - e.fa), upper = (e.b - x) / (e.fb - f);
+  if (!(lower * upper > 0)) {
+    return {x, f == 0 ? 0 : kNaN};
+  }
+  const double bend = (upper - lower) / (e.fb - e.fa);
+  const auto [least, most] = std::minmax({x - f * lower, x - f * upper});
+  return {std::clamp(e.a - e.fa * (lower - bend * f), least, most), most - least};
+}
+
+// Regula falsi as of Illinois: an end that stays twice counts half. Ends where the last three
+// values tell the crossing within the tolerance, if between them the field bends one way.
 double FalsePosition(Bracket e, double tolerance, const LineField& field,
                      std::int64_t& evaluations) {
   constexpr int kMostSteps = 60;
-  int last = -1;
+  double weight_a = 1, weight_b = 1;
+  bool last_upper = false;
   for (int step = 0; step < kMostSteps && e.b - e.a > tolerance; ++step) {
-    const double x = e.SecantRoot();
-    const double slope = std::abs(e.fa - e.fb) / (e.b - e.a);
-    const double f = field(x);
+    const double x = e.SecantRoot(weight_a, weight_b), f = field(x);
     ++evaluations;
-    if (std::abs(f) <= 0.5 * tolerance * slope) {
-      return x;
+    const Estimate crossing = Estimated(e, x, f);
+    if (crossing.uncertain_by <= tolerance) {
+      return std::clamp(crossing.at, e.a, e.b);
     }
-    const int upper = e.Narrow(x, f) ? 1 : 0;
-    if (upper == last) {
-      (upper ? e.fa : e.fb) *= 0.5;
-    }
-    last = upper;
+    const bool upper = e.Narrow(x, f);
+    const bool again = step > 0 && upper == last_upper;
+    weight_a = upper && again ? 0.5 * weight_a : 1;
+    weight_b = !upper && again ? 0.5 * weight_b : 1;
+    last_upper = upper;
   }
   return e.SecantRoot();
 }

@@ -7,15 +7,17 @@
 #include <cmath>
 #include <variant>
 
+#include "surfaces/distance_batch.h"
 #include "surfaces/emitter.h"
 #include "surfaces/emitter_triangle.h"
 #include "surfaces/flat_kernel.h"
 
 namespace semblance {
 
-// Each kernel: Gain(t) sets EmitterTriangle::gain; Emission(t, p, height) at a height > 0 is at
-// most most_gain * Most(distance^2, height), distances taken to the triangle and where it is moved
-// to, by Advance(t) along its normal, and 0 where it would be less than Cut().
+// Each kernel: Gain(t) sets EmitterTriangle::gain; what a triangle emits at a height > 0 is at most
+// most_gain * Most(distance^2, height), distances taken to the triangle and where it is moved to,
+// by Advance(t) along its normal, and 0 where it would be less than Cut(). FlatKernel emits by
+// itself; the others, from distances of at least Floor(t), as Fall() says (distance_batch.h).
 
 // gain / distance^k of the thesis's emitters; 0 where that is less than the cut.
 class DistanceFalloff {
@@ -24,6 +26,9 @@ class DistanceFalloff {
   double Decay() const { return k_; }
   double Cut() const { return cut_; }
   double Power(double squared) const { return power_(squared); }
+  DistanceFall Fall() const {
+    return {k_, k_ == std::floor(k_) ? static_cast<int>(k_) : -1, cut_, kMostEmission};
+  }
   double At(const EmitterTriangle& t, double squared, double depth_share) const {
     const double emission = t.gain * power_(std::max(squared, t.Floor2(depth_share)));
     return emission < cut_ ? 0 : std::min(emission, kMostEmission);
@@ -38,14 +43,13 @@ class ThesisKernel {
  public:
   explicit ThesisKernel(const ThesisEmitter& o) : falloff_(o.decay, o.cut_below) {}
   double Gain(const EmitterTriangle& t) const { return std::pow(t.depth_mm, falloff_.Decay()); }
-  double Emission(const EmitterTriangle& t, const Vec3& p, double) const {
-    return falloff_.At(t, SquaredDistance(t, p), 1);
-  }
   double AtDistance(const EmitterTriangle& t, double d) const { return falloff_.At(t, d * d, 1); }
   double Decay() const { return falloff_.Decay(); }
   double Most(double squared, double) const { return falloff_.Power(squared); }
   double Cut() const { return falloff_.Cut(); }
+  DistanceFall Fall() const { return falloff_.Fall(); }
   double Advance(const EmitterTriangle&) const { return 0; }
+  double Floor(const EmitterTriangle& t) const { return std::sqrt(t.Floor2(1)); }
   double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
 
  private:
@@ -58,13 +62,6 @@ class SplitKernel {
   double Gain(const EmitterTriangle& t) const {
     return std::pow(EmittingDepth(t), falloff_.Decay());
   }
-  double Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
-    const double shift = Advance(t);
-    if (height < shift) {
-      return ProjectsOnto(t, p) ? kMostEmission : 0;
-    }
-    return falloff_.At(t, SquaredDistance(t, p - shift * t.normal), 1 - t_);
-  }
   // From the moved triangle.
   double AtDistance(const EmitterTriangle& t, double d) const {
     return falloff_.At(t, d * d, 1 - t_);
@@ -72,7 +69,9 @@ class SplitKernel {
   double Decay() const { return falloff_.Decay(); }
   double Most(double squared, double) const { return falloff_.Power(squared); }
   double Cut() const { return falloff_.Cut(); }
+  DistanceFall Fall() const { return falloff_.Fall(); }
   double Advance(const EmitterTriangle& t) const { return t_ * t.depth_mm; }
+  double Floor(const EmitterTriangle& t) const { return std::sqrt(t.Floor2(1 - t_)); }
   double EmittingDepth(const EmitterTriangle& t) const { return (1 - t_) * t.depth_mm; }
 
  private:

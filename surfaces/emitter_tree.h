@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "surfaces/distance_batch.h"
 #include "surfaces/emitter_triangle.h"
 #include "surfaces/flat_batch.h"
 
@@ -21,28 +22,29 @@ struct EmitterNode {
       std::numeric_limits<double>::infinity();  // over planes through the box's center
   int begin = 0, end = 0;                       // of emitters
   int left = -1, right = -1;                    // -1 in a leaf
-  int batch = -1;                               // of a leaf, if there are batches
   double gain = 0;                              // sum over its emitters
   double greatest_gain = 0;
 
-  // Not less than the height of p over the plane of any of its emitters.
-  double MostHeight(const Vec3& p) const {
+  // Not less than the height of any point within half of p, each way, over the plane of any of its
+  // emitters.
+  double MostHeight(const Vec3& p, const Vec3& half) const {
     const Vec3 from = p - box.center();
     const double most =
-        normals.min().cwiseProduct(from).cwiseMax(normals.max().cwiseProduct(from)).sum();
-    return most - lowest_mm + kRounding * (from.cwiseAbs().sum() + std::abs(lowest_mm));
+        normals.min().cwiseProduct(from).cwiseMax(normals.max().cwiseProduct(from)).sum() +
+        normals.min().cwiseAbs().cwiseMax(normals.max().cwiseAbs()).dot(half);
+    return most - lowest_mm + kRounding * ((from.cwiseAbs() + half).sum() + std::abs(lowest_mm));
   }
 };
 
+// Each leaf begins at a multiple of the batches' lanes.
 class EmitterTree {
  public:
   explicit EmitterTree(std::vector<EmitterTriangle>& emitters) {
     Split(emitters, 0, static_cast<int>(emitters.size()));
   }
 
-  // Calls visit(leaf) for each leaf that is not left out, in a fixed order. A node
-  // is left out where bound(node), the most that it emits at p, is at most `least`; returns the sum
-  // of those bounds.
+  // Calls visit(leaf) for each leaf that is not left out, in a fixed order. A node is left out
+  // where bound(node), the most that it emits, is at most `least`; returns the sum of those bounds.
   template <class Bound, class Visit>
   double Near(double least, const Bound& bound, const Visit& visit) const {
     std::array<int, 64> stack;
@@ -64,17 +66,9 @@ class EmitterTree {
     return left_out;
   }
 
-  template <class Visit>
-  void ForEachLeaf(const Visit& visit) {
-    for (EmitterNode& node : nodes_) {
-      if (node.left < 0) {
-        visit(node);
-      }
-    }
-  }
-
  private:
   static constexpr int kLeaf = FlatBatch::kLanes;
+  static_assert(kLeaf == DistanceBatch::kLanes);
 
   int Split(std::vector<EmitterTriangle>& emitters, int begin, int end) {
     const int self = static_cast<int>(nodes_.size());

@@ -5,14 +5,7 @@
 #include <cmath>
 #include <span>
 
-// Wider instructions where the processor has them. They round alike: nothing is contracted. Under a
-// sanitizer the choice at load time would run before the sanitizer does.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__)
-#define SEMBLANCE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define SEMBLANCE_WIDE
-#endif
+#include "surfaces/wide.h"
 
 namespace semblance {
 namespace {
@@ -61,9 +54,6 @@ struct Seen {
   std::array<Lanes, 3> from{};
   Lanes height{}, share{};
 };
-
-// Inlined, so that each clone of EmitFlat has them in its own instructions.
-#define SEMBLANCE_INLINE [[gnu::always_inline]] inline
 
 SEMBLANCE_INLINE Seen See(const FlatBatch& batch, const Vec3& p) {
   const double x = p.x(), y = p.y(), z = p.z();

@@ -41,8 +41,8 @@ int ExtremePoint(const TriMesh& shell, std::span<const double> depth_mm, const V
 }
 
 // The four cells around the last edge, going outward along an axis from a corner near `start`, on
-// which the field turns negative.
-void AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& start, int axis,
+// which the field turns negative. False if it is positive up to the grid's end.
+bool AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& start, int axis,
                  int step, std::vector<std::int64_t>& seeds) {
   std::array<int, 3> at;
   for (int a = 0; a < 3; ++a) {
@@ -58,8 +58,8 @@ void AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& s
     }
     inside = now_inside;
   }
-  if (crossing < 0) {
-    return;
+  if (crossing < 0 || inside) {
+    return !inside;
   }
   at[axis] = crossing;
   for (int n = 0; n < 4; ++n) {
@@ -68,20 +68,23 @@ void AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& s
     cell[(axis + 2) % 3] -= n >> 1;
     seeds.push_back(grid.Index(cell[0], cell[1], cell[2]));
   }
+  return true;
 }
 
-std::vector<std::int64_t> FindSeeds(const TriMesh& shell, std::span<const double> depth_mm,
-                                    const ScalarField& field, const SampleGrid& grid) {
-  std::vector<std::int64_t> seeds;
+// False if the surface leaves the grid, as far as is seen from the shell's extreme points.
+bool FindSeeds(const TriMesh& shell, std::span<const double> depth_mm, const ScalarField& field,
+               const SampleGrid& grid, std::vector<std::int64_t>& seeds) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const int step : {-1, 1}) {
       const Vec3 direction = step * Vec3::Unit(axis);
       const int extreme = ExtremePoint(shell, depth_mm, direction);
-      AppendSeeds(field, grid, shell.points[extreme] + 0.4 * depth_mm[extreme] * direction, axis,
-                  step, seeds);
+      if (!AppendSeeds(field, grid, shell.points[extreme] + 0.4 * depth_mm[extreme] * direction,
+                       axis, step, seeds)) {
+        return false;
+      }
     }
   }
-  return seeds;
+  return true;
 }
 
 // Polygonises in a grid that is made larger until the surface fits into it.
@@ -91,7 +94,10 @@ PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_
   const ScalarField field = [&surface](const Vec3& p) { return surface.Flattened(p); };
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
     const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
-    const std::vector<std::int64_t> seeds = FindSeeds(shell, depth_mm, field, grid);
+    std::vector<std::int64_t> seeds;
+    if (!FindSeeds(shell, depth_mm, field, grid, seeds)) {
+      continue;
+    }
     PolygonizeResult result =
         PolygonizeSurface(options.polygonizer, surface, grid, seeds, options.edges, context);
     cell_mm = grid.cell_mm.x();

@@ -1,156 +1,62 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/implicit_surface.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "surfaces/emitter_bounds.h"
 #include "surfaces/emitter_tree.h"
-#include "surfaces/error.h"
+#include "surfaces/make_emitters.h"
+#include "surfaces/near_leaves.h"
 
 namespace semblance {
 namespace {
-
-double DecayOf(const Kernel& kernel) {
-  return std::visit([](const auto& k) { return k.Decay(); }, kernel);
-}
 
 EmitterDepth DepthOver(const Emitter& emitter) {
   const auto* flat = std::get_if<FlatEmitter>(&emitter);
   return flat ? flat->depth : EmitterDepth::kMean;
 }
 
-// A triangle with the depths of its corners.
-struct DeepTriangle {
-  std::array<Vec3, 3> corner;
-  std::array<double, 3> depth_mm;
-
-  double MeanDepth() const { return (depth_mm[0] + depth_mm[1] + depth_mm[2]) / 3; }
-  Vec3 AreaVector() const { return 0.5 * (corner[1] - corner[0]).cross(corner[2] - corner[0]); }
-};
-
-// The gradient of the depth over its mean, in the plane.
-Vec3 RelativeSlope(const DeepTriangle& t, const Vec3& normal, double area_mm2) {
-  Vec3 sum = Vec3::Zero();
-  for (int c = 0; c < 3; ++c) {
-    sum += t.depth_mm[c] * normal.cross(t.corner[(c + 2) % 3] - t.corner[(c + 1) % 3]);
-  }
-  return sum / (2 * area_mm2 * t.MeanDepth());
-}
-
-EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel) {
-  EmitterTriangle e;
-  e.a = t.corner[0];
-  e.b = t.corner[1];
-  e.c = t.corner[2];
-  e.centroid = (e.a + e.b + e.c) / 3;
-  const Vec3 area_vector = t.AreaVector();
-  e.area_mm2 = area_vector.norm();
-  e.normal = area_vector / e.area_mm2;
-  e.depth_mm = t.MeanDepth();
-  e.longest2_mm2 =
-      std::max({(e.b - e.a).squaredNorm(), (e.c - e.b).squaredNorm(), (e.a - e.c).squaredNorm()});
-  e.edge_normal_a = (e.b - e.a).cross(e.normal);
-  e.edge_normal_b = (e.c - e.b).cross(e.normal);
-  e.edge_normal_c = (e.a - e.c).cross(e.normal);
-  e.moved = std::visit([&e](const auto& k) { return k.Advance(e); }, kernel) * e.normal;
-  e.gain = e.most_gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
-  if (depth == EmitterDepth::kLinear) {
-    const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
-    e.least_share = *least / e.depth_mm;
-    e.most_share = *most / e.depth_mm;
-    e.slope = RelativeSlope(t, e.normal, e.area_mm2);
-    e.most_gain *= std::pow(e.most_share, DecayOf(kernel));
-  }
-  return e;
-}
-
-// Appends the triangle, or, where the depth is linear and changes much, its quarters.
-void AppendEmitters(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel,
-                    std::vector<EmitterTriangle>& emitters) {
-  constexpr double kMostChange = 0.15;  // of the mean
-  const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
-  if (depth == EmitterDepth::kMean || *most - *least <= kMostChange * t.MeanDepth()) {
-    emitters.push_back(MakeTriangle(t, depth, kernel));
-    return;
-  }
-  DeepTriangle middle;
-  for (int c = 0; c < 3; ++c) {
-    middle.corner[c] = 0.5 * (t.corner[(c + 1) % 3] + t.corner[(c + 2) % 3]);
-    middle.depth_mm[c] = 0.5 * (t.depth_mm[(c + 1) % 3] + t.depth_mm[(c + 2) % 3]);
-  }
-  AppendEmitters(middle, depth, kernel, emitters);
-  for (int c = 0; c < 3; ++c) {
-    DeepTriangle quarter = middle;
-    quarter.corner[c] = t.corner[c];
-    quarter.depth_mm[c] = t.depth_mm[c];
-    std::swap(quarter.corner[(c + 1) % 3], quarter.corner[(c + 2) % 3]);
-    std::swap(quarter.depth_mm[(c + 1) % 3], quarter.depth_mm[(c + 2) % 3]);
-    AppendEmitters(quarter, depth, kernel, emitters);
-  }
-}
-
-std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
-                                          EmitterDepth over_triangle, const Kernel& kernel) {
-  if (depth_mm.size() != skull.points.size()) {
-    throw InputError(
-        fmt::format("implicit surface: {} depths for {} vertices; one a vertex is needed",
-                    depth_mm.size(), skull.points.size()));
-  }
-  for (std::size_t v = 0; v < depth_mm.size(); ++v) {
-    if (depth_mm[v] <= 0 || std::isinf(depth_mm[v])) {
-      throw InputError(
-          fmt::format("implicit surface: the depth of vertex {} is {} mm; it must be positive, or "
-                      "NaN where nothing is emitted",
-                      v, depth_mm[v]));
-    }
-  }
-  std::vector<EmitterTriangle> emitters;
-  for (const Triangle& t : skull.triangles) {
-    DeepTriangle deep;
-    for (int c = 0; c < 3; ++c) {
-      deep.corner[c] = skull.points[t[c]];
-      deep.depth_mm[c] = depth_mm[t[c]];
-    }
-    if (std::isfinite(deep.MeanDepth()) && deep.AreaVector().norm() > 0) {
-      AppendEmitters(deep, over_triangle, kernel, emitters);
-    }
-  }
-  if (emitters.empty()) {
-    throw InputError(
-        "implicit surface: no triangle has a depth at all three corners; nothing emits");
-  }
-  return emitters;
-}
-
 // Integrals of a flat emitter by two numerical ways, each within 1 %.
 constexpr double kFlatShare = 0.025;
 
-// One a leaf, if the kernel is taken by batches.
-template <class EmitterKernel>
-std::vector<FlatBatch> MakeBatches(const EmitterKernel& kernel,
-                                   const std::vector<EmitterTriangle>& emitters,
-                                   EmitterTree& tree) {
-  std::vector<FlatBatch> batches;
-  if constexpr (std::is_same_v<EmitterKernel, FlatKernel>) {
-    if (kernel.Batches()) {
-      tree.ForEachLeaf([&](EmitterNode& leaf) {
-        leaf.batch = static_cast<int>(batches.size());
-        FlatBatch& batch = batches.emplace_back();
-        for (int e = leaf.begin; e < leaf.end; ++e) {
-          const EmitterTriangle& t = emitters[e];
-          batch.Set(e - leaf.begin, t.a, t.b, t.c, t.normal, t.gain);
-          if (t.IsSloped()) {
-            batch.SetSlope(e - leaf.begin, t.slope);
-          }
-        }
-      });
+// Of the tree's leaves, whose emitters are 8 each but for the last.
+std::vector<FlatBatch> MakeFlatBatches(const std::vector<EmitterTriangle>& emitters) {
+  constexpr std::size_t kLanes = FlatBatch::kLanes;
+  std::vector<FlatBatch> batches((emitters.size() + kLanes - 1) / kLanes);
+  for (std::size_t e = 0; e < emitters.size(); ++e) {
+    const EmitterTriangle& t = emitters[e];
+    FlatBatch& batch = batches[e / kLanes];
+    const int lane = static_cast<int>(e % kLanes);
+    batch.Set(lane, t.a, t.b, t.c, t.normal, t.gain);
+    if (t.IsSloped()) {
+      batch.SetSlope(lane, t.slope);
     }
   }
   return batches;
+}
+
+template <class EmitterKernel>
+std::vector<DistanceBatch> MakeDistanceBatches(const EmitterKernel& kernel,
+                                               const std::vector<EmitterTriangle>& emitters) {
+  constexpr std::size_t kLanes = DistanceBatch::kLanes;
+  std::vector<DistanceBatch> batches((emitters.size() + kLanes - 1) / kLanes);
+  for (std::size_t e = 0; e < emitters.size(); ++e) {
+    const EmitterTriangle& t = emitters[e];
+    batches[e / kLanes].Set(static_cast<int>(e % kLanes), t.a, t.b, t.c, t.normal,
+                            kernel.Advance(t), kernel.Floor(t), t.gain);
+  }
+  return batches;
+}
+
+// Of the cubes that share a list of what is near.
+double CubeSize(const std::vector<EmitterTriangle>& emitters) {
+  constexpr double kOfDepth = 0.4;
+  const double sum =
+      std::accumulate(emitters.begin(), emitters.end(), 0.0,
+                      [](double s, const EmitterTriangle& t) { return s + t.depth_mm; });
+  return kOfDepth * sum / static_cast<double>(emitters.size());
 }
 
 }  // namespace
@@ -160,68 +66,119 @@ struct ImplicitSurface::Impl {
       : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
         emitters(MakeEmitters(skull, depth_mm, DepthOver(options.emitter), kernel)),
         tree(emitters),
-        batches(
-            std::visit([this](const auto& k) { return MakeBatches(k, emitters, tree); }, kernel)),
+        near_leaves(CubeSize(emitters)),
         tail_error(options.tail_error),
-        decay(DecayOf(kernel)) {}
+        decay(std::visit([](const auto& k) { return k.Decay(); }, kernel)) {
+    std::visit([this](const auto& k) { MakeBatches(k); }, kernel);
+  }
 
-  // Visits the emitters near p such that the others together emit at most the tail error. The first
-  // guess at what a node may emit and be left out nearly always does.
-  template <class EmitterKernel, class Begin, class Visit>
-  void Near(const EmitterKernel& k, const Vec3& p, const Begin& begin, const Visit& visit) const {
-    constexpr double kFirstShare = 1.0 / 64;
+  void MakeBatches(const FlatKernel& k) {
+    if (k.Batches()) {
+      flat_batches = MakeFlatBatches(emitters);
+    }
+  }
+  template <class EmitterKernel>
+  void MakeBatches(const EmitterKernel& k) {
+    distance_batches = MakeDistanceBatches(k, emitters);
+  }
+
+  // The leaves that points of a box may have to sum: all others together emit at most half of the
+  // tail error. The first guess at what a node may emit and be left out nearly always does.
+  template <class EmitterKernel>
+  NearLeaves NearBox(const EmitterKernel& k, const Box3& box) const {
+    constexpr double kFirstShare = 1.0 / 128;
     const double cut = (1 - kRounding) * k.Cut();
+    const Vec3 center = box.center(), half = 0.5 * box.sizes();
     const auto bound = [&](const EmitterNode& node) {
-      const double height = node.MostHeight(p);
+      const double height = node.MostHeight(center, half);
       if (height <= 0) {
         return 0.0;
       }
-      const double distance2 = node.box.squaredExteriorDistance(p);
+      const double distance2 = node.box.squaredExteriorDistance(box);
       if (distance2 <= 0) {
         return std::numeric_limits<double>::infinity();
       }
       const double share = k.Most(distance2, height);
       return node.greatest_gain * share < cut ? 0 : node.gain * share;
     };
+    NearLeaves near;
     double least = kFirstShare * tail_error;
-    double left_out = 0;
     do {
-      begin();
-      left_out = tree.Near(least, bound, visit);
+      near.leaves.clear();
+      near.left_out = tree.Near(least, bound, [&](const EmitterNode& leaf) {
+        near.leaves.push_back({leaf.box.min(), leaf.box.max(), leaf.MostHeight(center, half),
+                               leaf.gain, leaf.greatest_gain, leaf.begin, leaf.end});
+      });
       least /= 8;
-    } while (left_out > tail_error);
+    } while (near.left_out > 0.5 * tail_error);
+    return near;
   }
 
-  template <class EmitterKernel>
-  double Emission(const EmitterKernel& k, int e, const Vec3& p) const {
+  // Visits the leaves near p such that all others together emit at most the tail error.
+  template <class EmitterKernel, class Visit>
+  void Near(const EmitterKernel& k, const Vec3& p, const Visit& visit) const {
+    constexpr double kLeast = 1.0 / 32;  // of the tail error
+    const double cut = (1 - kRounding) * k.Cut(), least = kLeast * tail_error;
+    const NearLeavesTable::List near =
+        near_leaves.Find(p, [&](const Box3& box) { return NearBox(k, box); });
+    double rest = tail_error - near->left_out;
+    for (const NearLeaf& leaf : near->leaves) {
+      const double distance2 = leaf.SquaredDistance(p);
+      if (distance2 > 0) {
+        const double share = k.Most(distance2, leaf.height);
+        const double most = leaf.greatest_gain * share < cut ? 0 : leaf.gain * share;
+        if (most <= least && most <= rest) {
+          rest -= most;
+          continue;
+        }
+      }
+      visit(leaf);
+    }
+  }
+
+  double Emission(const FlatKernel& k, int e, const Vec3& p) const {
     const double height = (p - emitters[e].a).dot(emitters[e].normal);
     return height > 0 ? std::min(k.Emission(emitters[e], p, height), kMostEmission) : 0;
+  }
+  template <class EmitterKernel>
+  double Emission(const EmitterKernel& k, int e, const Vec3& p) const {
+    constexpr int kLanes = DistanceBatch::kLanes;
+    return EmitByDistance(distance_batches[e / kLanes], e % kLanes, p, k.Fall());
+  }
+
+  double LeafSum(const FlatKernel& k, int begin, int end, const Vec3& p) const {
+    if (k.Batches()) {
+      return k.Batch(flat_batches[begin / FlatBatch::kLanes], &emitters[begin], p);
+    }
+    double sum = 0;
+    for (int e = begin; e < end; ++e) {
+      sum += Emission(k, e, p);
+    }
+    return sum;
+  }
+  template <class EmitterKernel>
+  double LeafSum(const EmitterKernel& k, int begin, int, const Vec3& p) const {
+    DistanceBatch::Lanes emission;
+    EmitByDistance(distance_batches[begin / DistanceBatch::kLanes], p, k.Fall(), emission);
+    return std::accumulate(emission.begin(), emission.end(), 0.0);
   }
 
   template <class EmitterKernel>
   double Sum(const EmitterKernel& k, const Vec3& p, std::int64_t& evaluations) const {
     double sum = 0;
-    const auto add = [&](const EmitterNode& leaf) {
+    Near(k, p, [&](const NearLeaf& leaf) {
       evaluations += leaf.end - leaf.begin;
-      if constexpr (std::is_same_v<EmitterKernel, FlatKernel>) {
-        if (leaf.batch >= 0) {
-          sum += k.Batch(batches[leaf.batch], &emitters[leaf.begin], p);
-          return;
-        }
-      }
-      for (int e = leaf.begin; e < leaf.end; ++e) {
-        sum += Emission(k, e, p);
-      }
-    };
-    Near(
-        k, p, [&sum] { sum = 0; }, add);
+      sum += LeafSum(k, leaf.begin, leaf.end, p);
+    });
     return sum;
   }
 
   Kernel kernel;
   std::vector<EmitterTriangle> emitters;
   EmitterTree tree;
-  std::vector<FlatBatch> batches;  // of the tree's leaves
+  NearLeavesTable near_leaves;
+  std::vector<FlatBatch> flat_batches;  // of the tree's leaves; or
+  std::vector<DistanceBatch> distance_batches;
   double tail_error, decay;
 };
 
@@ -283,6 +240,25 @@ void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> em
       impl_->kernel);
 }
 
+EmissionBounds ImplicitSurface::BoundsIn(const Box3& box) const {
+  const NearLeaves near =
+      std::visit([&](const auto& kernel) { return impl_->NearBox(kernel, box); }, impl_->kernel);
+  std::vector<std::int32_t> emitters;
+  for (const NearLeaf& leaf : near.leaves) {
+    for (int e = leaf.begin; e < leaf.end; ++e) {
+      emitters.push_back(e);
+    }
+  }
+  std::vector<EmissionBounds> bounds(emitters.size());
+  BoundsIn(box, emitters, bounds);
+  EmissionBounds sum{-impl_->tail_error, near.left_out};
+  for (const EmissionBounds& one : bounds) {
+    sum.least += one.least;
+    sum.most += one.most;
+  }
+  return sum;
+}
+
 Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
   const EmitterTriangle& t = impl_->emitters[emitter];
   Box3 box;
@@ -301,9 +277,7 @@ std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
   std::int64_t count = 0;
   std::visit(
       [&](const auto& kernel) {
-        impl_->Near(
-            kernel, p, [&count] { count = 0; },
-            [&count](const EmitterNode& leaf) { count += leaf.end - leaf.begin; });
+        impl_->Near(kernel, p, [&count](const NearLeaf& leaf) { count += leaf.end - leaf.begin; });
       },
       impl_->kernel);
   return count;

@@ -64,6 +64,8 @@ class ImplicitSurface {
   double SumShare() const;
   void BoundsIn(const Box3& box, std::span<const std::int32_t> emitters,
                 std::span<EmissionBounds> bounds) const;
+  // Of Value(p) + 1 in the box.
+  EmissionBounds BoundsIn(const Box3& box) const;
   // The emitter, or the moved triangle of `split`, and d = l m^(1/k) around it (thesis 3.2.2): the
   // distance at which m of the thesis's emitters would just make a surface.
   Box3 InfluenceBox(std::int32_t emitter, double m) const;

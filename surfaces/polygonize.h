@@ -58,7 +58,8 @@ void Fields(Visitor& visit, EdgeSearchOptions& o) {
   visit(FieldInfo{.name = "tolerance",
                   .min = 1e-9,
                   .max = 0.5,
-                  .doc = "of a crossing, as a share of the edge"},
+                  .doc = "of a crossing, as a share of the edge; regula_falsi keeps it where the "
+                         "field bends one way along the edge"},
         o.tolerance);
 }
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/polygonizer.h"
 
+#include <algorithm>
 #include <atomic>
 
 #include "surfaces/octree_march.h"
+#include "surfaces/parallel.h"
 
 namespace semblance {
 namespace {
@@ -22,6 +24,64 @@ PolygonizeResult Counted(const ImplicitSurface& surface, const Polygonize& polyg
   return result;
 }
 
+// Appends the cells of a cube of `size` cells where bounds do not prove that there is no surface.
+void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid,
+                    const std::array<int, 3>& low, int size, std::vector<std::int64_t>& cells) {
+  constexpr int kLeast = 2;  // below, corners cost less than bounds
+  std::array<int, 3> end;
+  for (int axis = 0; axis < 3; ++axis) {
+    end[axis] = std::min(low[axis] + size, grid.counts[axis] - 1);
+    if (low[axis] >= end[axis]) {
+      return;
+    }
+  }
+  const EmissionBounds bounds = surface.BoundsIn(
+      Box3(grid.Corner(low[0], low[1], low[2]), grid.Corner(end[0], end[1], end[2])));
+  if (bounds.most < 1 || bounds.least > 1) {
+    return;
+  }
+  if (size > kLeast) {
+    for (int c = 0; c < 8; ++c) {
+      const int half = size / 2;
+      AppendUnproven(
+          surface, grid,
+          {low[0] + (c & 1) * half, low[1] + (c >> 1 & 1) * half, low[2] + (c >> 2 & 1) * half},
+          half, cells);
+    }
+    return;
+  }
+  for (int k = low[2]; k < end[2]; ++k) {
+    for (int j = low[1]; j < end[1]; ++j) {
+      for (int i = low[0]; i < end[0]; ++i) {
+        cells.push_back(grid.Index(i, j, k));
+      }
+    }
+  }
+}
+
+std::vector<std::int64_t> UnprovenCells(const ImplicitSurface& surface, const SampleGrid& grid,
+                                        const RunContext& context) {
+  constexpr int kCube = 16;
+  std::vector<std::array<int, 3>> cubes;
+  for (int k = 0; k < grid.counts[2]; k += kCube) {
+    for (int j = 0; j < grid.counts[1]; j += kCube) {
+      for (int i = 0; i < grid.counts[0]; i += kCube) {
+        cubes.push_back({i, j, k});
+      }
+    }
+  }
+  std::vector<std::vector<std::int64_t>> found(cubes.size());
+  ParallelFor(cubes.size(), context.threads, 4, [&](std::size_t n) {
+    context.ThrowIfStopped();
+    AppendUnproven(surface, grid, cubes[n], kCube, found[n]);
+  });
+  std::vector<std::int64_t> cells;
+  for (const std::vector<std::int64_t>& some : found) {
+    cells.insert(cells.end(), some.begin(), some.end());
+  }
+  return cells;
+}
+
 struct Polygonize {
   const ImplicitSurface& surface;
   const SampleGrid& grid;
@@ -29,9 +89,13 @@ struct Polygonize {
   const EdgeSearchOptions& options;
   const RunContext& context;
 
-  PolygonizeResult operator()(const NarrowBand&) const {
-    return Counted(surface, [this](const ScalarField& field) {
-      return PolygonizeFrom(field, grid, seed_cells, options, context);
+  PolygonizeResult operator()(const NarrowBand& band) const {
+    return Counted(surface, [&](const ScalarField& field) {
+      return PolygonizeFrom(field, grid,
+                            band.components == FollowedComponents::kAll
+                                ? UnprovenCells(surface, grid, context)
+                                : std::vector<std::int64_t>(seed_cells.begin(), seed_cells.end()),
+                            options, context);
     });
   }
   PolygonizeResult operator()(const BruteForce&) const {

@@ -12,13 +12,28 @@
 
 namespace semblance {
 
-// From cells on the outermost surface on to their neighbours: PolygonizeFrom. The one way of the
-// four that finds no other sheets than those it starts from; all threads.
+// The components of the surface that are followed: those that the outermost surface's seeds touch,
+// or all in the grid, inner sheets and fragments too.
+enum class FollowedComponents { kOutermost, kAll };
+constexpr auto EnumNames(FollowedComponents) {
+  return std::to_array<std::string_view>({"outermost", "all"});
+}
+
+// From cells on the surface on to their neighbours: PolygonizeFrom. To miss no component it also
+// starts wherever bounds on the field do not prove that there is no surface. All threads.
 struct NarrowBand {
   static constexpr std::string_view kName = "narrow_band";
+  FollowedComponents components = FollowedComponents::kOutermost;
 };
 template <class Visitor>
-void Fields(Visitor&, NarrowBand&) {}
+void Fields(Visitor& visit, NarrowBand& o) {
+  visit(
+      FieldInfo{.name = "components",
+                .doc = "outermost: of the surface only what is connected to its outermost points; "
+                       "all: no component of it in the grid is missed, at many times the cost, so "
+                       "that sheets and fragments that are dropped are counted"},
+      o.components);
+}
 
 // Every corner of the grid: PolygonizeAll (thesis 3.2.1). At each, emitters too far to count are
 // left out as in NarrowBand. All threads.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "surfaces/crossings.h"
 #include "surfaces/error.h"
 #include "tests/testing/shapes.h"
 
@@ -57,6 +58,50 @@ TEST(Polygonize, RegulaFalsiNeedsFewerEvaluations) {
         .summary.edge_evaluations;
   };
   EXPECT_LT(3 * evaluations(EdgeSearch::kRegulaFalsi), evaluations(EdgeSearch::kBisection));
+}
+
+// Of a function that falls from positive at 0 to negative at 1, against 60 halvings.
+void ExpectCrossing(const std::function<double(double)>& field, double within,
+                    std::int64_t& evaluations) {
+  double low = 0, high = 1;
+  for (int n = 0; n < 60; ++n) {
+    const double middle = 0.5 * (low + high);
+    (field(middle) > 0 ? low : high) = middle;
+  }
+  for (const double tolerance : {1e-2, 1e-3, 1e-5}) {
+    const double at =
+        SearchCrossing(field(0), field(1), {.tolerance = tolerance}, field, evaluations);
+    EXPECT_NEAR(at, low, within * tolerance);
+  }
+}
+
+// Where the curve bends one way the tolerance is kept; where it turns, nearly.
+TEST(SearchCrossing, IsWithinTheToleranceOnSmoothCurves) {
+  Random random(31);
+  std::int64_t evaluations = 0;
+  for (int n = 0; n < 3000; ++n) {
+    const double at = random.Uniform(0.001, 0.999), bend = random.Uniform(-0.45, 0.45),
+                 twist = n % 2 == 0 ? 0 : random.Uniform(-0.3, 0.3);
+    const auto curve = [&](double t) {
+      return (at - t) * (1 + bend * (t - at) + twist * (t - at) * (t - at));
+    };
+    ExpectCrossing(curve, twist == 0 ? 1 : 5, evaluations);
+  }
+  EXPECT_LT(evaluations, 3000 * 3 * 3);
+}
+
+// Each bends one way: a corner, a step that is cut off at one end, a power.
+TEST(SearchCrossing, IsWithinTheToleranceHoweverSharpTheBend) {
+  Random random(32);
+  std::int64_t evaluations = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const double at = random.Uniform(0.01, 0.99), corner = random.Uniform(0, 1),
+                 steep = std::exp(random.Uniform(-2, 2));
+    const auto bent = [&](double t) { return t < corner ? corner - t : steep * (corner - t); };
+    ExpectCrossing([&](double t) { return bent(t) - bent(at); }, 1, evaluations);
+    ExpectCrossing([&](double t) { return std::min(0.99, 30 * steep * (at - t)); }, 1, evaluations);
+    ExpectCrossing([&](double t) { return std::pow(at, 6) - std::pow(t, 6); }, 1, evaluations);
+  }
 }
 
 TEST(Polygonize, ContinuationGivesTheMeshOfAllCells) {

@@ -55,7 +55,8 @@ const std::vector<Emitter> kEmitters = {FlatEmitter{},
                                         ThesisEmitter{},
                                         ThesisEmitter{.cut_below = 0.002},
                                         SplitEmitter{.cut_below = 0.002}};
-const std::vector<Polygonizer> kFaster = {NarrowBand{}, McOctree{}, MinMaxOctree{},
+const std::vector<Polygonizer> kFaster = {NarrowBand{}, NarrowBand{FollowedComponents::kAll},
+                                          McOctree{}, MinMaxOctree{},
                                           MinMaxOctree{.least_emission = 0.05}};
 
 class Agreement : public ::testing::TestWithParam<Emitter> {};
@@ -96,6 +97,31 @@ TEST(Polygonizer, RefusesAGridThatIsNone) {
   for (const Polygonizer& polygonizer : kFaster) {
     EXPECT_THROW(PolygonizeSurface(polygonizer, surface, SampleGrid{}, {}, {}, {}), InputError);
   }
+}
+
+// Two balls far from each other, one of them within a shell that is open nowhere: four components.
+TEST_P(Agreement, NoComponentIsMissedWhereAllAreAsked) {
+  TriMesh mesh;
+  for (const TriMesh& part : {SphereMesh({0, 0, 0}, 20, 14), SphereMesh({0, 0, 0}, 3, 6),
+                              SphereMesh({45, 5, 3}, 6, 8), SphereMesh({1, 44, -9}, 1.5, 6)}) {
+    const auto offset = static_cast<std::int32_t>(mesh.points.size());
+    const bool inward = part.points.size() == SphereMesh({0, 0, 0}, 20, 14).points.size();
+    mesh.points.insert(mesh.points.end(), part.points.begin(), part.points.end());
+    for (const Triangle& t : part.triangles) {
+      mesh.triangles.push_back(inward ? Triangle{t[0] + offset, t[2] + offset, t[1] + offset}
+                                      : Triangle{t[0] + offset, t[1] + offset, t[2] + offset});
+    }
+  }
+  const ImplicitSurface surface(mesh, std::vector<double>(mesh.points.size(), 2.5),
+                                {GetParam(), 1e-3});
+  const SampleGrid grid{Vec3(-34.3, -34.1, -33.2), Vec3::Constant(1.7), {57, 55, 40}};
+  const PolygonizeResult brute = PolygonizeSurface(BruteForce{}, surface, grid, {}, {}, {}),
+                         all = PolygonizeSurface(NarrowBand{FollowedComponents::kAll}, surface,
+                                                 grid, {}, {}, {});
+  EXPECT_GE(ConnectedComponents(brute.mesh).count, 4);
+  EXPECT_EQ(all.mesh.points, brute.mesh.points);
+  EXPECT_EQ(all.mesh.triangles, brute.mesh.triangles);
+  EXPECT_LT(all.summary.corner_evaluations, brute.summary.corner_evaluations / 2);
 }
 
 class Bounds : public ::testing::TestWithParam<Emitter> {

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How far the implicit surface depends on the skull's mesh: 10, 40 and 160 thousand triangles of
+// one skull, each emitter, over the whole skull and where the coarser skull itself is the finer
+// one.
+#include <filesystem>
+#include <map>
+
+#include "surfaces/decimate.h"
+#include "surfaces/implicit_surface.h"
+#include "surfaces/mesh_io.h"
+#include "surfaces/mesh_query.h"
+#include "surfaces/skull_fill.h"
+#include "tests/bench/entry.h"
+#include "tests/bench/phantom_head.h"
+
+namespace semblance {
+namespace {
+
+using bench::Head;
+
+constexpr std::size_t kEach = 701;  // every so many vertices are looked at
+
+// Where the outermost surface lies over some vertices of a skull, along their normals.
+std::vector<double> Heights(const ImplicitSurface& surface, const Head& from) {
+  const std::vector<Vec3> normals = VertexNormals(from.skull);
+  std::vector<double> heights;
+  for (std::size_t v = 0; v < normals.size(); v += kEach) {
+    const double step = 0.25 * from.depth_mm[v];
+    const auto inside = [&](double h) {
+      return surface.Value(from.skull.points[v] + h * normals[v]) > 0;
+    };
+    double low = 0;
+    for (double h = step; h < 24 * step; h += step) {
+      low = inside(h) ? h : low;
+    }
+    double high = low + step;
+    for (int n = 0; n < 10; ++n) {
+      const double middle = 0.5 * (low + high);
+      (inside(middle) ? low : high) = middle;
+    }
+    heights.push_back(low);
+  }
+  return heights;
+}
+
+// The furthest that the finest skull is from a coarser one within one depth of those vertices.
+std::vector<double> SkullDistances(const Head& finest, const TriMesh& coarse) {
+  const MeshQuery query(coarse);
+  std::vector<double> distance;
+  for (const Vec3& p : finest.skull.points) {
+    distance.push_back(query.Closest(p).distance_mm);
+  }
+  std::vector<double> worst;
+  for (std::size_t v = 0; v < distance.size(); v += kEach) {
+    double most = 0;
+    for (std::size_t w = 0; w < distance.size(); ++w) {
+      const double apart = (finest.skull.points[w] - finest.skull.points[v]).norm();
+      most = apart <= finest.depth_mm[v] ? std::max(most, distance[w]) : most;
+    }
+    worst.push_back(most);
+  }
+  return worst;
+}
+
+struct Difference {
+  double rms_mm = 0;
+  std::size_t count = 0, over_1mm = 0;
+};
+
+Difference Compare(const std::vector<double>& a, const std::vector<double>& b,
+                   const std::vector<double>& skull_mm, double at_most_mm) {
+  Difference difference;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    if (skull_mm[n] <= at_most_mm) {
+      const double apart = std::abs(a[n] - b[n]);
+      difference.rms_mm += apart * apart;
+      ++difference.count;
+      difference.over_1mm += apart > 1 ? 1 : 0;
+    }
+  }
+  difference.rms_mm = std::sqrt(difference.rms_mm / double(difference.count));
+  return difference;
+}
+
+void Print(const std::string& name, double ours, double goal, const char* unit) {
+  bench::Print({"implicit." + name, ours, kNaN, kNaN, goal, unit, true},
+               "build/tests/bench/independence_bench");
+}
+
+// How far the surfaces of coarser meshes of one skull lie from that of the finest.
+void Independence(const std::string& subject, const std::vector<Head>& coarse_to_fine) {
+  constexpr double kAgreement_mm = 0.3;
+  const std::map<std::string, Emitter> emitters = {
+      {"flat", FlatEmitter{}},
+      {"flat_linear", FlatEmitter{6, EmitterDepth::kLinear}},
+      {"split", SplitEmitter{.cut_below = 0.002}},
+      {"thesis", ThesisEmitter{.cut_below = 0.002}}};
+  const Head& finest = coarse_to_fine.back();
+  for (std::size_t n = 0; n + 1 < coarse_to_fine.size(); ++n) {
+    const Head& coarse = coarse_to_fine[n];
+    const std::vector<double> skull_mm = SkullDistances(finest, coarse.skull);
+    for (const auto& [emitter_name, emitter] : emitters) {
+      const auto heights = [&](const Head& head) {
+        return Heights(ImplicitSurface(head.skull, head.depth_mm, {emitter, 1e-3}), finest);
+      };
+      const std::vector<double> here = heights(coarse), reference = heights(finest);
+      const std::string name =
+          fmt::format("{}_{}_rms_from_{}_to_{}", subject, emitter_name,
+                      coarse.skull.triangles.size(), finest.skull.triangles.size());
+      const Difference all = Compare(here, reference, skull_mm, 1e300),
+                       agreed = Compare(here, reference, skull_mm, kAgreement_mm);
+      Print(name, all.rms_mm, kNaN, "mm");
+      Print(name + "_over_1mm", double(all.over_1mm) / double(all.count), kNaN, "share");
+      Print(name + "_where_skulls_agree", agreed.rms_mm,
+            emitter_name.starts_with("flat") ? 0.15 : kNaN, "mm");
+      Print(name + "_skulls_agree", double(agreed.count) / double(all.count), kNaN, "share");
+    }
+  }
+}
+
+void MeasureAll() {
+  std::vector<Head> phantoms;
+  for (const int rings : bench::kRings) {
+    phantoms.push_back(bench::PhantomHead(rings));
+  }
+  Independence("phantom", phantoms);
+  const std::filesystem::path cranium = SEMBLANCE_SOURCE_DIR "/../shared/data/cranium/skull.ply";
+  if (!std::filesystem::exists(cranium)) {
+    fmt::print(stderr, "independence_bench: no {}, the real head is skipped\n", cranium.string());
+    return;
+  }
+  const TriMesh shell = FillSkull(ReadMesh(cranium), WrapFill{.edge_mm = 1}, {});
+  std::vector<Head> heads;
+  for (const int count : {10000, 40000, 160000}) {
+    Head head{Decimate(shell, count), {}};
+    for (const Vec3& p : head.skull.points) {
+      head.depth_mm.push_back(7 + 3 * std::sin(0.03 * p.x()) * std::cos(0.04 * p.z()));
+    }
+    heads.push_back(std::move(head));
+  }
+  Independence("cranium", heads);
+}
+
+}  // namespace
+}  // namespace semblance
+
+int main() { semblance::MeasureAll(); }
