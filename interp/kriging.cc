@@ -78,14 +78,34 @@ class Process {
   }
 
   DepthValue DepthAt(const Vec3& p) const {
+    const Eigen::VectorXd with = WithDowels(p);
+    return {mean_mm_ + with.dot(weights_), inverse_root_.size() > 0 ? Sd(with) : kNaN};
+  }
+
+  DepthPosterior Posterior(std::span<const Vec3> places) const {
+    const auto n = static_cast<Eigen::Index>(places.size());
+    Eigen::MatrixXd with(weights_.size(), n), all(n, n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      with.col(i) = WithDowels(places[i]);
+      for (Eigen::Index j = 0; j <= i; ++j) {
+        all(i, j) = all(j, i) = CovarianceAt((places[i] - places[j]).norm());
+      }
+    }
+    const Eigen::MatrixXd known = factor_.matrixL().solve(with);
+    const Eigen::VectorXd of_mean = 1 - (with.transpose() * inverse_ones_).array();
+    return {(with.transpose() * weights_).array() + mean_mm_,
+            all - known.transpose() * known + of_mean * of_mean.transpose() / ones_};
+  }
+
+ private:
+  Eigen::VectorXd WithDowels(const Vec3& p) const {
     Eigen::VectorXd with(weights_.size());
     for (Eigen::Index i = 0; i < with.size(); ++i) {
       with[i] = CovarianceAt((bases_[i] - p).norm());
     }
-    return {mean_mm_ + with.dot(weights_), inverse_root_.size() > 0 ? Sd(with) : kNaN};
+    return with;
   }
 
- private:
   double CovarianceAt(double distance_mm) const {  // mm^2
     return hyper_.signal_mm * hyper_.signal_mm *
            Correlation(covariance_, distance_mm, hyper_.length_mm);
@@ -240,6 +260,13 @@ KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const R
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const Hyper hyper = FitHyper(options, samples, run);
   return {hyper.length_mm, hyper.signal_mm, Process(options, samples, hyper).Mean()};
+}
+
+DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
+                                std::span<const Vec3> places, const RunContext& run) {
+  CheckDepthInput(input);
+  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
+  return Process(options, samples, FitHyper(options, samples, run)).Posterior(places);
 }
 
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,

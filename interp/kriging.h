@@ -2,8 +2,10 @@
 // Ordinary kriging: tissue depth as a Gaussian process in space, with a standard deviation.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "interp/depth_input.h"
@@ -87,6 +89,16 @@ struct KrigingModel {
 // The maximum of the restricted likelihood times the prior, by a grid and a compass search. Of more
 // than 200 dowels it uses 200 that lie far apart. Throws InputError as CheckDepthInput.
 KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
+
+// Of the depths at some places, given the dowels, the model and the uncertain mean.
+struct DepthPosterior {
+  Eigen::VectorXd mean_mm;     // without `clamp`
+  Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is the square of the sd_mm below
+};
+
+// Throws InputError as CheckDepthInput.
+DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
+                                std::span<const Vec3> places, const RunContext& run);
 
 // Far from all dowels the depth is the process's mean. sd_mm is that of the process at the vertex,
 // given the dowels, the model and the uncertain mean; it does not hold the nugget of a further
