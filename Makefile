@@ -48,7 +48,7 @@ format:
 check: build
 	@git ls-files '*.h' '*.cc' | xargs clang-format --dry-run -Werror
 	@ctest --preset $(PRESET) -R architecture_test
-	@build/problems/semblance check configs/*.yaml
+	@build/problems/semblance check configs/*.yaml configs/fit/*.yaml
 
 clean:
 	@rm -rf build build-debug build-sanitize

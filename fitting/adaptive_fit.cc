@@ -121,6 +121,7 @@ class AdaptiveFitter {
     settled_ = true;
     Measure();
     result.levels.push_back(Solve(kConverged));
+    MeasureCoverage(result.levels.back());
     Finish(result);
     return result;
   }
@@ -249,6 +250,24 @@ class AdaptiveFitter {
     }
     summary.rms_after_mm = RmsMm();
     return summary;
+  }
+
+  // What the points alone determine.
+  void MeasureCoverage(LevelSummary& summary) const {
+    std::vector<int> counts;
+    for (const TreeNode& node : tree_.nodes()) {
+      if (node.children < 0) {
+        counts.push_back(static_cast<int>(node.range.size()));
+      }
+    }
+    summary.coverage = CoverageOf(std::move(counts));
+    const SparseMatrix points = Assemble(tree_, PointScale(), {}).lower;
+    summary.uncovered_vertices = 0;
+    for (std::size_t k = 0; k < tree_.unknowns().size(); ++k) {
+      const bool held = points.coeff(k, k) > 0 || tree_.unknowns()[k].covered;
+      summary.uncovered_vertices += held ? 0 : 1;
+    }
+    summary.rank = NumericalRank(points, cloud_.points().size());
   }
 
   // Returns how far the surface moved, of its size. The matrix is that of the last step unless a

@@ -11,6 +11,7 @@
 #include "fitting/auto_weight.h"
 #include "fitting/level_solver.h"
 #include "fitting/normal_equations.h"
+#include "fitting/reweighting.h"
 #include "fitting/sparse_factor.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
@@ -48,22 +49,14 @@ void CheckView(const LevelView& view, std::span<const Term> terms) {
 // Patches are named by their first vertex.
 int PatchOf(const PatchGrid& grid, const Vec2& uv) { return grid.StencilAt(uv).index[0]; }
 
-// The whole normal matrix with its columns scaled to 1 on the diagonal, which leaves the rank.
-SparseMatrix Scaled(const SparseMatrix& lower) {
-  const Eigen::VectorXd d = lower.diagonal();
-  const Eigen::VectorXd scale =
-      (d.array() > 0).select(d.array().max(1e-300).rsqrt(), Eigen::ArrayXd::Zero(d.size()));
-  return scale.asDiagonal() * lower * scale.asDiagonal();
-}
-
-// Pivots of the scaled normal equations that stand out of a shift, which keeps the others from
-// being zero. A pivot just above the threshold leaves shift / threshold in the next one, so the
-// threshold is above the root of the shift.
-int NumericalRank(const SparseMatrix& lower, std::size_t observations) {
-  constexpr double kIndependent = 1e-6;
-  const Eigen::VectorXd pivots = Pivots(Scaled(lower), 1e-13, kIndependent);
-  return static_cast<int>(
-      std::min<Eigen::Index>((pivots.array() > kIndependent).count(), observations));
+PatchCoverage PatchCounts(const LevelView& view) {
+  std::vector<int> counts(static_cast<std::size_t>(view.grid.patches_u) * view.grid.patches_v, 0);
+  const auto cell = [](double x, int n) { return std::clamp(static_cast<int>(x * n), 0, n - 1); };
+  for (const Observation& o : view.observations) {
+    ++counts[cell(o.uv.x(), view.grid.patches_u) +
+             view.grid.patches_u * cell(o.uv.y(), view.grid.patches_v)];
+  }
+  return CoverageOf(std::move(counts));
 }
 
 double MaxMove(const ControlNet& a, const ControlNet& b) {
@@ -100,6 +93,7 @@ void Measure(const LevelView& view, std::span<const Term> terms, const SparseMat
                              .after = CostOf(term, view, solution.net, summary.rms_after_mm)});
   }
   summary.uncovered_vertices = static_cast<int>((lower.diagonal().array() <= 0).count());
+  summary.coverage = PatchCounts(view);
   summary.rank = NumericalRank(lower, view.observations.size());
   summary.max_move_mm = MaxMove(view.start, solution.net);
 }
@@ -111,10 +105,12 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver 
   SortObservations(view.grid, view.observations);
   LevelSolution solution{.net = view.start, .summary = {}};
   const std::vector<Term> terms = WithChosenWeight(view, given, solution.summary.auto_weight);
-  const bool separable = AllSeparable(terms);
-  const bool direct = solver == LevelSolver::kFastest && separable;
-  const auto solve = direct ? SolveDirectly : separable ? SolveByTiles : SolveByCeres;
-  const SolverOutcome outcome = solve(view, terms, solution.net);
+  const bool coupled = !SeparableButForLoss(terms);
+  const bool direct = solver == LevelSolver::kFastest && !coupled;
+  const auto solve = coupled ? SolveByCeres : direct ? SolveDirectly : SolveByTiles;
+  const SolverOutcome outcome = coupled || AllSeparable(terms)
+                                    ? solve(view, terms, solution.net)
+                                    : SolveReweighted(view, terms, solve, solution.net);
   solution.summary.solver = direct ? "direct" : "ceres";
   solution.summary.iterations = outcome.iterations;
   solution.summary.free_vertices = outcome.free_vertices;
@@ -122,6 +118,18 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver 
   solution.summary.usable = outcome.usable;
   Measure(view, terms, outcome.points.rows() > 0 ? outcome.points : PointNormal(view), solution);
   return solution;
+}
+
+PatchCoverage CoverageOf(std::vector<int> counts) {
+  PatchCoverage coverage{.patches = static_cast<int>(counts.size()), .empty_patches = 0};
+  coverage.empty_patches = static_cast<int>(std::erase(counts, 0));
+  if (!counts.empty()) {
+    const auto upper = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
+    std::nth_element(counts.begin(), upper, counts.end());
+    const int lower = counts.size() % 2 == 1 ? *upper : *std::max_element(counts.begin(), upper);
+    coverage.median_patch_points = (*upper + lower) / 2.0;
+  }
+  return coverage;
 }
 
 void SortObservations(const PatchGrid& grid, std::vector<Observation>& observations) {

@@ -31,6 +31,15 @@ struct LevelView {
   std::vector<Observation> observations;
 };
 
+struct PatchCoverage {
+  int patches = -1;                   // of the level; adaptive fits: the finest everywhere
+  int empty_patches = -1;             // in which no observation lies
+  double median_patch_points = kNaN;  // observations in each of the others
+};
+
+// counts: of the observations, one a patch.
+PatchCoverage CoverageOf(std::vector<int> counts);
+
 struct TermCosts {
   std::string term;      // its kName
   double before = kNaN;  // mm^2, at LevelView::start
@@ -46,8 +55,10 @@ struct LevelSummary {
   int iterations = -1;           // of the solver
   int free_vertices = -1;        // that some term touches; all others stay
   int uncovered_vertices = -1;   // that no observation touches
-  int rank = -1;  // estimated numerical rank of the observations' matrix; vertices - rank
-                  // directions are left to the other terms, or stay
+  PatchCoverage coverage = {};   // of the patches by the observations
+  int rank = -1;  // estimated numerical rank of the observations' matrix; free_vertices - rank
+                  // directions are left to the other terms, or stay; -1: not asked (adaptive fits
+                  // ask at the end)
   double max_move_mm = kNaN;       // of a vertex, at the solution; Fit: as written back
   double auto_weight = kNaN;       // what `weight: auto` became, if a term has it
   std::string solver = "not run";  // ceres or direct
@@ -71,12 +82,13 @@ constexpr auto EnumNames(LevelSolver) {
 // Minimises the sum of the terms over the level's control vertices: by Ceres, one thread (a
 // parameter block is a vertex, or, if all terms are linear and treat x, y and z alike, one
 // coordinate of 3 x 3 vertices); or, if the fastest way is asked for and all terms are linear and
-// treat x, y and z alike, with one sparse Cholesky factor for the three. Where the terms leave
-// vertices undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word on it;
-// the steps are damped by a multiple of the identity, a proximal-point iteration, which converges
-// to it). Observations are used in a canonical order, so their order has no effect. Throws
-// InputError if nothing can be solved: sizes that disagree, or a template without extent for a term
-// that needs it.
+// treat x, y and z alike, with one sparse Cholesky factor for the three. A loss makes either a
+// sequence of such solves (reweighting.h) unless another term couples x, y and z. Where the terms
+// leave vertices undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word
+// on it; the steps are damped by a multiple of the identity, a proximal-point iteration, which
+// converges to it). Observations are used in a canonical order, so their order has no effect.
+// Throws InputError if nothing can be solved: sizes that disagree, or a template without extent for
+// a term that needs it.
 LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
                        LevelSolver solver = LevelSolver::kCeres);
 

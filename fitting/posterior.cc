@@ -5,14 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <numbers>
 #include <numeric>
-#include <random>
 #include <variant>
 
 #include "fitting/auto_weight.h"
+#include "fitting/level_view.h"
 #include "fitting/normal_equations.h"
+#include "fitting/normal_noise.h"
 #include "fitting/sparse_factor.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
@@ -117,74 +116,6 @@ void RequireFactor(const SparseFactor& factor) {
   }
 }
 
-// Normally distributed numbers (Box & Muller 1958).
-class Normal {
- public:
-  explicit Normal(std::uint64_t random_seed) : bits_(random_seed) {}
-  double operator()() {
-    const double r = std::sqrt(-2 * std::log(1 - Uniform()));
-    return r * std::cos(2 * std::numbers::pi * Uniform());
-  }
-
- private:
-  double Uniform() { return static_cast<double>(bits_() >> 11) * 0x1p-53; }
-
-  std::mt19937_64 bits_;
-};
-
-// Sum of A^T x over the rows, x random of unit variance: its covariance is the normal matrix M, so
-// that of M^-1 times it is the posterior's, M^-1.
-class NoiseSink final : public RowSink {
- public:
-  NoiseSink(Eigen::Index vertices, Normal& normal)
-      : normal_(normal), sum_(Eigen::MatrixX3d::Zero(vertices, 3)) {}
-
-  void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 /*b*/,
-           std::span<const int> vertices) override {
-    Rows3 noise(a->rows(), 3);
-    for (Eigen::Index k = 0; k < noise.size(); ++k) {
-      noise(k / 3, k % 3) = normal_();
-    }
-    const Eigen::MatrixX3d pull = a->transpose() * noise;
-    for (std::size_t k = 0; k < vertices.size(); ++k) {
-      sum_.row(vertices[k]) += pull.row(static_cast<Eigen::Index>(k));
-    }
-  }
-  const Eigen::MatrixX3d& Sum() const { return sum_; }
-
- private:
-  Normal& normal_;
-  Eigen::MatrixX3d sum_;
-};
-
-// A level of a surface, with the points of its target.
-LevelView ViewOf(const HSplineSurface& surface, const HSplineSurface& rest, const FitTarget& target,
-                 int level) {
-  const HSplineShape& shape = surface.shape();
-  if (level < 0 || level > shape.max_level || !(shape == rest.shape())) {
-    throw InputError(fmt::format(
-        "posterior: level {} of a surface with levels 0..{}; give one of them, and a template of "
-        "the same shape",
-        level, shape.max_level));
-  }
-  CheckTarget(target);
-  const bool periodic = shape.closure == Closure::kPeriodicU;
-  LevelView view{
-      .grid = {.patches_u = shape.PatchesU(level),
-               .patches_v = shape.PatchesV(level),
-               .periodic_u = periodic},
-      .start = surface.Net(level),
-      .rest = rest.Net(level),
-      .lengths_mm = MeanLengths(
-          {.patches_u = shape.patches_u, .patches_v = shape.patches_v, .periodic_u = periodic},
-          rest.Net(0)),
-      .observations = {}};
-  for (const FitPoint& p : target.points) {
-    view.observations.push_back({.uv = p.uv, .position = p.position, .weight = p.weight});
-  }
-  return view;
-}
-
 }  // namespace
 
 std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double> sd_mm,
@@ -220,7 +151,7 @@ std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineS
                                    const FitTarget& target, std::span<const double> sd_mm,
                                    int level, std::span<const Term> terms,
                                    std::span<const Vec2> uv) {
-  return PosteriorSigma(ViewOf(surface, rest, target, level), sd_mm, terms, uv);
+  return PosteriorSigma(ViewOfLevel(surface, rest, target, level), sd_mm, terms, uv);
 }
 
 std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const double> sd_mm,
@@ -233,7 +164,7 @@ std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const 
   AddModel(view, sd_mm, terms, matrix);
   const SparseFactor factor = FactorOf(matrix.Lower());
   RequireFactor(factor);
-  Normal normal(random_seed);
+  NormalNumbers normal(random_seed);
   std::vector<ControlNet> samples;
   for (int sample = 0; sample < count; ++sample) {
     NoiseSink noise(static_cast<Eigen::Index>(view.start.vertices.size()), normal);
@@ -253,7 +184,7 @@ std::vector<HSplineSurface> PosteriorSamples(const HSplineSurface& surface,
                                              std::span<const Term> terms, int count,
                                              std::uint64_t random_seed) {
   std::vector<HSplineSurface> samples;
-  const LevelView view = ViewOf(surface, rest, target, level);
+  const LevelView view = ViewOfLevel(surface, rest, target, level);
   for (const ControlNet& net : PosteriorSamples(view, sd_mm, terms, count, random_seed)) {
     samples.push_back(surface);
     samples.back().SetNet(level, net);

@@ -3,6 +3,7 @@
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 
 #include "fitting/blas_threads.h"
 
@@ -55,6 +56,27 @@ Eigen::VectorXd Pivots(const SparseMatrix& lower, double shift, double enough) {
   signed_factor.setShift(shift);
   signed_factor.compute(lower);
   return signed_factor.vectorD();
+}
+
+namespace {
+
+// The whole normal matrix with its columns scaled to 1 on the diagonal, which leaves the rank.
+SparseMatrix Scaled(const SparseMatrix& lower) {
+  const Eigen::VectorXd d = lower.diagonal();
+  const Eigen::VectorXd scale =
+      (d.array() > 0).select(d.array().max(1e-300).rsqrt(), Eigen::ArrayXd::Zero(d.size()));
+  return scale.asDiagonal() * lower * scale.asDiagonal();
+}
+
+}  // namespace
+
+// Pivots of the scaled normal equations that stand out of a shift, which keeps the others from
+// being zero. A pivot just above the threshold leaves shift / threshold in the next one, so the
+// threshold is above the root of the shift.
+int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
+  constexpr double kIndependent = 1e-6;
+  const Eigen::VectorXd pivots = Pivots(Scaled(lower), 1e-13, kIndependent);
+  return static_cast<int>(std::min<Eigen::Index>((pivots.array() > kIndependent).count(), rows));
 }
 
 }  // namespace semblance

@@ -28,4 +28,7 @@ class SparseFactor {
 // cannot stop, then with signs.
 Eigen::VectorXd Pivots(const SparseMatrix& lower, double shift, double enough);
 
+// Estimated rank of the matrix whose normal matrix `lower` is; it has so many rows.
+int NumericalRank(const SparseMatrix& lower, std::size_t rows);
+
 }  // namespace semblance

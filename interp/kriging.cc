@@ -127,6 +127,24 @@ KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const R
           KrigingProcess(options.covariance, scene.data, hyper).mean_mm()};
 }
 
+DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
+                                std::span<const Vec3> places, const RunContext& run) {
+  CheckDepthInput(input);
+  Kriging straight = options;
+  straight.distance = DowelDistance::kEuclidean;
+  const KrigingScene scene = SceneOf(straight, input, DepthSamples(input.dowels), run);
+  const auto count = static_cast<Eigen::Index>(places.size());
+  Eigen::MatrixXd to_dowels_mm(scene.data.depth_mm.size(), count), between_mm(count, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    to_dowels_mm.col(i) = scene.DistancesTo(places[i], 0);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      between_mm(i, j) = (places[i] - places[j]).norm();
+    }
+  }
+  return KrigingProcess(straight.covariance, scene.data, HyperFor(straight, scene, run))
+      .Posterior(to_dowels_mm, between_mm);
+}
+
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
                             const RunContext& run) {
   CheckDepthInput(input);

@@ -2,8 +2,10 @@
 // Ordinary kriging: tissue depth as a Gaussian process in space, with a standard deviation.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "interp/depth_input.h"
@@ -90,6 +92,17 @@ struct KrigingModel {
 // The maximum of the restricted likelihood times the prior (kriging_likelihood.h). Of more than 200
 // dowels it uses 200 that lie far apart. Throws as InterpolateDepth.
 KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
+
+// Of the depths at some places, given the dowels, the model and the uncertain mean.
+struct DepthPosterior {
+  Eigen::VectorXd mean_mm;     // without `clamp`
+  Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is the square of the sd_mm below
+};
+
+// By straight distances, also where `options` says along the bone. Throws InputError as
+// CheckDepthInput.
+DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
+                                std::span<const Vec3> places, const RunContext& run);
 
 // Far from all dowels the depth is the process's mean. sd_mm is that of the process at the vertex,
 // given the dowels, the model and the uncertain mean; it does not hold the nugget of a further

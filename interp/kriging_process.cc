@@ -80,9 +80,7 @@ void KrigingProcess::FindWeights(const KrigingData& data) {
   if (data.distance_mm == data.distance_mm.transpose()) {
     return;
   }
-  Eigen::MatrixXd with = data.distance_mm.unaryExpr([&](double distance_mm) {
-    return variance_mm2_ * CorrelationAt(covariance_, distance_mm, hyper_.length_mm).value;
-  });
+  Eigen::MatrixXd with = CovarianceAt(data.distance_mm);
   with.diagonal() += nugget_mm2_;
   weights_ = with.partialPivLu().solve((data.depth_mm.array() - mean_mm_).matrix());
 }
@@ -108,12 +106,25 @@ void KrigingProcess::PrepareSd() {
   inverse_root_ = factor_.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
 }
 
+Eigen::MatrixXd KrigingProcess::CovarianceAt(const Eigen::MatrixXd& distance_mm) const {
+  return distance_mm.unaryExpr([&](double mm) {
+    return variance_mm2_ * CorrelationAt(covariance_, mm, hyper_.length_mm).value;
+  });
+}
+
 DepthValue KrigingProcess::ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm) const {
-  Eigen::VectorXd with(distance_mm.size());
-  for (Eigen::Index k = 0; k < with.size(); ++k) {
-    with[k] = variance_mm2_ * CorrelationAt(covariance_, distance_mm[k], hyper_.length_mm).value;
-  }
+  const Eigen::VectorXd with = CovarianceAt(distance_mm);
   return {mean_mm_ + with.dot(weights_), inverse_root_.size() > 0 ? Sd(with) : kNaN};
+}
+
+DepthPosterior KrigingProcess::Posterior(const Eigen::MatrixXd& to_dowels_mm,
+                                         const Eigen::MatrixXd& between_mm) const {
+  const Eigen::MatrixXd with = CovarianceAt(to_dowels_mm);
+  const Eigen::MatrixXd known = factor_.matrixL().solve(with);
+  const Eigen::VectorXd of_mean = 1 - (with.transpose() * inverse_ones_).array();
+  return {
+      (with.transpose() * weights_).array() + mean_mm_,
+      CovarianceAt(between_mm) - known.transpose() * known + of_mean * of_mean.transpose() / ones_};
 }
 
 double KrigingProcess::Sd(const Eigen::VectorXd& with) const {

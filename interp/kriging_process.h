@@ -51,10 +51,14 @@ class KrigingProcess {
   void PrepareSd();
   // distance_mm: n, from each dowel to the place.
   DepthValue ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm) const;
+  // Of m places together. to_dowels_mm: n x m; between_mm: m x m, symmetric.
+  DepthPosterior Posterior(const Eigen::MatrixXd& to_dowels_mm,
+                           const Eigen::MatrixXd& between_mm) const;
 
  private:
   void Factor(const KrigingData& data);
   void FindWeights(const KrigingData& data);
+  Eigen::MatrixXd CovarianceAt(const Eigen::MatrixXd& distance_mm) const;
   double Sd(const Eigen::VectorXd& with) const;
 
   Covariance covariance_;

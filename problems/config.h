@@ -86,7 +86,20 @@ T ReadConfig(const std::filesystem::path& file, std::span<const std::string> ove
   return value;
 }
 
-// The same for a text, as if it stood in `pretend_file`, which need not exist.
+// How many of the keys at the top of a file (and its bases) are fields of T: tells what a file is
+// for. 0 for a file that cannot be read as YAML. Throws IoError if it cannot be read at all.
+template <class T>
+int KnownKeys(const std::filesystem::path& file) {
+  ConfigErrors errors;
+  const ConfigNode fields = ConfigTreeOf(T{}), tree = LoadConfigTree(file, {}, fields, errors);
+  int known = 0;
+  for (const ConfigNode::Entry& entry : tree.entries) {
+    known += fields.Find(entry.key) != nullptr ? 1 : 0;
+  }
+  return known;
+}
+
+// The same as ReadConfig for a text, as if it stood in `pretend_file`, which need not exist.
 template <class T>
 T ReadConfigText(std::string_view text, const std::filesystem::path& pretend_file,
                  std::span<const std::string> overrides = {}) {

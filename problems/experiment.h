@@ -22,6 +22,7 @@
 #include "problems/landmarks.h"
 #include "problems/phantom.h"
 #include "problems/template_face.h"
+#include "problems/uncertainty_options.h"
 #include "surfaces/implicit_face.h"
 #include "surfaces/skull_fill.h"
 
@@ -97,6 +98,7 @@ struct Experiment {
   double cut_margin_mm = 5;
   int rounds = 1;
   FitOptions fit = {.relaxation = {.mode = RelaxationMode::kFootpoint}};
+  UncertaintyOptions uncertainty;
   FaceRegionOptions region;
   DepthDirection direction;
   DepthTruthOptions depth_truth;
@@ -137,6 +139,8 @@ void Fields(Visitor& visit, Experiment& o) {
                   .doc = "how often seeds are taken anew and the schedule is run"},
         o.rounds);
   visit(FieldInfo{.name = "fit", .doc = "the level-by-level fit"}, o.fit);
+  visit(FieldInfo{.name = "uncertainty", .doc = "how far the face may be off, and by what"},
+        o.uncertainty);
   visit(FieldInfo{.name = "region", .doc = "which part of the true skin is scored"}, o.region);
   visit(FieldInfo{.name = "direction",
                   .doc = "along which a depth is taken where it is compared with the true one, and "

@@ -95,8 +95,26 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
   return std::move(*result);
 }
 
+std::optional<FaceUncertainty> Doubt(const Experiment& experiment, const DepthStage& stage,
+                                     const FittedFace& fitted, Case& subject,
+                                     const RunContext& context) {
+  if (!experiment.uncertainty.sigma && experiment.uncertainty.samples == 0) {
+    return std::nullopt;
+  }
+  FaceUncertainty result = MakeUncertainty(experiment, stage, fitted, context);
+  for (const std::string& term : result.left_out) {
+    subject.notes.push_back(fmt::format(
+        "the uncertainty of the face does not know of the fit's term '{}', which couples x, y and "
+        "z: it is rather too large than too small",
+        term));
+  }
+  return result;
+}
+
 std::optional<TruthComparison> Measure(const Experiment& experiment, const SkullStage& skull,
-                                       const TriMesh& face, const RunContext& context) {
+                                       const TriMesh& face,
+                                       const std::optional<FaceUncertainty>& uncertainty,
+                                       std::span<const Sphere> masks, const RunContext& context) {
   const Case& subject = skull.depth_stage->subject;
   if (!subject.skin) {
     return std::nullopt;
@@ -106,6 +124,10 @@ std::optional<TruthComparison> Measure(const Experiment& experiment, const Skull
   truth.face = CompareFaces(*subject.skin, truth.region, face, context);
   truth.implicit = CompareFaces(*subject.skin, truth.region, skull.implicit.mesh, context);
   truth.depth = CompareDepths(experiment, *skull.depth_stage, context);
+  if (uncertainty && experiment.uncertainty.sigma) {
+    truth.sigma = MeasureCoverage(*subject.skin, truth.face.signed_mm, face, uncertainty->sigma_mm,
+                                  masks, context);
+  }
   return truth;
 }
 
@@ -131,12 +153,26 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   });
   Tessellation face =
       step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
-  std::optional<TruthComparison> truth =
-      step("measure", [&] { return Measure(experiment, *skull, face.mesh, context); });
-  return {std::move(subject),        skull->depth_stage->shell, skull->depth_stage->depth,
-          skull->implicit,           face_from_template,        std::move(placed),
-          std::move(fitted.seeding), std::move(fitted.target),  std::move(fitted.fit),
-          std::move(face),           std::move(truth),          step.Take()};
+  std::optional<FaceUncertainty> uncertainty = step("uncertainty", [&] {
+    return Doubt(experiment, *skull->depth_stage, {placed.surface, fitted.target, fitted.fit, face},
+                 subject, context);
+  });
+  std::optional<TruthComparison> truth = step("measure", [&] {
+    return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(placed), context);
+  });
+  return {std::move(subject),
+          skull->depth_stage->shell,
+          skull->depth_stage->depth,
+          skull->implicit,
+          face_from_template,
+          std::move(placed),
+          std::move(fitted.seeding),
+          std::move(fitted.target),
+          std::move(fitted.fit),
+          std::move(face),
+          std::move(uncertainty),
+          std::move(truth),
+          step.Take()};
 }
 
 }  // namespace semblance

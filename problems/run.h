@@ -10,6 +10,7 @@
 #include "problems/depth_comparison.h"
 #include "problems/face_metrics.h"
 #include "problems/skull_stage.h"
+#include "problems/uncertainty.h"
 #include "surfaces/tessellate.h"
 
 namespace semblance {
@@ -20,6 +21,7 @@ struct TruthComparison {
   FaceMetrics face;
   FaceMetrics implicit;
   DepthComparison depth;  // of the shell's vertices
+  SigmaCoverage sigma;    // outside the features' regions; empty without an uncertainty
 };
 
 struct RunResult {
@@ -33,6 +35,7 @@ struct RunResult {
   FitTarget target;     // of the last round: dowel tips at their (u,v), then seeds
   FitResult fit;        // of the last round
   Tessellation face;    // of fit.surface
+  std::optional<FaceUncertainty> uncertainty;  // where it was asked for
   std::optional<TruthComparison> truth;
   std::vector<StepTime> times;  // not part of the result proper
 

@@ -55,6 +55,24 @@ Json FitJson(const RunResult& result) {
   return json;
 }
 
+Json UncertaintyJson(const RunResult& result) {
+  if (!result.uncertainty) {
+    return nullptr;
+  }
+  const FaceUncertainty& u = *result.uncertainty;
+  Json json = {{"sigma_median_mm", u.median_mm},
+               {"sigma_p95_mm", u.p95_mm},
+               {"prior_sd", u.prior_sd},
+               {"depth_length_mm", u.depth_length_mm},
+               {"depth_signal_mm", u.depth_signal_mm},
+               {"samples", u.samples.size()},
+               {"terms_left_out", u.left_out}};
+  json["coverage_90"] = result.truth ? Json(result.truth->sigma.at_90) : Json(nullptr);
+  json["coverage_area_cm2"] = result.truth ? Json(result.truth->sigma.area_cm2) : Json(nullptr);
+  json["coverage"] = result.truth ? Json(result.truth->sigma.curve) : Json(nullptr);
+  return json;
+}
+
 // Where a dowel stands in the fit's target; -1 if it is not fitted.
 int TargetIndex(const FitTarget& target, const std::string& site) {
   const auto found = std::find_if(target.points.begin(), target.points.end(),
@@ -109,31 +127,50 @@ std::vector<std::array<std::uint8_t, 3>> Bytes(const std::vector<Colour>& colour
 // A mesh with one value a vertex: as colours for people's eyes, as `quality` for MeshLab, as
 // `scalar_...` for CloudCompare and Blender.
 std::string MappedPly(const TriMesh& mesh, const std::string& scalar,
-                      const std::vector<double>& values, const ColourMap& map) {
+                      const std::vector<double>& values, const ColourMap& map,
+                      const std::vector<VertexScalar>& more = {}) {
   MeshAttributes attributes;
   attributes.colors = Bytes(ColoursAt(map, values));
   attributes.scalars = {{"quality", values}, {scalar, values}};
+  attributes.scalars.insert(attributes.scalars.end(), more.begin(), more.end());
   return EncodeMesh(mesh, ".ply", attributes);
 }
 
 // How far each vertex of a reconstructed mesh lies outside the true skin; distance to the skull
-// where the skin is not known.
+// where the skin is not known. more: further values of each vertex.
 std::string ReconstructionPly(const TriMesh& mesh, const RunResult& result,
-                              const RunContext& context) {
+                              const std::vector<VertexScalar>& more, const RunContext& context) {
   if (!result.truth) {
     std::vector<double> gap(mesh.points.size());
     const MeshQuery skull(result.shell);
     ParallelFor(gap.size(), context.threads, 256,
                 [&](std::size_t v) { gap[v] = skull.Closest(mesh.points[v]).distance_mm; });
-    return MappedPly(mesh, "scalar_depth_mm", gap, DepthColours());
+    return MappedPly(mesh, "scalar_depth_mm", gap, DepthColours(), more);
   }
-  return MappedPly(mesh, "scalar_error_mm", SignedErrorOf(mesh, result, context), ErrorColours());
+  return MappedPly(mesh, "scalar_error_mm", SignedErrorOf(mesh, result, context), ErrorColours(),
+                   more);
+}
+
+void WriteSamples(const FaceUncertainty& uncertainty, OutputFolder& folder) {
+  constexpr int kQuadsPerPatch = 4;
+  for (std::size_t k = 0; k < uncertainty.samples.size(); ++k) {
+    Tessellation sample = Tessellate(uncertainty.samples[k], kQuadsPerPatch);
+    folder.Write(fmt::format("sample_{}.ply", k),
+                 EncodeMesh(sample.mesh, ".ply", {std::move(sample.normals), {}, {}}));
+  }
 }
 
 void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext& context) {
   folder.Write("face.hspline.json", HSplineToJson(result.fit.surface));
-  folder.Write("face.ply", ReconstructionPly(result.face.mesh, result, context));
-  folder.Write("implicit.ply", ReconstructionPly(result.implicit.mesh, result, context));
+  std::vector<VertexScalar> sigma;
+  if (result.uncertainty && !result.uncertainty->sigma_mm.empty()) {
+    sigma.push_back({"scalar_sigma_mm", result.uncertainty->sigma_mm});
+  }
+  folder.Write("face.ply", ReconstructionPly(result.face.mesh, result, sigma, context));
+  folder.Write("implicit.ply", ReconstructionPly(result.implicit.mesh, result, {}, context));
+  if (result.uncertainty) {
+    WriteSamples(*result.uncertainty, folder);
+  }
   folder.Write("depth.ply",
                MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthColours()));
 }
@@ -191,6 +228,7 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
   json["depth_truth"] = result.truth ? ComparisonToJson(result.truth->depth) : Json(nullptr);
   json["implicit"] = ImplicitJson(result.implicit);
   json["fit"] = FitJson(result);
+  json["uncertainty"] = UncertaintyJson(result);
   json["notes"] = result.subject.notes;
   for (const std::string& note : result.implicit.notes) {
     json["notes"].push_back(note);

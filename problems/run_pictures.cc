@@ -77,6 +77,7 @@ void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
 
 ColourMap DepthColours() { return SequentialMap(0, 25); }
 ColourMap ErrorColours() { return DivergingMap(8); }
+ColourMap SigmaColours() { return SequentialMap(0, 6); }
 
 std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
                                   const RunContext& context) {
@@ -115,6 +116,12 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   over.objects.push_back(SkinObject(result.face.mesh, 0.55));
   WriteViews(over, result, {"H-spline face over skull and dowels", {}, std::nullopt},
              Lighting::kStudio, folder, "pictures/face_over_skull.png", threads);
+  if (result.uncertainty && !result.uncertainty->sigma_mm.empty()) {
+    const Legend sigma{SigmaColours(), "standard deviation along the normal"};
+    WriteViews({{MappedObject(result.face.mesh, result.uncertainty->sigma_mm, sigma.map)}}, result,
+               {"How far the face may be off", {}, sigma}, Lighting::kEven, folder,
+               "pictures/sigma.png", threads);
+  }
   if (result.truth) {
     WriteTruth(result, folder, threads);
   }

@@ -12,6 +12,7 @@ namespace semblance {
 
 ColourMap DepthColours();  // 0 to 25 mm
 ColourMap ErrorColours();  // -8 to 8 mm
+ColourMap SigmaColours();  // 0 to 6 mm
 
 // Signed distance of each vertex to the true skin, positive outside it; NaN where the nearest skin
 // is not scored. result.truth must be there.
@@ -19,7 +20,8 @@ std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
                                   const RunContext& context);
 
 // pictures/overview.png and, from front, three quarters and side: skull_dowels, depth, implicit,
-// face, face_over_skull and, where the true skin is known, truth and error (on the true skin).
+// face, face_over_skull, where it is known sigma, and, where the true skin is known, truth and
+// error (on the true skin).
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context);
 
 }  // namespace semblance

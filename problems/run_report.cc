@@ -27,6 +27,12 @@ std::string Percent(const Json& share) {
   return share.is_null() ? "" : fmt::format("{:.1f}", 100 * share.get<double>());
 }
 
+// Runs of older versions say nothing of it.
+bool HasSigma(const Json& result) {
+  return result.contains("uncertainty") && !result.at("uncertainty").is_null() &&
+         !result.at("uncertainty").at("sigma_median_mm").is_null();
+}
+
 std::vector<ReportTile> Tiles(const Json& result) {
   const Json& face = result.at("face");
   const Json& fit = result.at("fit");
@@ -41,6 +47,10 @@ std::vector<ReportTile> Tiles(const Json& result) {
   }
   tiles.push_back(
       {"dowel RMS", Number(fit.at("dowel_rms_mm")), "mm", "dowel tips to the fitted face"});
+  if (HasSigma(result)) {
+    tiles.push_back({"may be off", Number(result.at("uncertainty").at("sigma_median_mm")), "mm",
+                     "median standard deviation of the face along its normal"});
+  }
   return tiles;
 }
 
@@ -92,17 +102,26 @@ ReportImage ConvergencePlot(const Json& fit) {
           "root mean square distance by step of the schedule"};
 }
 
+std::string OutOf(const Json& level, const char* part, const char* all) {
+  return level.contains(part) && level.at(part).is_number()
+             ? fmt::format("{} of {}", level.at(part).dump(), level.at(all).dump())
+             : "";
+}
+
 ReportTable LevelsTable(const Json& fit) {
-  ReportTable table{"Steps of the schedule",
-                    {"step", "level", "fraction", "RMS before (mm)", "RMS after (mm)",
-                     "largest move (mm)", "vertices without data"},
-                    {}};
+  ReportTable table{
+      "Steps of the schedule",
+      {"step", "level", "fraction", "RMS before (mm)", "RMS after (mm)", "largest move (mm)",
+       "rank of the data", "vertices free", "vertices without data", "patches without data"},
+      {}};
   int step = 0;
   for (const Json& level : fit.at("levels")) {
     table.rows.push_back({std::to_string(++step), Number(level.at("level")),
                           Number(level.at("fraction")), Number(level.at("rms_before_mm")),
                           Number(level.at("rms_after_mm")), Number(level.at("max_move_mm")),
-                          Number(level.at("uncovered_vertices"))});
+                          Number(level.at("rank")), Number(level.at("free_vertices")),
+                          Number(level.at("uncovered_vertices")),
+                          OutOf(level, "empty_patches", "patches")});
   }
   return table;
 }
@@ -177,6 +196,27 @@ ReportSection PictureSection(const OutputFolder& folder) {
   return section;
 }
 
+ReportSection UncertaintySection(const Json& result, const OutputFolder& folder) {
+  const Json& uncertainty = result.at("uncertainty");
+  ReportSection section{.heading = "How far the face may be off"};
+  section.paragraphs = {fmt::format(
+      "Standard deviation of the face along its normal, from that of the dowels' depths, of the "
+      "depths between them, and of what the fit's smoothness holds back: {} mm in the median and "
+      "{} mm at the 95th percentile of the area that dowels and seeds hold. It knows nothing of a "
+      "wrong skull, wrong landmarks or a table of other people.",
+      Number(uncertainty.at("sigma_median_mm")), Number(uncertainty.at("sigma_p95_mm")))};
+  if (!uncertainty.at("coverage_90").is_null()) {
+    section.paragraphs.push_back(
+        fmt::format("Of the true skin in front of the network, the features' regions apart, {} % "
+                    "lie within the interval that should hold 90 %.",
+                    Percent(uncertainty.at("coverage_90"))));
+  }
+  section.images = {
+      ReportImageFromFile(folder.Root() / "pictures/sigma.png", "",
+                          "standard deviation of the H-spline face from three sides")};
+  return section;
+}
+
 ReportSection NotesSection(const Json& result) {
   ReportSection section{.heading = "Notes"};
   for (const Json& note : result.at("notes")) {
@@ -211,6 +251,9 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
        .images = {ConvergencePlot(result.at("fit"))},
        .tables = {LevelsTable(result.at("fit")), CountsTable("Counts of the fit", result.at("fit")),
                   DowelsTable(ReadFileBytes(folder.Root() / "dowels.csv"))}});
+  if (HasSigma(result)) {
+    report.sections.push_back(UncertaintySection(result, folder));
+  }
   report.sections.push_back({.heading = "Depth and implicit surface",
                              .tables = {CountsTable("Depth field", result.at("depth")),
                                         CountsTable("Implicit surface", result.at("implicit"))}});

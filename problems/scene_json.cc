@@ -114,6 +114,10 @@ class SceneWriter {
     Depth();
     Face("implicit", "Implicit face", view_.implicit, "#d9b38c");
     Face("face", "H-spline face", view_.face, "#d8a58a");
+    if (result_.uncertainty && !result_.uncertainty->sigma_mm.empty()) {
+      Mesh("sigma", "How far the face may be off", view_.face, "#8f8f8f");
+      Map("sigma", NearestValues(view_.face, result_.face.mesh, result_.uncertainty->sigma_mm));
+    }
     if (result_.subject.skin) {
       Mesh("skin", "True skin", view_.skin, "#b9c7d6");
     }
@@ -142,26 +146,35 @@ class SceneWriter {
     }
   }
 
-  // The depth of the nearest vertex of the shell that was not thinned out.
-  void Depth() {
-    const TriMesh& mesh = view_.shell;
-    const MeshQuery query(result_.shell);
-    std::vector<double> depth(mesh.points.size());
-    ParallelFor(depth.size(), context_.threads, 256, [&](std::size_t v) {
-      const MeshPoint at = query.Closest(mesh.points[v]);
+  // The value of the nearest vertex of the mesh before it was thinned out.
+  std::vector<double> NearestValues(const TriMesh& thin, const TriMesh& full,
+                                    const std::vector<double>& full_values) const {
+    const MeshQuery query(full);
+    std::vector<double> values(thin.points.size());
+    ParallelFor(values.size(), context_.threads, 256, [&](std::size_t v) {
+      const MeshPoint at = query.Closest(thin.points[v]);
       double nearest = std::numeric_limits<double>::infinity();
-      for (const std::int32_t corner : result_.shell.triangles[at.triangle]) {
-        const double distance = (result_.shell.points[corner] - mesh.points[v]).norm();
+      for (const std::int32_t corner : full.triangles[at.triangle]) {
+        const double distance = (full.points[corner] - thin.points[v]).norm();
         if (distance < nearest) {
           nearest = distance;
-          depth[v] = result_.depth.depth_mm[corner];
+          values[v] = full_values[corner];
         }
       }
     });
-    Mesh("depth", "Tissue depth on skull", mesh, "#8f8f8f");
-    layers_.back()["map"] = "depth";
+    return values;
+  }
+
+  // Colours the last layer.
+  void Map(const char* map, const std::vector<double>& values) {
+    layers_.back()["map"] = map;
     layers_.back()["always_mapped"] = true;
-    layers_.back()["values"] = blobs_.AddValues(depth);
+    layers_.back()["values"] = blobs_.AddValues(values);
+  }
+
+  void Depth() {
+    Mesh("depth", "Tissue depth on skull", view_.shell, "#8f8f8f");
+    Map("depth", NearestValues(view_.shell, result_.shell, result_.depth.depth_mm));
   }
 
   void Dowels() {
@@ -210,7 +223,8 @@ class SceneWriter {
 
   Json Maps() const {
     return {{"error", MapJson(ErrorColours(), "outside (+) or inside (\u2212) the true skin")},
-            {"depth", MapJson(DepthColours(), "tissue depth")}};
+            {"depth", MapJson(DepthColours(), "tissue depth")},
+            {"sigma", MapJson(SigmaColours(), "standard deviation of the face")}};
   }
 
   Json Facts() const {

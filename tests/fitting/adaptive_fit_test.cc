@@ -73,6 +73,13 @@ TEST(AdaptiveFit, ReproducesASurfaceWhoseVerticesAreKnown) {
     const FitResult result = Fit(start, PointsOf(truth, 40000), {}, Adaptive(1, 3), {});
     EXPECT_LT(LargestDistance(result.surface, truth), 1e-9);
     EXPECT_LT(result.point_rms_mm, 1e-9);
+    const LevelSummary& last = result.levels.back();
+    EXPECT_EQ(last.rank, last.free_vertices);  // the points determine all
+    EXPECT_EQ(last.uncovered_vertices, 0);
+    EXPECT_GE(last.coverage.patches, 4 * 3);
+    EXPECT_EQ(last.coverage.empty_patches, 0);
+    EXPECT_NEAR(last.coverage.median_patch_points, 40000.0 / last.coverage.patches,
+                40000.0 / last.coverage.patches);
     EXPECT_EQ(result.surface.Offsets().size(), truth.Offsets().size());
     EXPECT_TRUE(result.usable);
   }

@@ -147,6 +147,15 @@ TEST(LevelFit, TakesTheNearestOfManySolutions) {
   EXPECT_LT(solution.summary.rms_after_mm, 1e-7);
 }
 
+TEST(LevelFit, CoverageCountsThePointsOfEachPatch) {
+  const PatchCoverage odd = CoverageOf({0, 4, 1, 0, 9}), even = CoverageOf({3, 0, 8});
+  EXPECT_EQ(odd.patches, 5);
+  EXPECT_EQ(odd.empty_patches, 2);
+  EXPECT_EQ(odd.median_patch_points, 4);
+  EXPECT_EQ(even.median_patch_points, 5.5);
+  EXPECT_TRUE(std::isnan(CoverageOf({0, 0}).median_patch_points));
+}
+
 TEST(LevelFit, VerticesThatNoTermTouchesStayToTheBit) {
   const ControlNet start = Sheet(8, 3, 1, 8);
   const LevelView view = View(start, Observe(Sheet(8, 3, 4, 9), 60, 10, 0, 0.49));  // patches 0..3
@@ -162,6 +171,9 @@ TEST(LevelFit, VerticesThatNoTermTouchesStayToTheBit) {
   EXPECT_EQ(moved, 7 * start.rows);
   EXPECT_EQ(solution.summary.free_vertices, 7 * start.rows);
   EXPECT_EQ(solution.summary.uncovered_vertices, 4 * start.rows);
+  EXPECT_EQ(solution.summary.coverage.patches, 8 * 3);
+  EXPECT_EQ(solution.summary.coverage.empty_patches, 4 * 3);
+  EXPECT_NEAR(solution.summary.coverage.median_patch_points, 60 / 12.0, 2);
   // With a smoothness term they follow.
   const LevelSolution smooth = FitLevel(view, std::vector<Term>{PointTerm{}, SmoothnessTerm{}});
   EXPECT_EQ(smooth.summary.free_vertices, static_cast<int>(start.vertices.size()));

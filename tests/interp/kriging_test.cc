@@ -234,5 +234,33 @@ TEST(KrigingFit, CoversTheDepthsOfItsOwnProcess) {
   EXPECT_NEAR(covered, 72, 7);  // 90 % of 80
 }
 
+// On the diagonal the stated deviations; off it what a further dowel would tell: it takes
+// cov(p, q)^2 / var(q) off the variance at p.
+TEST(Kriging, TheCovarianceIsWhatADowelThereWouldTell) {
+  DowelScene scene = ScatteredScene(12);
+  scene.network.areas.clear();
+  const Kriging kriging{.length_mm = 25, .signal_mm = 3, .clamp = false};
+  std::vector<Vec3> places;
+  for (std::size_t k = 0; k + 1 < scene.dowels.size() && k < 4; ++k) {
+    places.push_back((2 * scene.dowels[k].base + scene.dowels[k + 1].base) / 3);
+  }
+  const DepthPosterior posterior = KrigingPosterior(kriging, scene.Input(), places, RunContext{});
+  const Eigen::MatrixXd& covariance = posterior.covariance;
+  const DepthField field = FieldAt(kriging, scene, places);
+  DowelScene more = scene;
+  more.dowels.push_back({"zzz", places[0], scene.dowels[0].direction, 9, kNaN});
+  const Eigen::MatrixXd after =
+      KrigingPosterior(kriging, more.Input(), places, RunContext{}).covariance;
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    EXPECT_NEAR(covariance(p, p), std::pow(field.sd_mm[p], 2), 1e-8);
+    EXPECT_NEAR(posterior.mean_mm[p], field.depth_mm[p], 1e-9);
+    for (std::size_t q = 0; q < places.size(); ++q) {
+      const double told = covariance(p, 0) * covariance(q, 0) / covariance(0, 0);
+      EXPECT_NEAR(after(p, q), covariance(p, q) - told, 1e-6);
+      EXPECT_EQ(covariance(p, q), covariance(q, p));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace semblance

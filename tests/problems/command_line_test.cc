@@ -158,10 +158,24 @@ TEST_F(CommandLine, ASkullWithTooFewLandmarksIsRefused) {
 }
 
 TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
-  EXPECT_EQ(Call("check " + kConfigs + "/phantom.yaml " + kConfigs + "/demo.yaml " + kConfigs +
-                 "/cranium.yaml")
-                .code,
-            0);
+  std::string files;
+  for (const std::string& folder : {kConfigs, kConfigs + "/fit"}) {
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      files += entry.path().extension() == ".yaml" ? fmt::format(" {}", entry.path().string()) : "";
+    }
+  }
+  EXPECT_THAT(files, HasSubstr("franke.yaml"));
+  const Outcome outcome = Call("check" + files);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+}
+
+TEST_F(CommandLine, CheckTellsAFitFromAnExperimentAndRefusesTheFaultsOfEither) {
+  Write("fit.yaml", "patches_u: 4\nclosure: periodic_u\nfit: {terms: [points]}\n");
+  EXPECT_EQ(Call("check fit.yaml").code, 0);
+  Write("fit.yaml", "patches_u: 4\nclosure: periodic\nfit: {terms: [points]}\n");
+  ExpectRefused("check fit.yaml", "fit.yaml:2:");
+  Write("both.yaml", "patches_u: 4\nsubject: phantom\nrounds: 2\n");
+  ExpectRefused("check both.yaml", "patches_u");
 }
 
 TEST_F(CommandLine, OptionsNameEveryKeyAndTheSchemaIsJson) {

@@ -112,6 +112,7 @@ TEST(Run, TheFolderHoldsWhatItsManifestLists) {
                                                 "pictures/face_over_skull.png",
                                                 "pictures/implicit.png",
                                                 "pictures/overview.png",
+                                                "pictures/sigma.png",
                                                 "pictures/skull_dowels.png",
                                                 "pictures/truth.png",
                                                 "report.html",
