@@ -9,6 +9,7 @@
 #include "problems/case.h"
 #include "problems/depth_comparison.h"
 #include "problems/face_metrics.h"
+#include "problems/feature_damage.h"
 #include "problems/skull_stage.h"
 #include "surfaces/tessellate.h"
 
@@ -34,6 +35,7 @@ struct RunResult {
   FitResult fit;        // of the last round
   Tessellation face;    // of fit.surface
   std::optional<TruthComparison> truth;
+  std::vector<FeatureDamage> features;
   std::vector<StepTime> times;  // not part of the result proper
 
   bool usable() const { return fit.usable && face.mesh.points.size() > 0; }
