@@ -92,11 +92,7 @@ class AdaptiveFitter {
     }
     if (options.relaxation.mode != RelaxationMode::kNone) {
       moved_ = target;
-      std::vector<Vec2> uv;
-      for (const FitPoint& p : target.points) {
-        uv.push_back(p.uv);
-      }
-      mesh_.emplace(rest, uv);
+      mesh_.emplace(MeshOf(rest, target, options.relaxation));
     }
   }
 

@@ -45,8 +45,16 @@ Vec2 Lengths(const HSplineSurface& surface) {
 
 }  // namespace
 
-DowelMesh::DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv)
+DowelMesh::DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv,
+                     DowelLinks links)
     : rest_uv_(uv.begin(), uv.end()), corner_(uv.size()), lengths_mm_(Lengths(template_surface)) {
+  std::iota(corner_.begin(), corner_.end(), 0);
+  if (links == DowelLinks::kDelaunay) {
+    Link(uv);
+  }
+}
+
+void DowelMesh::Link(std::span<const Vec2> uv) {
   Delaunay delaunay;
   for (const int k : Ordered(uv)) {
     const Vec2 place = uv[k].cwiseProduct(lengths_mm_);
@@ -77,6 +85,17 @@ bool DowelMesh::Turned(const std::array<int, 3>& triangle, std::span<const Vec2>
 int DowelMesh::Flips(std::span<const Vec2> uv) const {
   return static_cast<int>(std::count_if(triangles_.begin(), triangles_.end(),
                                         [&](const auto& t) { return Turned(t, uv); }));
+}
+
+DowelMesh MeshOf(const HSplineSurface& rest, const FitTarget& target,
+                 const RelaxationOptions& options) {
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    uv.push_back(p.uv);
+  }
+  const bool neighbours = options.mode != RelaxationMode::kFootpoint &&
+                          (options.bunching > 0 || options.distortion > 0 || options.crease > 0);
+  return {rest, uv, options.barrier || neighbours ? DowelLinks::kDelaunay : DowelLinks::kNone};
 }
 
 }  // namespace semblance

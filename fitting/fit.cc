@@ -10,53 +10,14 @@
 #include <string>
 
 #include "fitting/adaptive_fit.h"
+#include "fitting/auto_weight.h"
+#include "fitting/fit_check.h"
+#include "fitting/joint_relaxation.h"
 #include "fitting/seeding.h"
-#include "surfaces/error.h"
 #include "surfaces/feature.h"
 
 namespace semblance {
 namespace {
-
-[[noreturn]] void Fail(const std::string& what) { throw InputError("fit: " + what); }
-
-void CheckSchedule(const std::vector<LevelFit>& schedule, int max_level) {
-  if (schedule.empty()) {
-    Fail("the schedule is empty; give at least one {level, fraction}");
-  }
-  for (std::size_t i = 0; i < schedule.size(); ++i) {
-    if (schedule[i].level < 0 || schedule[i].level > max_level) {
-      Fail(fmt::format("step {} of the schedule asks for level {}; the surface has levels 0..{}", i,
-                       schedule[i].level, max_level));
-    }
-    if (!(schedule[i].fraction >= 0 && schedule[i].fraction <= 1)) {
-      Fail(fmt::format("step {} of the schedule has the fraction {}; allowed are 0..1", i,
-                       schedule[i].fraction));
-    }
-  }
-}
-
-void CheckFeatures(std::span<const VertexId> features, int max_level) {
-  for (const VertexId& f : features) {
-    if (f.level < 1 || f.level > max_level) {
-      Fail(
-          fmt::format("feature vertex ({}, {}) is of level {}; features are offsets, of levels "
-                      "1..{}",
-                      f.i, f.j, f.level, max_level));
-    }
-  }
-}
-
-std::vector<LevelFit> StepsOf(const FitOptions& options) {
-  const auto* const plan = std::get_if<CoarseToFinePlan>(&options.plan);
-  if (plan == nullptr) {
-    return options.schedule;
-  }
-  std::vector<LevelFit> steps;
-  for (int level = 0; level <= plan->finest; ++level) {
-    steps.push_back({level, plan->fraction});
-  }
-  return steps;
-}
 
 // Every level of the steps, coarse to fine.
 std::vector<LevelFit> SweepOf(const std::vector<LevelFit>& steps) {
@@ -69,25 +30,6 @@ std::vector<LevelFit> SweepOf(const std::vector<LevelFit>& steps) {
     sweep.push_back({level, 1});
   }
   return sweep;
-}
-
-void CheckInput(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
-                std::span<const VertexId> features, const FitOptions& options) {
-  if (!(start.shape() == rest.shape())) {
-    Fail("the start and the template differ in shape (patches, levels, closure or reference)");
-  }
-  if (target.points.empty()) {
-    Fail("the target has no point; give dowels or seed some");
-  }
-  CheckTarget(target);
-  const auto* const plan = std::get_if<AdaptivePlan>(&options.plan);
-  if (plan == nullptr) {
-    CheckSchedule(StepsOf(options), start.shape().max_level);
-  } else if (plan->finest > start.shape().max_level) {
-    Fail(fmt::format("the adaptive plan asks for level {}; the surface has levels 0..{}",
-                     plan->finest, start.shape().max_level));
-  }
-  CheckFeatures(features, start.shape().max_level);
 }
 
 PatchGrid GridOf(const HSplineShape& shape, int level) {
@@ -105,8 +47,9 @@ Observation Observe(const FitPoint& point, const HSplineSurface& surface, int le
   return o;
 }
 
+// held: vertices of any level.
 LevelView ViewOf(int level, const HSplineSurface& surface, const HSplineSurface& rest,
-                 const FitTarget& target, FitAim aim) {
+                 const FitTarget& target, FitAim aim, const std::set<VertexId>& held) {
   LevelView view{.grid = GridOf(surface.shape(), level),
                  .start = surface.Net(level),
                  .rest = rest.Net(level),
@@ -116,14 +59,30 @@ LevelView ViewOf(int level, const HSplineSurface& surface, const HSplineSurface&
   for (const FitPoint& point : target.points) {
     view.observations.push_back(Observe(point, surface, level, aim));
   }
+  for (std::size_t k = 0; k < target.feet.size(); ++k) {
+    const Observation& o = view.observations[k];
+    const Vec3 detail = target.points[k].position - o.position;
+    if (target.feet[k].foot.allFinite()) {
+      view.bone.push_back({o, target.feet[k].foot - detail, target.feet[k].direction});
+    }
+  }
+  for (const VertexId& vertex : held) {
+    if (vertex.level == level) {
+      view.held.push_back(view.start.Index(vertex.i, vertex.j));
+    }
+  }
   return view;
 }
 
-// c + fraction (c' - c); a vertex that the solve left alone keeps its bits. Returns the longest
-// way.
-double WriteBack(const ControlNet& solved, const LevelFit& step, HSplineSurface& surface) {
+// c + fraction (c' - c); a vertex that the solve left alone, or that stays, keeps its bits. Returns
+// the longest way.
+double WriteBack(ControlNet solved, const LevelFit& step, std::span<const int> stay,
+                 HSplineSurface& surface) {
   ControlNet net = surface.Net(step.level);
   double longest = 0;
+  for (const int k : stay) {
+    solved.vertices[k] = net.vertices[k];
+  }
   for (std::size_t k = 0; k < net.vertices.size(); ++k) {
     const Vec3 move = step.fraction * (solved.vertices[k] - net.vertices[k]);
     net.vertices[k] += move;
@@ -153,21 +112,8 @@ double PointRms(const HSplineSurface& surface, const FitTarget& target) {
   return WeightedRms(std::move(all));
 }
 
-LevelSummary FitStep(const LevelFit& step, const HSplineSurface& rest, const FitTarget& target,
-                     const FitOptions& options, double rms_before_mm, HSplineSurface& surface) {
-  LevelSolution solution = FitLevel(ViewOf(step.level, surface, rest, target, options.aim),
-                                    options.terms, options.solver);
-  LevelSummary summary = std::move(solution.summary);
-  summary.level = step.level;
-  summary.fraction = step.fraction;
-  summary.max_move_mm = WriteBack(solution.net, step, surface);
-  summary.rms_before_mm = rms_before_mm;
-  summary.rms_after_mm = PointRms(surface, target);
-  return summary;
-}
-
-int RestoreFeatures(const HSplineSurface& rest, std::span<const VertexId> features,
-                    HSplineSurface& surface) {
+int GiveBack(const HSplineSurface& rest, std::span<const VertexId> features,
+             HSplineSurface& surface) {
   RestoreFeature(ExtractFeature(rest, "rest", features), features, surface);
   return static_cast<int>(std::set(features.begin(), features.end()).size());
 }
@@ -202,25 +148,57 @@ void MeasureAnew(FitTarget target, FitResult& result) {
   MeasurePoints(target, kNaN, result);
 }
 
+// The terms with points that may slide along the surface; what `weight: auto` was before holds.
+std::vector<Term> Sliding(std::vector<Term> terms, double tangential, double auto_weight) {
+  if (const int automatic = AutoTerm(terms); automatic >= 0) {
+    SetWeight(auto_weight, terms[automatic]);
+  }
+  for (Term& term : terms) {
+    if (const auto* const points = std::get_if<PointTerm>(&term)) {
+      term = TangentPointTerm{.weight = points->weight, .tangential = tangential};
+    }
+  }
+  return terms;
+}
+
+// The weight of a PriorTerm that holds features.
+double Resistance(const FeatureRule& rule) {
+  constexpr double kFrozen = 1e6;
+  const auto* const weighted = std::get_if<WeightedFeatures>(&rule);
+  return weighted != nullptr                            ? weighted->weight
+         : std::holds_alternative<FrozenFeatures>(rule) ? kFrozen
+                                                        : 0;
+}
+
+double SumOfCosts(const LevelSummary& summary) {
+  double sum = 0;
+  for (const TermCosts& term : summary.terms) {
+    sum += term.after;
+  }
+  return sum;
+}
+
 // Takes the steps of a schedule, with the relaxation after each.
 class Fitter {
  public:
-  Fitter(const HSplineSurface& rest, const FitTarget& target, const FitOptions& options,
-         std::size_t most_steps, const RunContext& context, FitResult& result)
+  Fitter(const HSplineSurface& rest, const FitTarget& target, std::span<const VertexId> features,
+         const FitOptions& options, std::size_t most_steps, const RunContext& context,
+         FitResult& result)
       : rest_(rest),
         given_(target),
         options_(options),
+        terms_(options.terms),
         most_steps_(static_cast<double>(most_steps)),
         context_(context),
         result_(result),
         rms_mm_(PointRms(result.surface, target)) {
+    if (const double weight = Resistance(options.features); weight > 0) {
+      held_.insert(features.begin(), features.end());
+      terms_.emplace_back(PriorTerm{.weight = weight, .held_only = true});
+    }
     if (options.relaxation.mode != RelaxationMode::kNone) {
       moved_ = target;
-      std::vector<Vec2> uv;
-      for (const FitPoint& p : target.points) {
-        uv.push_back(p.uv);
-      }
-      mesh_.emplace(rest, uv);
+      mesh_.emplace(MeshOf(rest, target, options.relaxation));
     }
   }
 
@@ -234,32 +212,65 @@ class Fitter {
   }
 
   double rms_mm() const { return rms_mm_; }
+  int frozen() const { return IsFrozen() ? static_cast<int>(held_.size()) : 0; }
   const FitTarget& target() const { return mesh_ ? moved_ : given_; }
 
  private:
   void Take(const LevelFit& step) {
-    result_.levels.push_back(Solve(step));
+    result_.levels.push_back(Solve(step, terms_));
+    const RelaxationOptions& options = options_.relaxation;
     if (!mesh_) {
       return;
     }
-    const RelaxationOptions& options = options_.relaxation;
+    result_.relaxations.emplace_back();
     if (options.mode == RelaxationMode::kFootpoint) {
-      result_.relaxations.push_back(Move(options.rounds));
+      result_.relaxations.back() = Move(options.rounds);
       return;
     }
     for (int round = 0; round < options.rounds; ++round) {
-      const RelaxationSummary moved = Move(1);
-      round == 0 ? result_.relaxations.push_back(moved) : Join(moved, result_.relaxations.back());
-      const double rms_before_mm = result_.levels.back().rms_before_mm;
-      result_.levels.back() = Solve(step);
-      result_.levels.back().rms_before_mm = rms_before_mm;
+      Keep(options.mode == RelaxationMode::kJoint ? MoveJointly(step) : Move(1));
+      SolveAgain(step, terms_);
+    }
+    if (options.mode == RelaxationMode::kTangentDistance) {
+      Slide(step);
     }
   }
 
-  LevelSummary Solve(const LevelFit& step) {
-    LevelSummary summary = FitStep(step, rest_, target(), options_, rms_mm_, result_.surface);
-    rms_mm_ = summary.rms_after_mm;
+  void Slide(const LevelFit& step) {
+    const RelaxationOptions& options = options_.relaxation;
+    const std::vector<Term> terms =
+        Sliding(terms_, options.tangential, result_.levels.back().auto_weight);
+    for (int round = 0; round < options.tangent_rounds; ++round) {
+      SolveAgain(step, terms);
+      Keep(Move(1));
+      result_.levels.back().rms_after_mm = rms_mm_;
+    }
+  }
+
+  bool IsFrozen() const { return std::holds_alternative<FrozenFeatures>(options_.features); }
+
+  LevelView View(int level, const FitTarget& target) const {
+    return ViewOf(level, result_.surface, rest_, target, options_.aim, held_);
+  }
+
+  LevelSummary Solve(const LevelFit& step, std::span<const Term> terms) {
+    LevelView view = View(step.level, target());
+    const std::vector<int> stay = IsFrozen() ? view.held : std::vector<int>();
+    LevelSolution solution = FitLevel(std::move(view), terms, options_.solver);
+    LevelSummary summary = std::move(solution.summary);
+    summary.level = step.level;
+    summary.fraction = step.fraction;
+    summary.max_move_mm = WriteBack(std::move(solution.net), step, stay, result_.surface);
+    summary.rms_before_mm = rms_mm_;
+    rms_mm_ = summary.rms_after_mm = PointRms(result_.surface, target());
     return summary;
+  }
+
+  // As a part of the last step.
+  void SolveAgain(const LevelFit& step, std::span<const Term> terms) {
+    const double rms_before_mm = result_.levels.back().rms_before_mm;
+    result_.levels.back() = Solve(step, terms);
+    result_.levels.back().rms_before_mm = rms_before_mm;
   }
 
   RelaxationSummary Move(int rounds) {
@@ -269,7 +280,28 @@ class Fitter {
     return summary;
   }
 
-  static void Join(const RelaxationSummary& next, RelaxationSummary& all) {
+  RelaxationSummary MoveJointly(const LevelFit& step) {
+    std::vector<Term> terms = terms_;
+    if (const int automatic = AutoTerm(terms); automatic >= 0) {
+      SetWeight(result_.levels.back().auto_weight, terms[automatic]);
+    }
+    const bool detail =
+        options_.aim == FitAim::kSurface && step.level < result_.surface.shape().max_level;
+    const JointLevel level{
+        .view = View(step.level, moved_),
+        .terms = terms,
+        .detail = detail ? &result_.surface : nullptr,
+        .level = step.level,
+        .cost = [&](const FitTarget& target) {
+          return SumOfCosts(FitLevel(View(step.level, target), terms, options_.solver).summary);
+        }};
+    return RelaxJointly(result_.surface, rest_, *mesh_, options_.relaxation, level, moved_);
+  }
+
+  // As a part of the last step's.
+  void Keep(const RelaxationSummary& next) {
+    RelaxationSummary& all = result_.relaxations.back();
+    all.before = std::isnan(all.before.distance) ? next.before : all.before;
     all.after = next.after;
     all.max_move_mm = std::max(all.max_move_mm, next.max_move_mm);
     all.flips_prevented += next.flips_prevented;
@@ -279,6 +311,8 @@ class Fitter {
   const HSplineSurface& rest_;
   const FitTarget& given_;
   const FitOptions& options_;
+  std::vector<Term> terms_;
+  std::set<VertexId> held_;  // features that resist
   double most_steps_;
   const RunContext& context_;
   FitResult& result_;
@@ -292,11 +326,11 @@ class Fitter {
 FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& given,
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context) {
-  CheckInput(start, rest, given, features, options);
+  CheckFit(start, rest, given, features, options);
   if (std::holds_alternative<AdaptivePlan>(options.plan)) {
     FitResult result = FitAdaptively(start, rest, given, options, context);
-    if (options.features == FeatureRule::kRestore && !features.empty()) {
-      result.restored_features = RestoreFeatures(rest, features, result.surface);
+    if (std::holds_alternative<RestoreFeatures>(options.features) && !features.empty()) {
+      result.restored_features = GiveBack(rest, features, result.surface);
       MeasureAnew(given, result);
     }
     return result;
@@ -305,8 +339,8 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
   const std::vector<LevelFit> steps = StepsOf(options), sweep = SweepOf(steps);
   const auto* const until = std::get_if<UntilPlan>(&options.plan);
   const int passes = until == nullptr ? 1 : until->max_passes;
-  Fitter fitter(rest, given, options, passes * steps.size() + options.sweeps * sweep.size(),
-                context, result);
+  Fitter fitter(rest, given, features, options,
+                passes * steps.size() + options.sweeps * sweep.size(), context, result);
   for (int pass = 0; pass < passes; ++pass) {
     const double before_mm = fitter.rms_mm();
     fitter.TakeAll(steps);
@@ -317,9 +351,9 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
   for (int k = 0; k < options.sweeps; ++k) {
     fitter.TakeAll(sweep);
   }
-  const bool restore = options.features == FeatureRule::kRestore;
-  result.restored_features = restore ? RestoreFeatures(rest, features, result.surface) : 0;
-  MeasurePoints(fitter.target(), result.restored_features > 0 ? kNaN : fitter.rms_mm(), result);
+  const bool restore = std::holds_alternative<RestoreFeatures>(options.features);
+  result.restored_features = restore ? GiveBack(rest, features, result.surface) : fitter.frozen();
+  MeasurePoints(fitter.target(), restore && !features.empty() ? kNaN : fitter.rms_mm(), result);
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "fitting/feature_rule.h"
 #include "fitting/fit_schedule.h"
 #include "fitting/fit_target.h"
 #include "fitting/level_fit.h"
@@ -17,18 +18,13 @@
 
 namespace semblance {
 
-enum class FeatureRule { kRestore, kFree };
-constexpr auto EnumNames(FeatureRule) {
-  return std::to_array<std::string_view>({"restore", "free"});
-}
-
 enum class FitAim { kSurface, kLevel };
 constexpr auto EnumNames(FitAim) { return std::to_array<std::string_view>({"surface", "level"}); }
 
 struct FitOptions {
   std::vector<LevelFit> schedule = PublishedSchedule();
   std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};
-  FeatureRule features = FeatureRule::kRestore;
+  FeatureRule features = RestoreFeatures{};
   FitAim aim = FitAim::kSurface;
   RelaxationOptions relaxation = {};
   SchedulePlan plan = ListedPlan{};
@@ -44,8 +40,10 @@ void Fields(Visitor& visit, FitOptions& o) {
         o.schedule);
   visit(FieldInfo{.name = "terms", .min = 1, .doc = "what each level's solve weighs"}, o.terms);
   visit(FieldInfo{.name = "features",
-                  .doc = "feature vertices are fitted as free; restore: afterwards they get back "
-                         "the template's offsets (thesis 4.3); free: they keep what the fit gave"},
+                  .doc = "what the fit may do to the offsets that make eyes, nose and mouth; "
+                         "restore: fit them as any, then give them back the template's (thesis "
+                         "4.3); free: they keep what the fit gave; weighted: they resist it; "
+                         "frozen: they do not take part, and the fit makes do with the others"},
         o.features);
   visit(FieldInfo{.name = "aim",
                   .doc = "surface: a level moves so that the whole surface, with the detail of its "
@@ -87,7 +85,7 @@ struct FitResult {
                                          // the final surface at its (u,v)
   double point_rms_mm = kNaN;            // of all points, weighted, after features were restored
   double dowel_rms_mm = kNaN;            // of the points that were not seeded (seeding.h), weighted
-  int restored_features = -1;            // offsets that were given back
+  int restored_features = -1;            // offsets that were given back, or never changed
   bool usable = false;                   // every step's solution could be used
 };
 

@@ -15,6 +15,10 @@ bool InDomain(const Vec2& uv) { return (uv.array() >= 0).all() && (uv.array() <=
 }  // namespace
 
 void CheckTarget(const FitTarget& target) {
+  if (!target.feet.empty() && target.feet.size() != target.points.size()) {
+    throw InputError(fmt::format("fit target: {} feet on bone for {} points; give one a point",
+                                 target.feet.size(), target.points.size()));
+  }
   for (std::size_t i = 0; i < target.points.size(); ++i) {
     const FitPoint& p = target.points[i];
     const auto fail = [&](const std::string& what) {
@@ -28,6 +32,11 @@ void CheckTarget(const FitTarget& target) {
     }
     if (!(std::isfinite(p.weight) && p.weight > 0)) {
       fail(fmt::format("weight {} is not a positive number", p.weight));
+    }
+    if (!target.feet.empty() && target.feet[i].foot.allFinite() &&
+        !(std::abs(target.feet[i].direction.norm() - 1) < 1e-6)) {
+      fail(fmt::format("its direction out of the bone has the length {}; give a unit vector",
+                       target.feet[i].direction.norm()));
     }
   }
 }

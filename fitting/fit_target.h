@@ -17,12 +17,20 @@ struct FitPoint {
   double weight = 1;                     // > 0; relative to the other points
 };
 
+// Where a point stands on bone; for the terms that look at it.
+struct BoneFoot {
+  Vec3 foot = Vec3::Constant(kNaN);       // mm; NaN where it is not known
+  Vec3 direction = Vec3::Constant(kNaN);  // unit, out of the bone
+};
+
 struct FitTarget {
   std::vector<FitPoint> points;
+  std::vector<BoneFoot> feet = {};  // one a point, or none
 };
 
 // Throws InputError, naming the point, if one has a position that is not finite, a (u,v) outside
-// the domain or a weight that is not positive and finite.
+// the domain, a weight that is not positive and finite, or a foot without a unit direction; or if
+// there are feet, but not one a point.
 void CheckTarget(const FitTarget& target);
 
 }  // namespace semblance

@@ -23,6 +23,11 @@ double WeightOf(const Term& term) {
   return std::visit([](const auto& t) -> double { return t.weight; }, term);
 }
 
+bool NeedsFeet(const Term& term) {
+  return WeightOf(term) > 0 && (std::holds_alternative<NonPenetrationTerm>(term) ||
+                                std::holds_alternative<SpringTerm>(term));
+}
+
 bool NeedsExtent(const Term& term) {
   return WeightOf(term) > 0 && (std::holds_alternative<SmoothnessTerm>(term) ||
                                 std::holds_alternative<MembraneTerm>(term));
@@ -43,6 +48,13 @@ void CheckView(const LevelView& view, std::span<const Term> terms) {
         "level fit: the template's mean lengths along u and v are {} and {} mm; the smoothness and "
         "membrane terms need a template that is more than a point or a line",
         view.lengths_mm.x(), view.lengths_mm.y()));
+  }
+  const auto bone = std::find_if(terms.begin(), terms.end(), NeedsFeet);
+  if (bone != terms.end() && view.bone.empty()) {
+    throw InputError(fmt::format(
+        "level fit: the term '{}' looks at bone, and no point has a foot on bone; leave it out, or "
+        "fit a face to a skull",
+        TermName(*bone)));
   }
 }
 
@@ -98,11 +110,22 @@ void Measure(const LevelView& view, std::span<const Term> terms, const SparseMat
   summary.max_move_mm = MaxMove(view.start, solution.net);
 }
 
+void SortBone(std::vector<BoneObservation>& bone) {
+  const auto key = [](const BoneObservation& o) {
+    const Vec3 &p = o.point.position, &f = o.foot;
+    return std::tuple(o.point.uv.x(), o.point.uv.y(), p.x(), p.y(), p.z(), f.x(), f.y(), f.z(),
+                      o.point.weight);
+  };
+  std::sort(bone.begin(), bone.end(),
+            [&](const auto& a, const auto& b) { return key(a) < key(b); });
+}
+
 }  // namespace
 
 LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver solver) {
   CheckView(view, given);
   SortObservations(view.grid, view.observations);
+  SortBone(view.bone);
   LevelSolution solution{.net = view.start, .summary = {}};
   const std::vector<Term> terms = WithChosenWeight(view, given, solution.summary.auto_weight);
   const bool coupled = !SeparableButForLoss(terms);

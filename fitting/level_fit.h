@@ -21,6 +21,13 @@ struct Observation {
   double weight = 1;                     // > 0, relative to the other points
 };
 
+// A point whose foot on the bone is known; all less what finer levels add to it.
+struct BoneObservation {
+  Observation point;
+  Vec3 foot = Vec3::Constant(kNaN);       // mm
+  Vec3 direction = Vec3::Constant(kNaN);  // unit, out of the bone
+};
+
 // All that the terms may look at.
 struct LevelView {
   PatchGrid grid;
@@ -29,6 +36,8 @@ struct LevelView {
   Vec2 lengths_mm = Vec2::Constant(kNaN);  // what [0,1] stands for along u and v, MeanLengths of
                                            // the template; > 0
   std::vector<Observation> observations;
+  std::vector<BoneObservation> bone = {};
+  std::vector<int> held = {};  // vertices that a PriorTerm with held_only looks at, each once
 };
 
 struct PatchCoverage {
@@ -87,8 +96,8 @@ constexpr auto EnumNames(LevelSolver) {
 // leave vertices undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word
 // on it; the steps are damped by a multiple of the identity, a proximal-point iteration, which
 // converges to it). Observations are used in a canonical order, so their order has no effect.
-// Throws InputError if nothing can be solved: sizes that disagree, or a template without extent for
-// a term that needs it.
+// Throws InputError if nothing can be solved: sizes that disagree, a template without extent for a
+// term that needs it, or points without a foot on bone for one that looks at bone.
 LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
                        LevelSolver solver = LevelSolver::kCeres);
 

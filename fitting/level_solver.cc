@@ -26,7 +26,8 @@ double WeightOf(const Term& term) {
 double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
   double sum = 0;
   for (const Term& term : terms) {
-    sum += WeightOf(term);
+    const auto* const prior = std::get_if<PriorTerm>(&term);
+    sum += prior != nullptr && prior->held_only ? 0 : WeightOf(term);
   }
   return sum / static_cast<double>(vertices);
 }

@@ -24,18 +24,6 @@ double WeightSum(const LevelView& view) {
   return sum;
 }
 
-std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale) {
-  std::unique_ptr<ceres::LossFunction> loss;
-  if (term.loss == RobustLoss::kHuber) {
-    loss = std::make_unique<ceres::HuberLoss>(term.loss_width_mm);
-  } else if (term.loss == RobustLoss::kTukey) {
-    loss = std::make_unique<ceres::TukeyLoss>(term.loss_width_mm);
-  } else {
-    loss = std::make_unique<ceres::CauchyLoss>(term.loss_width_mm);
-  }
-  return std::make_unique<ceres::ScaledLoss>(loss.release(), scale, ceres::TAKE_OWNERSHIP);
-}
-
 // A loss looks at each point by itself, so robust points are not reduced.
 void AddByPoint(const PointTerm& term, const LevelView& view, ControlNet& net,
                 ceres::Problem& problem) {
@@ -86,6 +74,18 @@ class PatchBuffer {
 };
 
 }  // namespace
+
+std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale) {
+  std::unique_ptr<ceres::LossFunction> loss;
+  if (term.loss == RobustLoss::kHuber) {
+    loss = std::make_unique<ceres::HuberLoss>(term.loss_width_mm);
+  } else if (term.loss == RobustLoss::kTukey) {
+    loss = std::make_unique<ceres::TukeyLoss>(term.loss_width_mm);
+  } else {
+    loss = std::make_unique<ceres::CauchyLoss>(term.loss_width_mm);
+  }
+  return std::make_unique<ceres::ScaledLoss>(loss.release(), scale, ceres::TAKE_OWNERSHIP);
+}
 
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink) {
   const double scale = term.weight / WeightSum(view);

@@ -13,9 +13,10 @@
 
 namespace semblance {
 
-enum class RelaxationMode { kNone, kFootpoint, kAlternating };
+enum class RelaxationMode { kNone, kFootpoint, kAlternating, kTangentDistance, kJoint };
 constexpr auto EnumNames(RelaxationMode) {
-  return std::to_array<std::string_view>({"none", "footpoint", "alternating"});
+  return std::to_array<std::string_view>(
+      {"none", "footpoint", "alternating", "tangent_distance", "joint"});
 }
 
 // What a point's move in (u,v) weighs against each other; all in mm on the surface, so that a
@@ -30,6 +31,9 @@ struct RelaxationOptions {
   double distortion = 0.005;
   double crease = 0;
   double standard = 0;
+  int tangent_rounds = 3;
+  double tangential = 0.1;
+  bool barrier = true;
 };
 template <class Visitor>
 void Fields(Visitor& visit, RelaxationOptions& o) {
@@ -37,7 +41,10 @@ void Fields(Visitor& visit, RelaxationOptions& o) {
                   .doc = "none: dowels keep their (u,v); footpoint: after each step of the "
                          "schedule they move towards the nearest point of the surface, and of the "
                          "other weights only `standard` counts; alternating: all weights count, "
-                         "and each round of moves is followed by another fit of the level"},
+                         "and each round of moves is followed by another fit of the level; "
+                         "tangent_distance: alternating, then `tangent_rounds` fits in which the "
+                         "points may slide along the surface, each followed by a move; joint: each "
+                         "round moves (u,v) and vertices in one problem, then fits the level"},
         o.mode);
   visit(FieldInfo{.name = "rounds",
                   .min = 1,
@@ -84,6 +91,21 @@ void Fields(Visitor& visit, RelaxationOptions& o) {
                   .doc = "weight that holds points which are not seeded (the standard landmarks) "
                          "at the template's (u,v)"},
         o.standard);
+  visit(FieldInfo{.name = "tangent_rounds",
+                  .min = 1,
+                  .max = 100,
+                  .doc = "of tangent_distance: sliding fits after the alternating rounds"},
+        o.tangent_rounds);
+  visit(FieldInfo{.name = "tangential",
+                  .min = 0,
+                  .max = 1,
+                  .doc = "of tangent_distance: what a misfit along the surface counts in a sliding "
+                         "fit against one along its normal"},
+        o.tangential);
+  visit(FieldInfo{.name = "barrier",
+                  .doc = "no triangle of the points' network in (u,v) may turn over; false for "
+                         "points so dense that errors of (u,v) have changed their order"},
+        o.barrier);
 }
 
 // Mean penalties, mm^2, before their weights.
@@ -103,14 +125,17 @@ struct RelaxationSummary {
   int steps_shortened = 0;  // of single points in one round, for that
 };
 
+enum class DowelLinks { kDelaunay, kNone };
+
 // The triangles of the points' (u,v), Delaunay in mm of the template; they never turn over. Points
 // of the same (u,v) share a corner. With a periodic u the network is cut at u = 0, which no point
-// passes.
+// passes. Without links it is the points alone, each its own corner.
 class DowelMesh {
  public:
   // template_surface: where `uv` are the points' places before any move. Needs no particular count
   // of points: fewer than three, or all on a line, have no triangles.
-  DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv);
+  DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv,
+            DowelLinks links = DowelLinks::kDelaunay);
   const std::vector<std::array<int, 3>>& triangles() const { return triangles_; }
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }
   // Point that stands for each; itself, or the first of the same (u,v).
@@ -122,6 +147,8 @@ class DowelMesh {
   bool Turned(const std::array<int, 3>& triangle, std::span<const Vec2> uv) const;
 
  private:
+  void Link(std::span<const Vec2> uv);
+
   std::vector<Vec2> rest_uv_;
   std::vector<int> corner_;
   std::vector<std::array<int, 3>> triangles_;
@@ -129,10 +156,20 @@ class DowelMesh {
   Vec2 lengths_mm_;
 };
 
+// The network of the points in the template; without links where no option needs one.
+DowelMesh MeshOf(const HSplineSurface& rest, const FitTarget& target,
+                 const RelaxationOptions& options);
+
+// The largest angle between the surface's normals at two neighbours of the network, whose points
+// are at uv; 0 without neighbours.
+double SharpestCrease_deg(const HSplineSurface& surface, const DowelMesh& mesh,
+                          std::span<const Vec2> uv);
+
 // Moves the (u,v) of the points of `target` on the surface as it stands, each by a damped
 // Gauss-Newton step of its penalties a round, shortened until they fall and no triangle turns over.
 // `mesh` was made of the points in the template `rest`, in their order. The options' mode says
-// which weights count, their rounds are the caller's.
+// which weights count, their rounds are the caller's. Without links a closed surface is passed
+// round.
 RelaxationSummary Relax(const HSplineSurface& surface, const HSplineSurface& rest,
                         const DowelMesh& mesh, const RelaxationOptions& options, int rounds,
                         FitTarget& target);

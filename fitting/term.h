@@ -96,6 +96,8 @@ struct PriorTerm {
   static constexpr std::string_view kName = "prior";
   double weight = 1e-3;
   PriorTowards towards = PriorTowards::kStart;
+  bool held_only = false;  // of LevelView::held alone, the mean still over all; no option: fit.h
+                           // asks for it to hold features
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorTerm& o) {
@@ -179,8 +181,71 @@ void Fields(Visitor& visit, SymmetryTerm& o) {
         o.of);
 }
 
+// Skin outside bone, for points whose foot on the bone is known: weight * mean over them, by their
+// weights, of max(0, min_depth_mm - n . (S(u,v) - foot))^2, mm^2; n is the point's direction out of
+// the bone. Costs nothing where the surface is far enough out.
+struct NonPenetrationTerm {
+  static constexpr std::string_view kName = "non_penetration";
+  double weight = 1;
+  double min_depth_mm = 2;
+};
+template <class Visitor>
+void Fields(Visitor& visit, NonPenetrationTerm& o) {
+  WeightField(visit, o.weight);
+  visit(FieldInfo{.name = "min_depth_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 100,
+                  .doc = "how far outside the bone the surface is to be, at least, along the "
+                         "point's direction"},
+        o.min_depth_mm);
+}
+
+// A spring from the foot on the bone to the surface (thesis 5.3): weight * mean over the points
+// with a foot, by their weights, of (|S(u,v) - foot| - depth)^2, mm^2. Its length at rest is the
+// point's depth, its distance from the foot. Unlike the points it lets the surface swing round the
+// foot.
+struct SpringTerm {
+  static constexpr std::string_view kName = "spring";
+  double weight = 0.1;
+};
+template <class Visitor>
+void Fields(Visitor& visit, SpringTerm& o) {
+  WeightField(visit, o.weight);
+}
+
+enum class DistortionOf { kMetric, kArea };
+constexpr auto EnumNames(DistortionOf) {
+  return std::to_array<std::string_view>({"metric", "area"});
+}
+
+// The first fundamental form stays the template's: weight * length_mm^2 * mean over the template's
+// surface of |E|^2; E = (F^T F - 1) / 2 is Green's strain, F the linear map that takes the
+// template's tangent plane to the surface's. of area: mean of (dA / dA of the template - 1)^2.
+// Taken at 2 x 2 Gauss points a patch, of the level's plain B-splines. Bending is free.
+struct DistortionTerm {
+  static constexpr std::string_view kName = "distortion";
+  double weight = 0.1;
+  DistortionOf of = DistortionOf::kMetric;
+  double length_mm = 10;
+};
+template <class Visitor>
+void Fields(Visitor& visit, DistortionTerm& o) {
+  WeightField(visit, o.weight);
+  visit(FieldInfo{.name = "of",
+                  .doc = "metric: lengths and angles on the surface stay the template's; area: "
+                         "areas alone"},
+        o.of);
+  visit(FieldInfo{.name = "length_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 1e3,
+                  .doc = "length over which distortion is measured; enters by its square"},
+        o.length_mm);
+}
+
 using Term = std::variant<PointTerm, PriorTerm, SmoothnessTerm, MembraneTerm, TangentPointTerm,
-                          SymmetryTerm>;
+                          SymmetryTerm, NonPenetrationTerm, SpringTerm, DistortionTerm>;
 
 inline std::string_view TermName(const Term& term) {
   return std::visit([](const auto& t) { return t.kName; }, term);

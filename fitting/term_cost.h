@@ -3,7 +3,10 @@
 // states.
 #pragma once
 
+#include <ceres/loss_function.h>
 #include <ceres/problem.h>
+
+#include <memory>
 
 #include "fitting/level_fit.h"
 #include "fitting/linear_cost.h"
@@ -40,11 +43,20 @@ void AddResiduals(const TangentPointTerm& term, const LevelView& view, ControlNe
                   ceres::Problem& problem);
 void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem);
+void AddResiduals(const NonPenetrationTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const SpringTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const DistortionTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
 template <RowTerm T>
 void AddResiduals(const T& term, const LevelView& view, ControlNet& net, ceres::Problem& problem) {
   ProblemSink sink(net, problem);
   AddRows(term, view, sink);
 }
+
+// scale * rho of a squared distance in mm^2, for a term with a loss.
+std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale);
 
 // The cost of a term as term.h states it, mm^2.
 double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net);
@@ -53,5 +65,8 @@ double TermCost(const SmoothnessTerm& term, const LevelView& view, const Control
 double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const TangentPointTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const NonPenetrationTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const SpringTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const DistortionTerm& term, const LevelView& view, const ControlNet& net);
 
 }  // namespace semblance

@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "problems/cut_planes.h"
 #include "problems/stage_key.h"
 #include "surfaces/mesh_query.h"
@@ -17,6 +20,7 @@ FitTarget DowelTarget(const std::vector<Dowel>& dowels, const TemplateFace& face
     const auto uv = face.site_uv.find(dowel.site);
     if (uv != face.site_uv.end()) {
       target.points.push_back({dowel.site, dowel.Tip(), uv->second, 1});
+      target.feet.push_back({dowel.base, dowel.direction});
     }
   }
   return target;
@@ -63,10 +67,31 @@ TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh&
   return WithinScan(implicit, planes, experiment.cut_margin_mm);
 }
 
+bool LooksAtBone(const std::vector<Term>& terms) {
+  return std::any_of(terms.begin(), terms.end(), [](const Term& term) {
+    return std::holds_alternative<NonPenetrationTerm>(term) ||
+           std::holds_alternative<SpringTerm>(term);
+  });
+}
+
+// Where seeds stand on the shell of the skull: nearest, and seen from there.
+std::vector<BoneFoot> FeetOf(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
+  const MeshQuery query(shell);
+  std::vector<BoneFoot> feet;
+  for (const FitPoint& seed : seeds) {
+    const MeshPoint nearest = query.Closest(seed.position);
+    const Vec3 out = nearest.distance_mm > 1e-6
+                         ? Vec3(seed.position - nearest.position)
+                         : TriangleAreaVector(shell, shell.triangles[nearest.triangle]);
+    feet.push_back({nearest.position, out.normalized()});
+  }
+  return feet;
+}
+
 // Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
 // both (see seeding.h for why).
 FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTarget dowels,
-                const TriMesh& implicit, const RunContext& context) {
+                const TriMesh& implicit, const TriMesh& shell, const RunContext& context) {
   const std::vector<VertexId> features = FeatureVertices(placed);
   const std::vector<Sphere> masks = TemplateMasks(placed);
   const MeshQuery query(implicit);
@@ -85,6 +110,11 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
     SeedResult seeding = SeedDowels(surface, query, implicit, masks, experiment.seeds);
     FitTarget target = dowels;
     target.points.insert(target.points.end(), seeding.points.begin(), seeding.points.end());
+    target.feet.resize(target.points.size());
+    if (LooksAtBone(experiment.fit.terms)) {
+      const std::vector<BoneFoot> feet = FeetOf(seeding.points, shell);
+      std::copy(feet.begin(), feet.end(), target.feet.end() - std::ssize(feet));
+    }
     FitResult fit = Fit(surface, placed.surface, target, features, experiment.fit, context);
     surface = fit.surface;
     for (std::size_t k = 0; k < dowels.points.size(); ++k) {
@@ -149,7 +179,8 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   TemplateFace placed = Placed(*generic, face_from_template);
   FaceFit fitted = step("fit", [&] {
     return FitFace(experiment, placed, dowels,
-                   SeedableFace(experiment, subject, skull->implicit.dense), context);
+                   SeedableFace(experiment, subject, skull->implicit.dense),
+                   skull->depth_stage->shell, context);
   });
   Tessellation face =
       step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
@@ -160,19 +191,14 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   std::optional<TruthComparison> truth = step("measure", [&] {
     return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(placed), context);
   });
-  return {std::move(subject),
-          skull->depth_stage->shell,
-          skull->depth_stage->depth,
-          skull->implicit,
-          face_from_template,
-          std::move(placed),
-          std::move(fitted.seeding),
-          std::move(fitted.target),
-          std::move(fitted.fit),
-          std::move(face),
-          std::move(uncertainty),
-          std::move(truth),
-          step.Take()};
+  std::vector<FeatureDamage> features = MeasureFeatures(placed, fitted.fit.surface);
+  return {std::move(subject),        skull->depth_stage->shell,
+          skull->depth_stage->depth, skull->implicit,
+          face_from_template,        std::move(placed),
+          std::move(fitted.seeding), std::move(fitted.target),
+          std::move(fitted.fit),     std::move(face),
+          std::move(uncertainty),    std::move(truth),
+          std::move(features),       step.Take()};
 }
 
 }  // namespace semblance

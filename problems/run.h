@@ -9,6 +9,7 @@
 #include "problems/case.h"
 #include "problems/depth_comparison.h"
 #include "problems/face_metrics.h"
+#include "problems/feature_damage.h"
 #include "problems/skull_stage.h"
 #include "problems/uncertainty.h"
 #include "surfaces/tessellate.h"
@@ -37,6 +38,7 @@ struct RunResult {
   Tessellation face;    // of fit.surface
   std::optional<FaceUncertainty> uncertainty;  // where it was asked for
   std::optional<TruthComparison> truth;
+  std::vector<FeatureDamage> features;
   std::vector<StepTime> times;  // not part of the result proper
 
   bool usable() const { return fit.usable && face.mesh.points.size() > 0; }

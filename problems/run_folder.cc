@@ -40,6 +40,22 @@ Json ImplicitJson(const ImplicitFace& face) {
           {"bound_evaluations", face.counts.bound_evaluations}};
 }
 
+// What relaxation has to keep whole: the network of dowels and seeds in (u,v).
+void AddNetwork(const RunResult& result, Json& json) {
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : result.target.points) {
+    uv.push_back(p.uv);
+  }
+  const DowelMesh mesh(result.placed.surface, uv);
+  int prevented = 0;
+  for (const RelaxationSummary& step : result.fit.relaxations) {
+    prevented += step.flips_prevented;
+  }
+  json["sharpest_crease_deg"] = SharpestCrease_deg(result.fit.surface, mesh, result.fit.uv);
+  json["flips"] = mesh.Flips(result.fit.uv);
+  json["flips_prevented"] = prevented;
+}
+
 Json FitJson(const RunResult& result) {
   Json json = {{"dowel_rms_mm", result.fit.dowel_rms_mm},
                {"point_rms_mm", result.fit.point_rms_mm},
@@ -50,7 +66,9 @@ Json FitJson(const RunResult& result) {
                {"seeds_folded", result.seeding.folded},
                {"template_scale", result.face_from_template.scale},
                {"restored_features", result.fit.restored_features},
+               {"feature_distortion", FeaturesToJson(result.features)},
                {"usable", result.fit.usable}};
+  AddNetwork(result, json);
   json.update(StepsToJson(result.fit));
   return json;
 }

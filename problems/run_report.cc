@@ -108,6 +108,42 @@ std::string OutOf(const Json& level, const char* part, const char* all) {
              : "";
 }
 
+// How the points' (u,v) moved; empty without relaxation, or for runs of older versions.
+ReportTable RelaxationTable(const Json& fit) {
+  ReportTable table{"How dowels and seeds moved over the face: mean penalties after each step",
+                    {"step", "distance before (mm²)", "distance (mm²)", "bunching (mm²)",
+                     "distortion (mm²)", "crease (mm²)", "largest move (mm)", "folds prevented"},
+                    {}};
+  int step = 0;
+  for (const Json& moves : fit.value("relaxations", Json::array())) {
+    const Json& after = moves.at("after");
+    table.rows.push_back({std::to_string(++step), Number(moves.at("before").at("distance"), 3),
+                          Number(after.at("distance"), 3), Number(after.at("bunching"), 3),
+                          Number(after.at("distortion"), 3), Number(after.at("crease"), 3),
+                          Number(moves.at("max_move_mm")), Number(moves.at("flips_prevented"))});
+  }
+  return table;
+}
+
+ReportTable FeaturesTable(const Json& fit) {
+  ReportTable table{
+      "What the fit did to the generic face's features: strain against the template",
+      {"part", "area (cm²)", "RMS strain (%)", "largest strain (%)", "RMS change of area (%)"},
+      {}};
+  const Json parts = fit.value("feature_distortion", Json::object());
+  for (const auto& [part, d] : parts.items()) {
+    table.rows.push_back({part, Number(d.at("area_cm2"), 1), Percent(d.at("rms_strain")),
+                          Percent(d.at("max_strain")), Percent(d.at("rms_area"))});
+  }
+  return table;
+}
+
+// Those with rows.
+std::vector<ReportTable> Filled(std::vector<ReportTable> tables) {
+  std::erase_if(tables, [](const ReportTable& table) { return table.rows.empty(); });
+  return tables;
+}
+
 ReportTable LevelsTable(const Json& fit) {
   ReportTable table{
       "Steps of the schedule",
@@ -249,8 +285,10 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
   report.sections.push_back(
       {.heading = "The fit",
        .images = {ConvergencePlot(result.at("fit"))},
-       .tables = {LevelsTable(result.at("fit")), CountsTable("Counts of the fit", result.at("fit")),
-                  DowelsTable(ReadFileBytes(folder.Root() / "dowels.csv"))}});
+       .tables = Filled({LevelsTable(result.at("fit")), RelaxationTable(result.at("fit")),
+                         FeaturesTable(result.at("fit")),
+                         CountsTable("Counts of the fit", result.at("fit")),
+                         DowelsTable(ReadFileBytes(folder.Root() / "dowels.csv"))})});
   if (HasSigma(result)) {
     report.sections.push_back(UncertaintySection(result, folder));
   }

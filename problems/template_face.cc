@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
 #include <utility>
 
 #include "problems/head_formula.h"
+#include "problems/phantom_shape.h"
 #include "problems/template_sites.h"
 #include "surfaces/error.h"
 
@@ -164,6 +166,16 @@ void CheckOptions(const TemplateOptions& o) {
   check("patches_v", o.patches_v, 4, 16);
   check("max_level", o.max_level, 0, 4);
   check("detail_tolerance_mm", o.detail_tolerance_mm, 0, 10);
+  check("site_error", o.site_error, 0, 0.2);
+}
+
+void Disturb(double error, std::uint64_t random_seed, std::map<std::string, Vec2>& site_uv) {
+  SeededNumbers random(random_seed);
+  for (auto& [site, uv] : site_uv) {
+    for (int axis = 0; axis < 2; ++axis) {
+      uv[axis] = std::clamp(uv[axis] + random.Between(-error, error), 0.0, 1.0);
+    }
+  }
 }
 
 }  // namespace
@@ -183,6 +195,9 @@ TemplateFace MakeTemplateFace(const TemplateOptions& options) {
   TemplateFace face{.surface = std::move(surface), .site_uv = TemplateSites(), .features = {}};
   for (const FeatureRegion& f : kRegions) {
     face.features.push_back({f.name, VerticesInside(face.surface, f.region), f.region});
+  }
+  if (options.site_error > 0) {
+    Disturb(options.site_error, options.site_random_seed, face.site_uv);
   }
   return face;
 }

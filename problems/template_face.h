@@ -3,6 +3,7 @@
 // and its features.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,6 +20,8 @@ struct TemplateOptions {
   int max_level = 3;                 // finest level that holds detail
   double detail_tolerance_mm = 0.1;  // a level keeps a vertex that moves by more than this
   OffsetReference reference = OffsetReference::kFrame;
+  double site_error = 0;               // part of the domain
+  std::uint64_t site_random_seed = 1;  // of the errors
 };
 
 template <class Visitor>
@@ -51,6 +54,13 @@ void Fields(Visitor& visit, TemplateOptions& o) {
                   .doc = "axes in which detail is kept; frame: of the next coarser surface, so "
                          "that detail turns with it (thesis 4.1); world: fixed, to compare"},
         o.reference);
+  visit(FieldInfo{.name = "site_error",
+                  .min = 0,
+                  .max = 0.2,
+                  .doc = "part of the domain by which each site's (u,v) is off, at random; to see "
+                         "what relaxation makes of sites that are only about right"},
+        o.site_error);
+  visit(FieldInfo{.name = "site_random_seed", .doc = "which errors"}, o.site_random_seed);
 }
 
 // A part of the face whose detail a fit may free and then restore (thesis 4.3).

@@ -199,13 +199,45 @@ TEST(Fit, FeaturesGetTheirOffsetsBack) {
   const FitResult restored = Fit(start, target, features, {}, {});
   EXPECT_EQ(restored.restored_features, static_cast<int>(features.size()));
   int changed = 0;
-  const FitResult left = Fit(start, target, features, {.features = FeatureRule::kFree}, {});
+  const FitResult left = Fit(start, target, features, {.features = FreeFeatures{}}, {});
   for (const VertexId& feature : features) {
     EXPECT_EQ(restored.surface.Offset(feature), start.Offset(feature));
     changed += left.surface.Offset(feature) == start.Offset(feature) ? 0 : 1;
   }
   EXPECT_GT(changed, 10);
   EXPECT_EQ(left.restored_features, 0);
+}
+
+TEST(Fit, FrozenFeaturesKeepTheirOffsetsAndWeightedOnesResist) {
+  const HSplineSurface start = RandomSurface(Shape(), 2);
+  const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 300);
+  std::vector<VertexId> features = {{2, 7, 9}};  // without an offset
+  for (const auto& [vertex, offset] : start.Offsets()) {
+    features.push_back(vertex);
+  }
+  const auto moved = [&](const FeatureRule& rule) {
+    const FitResult result = Fit(start, target, features, {.features = rule}, {});
+    double sum = 0;
+    for (const VertexId& feature : features) {
+      sum += (result.surface.Offset(feature).value_or(Vec3::Zero()) -
+              start.Offset(feature).value_or(Vec3::Zero()))
+                 .norm();
+    }
+    return sum;
+  };
+  const FitResult frozen = Fit(start, target, features, {.features = FrozenFeatures{}}, {});
+  for (const VertexId& feature : features) {
+    EXPECT_EQ(frozen.surface.Offset(feature), start.Offset(feature));
+  }
+  EXPECT_EQ(frozen.restored_features, static_cast<int>(features.size()));
+  const double free = moved(FreeFeatures{}), some = moved(WeightedFeatures{.weight = 1}),
+               few = moved(WeightedFeatures{.weight = 100});
+  EXPECT_EQ(moved(WeightedFeatures{.weight = 0}), free);
+  EXPECT_LT(some, 0.9 * free);
+  EXPECT_LT(few, 0.5 * some);
+  // What is frozen is made up for by its neighbours; what is given back afterwards is not.
+  const FitResult restored = Fit(start, target, features, {}, {});
+  EXPECT_LT(frozen.point_rms_mm, restored.point_rms_mm);
 }
 
 TEST(Fit, OrderOfPointsChangesNoByte) {

@@ -5,10 +5,12 @@
 #include <ceres/crs_matrix.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 
 #include "fitting/term_cost.h"
+#include "surfaces/error.h"
 #include "tests/testing/level_views.h"
 
 namespace semblance {
@@ -67,11 +69,12 @@ TEST(Terms, JacobianEqualsItsNumericTwin) {
     ASSERT_EQ(here.jacobian.cols(), 3 * static_cast<int>(view.start.vertices.size()));
     for (int c = 0; c < here.jacobian.cols(); ++c) {
       ControlNet plus = view.start, minus = view.start;
-      plus.vertices[c / 3][c % 3] += 0.5;  // exact: the residuals are linear
-      minus.vertices[c / 3][c % 3] -= 0.5;
+      constexpr double kStep_mm = 1e-4;  // not all residuals are linear
+      plus.vertices[c / 3][c % 3] += kStep_mm;
+      minus.vertices[c / 3][c % 3] -= kStep_mm;
       const std::vector<double> a = Residuals(term, view, plus), b = Residuals(term, view, minus);
       for (int r = 0; r < here.jacobian.rows(); ++r) {
-        ASSERT_NEAR(here.jacobian(r, c), a[r] - b[r], 1e-9);
+        ASSERT_NEAR(here.jacobian(r, c), (a[r] - b[r]) / (2 * kStep_mm), 1e-7);
       }
     }
   }
@@ -155,6 +158,109 @@ TEST(Terms, MirroredDisplacementsAreSymmetric) {
   EXPECT_NEAR(TermCost(surface, view, view.start), 0, 1e-12);
   view.start.At(1, 1) += turn * Vec3(1, 0, 0);
   EXPECT_NEAR(TermCost(SymmetryTerm{.weight = 1}, view, view.start), 2.0 / 42, 1e-12);
+}
+
+TEST(Terms, APriorOfTheHeldLooksAtThemAlone) {
+  LevelView view = NoisyView();
+  ControlNet net = view.start;
+  view.held = {3, 8};
+  for (const int k : {3, 8, 20}) {
+    net.vertices[k] += Vec3(0, 3, 4);
+  }
+  const PriorTerm term{.weight = 2, .held_only = true};
+  EXPECT_NEAR(TermCost(term, view, net), 2.0 * 2 * 25 / 42, 1e-12);
+  EXPECT_EQ(TermCost(term, view, view.start), 0);
+}
+
+TEST(Terms, BoneIsNotPenetrated) {
+  LevelView view = NoisyView();
+  for (BoneObservation& o : view.bone) {
+    o.foot = view.grid.StencilAt(o.point.uv).Apply(view.start) - Vec3(0, 0, 3);
+  }
+  EXPECT_EQ(TermCost(NonPenetrationTerm{.min_depth_mm = 3 - 1e-9}, view, view.start), 0);
+  EXPECT_NEAR(TermCost(NonPenetrationTerm{.weight = 2, .min_depth_mm = 5}, view, view.start), 8,
+              1e-9);
+  // Bone 1 mm above the points: they draw the surface in, the term keeps it 2 mm above the bone.
+  view.start = Sheet(4, 3, 0, 0);
+  view.observations = testing::Observe(view.start, 320, 3);
+  view.bone.clear();
+  testing::StandOnBone(view);
+  for (BoneObservation& o : view.bone) {
+    o.foot = o.point.position + Vec3(0, 0, 1);
+  }
+  const auto height = [&](double weight) {
+    const std::array<Term, 2> terms = {PointTerm{}, NonPenetrationTerm{.weight = weight}};
+    const ControlNet net = FitLevel(view, terms).net;
+    const Observation& o = view.observations[100];
+    return view.grid.StencilAt(o.uv).Apply(net).z() - o.position.z();
+  };
+  EXPECT_NEAR(height(0), 0, 1e-6);
+  EXPECT_NEAR(height(1), 1.5, 1e-6);
+  EXPECT_NEAR(height(1e4), 3, 1e-3);
+}
+
+TEST(Terms, SpringsRestAtTheirDepthWhicheverWayTheyPoint) {
+  LevelView view = NoisyView();
+  for (BoneObservation& o : view.bone) {
+    const Vec3 point = view.grid.StencilAt(o.point.uv).Apply(view.start);
+    o.foot = point + Vec3(3, 4, 0);  // 5 mm from the surface, and from a point of its own
+    o.point.position = o.foot + Vec3(0, 0, 5);
+  }
+  EXPECT_NEAR(TermCost(SpringTerm{}, view, view.start), 0, 1e-20);
+  for (BoneObservation& o : view.bone) {
+    o.point.position = o.foot + Vec3(0, 7, 0);
+  }
+  EXPECT_NEAR(TermCost(SpringTerm{.weight = 3}, view, view.start), 12, 1e-9);
+  const std::array<Term, 2> terms = {SpringTerm{.weight = 1}, PriorTerm{.weight = 1e-6}};
+  const LevelSolution solved = FitLevel(view, terms);
+  EXPECT_LT(TermCost(SpringTerm{.weight = 1}, view, solved.net), 1e-3);
+}
+
+// A flat template that is scaled, sheared or moved; strains by hand.
+TEST(Terms, DistortionIsGreensStrain) {
+  LevelView view = NoisyView();
+  for (Vec3& v : view.rest.vertices) {
+    v.z() = 0;
+  }
+  const auto cost = [&](const Mat3& map, DistortionOf of) {
+    ControlNet net = view.rest;
+    for (Vec3& v : net.vertices) {
+      v = map * v + Vec3(1, 2, 3);
+    }
+    return TermCost(DistortionTerm{.weight = 1, .of = of, .length_mm = 1}, view, net);
+  };
+  const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).matrix();
+  Mat3 shear = Mat3::Identity();
+  shear(0, 1) = 0.2;
+  for (const DistortionOf of : {DistortionOf::kMetric, DistortionOf::kArea}) {
+    EXPECT_NEAR(cost(turn, of), 0, 1e-20);
+  }
+  EXPECT_NEAR(cost(1.1 * turn, DistortionOf::kMetric), 2 * std::pow(0.105, 2), 1e-12);
+  EXPECT_NEAR(cost(1.1 * turn, DistortionOf::kArea), std::pow(0.21, 2), 1e-12);
+  EXPECT_NEAR(cost(turn * shear, DistortionOf::kArea), 0, 1e-20);
+  EXPECT_NEAR(cost(turn * shear, DistortionOf::kMetric), 0.02 + 0.0004, 1e-12);
+  // It keeps the template's lengths where points would stretch it.
+  LevelView stretched = view;
+  for (Observation& o : stretched.observations) {
+    o.position = 1.2 * view.grid.StencilAt(o.uv).Apply(view.rest);
+  }
+  stretched.start = view.rest;
+  const auto strain = [&](double weight) {
+    const DistortionTerm term{.weight = weight, .length_mm = 10};
+    const std::array<Term, 3> terms = {PointTerm{}, PriorTerm{.weight = 1e-6}, term};
+    const ControlNet net = FitLevel(stretched, terms).net;
+    return TermCost(DistortionTerm{.weight = 1, .length_mm = 1}, stretched, net);
+  };
+  EXPECT_LT(strain(100), 0.1 * strain(0));
+}
+
+TEST(Terms, ThatLookAtBoneNeedFeet) {
+  LevelView view = NoisyView();
+  view.bone.clear();
+  for (const Term& term : {Term(SpringTerm{}), Term(NonPenetrationTerm{})}) {
+    const std::array<Term, 2> terms = {PointTerm{}, term};
+    EXPECT_THROW(FitLevel(view, terms), InputError);
+  }
 }
 
 }  // namespace
