@@ -115,7 +115,7 @@ class SceneWriter {
     Face("implicit", "Implicit face", view_.implicit, "#d9b38c");
     Face("face", "H-spline face", view_.face, "#d8a58a");
     if (result_.uncertainty && !result_.uncertainty->sigma_mm.empty()) {
-      Mesh("sigma", "How far the face may be off", view_.face, "#8f8f8f");
+      Mesh("sigma", "Uncertainty of face", view_.face, "#8f8f8f");
       Map("sigma", NearestValues(view_.face, result_.face.mesh, result_.uncertainty->sigma_mm));
     }
     if (result_.subject.skin) {
