@@ -415,7 +415,7 @@ void Run() {
 }  // namespace semblance
 
 // One BLAS thread for every case; OpenBLAS looks at the variable only when it is loaded.
-// fit_bench [head] [peers] [linear]: parts; none: all of them.
+// fit_bench [head] [peers] [relax] [linear]: parts; none: all of them.
 int main(int argc, char** argv) {
   if (std::getenv("OPENBLAS_NUM_THREADS") == nullptr) {
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
