@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include "problems/cut_planes.h"
@@ -125,6 +126,12 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
   return std::move(*result);
 }
 
+bool TakesTableAsExact(const Experiment& experiment, const Case& subject) {
+  return experiment.tissue.depths == DepthSource::kTable &&
+         experiment.uncertainty.dowel_sd_mm == 0 &&
+         std::ranges::any_of(subject.dowels, [](const Dowel& d) { return std::isnan(d.sd_mm); });
+}
+
 std::optional<FaceUncertainty> Doubt(const Experiment& experiment, const DepthStage& stage,
                                      const FittedFace& fitted, Case& subject,
                                      const RunContext& context) {
@@ -137,6 +144,12 @@ std::optional<FaceUncertainty> Doubt(const Experiment& experiment, const DepthSt
         "the uncertainty of the face does not know of the fit's term '{}', which couples x, y and "
         "z: it is rather too large than too small",
         term));
+  }
+  if (TakesTableAsExact(experiment, subject)) {
+    subject.notes.push_back(
+        "the table states no standard deviation: the uncertainty of the face takes its depths as "
+        "exact for this head, and is too small; set uncertainty.dowel_sd_mm (3 mm is the mean of "
+        "tables/t_table_2023.yaml)");
   }
   return result;
 }

@@ -11,6 +11,7 @@
 
 #include "problems/experiment_config.h"
 #include "problems/run_folder.h"
+#include "surfaces/mesh_query.h"
 #include "surfaces/whole_file.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
@@ -79,6 +80,48 @@ TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
     turned += TriangleAreaVector(face, t).dot(TriangleCentroid(face, t) - middle) < 0 ? 1 : 0;
   }
   EXPECT_LT(turned, 0.02 * static_cast<double>(face.triangles.size()));
+}
+
+// Mean distance of the face's vertices over the bone beneath them from the shell of the skull.
+double MeanHeight_mm(const RunResult& result) {
+  const MeshQuery shell(result.shell);
+  double sum = 0;
+  int count = 0;
+  for (const FitPoint& p : result.target.points) {
+    sum += shell.Closest(result.fit.surface.Point(p.uv)).distance_mm;
+    ++count;
+  }
+  return sum / count;
+}
+
+TEST(Run, TermsThatLookAtBoneChangeTheFace) {
+  const auto height = [](const std::string& term) {
+    return MeanHeight_mm(semblance::Run(
+        SmallPhantom({fmt::format("fit.terms=[points, smoothness, membrane{}]", term),
+                      "fit.schedule=[{level: 0, fraction: 1}]", "fit.relaxation.mode=none"}),
+        {}));
+  };
+  const double plain = height("");
+  EXPECT_NEAR(height(", {type: non_penetration, min_depth_mm: 0}"), plain, 0.1);
+  EXPECT_GT(height(", {type: non_penetration, weight: 10, min_depth_mm: 25}"), plain + 5);
+  EXPECT_NE(height(", {type: spring, weight: 1}"), plain);
+  EXPECT_NE(height(", {type: distortion, weight: 1}"), plain);
+}
+
+// Whether a rule spares the features is for studies to say; here that a run obeys and reports it.
+TEST(Run, SaysWhatItDidToTheFeatures) {
+  const auto strain = [](const std::string& rule, bool frozen) {
+    const RunResult result =
+        semblance::Run(SmallPhantom({fmt::format("fit.features={}", rule)}), {});
+    EXPECT_EQ(result.fit.restored_features > 0, frozen);
+    EXPECT_EQ(result.features.back().part, "elsewhere");
+    const FeatureDamage& all = *(result.features.end() - 2);
+    EXPECT_EQ(all.part, "features");
+    EXPECT_GT(all.distortion.rms_strain, 0);
+    EXPECT_GT(all.distortion.max_strain, all.distortion.rms_strain);
+    return all.distortion.rms_strain;
+  };
+  EXPECT_NE(strain("frozen", true), strain("free", false));
 }
 
 TEST(Run, SameBytesEachTimeAndForAnyNumberOfThreads) {
