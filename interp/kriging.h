@@ -107,7 +107,8 @@ DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
 // Far from all dowels the depth is the process's mean. sd_mm is that of the process at the vertex,
 // given the dowels, the model and the uncertain mean; it does not hold the nugget of a further
 // measurement there, nor the uncertainty of length and signal. kNotFacing as AssignWhereFacing;
-// kOutside where no dowel is reached along the bone. Along the bone it keeps 8 bytes a vertex and
+// kOutside where no dowel is reached along the bone. There the smoother covariances are not always
+// definite; then the field smooths, and may miss certain dowels. It keeps 8 bytes a vertex and
 // dowel. Throws InputError as CheckDepthInput, or if the skull has no triangle to go along.
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/kriging_process.h"
 
-#include <Eigen/LU>
 #include <cmath>
 #include <numbers>
 
@@ -73,16 +72,28 @@ void KrigingProcess::Factor(const KrigingData& data) {
   }
 }
 
-// Distances that are not symmetric have weights of their own, by which the field still honours the
-// dowels.
+// With ways that are not quite symmetric, and a diagonal that had to grow, the field misses the
+// dowels a little; it is brought nearer to them for as long as that helps. To solve the equations
+// of the ways themselves would be exact and wild: they need not be definite.
 void KrigingProcess::FindWeights(const KrigingData& data) {
+  constexpr int kRounds = 20;
   weights_ = inverse_residual_;
   if (data.distance_mm == data.distance_mm.transpose()) {
     return;
   }
   Eigen::MatrixXd with = CovarianceAt(data.distance_mm);
   with.diagonal() += nugget_mm2_;
-  weights_ = with.partialPivLu().solve((data.depth_mm.array() - mean_mm_).matrix());
+  const auto miss = [&](const Eigen::VectorXd& weights) -> Eigen::VectorXd {
+    return (data.depth_mm.array() - mean_mm_).matrix() - with * weights;
+  };
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::VectorXd off = miss(weights_);
+    const Eigen::VectorXd nearer = weights_ + factor_.solve(off);
+    if (!(miss(nearer).norm() < off.norm())) {
+      return;
+    }
+    weights_ = nearer;
+  }
 }
 
 double KrigingProcess::Deviance() const {
