@@ -7,8 +7,7 @@ template ConfigNode ConfigTreeOf(const Experiment& value);
 template Experiment ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors);
 template Experiment ReadConfig(const std::filesystem::path& file,
                                std::span<const std::string> overrides);
-template Experiment ReadConfigText(std::string_view text,
-                                   const std::filesystem::path& pretend_file,
+template Experiment ReadConfigText(std::string_view text, const std::filesystem::path& pretend_file,
                                    std::span<const std::string> overrides);
 template std::string WriteConfig(const Experiment& value);
 template std::string OptionsReference<Experiment>();
