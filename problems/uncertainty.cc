@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "fitting/error_spread.h"
 #include "fitting/seeding.h"
 #include "interp/calibration.h"
+#include "interp/kriging_process.h"
 #include "surfaces/mesh_query.h"
 #include "surfaces/parallel.h"
 
@@ -69,18 +69,14 @@ std::vector<DepthPlace> PlacesOf(const FitTarget& target, const DepthStage& stag
   return places;
 }
 
-double Resemblance(double distance_mm, double length_mm) {  // Matern 3/2, as kriging's default
-  const double s = std::numbers::sqrt3 * distance_mm / length_mm;
-  return (1 + s) * std::exp(-s);
-}
-
-// Adds sd_i sd_j times the resemblance of the places.
+// Adds sd_i sd_j times the correlation of the places, Matern 3/2 as kriging's default.
 void AddSmoothErrors(std::span<const DepthPlace> places, const std::vector<double>& sd_mm,
                      double length_mm, Eigen::MatrixXd& covariance) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     for (std::size_t j = 0; j < places.size(); ++j) {
+      const double between_mm = (places[i].base - places[j].base).norm();
       covariance(i, j) +=
-          sd_mm[i] * sd_mm[j] * Resemblance((places[i].base - places[j].base).norm(), length_mm);
+          sd_mm[i] * sd_mm[j] * CorrelationAt(Covariance::kMatern32, between_mm, length_mm).value;
     }
   }
 }
