@@ -81,10 +81,6 @@ class WeightSearch {
   WeightChoice best_;
 };
 
-double WeightOf(const Term& term) {
-  return std::visit([](const auto& t) -> double { return t.weight; }, term);
-}
-
 void AddTerm(const Term& term, const LevelView& view, RowSink& sink) {
   std::visit(
       [&]<class T>(const T& t) {

@@ -19,10 +19,6 @@
 namespace semblance {
 namespace {
 
-double WeightOf(const Term& term) {
-  return std::visit([](const auto& t) -> double { return t.weight; }, term);
-}
-
 bool NeedsFeet(const Term& term) {
   return WeightOf(term) > 0 && (std::holds_alternative<NonPenetrationTerm>(term) ||
                                 std::holds_alternative<SpringTerm>(term));
@@ -141,6 +137,14 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver 
   solution.summary.usable = outcome.usable;
   Measure(view, terms, outcome.points.rows() > 0 ? outcome.points : PointNormal(view), solution);
   return solution;
+}
+
+double LevelView::WeightSum() const {
+  double sum = 0;
+  for (const Observation& o : observations) {
+    sum += o.weight;
+  }
+  return sum;
 }
 
 PatchCoverage CoverageOf(std::vector<int> counts) {

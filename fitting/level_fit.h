@@ -38,6 +38,8 @@ struct LevelView {
   std::vector<Observation> observations;
   std::vector<BoneObservation> bone = {};
   std::vector<int> held = {};  // vertices that a PriorTerm with held_only looks at, each once
+
+  double WeightSum() const;  // of the observations
 };
 
 struct PatchCoverage {

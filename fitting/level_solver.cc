@@ -17,10 +17,6 @@ namespace {
 constexpr int kMaxIterations = 50;
 constexpr double kStepTolerance = 1e-13;  // of the norm of all vertices
 
-double WeightOf(const Term& term) {
-  return std::visit([](const auto& t) -> double { return t.weight; }, term);
-}
-
 // What the eigenvalues of the normal equations are measured by: residuals are means over points or
 // vertices, so a vertex that is well held has about weight / vertices on the diagonal.
 double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {

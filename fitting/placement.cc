@@ -25,17 +25,17 @@ struct Moments {
   Mat3 cross = Mat3::Zero();  // mean of subject * template^T, mm^2
 };
 
-[[noreturn]] void Fail(const std::string& what) { throw InputError("placement: " + what); }
+[[noreturn]] void FailPlacement(const std::string& what) { throw InputError("placement: " + what); }
 
 void CheckSizes(std::size_t on_template, std::size_t on_subject, std::size_t weights) {
   if (on_template != on_subject || (weights != 0 && weights != on_template)) {
-    Fail(
+    FailPlacement(
         fmt::format("{} points on the template, {} on the subject and {} weights; give as many of "
                     "each",
                     on_template, on_subject, weights));
   }
   if (on_template == 0) {
-    Fail("no point; give at least one that the template and the subject share");
+    FailPlacement("no point; give at least one that the template and the subject share");
   }
 }
 
@@ -43,10 +43,11 @@ void CheckValues(std::span<const Vec3> on_template, std::span<const Vec3> on_sub
                  std::span<const double> weights) {
   for (std::size_t i = 0; i < on_template.size(); ++i) {
     if (!on_template[i].allFinite() || !on_subject[i].allFinite()) {
-      Fail(fmt::format("point {} is not finite on the template or the subject; leave it out", i));
+      FailPlacement(
+          fmt::format("point {} is not finite on the template or the subject; leave it out", i));
     }
     if (!weights.empty() && !(std::isfinite(weights[i]) && weights[i] > 0)) {
-      Fail(fmt::format("weight {} of point {} is not a positive number", weights[i], i));
+      FailPlacement(fmt::format("weight {} of point {} is not a positive number", weights[i], i));
     }
   }
 }
@@ -80,7 +81,7 @@ Mat3 BestRotation(const Moments& m) {
   const Eigen::JacobiSVD<Mat3> svd(m.cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double size = std::sqrt(m.spread_template * m.spread_subject);
   if (!(svd.singularValues()[1] > 1e-9 * size)) {
-    Fail(
+    FailPlacement(
         "the shared points lie on a line (or are fewer than 3), which leaves the rotation open; "
         "add a point beside it or set rotate: false");
   }
@@ -94,7 +95,7 @@ double BestScale(const Moments& m, const Mat3& rotation) {
   const double numerator = (rotation.transpose() * m.cross).trace();
   const double scale = m.spread_template > 0 ? numerator / m.spread_template : kNaN;
   if (!(std::isfinite(scale) && scale > 0)) {
-    Fail(
+    FailPlacement(
         "the shared points give no positive scale (all at one place, or swapped on the subject); "
         "check their labels or set scale: false");
   }

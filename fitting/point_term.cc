@@ -16,18 +16,10 @@ namespace {
 
 using Indices = std::array<int, 16>;
 
-double WeightSum(const LevelView& view) {
-  double sum = 0;
-  for (const Observation& o : view.observations) {
-    sum += o.weight;
-  }
-  return sum;
-}
-
 // A loss looks at each point by itself, so robust points are not reduced.
 void AddByPoint(const PointTerm& term, const LevelView& view, ControlNet& net,
                 ceres::Problem& problem) {
-  const double scale = term.weight / WeightSum(view);
+  const double scale = term.weight / view.WeightSum();
   for (const Observation& o : view.observations) {
     const Stencil s = view.grid.StencilAt(o.uv);
     const Eigen::Map<const Eigen::Matrix<double, 1, 16>> row(s.weight.data());
@@ -88,7 +80,7 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scal
 }
 
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink) {
-  const double scale = term.weight / WeightSum(view);
+  const double scale = term.weight / view.WeightSum();
   PatchBuffer buffer(sink);
   for (const Observation& o : view.observations) {
     buffer.Add(view.grid.StencilAt(o.uv), o.position, std::sqrt(scale * o.weight));
@@ -111,7 +103,7 @@ double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& 
   for (const Observation& o : view.observations) {
     sum += o.weight * Rho(term, (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm());
   }
-  return view.observations.empty() ? 0 : term.weight * sum / WeightSum(view);
+  return view.observations.empty() ? 0 : term.weight * sum / view.WeightSum();
 }
 
 }  // namespace semblance

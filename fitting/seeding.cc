@@ -28,24 +28,24 @@ struct Seed {
   std::optional<Vec3> on_mesh;
 };
 
-[[noreturn]] void Fail(const std::string& what) { throw InputError("seeding: " + what); }
+[[noreturn]] void FailSeeding(const std::string& what) { throw InputError("seeding: " + what); }
 
 void CheckOptions(const SeedOptions& o, int max_level) {
   if (o.level < 0 || o.level > 8) {
-    Fail(fmt::format("level {} is not in 0..8", o.level));
+    FailSeeding(fmt::format("level {} is not in 0..8", o.level));
   }
   if (o.direction_level < 0 || o.direction_level > max_level) {
-    Fail(fmt::format("direction_level {}; the surface has levels 0..{}", o.direction_level,
-                     max_level));
+    FailSeeding(fmt::format("direction_level {}; the surface has levels 0..{}", o.direction_level,
+                            max_level));
   }
   if (!(std::isfinite(o.max_distance_mm) && o.max_distance_mm > 0)) {
-    Fail(fmt::format("max_distance_mm {} is not a positive number", o.max_distance_mm));
+    FailSeeding(fmt::format("max_distance_mm {} is not a positive number", o.max_distance_mm));
   }
   if (!(o.max_normal_angle_deg >= 0 && o.max_normal_angle_deg <= 90)) {
-    Fail(fmt::format("max_normal_angle_deg {} is not in 0..90", o.max_normal_angle_deg));
+    FailSeeding(fmt::format("max_normal_angle_deg {} is not in 0..90", o.max_normal_angle_deg));
   }
   if (!(std::isfinite(o.weight) && o.weight > 0)) {
-    Fail(fmt::format("weight {} is not a positive number", o.weight));
+    FailSeeding(fmt::format("weight {} is not a positive number", o.weight));
   }
 }
 
@@ -53,8 +53,8 @@ void CheckMasks(std::span<const Sphere> masks) {
   for (std::size_t i = 0; i < masks.size(); ++i) {
     if (!masks[i].center.allFinite() ||
         !(std::isfinite(masks[i].radius_mm) && masks[i].radius_mm > 0)) {
-      Fail(fmt::format("mask {} needs a finite center and a radius_mm > 0, not {}", i,
-                       masks[i].radius_mm));
+      FailSeeding(fmt::format("mask {} needs a finite center and a radius_mm > 0, not {}", i,
+                              masks[i].radius_mm));
     }
   }
 }

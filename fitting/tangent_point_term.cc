@@ -10,14 +10,6 @@
 namespace semblance {
 namespace {
 
-double WeightSum(const LevelView& view) {
-  double sum = 0;
-  for (const Observation& o : view.observations) {
-    sum += o.weight;
-  }
-  return sum;
-}
-
 // Takes a misfit d to one whose square is (n . d)^2 + tangential |d - n (n . d)|^2.
 Mat3 Shaping(const TangentPointTerm& term, const LevelView& view, const Vec2& uv) {
   const Vec3 du = view.grid.StencilAt(uv, {1, 0}).Apply(view.start),
@@ -54,7 +46,7 @@ void AddPatch(const TangentPointTerm& term, const LevelView& view,
 void AddResiduals(const TangentPointTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem) {
   constexpr std::size_t kMost = 16384;  // points; 19 MB
-  const double scale = term.weight / WeightSum(view);
+  const double scale = term.weight / view.WeightSum();
   const std::span<const Observation> all(view.observations);
   const auto patch = [&](std::size_t k) { return view.grid.StencilAt(all[k].uv).index; };
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
@@ -71,7 +63,7 @@ double TermCost(const TangentPointTerm& term, const LevelView& view, const Contr
     const Vec3 d = view.grid.StencilAt(o.uv).Apply(net) - o.position;
     sum += o.weight * (Shaping(term, view, o.uv) * d).squaredNorm();
   }
-  return view.observations.empty() ? 0 : term.weight * sum / WeightSum(view);
+  return view.observations.empty() ? 0 : term.weight * sum / view.WeightSum();
 }
 
 }  // namespace semblance

@@ -251,4 +251,8 @@ inline std::string_view TermName(const Term& term) {
   return std::visit([](const auto& t) { return t.kName; }, term);
 }
 
+inline double WeightOf(const Term& term) {
+  return std::visit([](const auto& t) -> double { return t.weight; }, term);
+}
+
 }  // namespace semblance

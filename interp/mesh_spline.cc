@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kLeastSoftness = 1e-12;  // two dowels closest to one vertex must not be singular
 
-constexpr std::size_t kTogether = 16;  // right sides solved at a time: 8 bytes a vertex each
+constexpr std::size_t kSolvedTogether = 16;  // right sides solved at a time: 8 bytes a vertex each
 
 // The function's mean that one dowel speaks of: sum of weight times value, weights of sum 1.
 struct Place {
@@ -165,11 +165,11 @@ class Spline {
   Eigen::MatrixXd Kernel(const RunContext& run) const {
     const Eigen::Index n = Size();
     Eigen::MatrixXd kernel = Eigen::MatrixXd::Zero(n, n);
-    const std::size_t blocks = (places_.size() + kTogether - 1) / kTogether;
+    const std::size_t blocks = (places_.size() + kSolvedTogether - 1) / kSolvedTogether;
     ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
       run.ThrowIfStopped();
-      const auto first = static_cast<Eigen::Index>(block * kTogether);
-      const Eigen::Index count = std::min<Eigen::Index>(kTogether, n - first);
+      const auto first = static_cast<Eigen::Index>(block * kSolvedTogether);
+      const Eigen::Index count = std::min<Eigen::Index>(kSolvedTogether, n - first);
       const Eigen::MatrixXd values =
           Varying(Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count)));
       for (Eigen::Index r = 0; r < n; ++r) {

@@ -14,7 +14,7 @@ constexpr double kAtBase_mm = 1e-6;  // so near, a dowel stands alone
 constexpr double kReach = 4;         // times the furthest dowel's distance
 using Sites = boost::container::small_vector<PowerSite, 48>;
 
-const DepthSample& Nearest(const std::vector<DepthSample>& samples, const Vec3& p) {
+const DepthSample& NearestSample(const std::vector<DepthSample>& samples, const Vec3& p) {
   return *std::ranges::min_element(
       samples, {}, [&](const DepthSample& sample) { return (sample.base - p).squaredNorm(); });
 }
@@ -66,7 +66,7 @@ void ForEachWeight(NeighbourWeights kind, const Sites& sites, const CellPolygon&
 
 DepthValue DepthAt(const std::vector<DepthSample>& samples, NeighbourWeights kind, const Vec3& p,
                    const Vec3& normal) {
-  const DepthSample& nearest = Nearest(samples, p);
+  const DepthSample& nearest = NearestSample(samples, p);
   if ((nearest.base - p).norm() <= kAtBase_mm) {
     return {nearest.depth_mm, nearest.sd_mm};
   }

@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-constexpr std::size_t kTogether = 8;  // distances held at a time: 8 bytes a vertex each
+constexpr std::size_t kHeldTogether = 8;  // distances held at a time: 8 bytes a vertex each
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
 // The distance at c of a front that reached a and b from one source: a, b and c in a plane, the
@@ -129,8 +129,8 @@ void ForEachGeodesic(std::string_view scheme, const TriMesh& skull,
   run.ThrowIfStopped();
   CheckSurface(scheme, skull);
   const SurfaceDistance surface(skull);
-  for (std::size_t first = 0; first < samples.size(); first += kTogether) {
-    const std::size_t count = std::min(kTogether, samples.size() - first);
+  for (std::size_t first = 0; first < samples.size(); first += kHeldTogether) {
+    const std::size_t count = std::min(kHeldTogether, samples.size() - first);
     std::vector<std::vector<double>> distances(count);
     ParallelFor(count, run.threads, 1, [&](std::size_t k) {
       run.ThrowIfStopped();

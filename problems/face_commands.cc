@@ -12,6 +12,7 @@
 
 #include "problems/config.h"
 #include "problems/edit_script.h"
+#include "problems/exit_code.h"
 #include "problems/face_export.h"
 #include "surfaces/error.h"
 #include "surfaces/feature.h"
@@ -52,7 +53,7 @@ int Edit(const FaceArguments& a) {
   }
   WriteHSpline(a.out, face);
   fmt::print("{}: {} vertices changed\n", a.out, inverse.edits.size());
-  return 0;
+  return kDone;
 }
 
 int Export(const FaceArguments& a) {
@@ -61,14 +62,14 @@ int Export(const FaceArguments& a) {
       EncodeFace(ReadHSpline(a.face), fs::path(a.out).extension().string(), a.chord_mm, a.threads);
   WriteFileAtomically(a.out, bytes);
   fmt::print("{}: {} bytes\n", a.out, bytes.size());
-  return 0;
+  return kDone;
 }
 
 int Store(const Feature& feature, const FaceArguments& a) {
   RefuseToReplace(fs::path(a.library) / fmt::format("{}.json", feature.name), a);
   const fs::path path = StoreFeature(a.library, feature);
   fmt::print("{}: {} vertices\n", path.string(), feature.offsets.size());
-  return 0;
+  return kDone;
 }
 
 int ExtractCommand(const FaceArguments& a) {
@@ -93,7 +94,7 @@ int ApplyCommand(const FaceArguments& a) {
   }
   WriteHSpline(a.out, face);
   fmt::print("{}: {} vertices given\n", a.out, vertices);
-  return 0;
+  return kDone;
 }
 
 int BlendCommand(const FaceArguments& a) {
@@ -119,7 +120,7 @@ int ListCommand(const FaceArguments& a) {
     fmt::print("{}: {} vertices, {} x {} patches\n", name, feature.offsets.size(),
                feature.shape.patches_u, feature.shape.patches_v);
   }
-  return 0;
+  return kDone;
 }
 
 using FaceCommand = int (*)(const FaceArguments&);

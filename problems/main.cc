@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "problems/depth_study.h"
+#include "problems/exit_code.h"
 #include "problems/experiment_config.h"
 #include "problems/face_commands.h"
 #include "problems/face_metrics_json.h"
@@ -22,8 +23,6 @@
 
 namespace semblance {
 namespace {
-
-constexpr int kDone = 0, kNotUsable = 1, kBadInput = 2;
 
 // What the user typed; each command reads its part.
 struct Arguments {

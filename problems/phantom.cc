@@ -34,7 +34,7 @@ const SitePlace kLateral[] = {
 constexpr double kVaultDepth = 5;     // mm
 constexpr double kBlendWidth = 0.27;  // sigma of a site's influence, radians
 
-struct Anchor {
+struct DirectionAnchor {
   Vec3 direction;
   double depth_mm;
 };
@@ -45,15 +45,15 @@ class DepthFormula {
   double At(const Vec3& direction) const;  // mm, > 0
 
  private:
-  std::vector<Anchor> anchors_;
+  std::vector<DirectionAnchor> anchors_;
   double subject_;
   WaveSum waves_;
 };
 
 Vec3 OnSide(const Vec3& place, double side) { return {side * place.x(), place.y(), place.z()}; }
 
-std::vector<Anchor> SiteAnchors() {
-  std::vector<Anchor> anchors;
+std::vector<DirectionAnchor> SiteAnchors() {
+  std::vector<DirectionAnchor> anchors;
   for (const SitePlace& s : kMidline) {
     anchors.push_back({PhantomDirection(s.place), s.depth_mm});
   }
@@ -65,16 +65,17 @@ std::vector<Anchor> SiteAnchors() {
 }
 
 // The vault is held at its depth by even points of the sphere that are far from every site.
-std::vector<Anchor> VaultAnchors(const std::vector<Anchor>& sites) {
+std::vector<DirectionAnchor> VaultAnchors(const std::vector<DirectionAnchor>& sites) {
   constexpr int kPoints = 200;
   const double far = std::cos(35 * std::numbers::pi / 180);
-  std::vector<Anchor> anchors;
+  std::vector<DirectionAnchor> anchors;
   for (int i = 0; i < kPoints; ++i) {
     const double z = 1 - (2 * i + 1.0) / kPoints;
     const double azimuth = i * std::numbers::pi * (3 - std::sqrt(5.0));
     const double s = std::sqrt(1 - z * z);
     const Vec3 d(s * std::cos(azimuth), s * std::sin(azimuth), z);
-    if (std::ranges::all_of(sites, [&](const Anchor& a) { return a.direction.dot(d) < far; })) {
+    if (std::ranges::all_of(sites,
+                            [&](const DirectionAnchor& a) { return a.direction.dot(d) < far; })) {
       anchors.push_back({d, kVaultDepth});
     }
   }
@@ -85,14 +86,14 @@ DepthFormula::DepthFormula(SeededNumbers& random)
     : anchors_(SiteAnchors()),
       subject_(std::clamp(1 + 0.08 * random.Normal(), 0.84, 1.16)),
       waves_(DrawWaves(random)) {
-  const std::vector<Anchor> vault = VaultAnchors(anchors_);
+  const std::vector<DirectionAnchor> vault = VaultAnchors(anchors_);
   anchors_.insert(anchors_.end(), vault.begin(), vault.end());
 }
 
 double DepthFormula::At(const Vec3& direction) const {
   constexpr double kWaveShare = 0.05;
   double sum = 0, weights = 0;
-  for (const Anchor& a : anchors_) {
+  for (const DirectionAnchor& a : anchors_) {
     const double weight = std::exp((a.direction.dot(direction) - 1) / (kBlendWidth * kBlendWidth));
     sum += weight * a.depth_mm;
     weights += weight;

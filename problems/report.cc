@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdint>
 
 #include "problems/files.h"
@@ -198,6 +199,10 @@ std::string SectionHtml(const ReportSection& section, std::size_t number) {
 }
 
 }  // namespace
+
+std::string TableNumber(double value) {
+  return std::isfinite(value) ? fmt::format("{:.3f}", value) : "";
+}
 
 ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,
                                 std::string alt) {

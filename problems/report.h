@@ -25,6 +25,9 @@ struct ReportTable {
                                                // numbers is aligned right; empty: a dash
 };
 
+// A table's number: three decimals, nothing where it is not finite.
+std::string TableNumber(double value);
+
 struct ReportImage {
   std::string bytes;    // of a PNG or SVG file
   std::string caption;  // below it; may be empty

@@ -26,7 +26,7 @@ double Quantile(const std::vector<double>& sorted, double share) {
   return sorted[low] + (at - static_cast<double>(low)) * (sorted[high] - sorted[low]);
 }
 
-double Mean(std::span<const double> values) {
+double MeanOf(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
@@ -124,7 +124,7 @@ SampleSummary Summarize(std::span<const double> values, std::uint64_t random_see
   }
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
-  s.mean = Mean(sorted);
+  s.mean = MeanOf(sorted);
   s.median = Quantile(sorted, 0.5);
   s.quartile_1 = Quantile(sorted, 0.25);
   s.quartile_3 = Quantile(sorted, 0.75);

@@ -16,10 +16,6 @@ struct Column {
   std::string head, metric;
 };
 
-std::string Number(double value) {
-  return std::isfinite(value) ? fmt::format("{:.3f}", value) : "";
-}
-
 // Over the trials of the treatment that are done, in the order of the plan; NaN for none.
 double MeanOf(const StudyResults& results, const Treatment& treatment, const std::string& metric,
               double (*of)(double)) {
@@ -53,7 +49,7 @@ ReportTable TableOf(const StudyResults& results, const std::vector<Treatment>& r
     if (known.contains(column.metric)) {
       table.header.push_back(column.head);
       for (std::size_t n = 0; n < ranked.size(); ++n) {
-        table.rows[n].push_back(Number(MeanOf(results, ranked[n], column.metric, Itself)));
+        table.rows[n].push_back(TableNumber(MeanOf(results, ranked[n], column.metric, Itself)));
       }
     }
   }
@@ -129,7 +125,7 @@ ReportTable SitesTable(const StudyResults& results, const std::vector<Treatment>
   for (const std::string& site : NamesBetween(results, prefix, "")) {
     std::vector<std::string> row = {site};
     for (const Treatment& treatment : ranked) {
-      row.push_back(Number(std::sqrt(MeanOf(results, treatment, prefix + site, Square))));
+      row.push_back(TableNumber(std::sqrt(MeanOf(results, treatment, prefix + site, Square))));
     }
     table.rows.push_back(std::move(row));
   }

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "problems/exit_code.h"
 #include "problems/study_report.h"
 #include "problems/study_run.h"
 #include "problems/study_submit.h"
@@ -18,8 +19,6 @@ namespace semblance {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr int kDone = 0, kNotUsable = 1;
 
 // What the user typed; each command reads its part.
 struct StudyArguments {
@@ -137,7 +136,7 @@ int SubmitCommand(const StudyArguments& a) {
   return kDone;
 }
 
-using Command = int (*)(const StudyArguments&);
+using StudyCommandFunction = int (*)(const StudyArguments&);
 
 void AddStudyOptions(CLI::App* study, StudyArguments& a) {
   study->add_option("CONFIG", a.files, "YAML file of the study; `plan` before it is --list")
@@ -178,7 +177,7 @@ void AddSubmitOptions(CLI::App* submit, StudyArguments& a) {
 void DeclareStudyCommands(CLI::App& app, std::stop_token stop, std::function<int()>& chosen) {
   const auto arguments = std::make_shared<StudyArguments>();
   arguments->stop = std::move(stop);
-  const auto add = [&](const char* name, const char* help, Command command) {
+  const auto add = [&](const char* name, const char* help, StudyCommandFunction command) {
     CLI::App* sub = app.add_subcommand(name, help);
     sub->callback([&chosen, command, arguments] {
       chosen = [command, arguments] { return command(*arguments); };

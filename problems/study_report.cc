@@ -17,10 +17,6 @@ namespace {
 constexpr std::size_t kMostScenes = 40;  // in one list to choose from
 constexpr int kLeastSubjects = 6;        // two-sided, five subjects cannot reach p < 0.05
 
-std::string Number(double value) {
-  return std::isfinite(value) ? fmt::format("{:.3f}", value) : "";
-}
-
 std::string IntervalText(const Interval& interval) {
   return std::isfinite(interval.low) ? fmt::format("{:.3f} to {:.3f}", interval.low, interval.high)
                                      : "";
@@ -58,9 +54,9 @@ ReportTable RankingTable(const std::vector<Treatment>& ranked, const std::string
       {}};
   for (const Treatment& treatment : ranked) {
     const SampleSummary s = Summarize(ValuesOf(treatment));
-    table.rows.push_back({treatment.label, std::to_string(s.n), Number(s.mean),
-                          IntervalText(s.mean_95), Number(s.sd), Number(s.median), Number(s.min),
-                          Number(s.max)});
+    table.rows.push_back({treatment.label, std::to_string(s.n), TableNumber(s.mean),
+                          IntervalText(s.mean_95), TableNumber(s.sd), TableNumber(s.median),
+                          TableNumber(s.min), TableNumber(s.max)});
   }
   return table;
 }
@@ -89,7 +85,7 @@ ReportTable PairsTable(const std::vector<Treatment>& ranked) {
     const bool enough = s.n >= kLeastSubjects && std::isfinite(w.p);
     p.push_back(enough ? w.p : 1);
     const auto worse = std::count_if(d.begin(), d.end(), [](double x) { return x > 0; });
-    table.rows.push_back({ranked[n].label, std::to_string(s.n), Number(s.mean),
+    table.rows.push_back({ranked[n].label, std::to_string(s.n), TableNumber(s.mean),
                           IntervalText(s.mean_95), fmt::format("{} of {}", worse, s.n),
                           enough ? fmt::format("{:.4f}{}", w.p, w.exact ? "" : " (normal)") : "",
                           enough ? "?" : ""});
@@ -155,7 +151,8 @@ ReportSection TrialsSection(const StudyResults& results) {
   for (const TrialRow& row : results.trials) {
     const auto value = row.metrics.find(results.metric);
     table.rows.push_back({row.id, row.subject, TreatmentLabel(results.axes, row.values), row.status,
-                          value == row.metrics.end() ? "" : Number(value->second), row.reason});
+                          value == row.metrics.end() ? "" : TableNumber(value->second),
+                          row.reason});
   }
   section.tables = {table};
   return section;
@@ -313,7 +310,7 @@ std::string StudyReportHtml(const StudyResults& results, const SceneCollection& 
                                    "No trial that is done has a value of '{}'.", results.metric)}});
   } else {
     report.tiles.push_back(
-        {"best mean", Number(Summarize(ValuesOf(ranked[0])).mean), "", ranked[0].label});
+        {"best mean", TableNumber(Summarize(ValuesOf(ranked[0])).mean), "", ranked[0].label});
     report.main_images = {{BoxPlotSvg(Boxes(ranked), results.metric),
                            "One dot a subject; box: quartiles and median.",
                            "box plot of the metric, one row a treatment"}};

@@ -93,7 +93,7 @@ std::string Cells(const std::vector<std::string>& texts) {
   return line;
 }
 
-std::string Number(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+std::string CsvNumber(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
 std::map<std::string, double> BySubject(const StudyResults& results, const Treatment& treatment,
                                         const std::string& metric) {
@@ -202,8 +202,8 @@ std::string SummaryCsv(const StudyResults& results) {
       }
       const SampleSummary s = Summarize(values);
       csv += fmt::format("{}{},{},{},{},{},{},{},{},{}\n", Cells(treatment.values), metric, s.n,
-                         Number(s.mean), Number(s.sd), Number(s.median), Number(s.min),
-                         Number(s.max), Number(s.mean_95.low), Number(s.mean_95.high));
+                         CsvNumber(s.mean), CsvNumber(s.sd), CsvNumber(s.median), CsvNumber(s.min),
+                         CsvNumber(s.max), CsvNumber(s.mean_95.low), CsvNumber(s.mean_95.high));
     }
   }
   return csv;

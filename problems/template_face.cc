@@ -26,10 +26,10 @@ constexpr int kSamplesPerPatch = 6;
 
 using Matrix = Eigen::MatrixXd;
 
-enum class Axis { kU, kV };
+enum class Direction { kU, kV };
 
-int Patches(const HSplineShape& shape, int level, Axis axis) {
-  return (axis == Axis::kU ? shape.patches_u : shape.patches_v) << level;
+int Patches(const HSplineShape& shape, int level, Direction axis) {
+  return (axis == Direction::kU ? shape.patches_u : shape.patches_v) << level;
 }
 
 double SampleAt(int sample, int patches) {
@@ -38,23 +38,24 @@ double SampleAt(int sample, int patches) {
 
 // Row s: the weights of the patches + 3 vertices of a line of the net at its sample s. The weights
 // of a stencil summed over the other direction are those of the line.
-Matrix Collocation(const HSplineShape& shape, int level, Axis axis) {
+Matrix Collocation(const HSplineShape& shape, int level, Direction axis) {
   const int patches = Patches(shape, level, axis);
-  const int columns = Patches(shape, level, Axis::kU) + 3;
+  const int columns = Patches(shape, level, Direction::kU) + 3;
   Matrix rows = Matrix::Zero(kSamplesPerPatch * patches + 1, patches + 3);
   for (int s = 0; s < rows.rows(); ++s) {
     const double t = SampleAt(s, patches);
-    const Stencil stencil = StencilAt(shape, level, axis == Axis::kU ? Vec2(t, 0) : Vec2(0, t));
+    const Stencil stencil =
+        StencilAt(shape, level, axis == Direction::kU ? Vec2(t, 0) : Vec2(0, t));
     for (int k = 0; k < 16; ++k) {
       const int vertex = stencil.index[k];
-      rows(s, axis == Axis::kU ? vertex % columns : vertex / columns) += stencil.weight[k];
+      rows(s, axis == Direction::kU ? vertex % columns : vertex / columns) += stencil.weight[k];
     }
   }
   return rows;
 }
 
 // (A^T A)^-1 A^T: from the samples of a line to its vertices.
-Matrix LeastSquares(const HSplineShape& shape, int level, Axis axis) {
+Matrix LeastSquares(const HSplineShape& shape, int level, Direction axis) {
   const Matrix a = Collocation(shape, level, axis);
   return (a.transpose() * a).ldlt().solve(a.transpose());
 }
@@ -76,10 +77,10 @@ std::array<Matrix, 3> SampleFormula(int patches_u, int patches_v) {
 // The plain B-spline of one level that is closest to the formula over a grid of samples. On such a
 // grid the least squares of the surface is that of its columns, then its rows.
 ControlNet FitFormula(const HSplineShape& shape, int level) {
-  const Matrix along_u = LeastSquares(shape, level, Axis::kU);
-  const Matrix along_v = LeastSquares(shape, level, Axis::kV);
+  const Matrix along_u = LeastSquares(shape, level, Direction::kU);
+  const Matrix along_v = LeastSquares(shape, level, Direction::kV);
   const auto samples =
-      SampleFormula(Patches(shape, level, Axis::kU), Patches(shape, level, Axis::kV));
+      SampleFormula(Patches(shape, level, Direction::kU), Patches(shape, level, Direction::kV));
   ControlNet net{.columns = static_cast<int>(along_u.rows()),
                  .rows = static_cast<int>(along_v.rows()),
                  .vertices = {}};

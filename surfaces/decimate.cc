@@ -14,8 +14,8 @@
 namespace semblance {
 namespace {
 
-using Kernel = CGAL::Simple_cartesian<double>;
-using SurfaceMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+using QuadricKernel = CGAL::Simple_cartesian<double>;
+using SurfaceMesh = CGAL::Surface_mesh<QuadricKernel::Point_3>;
 namespace simplification = CGAL::Surface_mesh_simplification;
 namespace processing = CGAL::Polygon_mesh_processing;
 
@@ -41,7 +41,7 @@ TriMesh FromCgal(SurfaceMesh& halfedges) {
   halfedges.collect_garbage();
   TriMesh mesh;
   for (const auto v : halfedges.vertices()) {
-    const Kernel::Point_3& p = halfedges.point(v);
+    const QuadricKernel::Point_3& p = halfedges.point(v);
     mesh.points.emplace_back(p.x(), p.y(), p.z());
   }
   for (const auto f : halfedges.faces()) {
@@ -80,7 +80,7 @@ TriMesh Decimate(const TriMesh& mesh, int target_triangles) {
     return mesh;
   }
   SurfaceMesh halfedges = ToCgal(mesh, "decimate");
-  using Policies = simplification::GarlandHeckbert_plane_policies<SurfaceMesh, Kernel>;
+  using Policies = simplification::GarlandHeckbert_plane_policies<SurfaceMesh, QuadricKernel>;
   const Policies policies(halfedges);
   simplification::edge_collapse(halfedges, FaceCountStop(halfedges, target_triangles),
                                 CGAL::parameters::get_cost(policies.get_cost())

@@ -13,8 +13,8 @@
 namespace semblance {
 namespace {
 
-constexpr std::string_view kFormat = "semblance-feature";
-constexpr int kVersion = 1;
+constexpr std::string_view kFeatureFormat = "semblance-feature";
+constexpr int kFeatureVersion = 1;
 
 void CheckName(const std::string& name) {
   const auto allowed = [](unsigned char c) {
@@ -62,7 +62,7 @@ void CheckVertices(const Feature& feature) {
 Feature ParsedFeature(const json_parts::Json& json) {
   json_parts::RequireKeys(json, {"format", "version", "name", "units", "patches", "max_level",
                                  "closure", "offset_reference", "offsets"});
-  json_parts::RequireFormat(json, kFormat, kVersion);
+  json_parts::RequireFormat(json, kFeatureFormat, kFeatureVersion);
   Feature feature;
   feature.name = json.at("name").get<std::string>();
   feature.shape = json_parts::ShapeFromJson(json);
@@ -172,8 +172,8 @@ Feature MirrorFeature(const Feature& feature) {
 
 std::string FeatureToJson(const Feature& feature) {
   json_parts::Json json;
-  json["format"] = kFormat;
-  json["version"] = kVersion;
+  json["format"] = kFeatureFormat;
+  json["version"] = kFeatureVersion;
   json["name"] = feature.name;
   json["units"] = "mm";
   json_parts::ShapeToJson(feature.shape, json);

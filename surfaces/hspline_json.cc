@@ -11,13 +11,13 @@ namespace {
 
 using namespace json_parts;
 
-constexpr std::string_view kFormat = "semblance-hspline";
-constexpr int kVersion = 1;
+constexpr std::string_view kHSplineFormat = "semblance-hspline";
+constexpr int kHSplineVersion = 1;
 
 HSplineSurface SurfaceFromJson(const Json& json) {
   RequireKeys(json, {"format", "version", "patches", "max_level", "closure", "offset_reference",
                      "units", "level0", "offsets"});
-  RequireFormat(json, kFormat, kVersion);
+  RequireFormat(json, kHSplineFormat, kHSplineVersion);
   const HSplineShape shape = ShapeFromJson(json);
   ControlNet net{shape.Columns(0), shape.Rows(0), {}};
   for (const Json& row : ListFromJson(json, "level0")) {
@@ -38,8 +38,8 @@ HSplineSurface SurfaceFromJson(const Json& json) {
 std::string HSplineToJson(const HSplineSurface& surface) {
   const HSplineShape& shape = surface.shape();
   Json json;
-  json["format"] = kFormat;
-  json["version"] = kVersion;
+  json["format"] = kHSplineFormat;
+  json["version"] = kHSplineVersion;
   json["units"] = "mm";
   ShapeToJson(shape, json);
   json["level0"] = Json::array();

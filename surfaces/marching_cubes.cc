@@ -8,7 +8,7 @@ namespace semblance {
 namespace {
 
 using Loop = std::vector<std::uint8_t>;  // edges in order
-using Triangles = std::vector<std::array<std::uint8_t, 3>>;
+using CaseTriangles = std::vector<std::array<std::uint8_t, 3>>;
 
 // The corners of the six faces, each in cyclic order, counter-clockwise seen from outside the cell.
 constexpr std::array<std::array<int, 4>, 6> kFaces = {
@@ -62,16 +62,16 @@ bool ShareFace(int edge_a, int edge_b) {
 
 // Triangulates loop[first..last] so that the fewest diagonals lie in a face of the cell; returns
 // how many do.
-int Triangulate(const Loop& loop, int first, int last, Triangles& triangles) {
+int Triangulate(const Loop& loop, int first, int last, CaseTriangles& triangles) {
   if (last - first < 2) {
     return 0;
   }
   const bool is_side = last - first == static_cast<int>(loop.size()) - 1;
   const int own = !is_side && ShareFace(loop[first], loop[last]) ? 1 : 0;
   int fewest = 100;
-  Triangles best;
+  CaseTriangles best;
   for (int middle = first + 1; middle < last; ++middle) {
-    Triangles trial = {{loop[first], loop[last], loop[middle]}};
+    CaseTriangles trial = {{loop[first], loop[last], loop[middle]}};
     const int bad =
         own + Triangulate(loop, first, middle, trial) + Triangulate(loop, middle, last, trial);
     if (bad < fewest) {
@@ -83,9 +83,9 @@ int Triangulate(const Loop& loop, int first, int last, Triangles& triangles) {
   return fewest;
 }
 
-Triangles TrianglesOfCase(int mask) {
+CaseTriangles TrianglesOfCase(int mask) {
   std::array<int, 12> next = LinkCrossings(mask);
-  Triangles triangles;
+  CaseTriangles triangles;
   for (int start = 0; start < 12; ++start) {
     Loop loop;
     for (int e = start; e >= 0 && next[e] >= 0;) {
@@ -103,7 +103,7 @@ Triangles TrianglesOfCase(int mask) {
 
 const std::array<std::vector<std::array<std::uint8_t, 3>>, 256>& MarchingCubesCases() {
   static const auto kCases = [] {
-    std::array<Triangles, 256> cases;
+    std::array<CaseTriangles, 256> cases;
     for (int mask = 0; mask < 256; ++mask) {
       cases[mask] = TrianglesOfCase(mask);
     }

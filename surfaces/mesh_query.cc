@@ -14,13 +14,13 @@
 namespace semblance {
 namespace {
 
-using Kernel = CGAL::Simple_cartesian<double>;
-using Triangles = std::vector<Kernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
-using AabbTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+using QueryKernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<QueryKernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<QueryKernel, Triangles::const_iterator>;
+using AabbTree = CGAL::AABB_tree<CGAL::AABB_traits<QueryKernel, Primitive>>;
 
-Kernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
-Vec3 ToVec(const Kernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
+QueryKernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+Vec3 ToVec(const QueryKernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
 
 Triangles CopyTriangles(const TriMesh& mesh) {
   if (mesh.triangles.empty()) {
@@ -74,14 +74,14 @@ MeshPoint MeshQuery::Closest(const Vec3& p) const {
 std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direction,
                                           double max_distance_mm) const {
   const Vec3 end = origin + max_distance_mm * direction.normalized();
-  const Kernel::Segment_3 segment(ToCgal(origin), ToCgal(end));
-  std::vector<AabbTree::Intersection_and_primitive_id<Kernel::Segment_3>::Type> found;
+  const QueryKernel::Segment_3 segment(ToCgal(origin), ToCgal(end));
+  std::vector<AabbTree::Intersection_and_primitive_id<QueryKernel::Segment_3>::Type> found;
   tree_->tree.all_intersections(segment, std::back_inserter(found));
   std::vector<MeshPoint> hits;
   for (const auto& hit : found) {
     // A ray that runs inside a triangle's plane meets it in a segment: its neighbours, met in
     // points, stand for it.
-    if (const Kernel::Point_3* point = boost::get<Kernel::Point_3>(&hit.first)) {
+    if (const QueryKernel::Point_3* point = boost::get<QueryKernel::Point_3>(&hit.first)) {
       const Vec3 position = ToVec(*point);
       hits.push_back({position, tree_->IndexOf(hit.second), (position - origin).norm()});
     }

@@ -14,14 +14,14 @@
 namespace semblance {
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using WrapMesh = CGAL::Surface_mesh<Kernel::Point_3>;
+using WrapKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using WrapMesh = CGAL::Surface_mesh<WrapKernel::Point_3>;
 
 // How far the wrap keeps from bone. Small against the pull, which takes it back.
 constexpr double kWrapOffset_mm = 0.6;
 
 TriMesh Wrap(const TriMesh& skull, double alpha_mm) {
-  std::vector<Kernel::Point_3> points;
+  std::vector<WrapKernel::Point_3> points;
   std::vector<std::vector<std::size_t>> faces;
   for (const Vec3& p : skull.points) {
     points.emplace_back(p.x(), p.y(), p.z());
@@ -34,7 +34,7 @@ TriMesh Wrap(const TriMesh& skull, double alpha_mm) {
   CGAL::alpha_wrap_3(points, faces, alpha_mm, kWrapOffset_mm, wrap);
   TriMesh shell;
   for (const auto v : wrap.vertices()) {
-    const Kernel::Point_3& p = wrap.point(v);
+    const WrapKernel::Point_3& p = wrap.point(v);
     shell.points.emplace_back(p.x(), p.y(), p.z());
   }
   for (const auto f : wrap.faces()) {
