@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kLeastSoftness = 1e-12;  // two dowels closest to one vertex must not be singular
 
+constexpr Eigen::Index kMostHeld = 64;       // functions held at a time: 8 bytes a vertex each
 constexpr std::size_t kSolvedTogether = 16;  // right sides solved at a time: 8 bytes a vertex each
 
 // The function's mean that one dowel speaks of: sum of weight times value, weights of sum 1.
@@ -53,7 +54,7 @@ Place PlaceOf(const Vec3& base, double radius_mm, const TriMesh& skull, const Me
 // Let b_i be the places, G the inverse of the energy's matrix on functions of mean 0, piece by
 // piece. The least energy with means d + residuals is u = sum_i l_i G b_i + a constant a piece,
 // where the l_i of a piece sum to 0: small equations in S_ij = b_i' G b_j, whatever the skull's
-// size.
+// size. As the l_i sum to 0, S may have its means taken off, rows and columns, piece by piece.
 class Spline {
  public:
   Spline(const MeshSpline& options, const TriMesh& skull, const std::vector<DepthSample>& samples,
@@ -75,26 +76,24 @@ class Spline {
 
   std::vector<double> Solve(const std::vector<DepthSample>& samples, const RunContext& run) const {
     const Eigen::Index n = Size();
-    const Eigen::MatrixXd kernel = Kernel(run);
-    const auto count = static_cast<Eigen::Index>(piece_area_.size());
+    const Eigen::MatrixXd kernel = Centred(Kernel(run));
     const std::vector<int> used = UsedPieces();
     const auto tail = static_cast<Eigen::Index>(used.size());
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + tail, n + tail);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(n + tail);
     matrix.topLeftCorner(n, n) = kernel;
-    const double scale = std::max(kernel.diagonal().mean(), 1e-300);
+    const double spread = kernel.diagonal().mean(), scale = spread > 0 ? spread : 1;
+    const double softness = std::max(options_.softness, kLeastSoftness) * scale;
     for (Eigen::Index i = 0; i < n; ++i) {
-      matrix(i, i) += std::max(options_.softness, kLeastSoftness) * scale;
+      matrix(i, i) += softness;
       const auto at = std::ranges::find(used, places_[i].piece) - used.begin();
       matrix(i, n + at) = matrix(n + at, i) = scale;
       right[i] = samples[i].depth_mm;
     }
-    const Eigen::VectorXd solution = Eigen::PartialPivLU<Eigen::MatrixXd>(matrix).solve(right);
-    Eigen::VectorXd constants = Eigen::VectorXd::Constant(count, kNaN);
-    for (Eigen::Index k = 0; k < tail; ++k) {
-      constants[used[k]] = scale * solution[n + k];
-    }
-    const Eigen::VectorXd varying = Varying(Combined(solution.head(n)));
+    const Eigen::VectorXd pull = Eigen::PartialPivLU<Eigen::MatrixXd>(matrix).solve(right).head(n);
+    const Eigen::VectorXd varying = Varying(Combined(pull));
+    const Eigen::VectorXd constants =
+        MeanByPiece(right.head(n) - softness * pull - AtPlaces(varying));
     std::vector<double> values(pieces_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = constants[pieces_[i]] + varying[static_cast<Eigen::Index>(i)];
@@ -151,34 +150,80 @@ class Spline {
   // what holds its vertex answers: the same for all places there, so nothing where the l_i sum to
   // 0.
   Eigen::MatrixXd Varying(const Eigen::MatrixXd& right) const {
+    const Eigen::MatrixXd values = HalfVarying(right);
+    return options_.energy == SplineEnergy::kLaplacian
+               ? HalfVarying(laplacian_.area_mm2.asDiagonal() * values)
+               : values;
+  }
+
+  // The same with the stiffness's inverse for G.
+  Eigen::MatrixXd HalfVarying(const Eigen::MatrixXd& right) const {
     const Eigen::VectorXd& area = laplacian_.area_mm2;
-    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(area.size());
     Eigen::MatrixXd values = solver_.Solve(right);
-    TakeShares(values, area, ones);
-    if (options_.energy == SplineEnergy::kLaplacian) {
-      values = solver_.Solve(area.asDiagonal() * values);
-      TakeShares(values, area, ones);
-    }
+    TakeShares(values, area, Eigen::VectorXd::Ones(area.size()));
     return values;
   }
 
+  // The means of functions, one a column, at the places.
+  Eigen::MatrixXd AtPlaces(const Eigen::MatrixXd& values) const {
+    Eigen::MatrixXd at = Eigen::MatrixXd::Zero(Size(), values.cols());
+    for (Eigen::Index k = 0; k < Size(); ++k) {
+      for (const auto& [vertex, weight] : places_[k].weights) {
+        at.row(k) += weight * values.row(vertex);
+      }
+    }
+    return at;
+  }
+
+  // Over the places of each piece, of one value a place; NaN on pieces without one.
+  Eigen::VectorXd MeanByPiece(const Eigen::VectorXd& of_place) const {
+    const auto count = static_cast<Eigen::Index>(piece_area_.size());
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(count), places = sum;
+    for (Eigen::Index k = 0; k < Size(); ++k) {
+      sum[places_[k].piece] += of_place[k];
+      ++places[places_[k].piece];
+    }
+    return sum.cwiseQuotient(places);
+  }
+
+  // S without the means, piece by piece, of its columns and then of its rows.
+  Eigen::MatrixXd Centred(Eigen::MatrixXd matrix) const {
+    for (int side = 0; side < 2; ++side) {
+      for (Eigen::Index c = 0; c < Size(); ++c) {
+        const Eigen::VectorXd mean = MeanByPiece(matrix.col(c));
+        for (Eigen::Index r = 0; r < Size(); ++r) {
+          matrix(r, c) -= mean[places_[r].piece];
+        }
+      }
+      matrix.transposeInPlace();
+    }
+    return matrix;
+  }
+
+  // S, but for what centring takes off.
   Eigen::MatrixXd Kernel(const RunContext& run) const {
     const Eigen::Index n = Size();
-    Eigen::MatrixXd kernel = Eigen::MatrixXd::Zero(n, n);
+    const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMostHeld;
+    Eigen::MatrixXd held(inner_product ? laplacian_.area_mm2.size() : 0, n), kernel(n, n);
     const std::size_t blocks = (places_.size() + kSolvedTogether - 1) / kSolvedTogether;
     ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
       run.ThrowIfStopped();
       const auto first = static_cast<Eigen::Index>(block * kSolvedTogether);
       const Eigen::Index count = std::min<Eigen::Index>(kSolvedTogether, n - first);
-      const Eigen::MatrixXd values =
-          Varying(Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count)));
-      for (Eigen::Index r = 0; r < n; ++r) {
-        for (const auto& [vertex, weight] : places_[r].weights) {
-          kernel.row(r).segment(first, count) += weight * values.row(vertex);
-        }
+      const Eigen::MatrixXd right =
+          Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count));
+      if (inner_product) {
+        held.middleCols(first, count) = HalfVarying(right);
+      } else {
+        kernel.middleCols(first, count) = AtPlaces(Varying(right));
       }
     });
-    return kernel;
+    return inner_product ? Products(held) : kernel;
+  }
+
+  // Twice the Laplacian makes an inner product of half-way functions: half of the solves.
+  Eigen::MatrixXd Products(const Eigen::MatrixXd& half_way) const {
+    return half_way.transpose() * laplacian_.area_mm2.asDiagonal() * half_way;
   }
 
   std::vector<int> UsedPieces() const {

@@ -211,6 +211,23 @@ TEST(MeshSplines, SoftnessLeadsToTheMean) {
   }
 }
 
+TEST(MeshSplines, DoNotHeedADowelGivenTwice) {  // 64 and 65 dowels are solved in two ways
+  DowelScene scene = FlatScene();
+  Random random(5);
+  scene.dowels.clear();
+  for (std::size_t k = 0; k < 64; ++k) {
+    const Vec3& base = scene.skull.points[k * scene.skull.points.size() / 64];
+    scene.dowels.push_back({"g", base, Vec3::UnitZ(), random.Uniform(4, 7), kNaN});
+  }
+  DowelScene twice = scene;
+  twice.dowels.push_back(scene.dowels[17]);
+  const DepthField once = InterpolateDepth(Biharmonic{}, scene.Input(), RunContext{}),
+                   again = InterpolateDepth(Biharmonic{}, twice.Input(), RunContext{});
+  for (std::size_t i = 0; i < once.depth_mm.size(); ++i) {
+    ASSERT_NEAR(once.depth_mm[i], again.depth_mm[i], 1e-6);
+  }
+}
+
 TEST(MeshSplines, SayThatTheyNeedTriangles) {
   const DowelScene scene = FlatScene().At({{1, 2, 3}});
   try {
