@@ -162,7 +162,7 @@ void AddQuadratic(Polyline& line, const Vec2& control, const Vec2& to) {
 }
 
 // Runs from midpoint to midpoint of the control polygon; an open one starts and ends at its ends.
-Polyline Curve(const Polyline& control, bool closed) {
+Polyline CurveThrough(const Polyline& control, bool closed) {
   const std::size_t n = control.size();
   const auto mid = [&](std::size_t i) -> Vec2 {
     return (control[i % n] + control[(i + 1) % n]) / 2;
@@ -181,7 +181,7 @@ std::vector<Polyline> Polylines(std::string_view strokes) {
   Polyline points;
   const auto finish = [&] {
     if (!points.empty()) {
-      lines.push_back(kind == '-' || kind == '.' ? points : Curve(points, kind == '@'));
+      lines.push_back(kind == '-' || kind == '.' ? points : CurveThrough(points, kind == '@'));
     }
     points.clear();
   };
