@@ -92,7 +92,7 @@ int StudyCommand(const StudyArguments& a) {
   }
   const fs::path root = a.out.empty() ? "out/" + file.stem().string() : a.out;
   if (!a.quiet) {
-    options.on_trial = StudyProgress(stderr);
+    options.on_pace = StudyProgress(stderr);
   }
   RunContext context;
   context.stop_token = a.stop;

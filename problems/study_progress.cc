@@ -22,6 +22,9 @@ std::string Duration(double seconds) {
 std::string PaceText(const StudyPace& pace) {
   std::string text = fmt::format("{} of {} trials", pace.finished, pace.trials);
   const int here = pace.finished - pace.finished_before;
+  if (here == 0 && pace.elapsed_s >= 1) {
+    text += fmt::format(", {} so far", Duration(pace.elapsed_s));
+  }
   if (here > 0 && pace.elapsed_s > 0) {
     const double each_s = pace.elapsed_s / here;
     text += each_s >= 1 ? fmt::format(", {:.1f} s each", each_s)
@@ -44,6 +47,10 @@ StudyProgress::StudyProgress(std::FILE* stream, std::chrono::milliseconds interv
 void StudyProgress::operator()(const StudyPace& pace, const std::string& trial) {
   constexpr const char* kClearLine = "\r\033[K";
   const bool is_last = pace.finished == pace.trials;
+  if (is_over_) {
+    return;
+  }
+  is_over_ = is_last;
   if (pace.failed > failed_) {
     failed_ = pace.failed;
     fmt::print(stream_, "{}{}\n", is_terminal_ ? kClearLine : "", trial);

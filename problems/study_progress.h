@@ -30,7 +30,7 @@ class StudyProgress {
   explicit StudyProgress(std::FILE* stream,
                          std::chrono::milliseconds interval = std::chrono::seconds(5));
 
-  // trial: subject, values and status; said alone where it failed.
+  // Any time. trial: the one that ended, subject, values and status; said alone where it failed.
   void operator()(const StudyPace& pace, const std::string& trial);
 
  private:
@@ -38,6 +38,7 @@ class StudyProgress {
   std::FILE* stream_;
   bool is_terminal_;
   std::chrono::milliseconds interval_;
+  bool is_over_ = false;
   int failed_ = 0;
   Clock::time_point last_ = Clock::now();
 };

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <ctime>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -108,8 +109,14 @@ class StudyRunner {
     }
     std::vector<std::jthread> threads;
     for (int job = 0; job < std::min<int>(options_.jobs, static_cast<int>(queue_.size())); ++job) {
-      threads.emplace_back([this] { Work(); });
+      threads.emplace_back([this] {
+        Work();
+        const std::lock_guard lock(mutex_);
+        ++ended_;
+        thread_ended_.notify_one();
+      });
     }
+    WatchUntilEnded(threads.size());
     threads.clear();  // joins
     if (broken_) {
       std::rethrow_exception(broken_);
@@ -127,6 +134,14 @@ class StudyRunner {
       ++summary_.skipped;
     } else {
       queue_.push_back(&trial);
+    }
+  }
+
+  void WatchUntilEnded(std::size_t threads) {
+    std::unique_lock lock(mutex_);
+    while (ended_ < threads) {
+      TellPace("");
+      thread_ended_.wait_for(lock, std::chrono::seconds(1), [&] { return ended_ == threads; });
     }
   }
 
@@ -219,19 +234,23 @@ class StudyRunner {
   void Tell(const StudyTrial& trial, const Json& json) {
     const std::lock_guard lock(mutex_);
     ++(json["status"] == "failed" ? summary_.failed : summary_.done);
-    if (!options_.on_trial) {
-      return;
-    }
-    const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
     const std::string reason =
         json.contains("reason") ? ": " + json["reason"].get<std::string>() : "";
-    options_.on_trial({.trials = summary_.trials,
-                       .finished = summary_.done + summary_.failed + summary_.skipped,
-                       .finished_before = summary_.skipped,
-                       .failed = summary_.failed,
-                       .elapsed_s = elapsed_s},
-                      fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
-                                  fmt::join(trial.values, " "), reason));
+    TellPace(fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
+                         fmt::join(trial.values, " "), reason));
+  }
+
+  // With mutex_ held.
+  void TellPace(const std::string& trial) {
+    if (options_.on_pace) {
+      const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
+      options_.on_pace({.trials = summary_.trials,
+                        .finished = summary_.done + summary_.failed + summary_.skipped,
+                        .finished_before = summary_.skipped,
+                        .failed = summary_.failed,
+                        .elapsed_s = elapsed_s},
+                       trial);
+    }
   }
 
   using Clock = std::chrono::steady_clock;
@@ -245,6 +264,8 @@ class StudyRunner {
   std::atomic<std::size_t> next_ = 0;
   std::atomic<bool> broken_flag_ = false;
   std::mutex mutex_;
+  std::condition_variable thread_ended_;
+  std::size_t ended_ = 0;  // of the threads
   std::exception_ptr broken_;
   StudySummary summary_;
 };

@@ -21,8 +21,9 @@ struct StudyRunOptions {
   bool retry_failed = false;         // run again what failed before
   std::filesystem::path cache = {};  // folder for implicit faces, shared by processes; empty: none
   int cache_limit_mb = 2000;
-  // May be empty. Called from one thread at a time after each trial; text: subject, values, status.
-  std::function<void(const StudyPace&, const std::string& text)> on_trial = {};
+  // May be empty. Called from one thread at a time: each second, and after each trial with its
+  // subject, values and status.
+  std::function<void(const StudyPace&, const std::string& trial)> on_pace = {};
 };
 
 struct StudySummary {

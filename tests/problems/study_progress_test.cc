@@ -24,6 +24,8 @@ TEST(StudyPace, SaysRateAndTimeLeftOfWhatWasDoneHere) {
   EXPECT_EQ(PaceText({.trials = 8, .finished = 8, .failed = 2, .elapsed_s = 16}),
             "8 of 8 trials, 2.0 s each; 2 failed");
   EXPECT_EQ(PaceText({.trials = 8, .finished = 3, .finished_before = 3}), "3 of 8 trials");
+  EXPECT_EQ(PaceText({.trials = 8, .finished = 3, .finished_before = 3, .elapsed_s = 75}),
+            "3 of 8 trials, 75 s so far");
 }
 
 TEST(StudyPace, TheBarFillsFromEmptyToFull) {
@@ -41,6 +43,7 @@ TEST(StudyProgress, OffATerminalSaysFailuresAndTheEndAndLittleElse) {
     progress({.trials = 1000, .finished = n, .failed = n >= 500 ? 1 : 0, .elapsed_s = 0.1 * n},
              "failed: a mean: no skull");
   }
+  progress({.trials = 1000, .finished = 1000, .failed = 1, .elapsed_s = 101}, "");
   std::fclose(file);
   const std::string log = ReadFileBytes(folder / "log");
   EXPECT_EQ(log, "failed: a mean: no skull\n1000 of 1000 trials, 10.0 a second; 1 failed\n");
