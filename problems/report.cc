@@ -201,7 +201,7 @@ std::string SectionHtml(const ReportSection& section, std::size_t number) {
 }  // namespace
 
 std::string TableNumber(double value) {
-  return std::isfinite(value) ? fmt::format("{:.3f}", value) : "";
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, std::abs(value) < 1e5 ? 3 : 0) : "";
 }
 
 ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,

@@ -25,7 +25,7 @@ struct ReportTable {
                                                // numbers is aligned right; empty: a dash
 };
 
-// A table's number: three decimals, nothing where it is not finite.
+// A table's number: three decimals, none from 100,000 on; nothing where it is not finite.
 std::string TableNumber(double value);
 
 struct ReportImage {

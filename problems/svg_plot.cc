@@ -13,7 +13,7 @@
 namespace semblance {
 namespace {
 
-constexpr double kWidth = 900, kLabels = 270, kRight = 30;
+constexpr double kWidth = 900, kLabels = 330, kRight = 30;
 // Told apart by people who do not see all colours (Okabe & Ito 2008).
 constexpr std::array<const char*, 7> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                  "#e69f00", "#56b4e9", "#444444"};
@@ -39,12 +39,34 @@ std::string Text(double x, double y, const std::string& text, const char* anchor
       anchor, EscapeHtml(text));
 }
 
-// Long labels are cut in the middle, where they tell least.
+// To so many bytes, and no character halved.
+std::string CutTo(const std::string& text, std::size_t most) {
+  if (text.size() <= most) {
+    return text;
+  }
+  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0) == 0x80) {
+    --most;
+  }
+  return text.substr(0, most) + "…";
+}
+
+// What fits beside a plot: each part of a label, between its commas, gets the same room, for what
+// tells them apart stands at their heads.
 std::string Shortened(const std::string& label) {
-  constexpr std::size_t kMost = 36;
-  return label.size() <= kMost
-             ? label
-             : fmt::format("{}…{}", label.substr(0, 22), label.substr(label.size() - 13));
+  constexpr std::size_t kMost = 40;
+  if (label.size() <= kMost) {
+    return label;
+  }
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin <= label.size();) {
+    const std::size_t end = std::min(label.find(", ", begin), label.size());
+    parts.push_back(label.substr(begin, end - begin));
+    begin = end + 2;
+  }
+  for (std::string& part : parts) {
+    part = CutTo(part, std::max<std::size_t>(kMost / parts.size(), 5) - 2);
+  }
+  return fmt::format("{}", fmt::join(parts, ", "));
 }
 
 // The axis of numbers at the foot of a plot.

@@ -32,6 +32,15 @@ TEST(BoxPlot, HasEachValueAndABoxARow) {
   EXPECT_EQ(Count(svg, "rect"), 2 + 1);  // the paper too
 }
 
+TEST(BoxPlot, KeepsTheHeadOfEachPartOfALongLabel) {
+  const std::string svg = BoxPlotSvg(
+      {{"minmax_octree least_emission=0.002, split decay=6 split=0.5 cut_below=0.002", {1}},
+       {"a mere word that is much longer than there is room for, xyété été été été", {2}}},
+      "");
+  EXPECT_THAT(svg, HasSubstr("minmax_octree leas…, split decay=6 spli…"));
+  EXPECT_THAT(svg, HasSubstr("a mere word that i…, xyété été ét…"));
+}
+
 TEST(CumulativePlot, HasALineARow) {
   EXPECT_EQ(Count(CumulativePlotSvg(kRows, "rms (mm)"), "polyline"), 6);  // and one in the legend
 }
