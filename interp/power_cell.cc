@@ -16,28 +16,31 @@ const CellCorner& Next(const CellPolygon& polygon, std::size_t i) {
   return polygon[i + 1 < polygon.size() ? i + 1 : 0];
 }
 
-// Leaves of the polygon what has value(x) >= 0, for a linear value. Most have it everywhere: then
-// false.
+// What of the polygon has value(x) >= 0, for a linear value. Most have it everywhere: then false,
+// and `clipped` is left alone.
 template <class Value>
-bool Clip(CellPolygon& polygon, const Value& value, int edge, CellPolygon& spare) {
-  const bool all =
-      std::ranges::all_of(polygon, [&](const CellCorner& corner) { return value(corner.at) >= 0; });
-  if (all) {
+bool Clip(const CellPolygon& polygon, const Value& value, int edge, CellPolygon& clipped) {
+  boost::container::small_vector<double, 24> at(polygon.size(), boost::container::default_init);
+  double least = kInfinity;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    at[i] = value(polygon[i].at);
+    least = std::min(least, at[i]);
+  }
+  if (least >= 0) {
     return false;
   }
-  spare.clear();
+  clipped.clear();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const CellCorner &a = polygon[i], &b = Next(polygon, i);
-    const double at_a = value(a.at), at_b = value(b.at);
-    if (at_a >= 0) {
-      spare.push_back(a);
+    const std::size_t next = i + 1 < polygon.size() ? i + 1 : 0;
+    const CellCorner &a = polygon[i], &b = polygon[next];
+    if (at[i] >= 0) {
+      clipped.push_back(a);
     }
-    if ((at_a >= 0) != (at_b >= 0)) {
-      const Vec2 between = a.at + at_a / (at_a - at_b) * (b.at - a.at);
-      spare.push_back({between, at_a >= 0 ? edge : a.edge});
+    if ((at[i] >= 0) != (at[next] >= 0)) {
+      const Vec2 between = a.at + at[i] / (at[i] - at[next]) * (b.at - a.at);
+      clipped.push_back({between, at[i] >= 0 ? edge : a.edge});
     }
   }
-  polygon = spare;
   return true;
 }
 
@@ -49,7 +52,7 @@ double TwiceAreaOf(const CellPolygon& polygon) {
   return twice;
 }
 
-double FurthestCorner2(const CellPolygon& polygon) {
+double Furthest2(const CellPolygon& polygon) {
   double furthest2 = 0;
   for (const CellCorner& corner : polygon) {
     furthest2 = std::max(furthest2, corner.at.squaredNorm());
@@ -183,26 +186,21 @@ class PartsTree {
 
 }  // namespace
 
-// The nearest edges first, ring by ring: they cut most away, and the rest need no look then.
-void FindCell(std::span<const PowerSite> sites, double reach, CellPolygon& cell) {
-  boost::container::small_vector<double, 48> edge2;  // squared distance of each site's edge
-  double inner2 = kInfinity;
-  for (const PowerSite& site : sites) {
-    edge2.push_back(site.distance2 * site.distance2 / (4 * site.place.squaredNorm()));
-    inner2 = std::min(inner2, edge2.back());
+PowerCell::PowerCell(double reach) {
+  polygons_[0] = {{{-reach, -reach}}, {{reach, -reach}}, {{reach, reach}}, {{-reach, reach}}};
+  furthest2_ = Furthest2(polygons_[0]);
+}
+
+void PowerCell::Cut(const PowerSite& site, int edge) {
+  const double edge4 = site.distance2 * site.distance2;  // 4 |place|^2 times its edge's distance^2
+  if (edge4 > 4 * site.place.squaredNorm() * furthest2_) {
+    return;  // beyond all corners
   }
-  cell = {{{-reach, -reach}}, {{reach, -reach}}, {{reach, reach}}, {{-reach, reach}}};
-  double furthest2 = FurthestCorner2(cell);
-  CellPolygon spare;
-  for (double outer2 = 2 * inner2; inner2 < furthest2; inner2 = outer2, outer2 *= 2) {
-    for (std::size_t k = 0; k < sites.size(); ++k) {
-      if (edge2[k] >= inner2 && edge2[k] < std::min(outer2, furthest2)) {
-        const auto value = [&](const Vec2& x) { return sites[k].At(x); };
-        if (Clip(cell, value, static_cast<int>(k), spare)) {
-          furthest2 = FurthestCorner2(cell);
-        }
-      }
-    }
+  const int other = 1 - current_;
+  const auto value = [&site](const Vec2& x) { return site.At(x); };
+  if (Clip(polygons_[current_], value, edge, polygons_[other])) {
+    current_ = other;
+    furthest2_ = Furthest2(polygons_[current_]);
   }
 }
 
@@ -223,7 +221,9 @@ void FindPartsByClipping(std::span<const PowerSite> sites, const CellPolygon& ce
       if (other != own && !part.empty()) {
         const PowerSite &a = sites[own], &b = sites[other];
         const auto value = [&](const Vec2& x) { return b.At(x) - a.At(x); };
-        Clip(part, value, other, spare);
+        if (Clip(part, value, other, spare)) {
+          std::swap(part, spare);
+        }
       }
     }
     twice_area[own] = TwiceAreaOf(part);

@@ -2,6 +2,7 @@
 // The cell that a point would have among sites, and what of it each of them would lose.
 #pragma once
 
+#include <array>
 #include <boost/container/small_vector.hpp>
 #include <span>
 
@@ -29,8 +30,23 @@ struct CellCorner {
 using CellPolygon = boost::container::small_vector<CellCorner, 24>;
 using SiteAreas = boost::container::small_vector<double, 48>;
 
-// Where all sites' values are >= 0, within |x|, |y| <= reach. Open edges lie on that square.
-void FindCell(std::span<const PowerSite> sites, double reach, CellPolygon& cell);
+// Where all sites' values are >= 0, within |x|, |y| <= reach, cut out by one site after another:
+// soonest if near ones come first. Open edges lie on that square.
+class PowerCell {
+ public:
+  explicit PowerCell(double reach);
+
+  // `edge` is the site's number.
+  void Cut(const PowerSite& site, int edge);
+  const CellPolygon& polygon() const { return polygons_[current_]; }
+  // Of its corners, from the point; 0 of an empty cell.
+  double FurthestCorner2() const { return furthest2_; }
+
+ private:
+  std::array<CellPolygon, 2> polygons_;  // the cell, and room for what the next site leaves of it
+  int current_ = 0;
+  double furthest2_ = 0;
+};
 
 // Twice the area of the part of a closed cell where each site's value is the least, one a site: by
 // the tree of borders between the parts, or where that would not do (a site whose part lies wholly

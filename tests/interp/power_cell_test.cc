@@ -24,6 +24,14 @@ std::vector<PowerSite> RandomSites(Random& random, int count, double height) {
   return sites;
 }
 
+CellPolygon CellOf(const std::vector<PowerSite>& sites) {
+  PowerCell cell(40);
+  for (std::size_t k = 0; k < sites.size(); ++k) {
+    cell.Cut(sites[k], static_cast<int>(k));
+  }
+  return cell.polygon();
+}
+
 bool Closed(const CellPolygon& cell) {
   return !cell.empty() && std::ranges::count(cell, kOpenEdge, &CellCorner::edge) == 0;
 }
@@ -41,8 +49,7 @@ TEST(PowerCell, HoldsJustThePointsThatNoSiteKeeps) {
   Random random(1);
   for (int trial = 0; trial < 200; ++trial) {
     const std::vector<PowerSite> sites = RandomSites(random, 25, 5);
-    CellPolygon cell;
-    FindCell(sites, 40, cell);
+    const CellPolygon cell = CellOf(sites);
     for (const CellCorner& corner : cell) {
       for (const PowerSite& site : sites) {
         ASSERT_GE(site.At(corner.at), -1e-9 * site.distance2);
@@ -59,8 +66,7 @@ TEST(PowerCell, TreeAndClippingGiveTheSameParts) {
   int by_tree = 0, closed = 0;
   for (int trial = 0; trial < 2000; ++trial) {
     const std::vector<PowerSite> sites = RandomSites(random, 5 + trial % 30, trial % 2 * 6);
-    CellPolygon cell;
-    FindCell(sites, 40, cell);
+    const CellPolygon cell = CellOf(sites);
     if (!Closed(cell)) {
       continue;
     }
@@ -87,8 +93,7 @@ TEST(PowerCell, ASiteWhosePartLiesWhollyInsideIsFound) {
   // Four on a circle, and one straight over the point: its part is the middle of the cell.
   const std::vector<PowerSite> sites = {
       {{10, 0}, 100}, {{0, 10}, 100}, {{-10, 0}, 100}, {{0, -10}, 100}, {{0.1, 0}, 20}};
-  CellPolygon cell;
-  FindCell(sites, 40, cell);
+  const CellPolygon cell = CellOf(sites);
   SiteAreas areas;
   EXPECT_FALSE(FindPartsByTree(sites, cell, areas));
   FindParts(sites, cell, areas);
@@ -100,8 +105,7 @@ TEST(PowerCell, ASiteWhosePartLiesWhollyInsideIsFound) {
 TEST(PowerCell, SitesOnOneCircleShareAlike) {
   const std::vector<PowerSite> sites = {
       {{10, 0}, 100}, {{0, 10}, 100}, {{-10, 0}, 100}, {{0, -10}, 100}};
-  CellPolygon cell;
-  FindCell(sites, 40, cell);
+  const CellPolygon cell = CellOf(sites);
   SiteAreas areas;
   FindParts(sites, cell, areas);
   for (const double area : areas) {
