@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "interp/power_cell.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -88,6 +89,47 @@ TEST_P(NaturalNeighbours, AreContinuousOnACurvedBone) {
   for (std::size_t k = 1; k < path.size(); ++k) {
     ASSERT_EQ(field.status[k], DepthStatus::kAssigned);
     ASSERT_NEAR(field.depth_mm[k], field.depth_mm[k - 1], 0.05);
+  }
+}
+
+// Sibson's depth from all dowels there are, by clipping each one's part: quadratic, but leaves none
+// out.
+double DepthFromAll(const std::vector<Dowel>& dowels, const Vec3& p, const Vec3& normal) {
+  const Vec3 first = normal.unitOrthogonal(), second = normal.cross(first);
+  std::vector<PowerSite> sites;
+  PowerCell cell(1000);
+  for (const Dowel& dowel : dowels) {
+    const Vec3 x = dowel.base - p;
+    sites.push_back({{x.dot(first), x.dot(second)}, x.squaredNorm()});
+    cell.Cut(sites.back(), static_cast<int>(sites.size()) - 1);
+  }
+  SiteAreas areas;
+  FindPartsByClipping(sites, cell.polygon(), areas);
+  double sum = 0, depth = 0;
+  for (std::size_t k = 0; k < areas.size(); ++k) {
+    sum += areas[k];
+    depth += areas[k] * dowels[k].depth_mm;
+  }
+  return depth / sum;
+}
+
+TEST(NaturalNeighbour, LeavesOutNoDowelThatHasAPart) {
+  Random random(3);
+  std::vector<Vec3> points, normals;
+  for (int k = 0; k < 100; ++k) {
+    normals.push_back(Vec3(random.Uniform(-0.5, 0.5), -1, random.Uniform(-0.5, 0.5)).normalized());
+    points.push_back(90 * normals.back());
+  }
+  for (const int count : {20, 60, 300}) {  // of 300, only the nearest of each are in order
+    DowelScene scene = ScatteredScene(count).At(points);
+    scene.normals = normals;
+    const DepthField field = InterpolateDepth(NaturalNeighbour{}, scene.Input(), RunContext{});
+    EXPECT_GT(testing::Count(field, DepthStatus::kAssigned), 90) << count;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (field.status[k] == DepthStatus::kAssigned) {
+        ASSERT_NEAR(field.depth_mm[k], DepthFromAll(scene.dowels, points[k], normals[k]), 1e-9);
+      }
+    }
   }
 }
 
