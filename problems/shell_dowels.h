@@ -11,6 +11,12 @@
 
 namespace semblance {
 
+// The shell, pressed in where a dowel would reach less than press_mm (>= 0; at most the dowel's
+// depth) out of it: by what is missing there, fading out over twice and a half that (at least 10
+// mm) to all sides, and nowhere below the bone. So a face can dip where the shell bridges a dip.
+TriMesh PressedIn(TriMesh shell, std::span<const Dowel> dowels, const TriMesh& bone,
+                  double press_mm);
+
 struct ShellDowels {
   std::vector<Dowel> dowels;       // one a dowel, in order
   std::vector<std::string> notes;  // which were lifted, or end under the shell

@@ -20,10 +20,13 @@ DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
     return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
                               [&] { return FillSkull(data->skull, e.fill, context); });
   });
-  ShellDowels standing = StandOnShell(subject.dowels, *shell, kLeastDepth_mm);
+  const auto* const wrap = std::get_if<WrapFill>(&e.fill);
+  TriMesh pressed = wrap ? PressedIn(*shell, subject.dowels, data->skull, wrap->press_mm) : *shell;
+  ShellDowels standing = StandOnShell(subject.dowels, pressed, kLeastDepth_mm);
   subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
+  std::vector<Vec3> normals = VertexNormals(pressed);
   DepthStage stage{
-      std::move(subject), *shell, VertexNormals(*shell), std::move(standing.dowels), {}};
+      std::move(subject), std::move(pressed), std::move(normals), std::move(standing.dowels), {}};
   stage.depth = step("interpolate depth", [&] {
     return ApplyOutsideRule(e.outside, stage.Input(),
                             InterpolateDepth(e.interp, stage.Input(), context), context);

@@ -17,6 +17,7 @@ struct WrapFill {
   double alpha_mm = 24;
   double edge_mm = 3.5;
   double pull_mm = 4;
+  double press_mm = 3;
 };
 template <class Visitor>
 void Fields(Visitor& visit, WrapFill& o) {
@@ -40,6 +41,14 @@ void Fields(Visitor& visit, WrapFill& o) {
                   .doc = "parts of the shell closer than this to bone are laid onto it, fading out "
                          "at twice this, so that the shell is bone where bone is exposed"},
         o.pull_mm);
+  visit(
+      FieldInfo{.name = "press_mm",
+                .unit = "mm",
+                .min = 0,
+                .max = 20,
+                .doc = "where a dowel would reach less than this out of the shell (the root of "
+                       "the nose), the shell is pressed in around it, to bone at most; 0: nowhere"},
+      o.press_mm);
 }
 
 struct NoFill {

@@ -54,5 +54,36 @@ TEST_F(ShellDowelsTest, NoDowelIsMadeLonger) {
   EXPECT_LE(standing.dowels[0].depth_mm, 0.4 + 1e-9);
 }
 
+TEST_F(ShellDowelsTest, PressedInADowelReachesOutAsFarAsAsked) {
+  const std::vector<Dowel> dowels = {DowelAt(40, 6), DowelAt(50, 8, {-1, 1, 0})};
+  const TriMesh bone = testing::SphereMesh({0, 0, 0}, 40, 120);
+  const TriMesh pressed = PressedIn(shell_, dowels, bone, 3);
+  const ShellDowels standing = StandOnShell(dowels, pressed, 1);
+  EXPECT_NEAR(standing.dowels[0].depth_mm, 3, 0.1);
+  EXPECT_NEAR(standing.dowels[1].depth_mm, 8, 0.1);
+  EXPECT_LT((standing.dowels[0].Tip() - dowels[0].Tip()).norm(), 0.1);
+}
+
+TEST_F(ShellDowelsTest, PressedInItStaysOutsideBoneAndTheRestStaysToTheBit) {
+  const std::vector<Dowel> dowels = {DowelAt(40, 6)};
+  const TriMesh bone = testing::SphereMesh({0, 0, 0}, 47, 120);  // in the way: 7 mm were asked
+  const TriMesh pressed = PressedIn(shell_, dowels, bone, 3);
+  const Vec3 at = 50 * dowels[0].direction;
+  double least = 50;
+  for (std::size_t v = 0; v < shell_.points.size(); ++v) {
+    least = std::min(least, pressed.points[v].norm());
+    if ((shell_.points[v] - at).norm() > 17.5) {
+      ASSERT_EQ(pressed.points[v], shell_.points[v]);
+    }
+  }
+  EXPECT_NEAR(least, 47, 0.05);
+}
+
+TEST_F(ShellDowelsTest, NothingIsPressedInWhereDowelsReachOutOrPressingIsOff) {
+  const TriMesh bone = testing::SphereMesh({0, 0, 0}, 40, 60);
+  EXPECT_EQ(PressedIn(shell_, std::vector<Dowel>{DowelAt(40, 14)}, bone, 3).points, shell_.points);
+  EXPECT_EQ(PressedIn(shell_, std::vector<Dowel>{DowelAt(40, 6)}, bone, 0).points, shell_.points);
+}
+
 }  // namespace
 }  // namespace semblance
