@@ -100,6 +100,7 @@ std::string ToBytes(const ImplicitFace& face) {
   Append(bytes, face.emitters_per_square_depth);
   Append(bytes, face.dropped_components);
   Append(bytes, face.counts);
+  Append(bytes, face.decimation);
   Append(bytes, face.notes.size());
   for (const std::string& note : face.notes) {
     Append(bytes, note.size());
@@ -118,6 +119,7 @@ std::optional<ImplicitFace> ImplicitFaceFrom(std::string_view bytes) {
   reader.Take(face.emitters_per_square_depth);
   reader.Take(face.dropped_components);
   reader.Take(face.counts);
+  reader.Take(face.decimation);
   face.notes.resize(reader.TakeCount(sizeof(std::size_t)));
   for (std::string& note : face.notes) {
     reader.Take(note);

@@ -32,6 +32,8 @@ Json ImplicitJson(const ImplicitFace& face) {
           {"emitters_per_square_depth", face.emitters_per_square_depth},
           {"triangles_dense", face.dense.triangles.size()},
           {"triangles", face.mesh.triangles.size()},
+          {"decimation_error_mm", face.decimation.error_mm},
+          {"decimation_ended_by", EnumNames(face.decimation.stop)[int(face.decimation.stop)]},
           {"dropped_components", face.dropped_components},
           {"crossed_cells", face.counts.active_cells},
           {"corner_evaluations", face.counts.corner_evaluations},

@@ -52,7 +52,7 @@ TriMesh ForView(const TriMesh& mesh) {
     return mesh;
   }
   try {
-    return Decimate(mesh, kTriangles);
+    return Decimate(mesh, {.target_triangles = kTriangles}).mesh;
   } catch (const InputError&) {  // a scan may hold edges that no decimation takes
     return Clustered(mesh, std::sqrt(2.3 * Area(mesh) / kTriangles));
   }

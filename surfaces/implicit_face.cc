@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "surfaces/crossings.h"
-#include "surfaces/decimate.h"
 #include "surfaces/error.h"
 #include "surfaces/parallel.h"
 
@@ -108,6 +107,22 @@ PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_
   throw InputError(
       "implicit face: no closed surface was found around the shell; is it outward, and is the "
       "resolution fine enough for its depths?");
+}
+
+void DecimateFace(const ImplicitFaceOptions& options, ImplicitFace& face) {
+  DecimateOptions decimate{.target_triangles = options.target_triangles};
+  decimate.tolerance_mm = options.tolerance_mm.value_or(decimate.tolerance_mm);
+  DecimateResult decimated = Decimate(face.dense, decimate);
+  face.mesh = std::move(decimated.mesh);
+  face.decimation = decimated.summary;
+  if (face.decimation.stop != DecimateStop::kTarget) {
+    face.notes.push_back(fmt::format(
+        "decimation: {} triangles are left of {} asked for; fewer would {}",
+        face.decimation.triangles, options.target_triangles,
+        face.decimation.stop == DecimateStop::kTolerance
+            ? fmt::format("lie further off than the tolerance, {:.3g} mm", decimate.tolerance_mm)
+            : "ruin the shape"));
+  }
 }
 
 void AppendNotes(const ImplicitFaceOptions& options, std::span<const double> depth_mm,
@@ -212,7 +227,7 @@ ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> dep
   face.counts = polygonized.summary;
   face.dense = KeepOutermost(polygonized.mesh, face.dropped_components);
   context.Report("decimate");
-  face.mesh = Decimate(face.dense, options.target_triangles);
+  DecimateFace(options, face);
   if (options.project) {
     ProjectOnto(surface, face.cell_mm, context, face.mesh);
   }

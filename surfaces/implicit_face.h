@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "surfaces/decimate.h"
 #include "surfaces/implicit_surface.h"
 #include "surfaces/polygonizer.h"
 #include "surfaces/run_context.h"
@@ -19,6 +21,7 @@ struct ImplicitFaceOptions {
   Polygonizer polygonizer = NarrowBand{};
   EdgeSearchOptions edges = {};
   int target_triangles = 14000;
+  std::optional<double> tolerance_mm = {};
   bool project = false;
 };
 template <class Visitor>
@@ -34,11 +37,21 @@ void Fields(Visitor& visit, ImplicitFaceOptions& o) {
                   .doc = "how the surface is found in the grid; the mesh is the same"},
         o.polygonizer);
   visit(FieldInfo{.name = "edges", .doc = "how crossings are found"}, o.edges);
-  visit(FieldInfo{.name = "target_triangles",
-                  .min = 100,
-                  .max = 10000000,
-                  .doc = "of the decimated face; the thesis: 14000"},
-        o.target_triangles);
+  visit(
+      FieldInfo{.name = "target_triangles",
+                .min = 100,
+                .max = 10000000,
+                .doc = "of the decimated face; the thesis: 14000. More are left where fewer would "
+                       "ruin the shape"},
+      o.target_triangles);
+  visit(FieldInfo{.name = "tolerance_mm",
+                  .unit = "mm",
+                  .min = 1e-6,
+                  .max = 100,
+                  .doc = "no collapse that leaves a vertex of the polygons further than this from "
+                         "the decimated face: more than target_triangles may be left; null: no "
+                         "such bound"},
+        o.tolerance_mm);
   visit(FieldInfo{.name = "project",
                   .doc = "lay the decimated face's vertices onto the implicit surface again, which "
                          "decimation leaves by some hundredths of a millimetre"},
@@ -53,6 +66,7 @@ struct ImplicitFace {
   double emitters_per_square_depth = kNaN;  // see ImplicitSurface
   int dropped_components = -1;  // sheets and fragments that are not the outermost surface
   PolygonizeSummary counts;
+  DecimateSummary decimation;      // before `project`
   std::vector<std::string> notes;  // what a reader should know, a line each
 };
 

@@ -7,9 +7,9 @@
 
 #include <algorithm>
 
-#include "surfaces/decimate.h"
 #include "surfaces/mesh_query.h"
 #include "surfaces/parallel.h"
+#include "surfaces/remesh.h"
 
 namespace semblance {
 namespace {

@@ -132,7 +132,7 @@ void MeasureAll() {
   const TriMesh shell = FillSkull(ReadMesh(cranium), WrapFill{.edge_mm = 1}, {});
   std::vector<Head> heads;
   for (const int count : {10000, 40000, 160000}) {
-    Head head{Decimate(shell, count), {}};
+    Head head{Decimate(shell, {.target_triangles = count}).mesh, {}};
     for (const Vec3& p : head.skull.points) {
       head.depth_mm.push_back(7 + 3 * std::sin(0.03 * p.x()) * std::cos(0.04 * p.z()));
     }

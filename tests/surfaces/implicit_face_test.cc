@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "surfaces/decimate.h"
 #include "surfaces/error.h"
 #include "surfaces/mesh_query.h"
 #include "surfaces/skull_fill.h"
@@ -99,6 +98,22 @@ TEST(ImplicitFace, ProjectedVerticesLieOnTheSurface) {
   EXPECT_GT(rms(false), 0.02);
 }
 
+TEST(ImplicitFace, ATolerancePrevailsOverTheTarget) {
+  const TriMesh sphere = SphereMesh({3, 2, 1}, 80, 20);
+  const std::vector<double> depth(sphere.points.size(), 8);
+  const ImplicitFace face = BuildImplicitFace(
+      sphere, depth, {.resolution = 50, .target_triangles = 100, .tolerance_mm = 0.3}, {});
+  ExpectClosedManifold(face.mesh);
+  EXPECT_GT(face.mesh.triangles.size(), 300u);
+  EXPECT_EQ(face.decimation.stop, DecimateStop::kTolerance);
+  const MeshQuery query(face.mesh);
+  for (const Vec3& p : face.dense.points) {
+    EXPECT_LE(query.Closest(p).distance_mm, 0.3);
+  }
+  ASSERT_EQ(face.notes.size(), 1u);
+  EXPECT_NE(face.notes[0].find("the tolerance, 0.3 mm"), std::string::npos) << face.notes[0];
+}
+
 TEST(KeepOutermost, DropsInnerSheetsAndFragments) {
   TriMesh inner = SphereMesh({0, 0, 0}, 5, 8);
   for (Triangle& t : inner.triangles) {
@@ -111,36 +126,6 @@ TEST(KeepOutermost, DropsInnerSheetsAndFragments) {
   EXPECT_EQ(dropped, 2);
   EXPECT_EQ(kept.points, outer.points);
   EXPECT_THROW(KeepOutermost(TriMesh{}, dropped), InputError);
-}
-
-TEST(Decimate, KeepsShapeAndTopology) {
-  const TriMesh sphere = SphereMesh({0, 0, 0}, 50, 60);
-  const TriMesh fewer = Decimate(sphere, 1500);
-  ExpectClosedManifold(fewer);
-  EXPECT_LE(fewer.triangles.size(), 1500u);
-  EXPECT_GT(fewer.triangles.size(), 1400u);
-  EXPECT_NEAR(SignedVolume(fewer) / SignedVolume(sphere), 1, 0.01);
-  EXPECT_EQ(Decimate(fewer, 5000).points, fewer.points);
-}
-
-TEST(Decimate, RefusesWhatIsNoManifold) {
-  TriMesh mesh = Plate(10, 1);
-  mesh.points.emplace_back(5, 5, 5);
-  mesh.triangles.push_back({0, 3, 4});
-  EXPECT_THROW(Decimate(mesh, 4 - 1), InputError);
-  mesh.triangles.push_back({3, 0, 4});
-  mesh.triangles.push_back({1, 0, 4});
-  EXPECT_THROW(Decimate(mesh, 4), InputError);
-}
-
-TEST(Remesh, MakesEdgesOfTheLengthAsked) {
-  const TriMesh even = Remesh(SphereMesh({0, 0, 0}, 50, 20), 4);
-  ExpectClosedManifold(even);
-  double sum = 0;
-  for (const Triangle& t : even.triangles) {
-    sum += (even.points[t[0]] - even.points[t[1]]).norm();
-  }
-  EXPECT_NEAR(sum / static_cast<double>(even.triangles.size()), 4, 0.6);
 }
 
 TEST(SkullFill, BridgesAHoleAndLeavesTheRestOnBone) {
