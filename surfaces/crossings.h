@@ -55,6 +55,10 @@ void ForEachOwnEdge(const SampleGrid& grid, const std::array<int, 3>& cell, int 
 double SearchCrossing(double from, double to, const EdgeSearchOptions& options,
                       const std::function<double(double)>& field, std::int64_t& evaluations);
 
+// Puts the edges in the order of their ids and tells which of them the component of the mesh with
+// the greatest volume may have, wherever on their edges the crossings are.
+std::vector<bool> EdgesOfLargest(const SampleGrid& grid, Crossings& crossings);
+
 // The mesh: points in the order of the edges' ids, triangles in that of the cells.
 PolygonizeResult MeshOf(const SampleGrid& grid, Crossings crossings);
 

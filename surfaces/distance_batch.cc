@@ -9,88 +9,47 @@
 namespace semblance {
 namespace {
 
-// Some lanes, from `first` on, seen from a point: in the plane, over it, and where they emit from.
-template <int count>
+// Some lanes, from `first` on, seen from a point: over the plane, and where they emit from.
+template <class N>
 struct Seen {
-  std::array<double, count> x{}, y{}, z{};
-  std::array<double, count> beside2{};  // squared distance in the plane to the triangle's border
-  std::array<double, count> over{};     // 1 over the triangle, else 0
+  N z{};
+  N beside2{};  // squared distance in the plane to the triangle's border
+  N within{};   // >= 0 over the triangle
 };
 
-template <int count>
-SEMBLANCE_INLINE void See(const DistanceBatch& b, int first, const Vec3& p, Seen<count>& seen) {
-  const double px = p.x(), py = p.y(), pz = p.z();
-  for (int n = 0; n < count; ++n) {
-    const int l = first + n;
-    const double dx = px - b.corner[0][l], dy = py - b.corner[1][l], dz = pz - b.corner[2][l];
-    seen.x[n] = dx * b.along[0][l] + dy * b.along[1][l] + dz * b.along[2][l];
-    seen.y[n] = dx * b.across[0][l] + dy * b.across[1][l] + dz * b.across[2][l];
-    seen.z[n] = dx * b.normal[0][l] + dy * b.normal[1][l] + dz * b.normal[2][l];
-  }
-  for (int n = 0; n < count; ++n) {
-    const int l = first + n;
-    const double x = seen.x[n], y = seen.y[n];
-    const double beyond_ab = x - std::min(std::max(x, 0.0), b.ab.length[l]);
-    const double u = x * b.ac.x[l] + y * b.ac.y[l], left_of_ac = y * b.ac.x[l] - x * b.ac.y[l];
-    const double beyond_ac = u - std::min(std::max(u, 0.0), b.ac.length[l]);
-    const double from_b = x - b.ab.length[l];
-    const double v = from_b * b.bc.x[l] + y * b.bc.y[l],
-                 left_of_bc = y * b.bc.x[l] - from_b * b.bc.y[l];
-    const double beyond_bc = v - std::min(std::max(v, 0.0), b.bc.length[l]);
-    seen.beside2[n] = std::min(beyond_ab * beyond_ab + y * y,
-                               std::min(beyond_ac * beyond_ac + left_of_ac * left_of_ac,
-                                        beyond_bc * beyond_bc + left_of_bc * left_of_bc));
-    seen.over[n] = std::min(y, std::min(-left_of_ac, left_of_bc)) >= 0 ? 1.0 : 0.0;
-  }
+template <class N>
+SEMBLANCE_INLINE Seen<N> See(const DistanceBatch& b, int first, const Vec3& p) {
+  const auto load = [first](const DistanceBatch::Lanes& lanes) { return Load<N>(lanes, first); };
+  const N dx = p.x() - load(b.corner[0]), dy = p.y() - load(b.corner[1]),
+          dz = p.z() - load(b.corner[2]);
+  const N x = dx * load(b.along[0]) + dy * load(b.along[1]) + dz * load(b.along[2]);
+  const N y = dx * load(b.across[0]) + dy * load(b.across[1]) + dz * load(b.across[2]);
+  const N ab = load(b.ab.length), beyond_ab = x - Smaller(Greater(x, N{}), ab);
+  const N u = x * load(b.ac.x) + y * load(b.ac.y), left_of_ac = y * load(b.ac.x) - x * load(b.ac.y);
+  const N beyond_ac = u - Smaller(Greater(u, N{}), load(b.ac.length));
+  const N from_b = x - ab;
+  const N v = from_b * load(b.bc.x) + y * load(b.bc.y),
+          left_of_bc = y * load(b.bc.x) - from_b * load(b.bc.y);
+  const N beyond_bc = v - Smaller(Greater(v, N{}), load(b.bc.length));
+  return {dx * load(b.normal[0]) + dy * load(b.normal[1]) + dz * load(b.normal[2]),
+          Smaller<N>(beyond_ab * beyond_ab + y * y,
+                     Smaller<N>(beyond_ac * beyond_ac + left_of_ac * left_of_ac,
+                                beyond_bc * beyond_bc + left_of_bc * left_of_bc)),
+          Smaller(y, Smaller<N>(-left_of_ac, left_of_bc))};
 }
 
-// square^(-decay / 2).
-template <int count>
-SEMBLANCE_INLINE void InversePowers(const DistanceFall& fall,
-                                    const std::array<double, count>& square,
-                                    std::array<double, count>& value) {
-  if (fall.whole < 0) {
-    for (int n = 0; n < count; ++n) {
-      value[n] = std::pow(square[n], -0.5 * fall.decay);
-    }
-    return;
-  }
-  std::array<double, count> power{};
-  const bool odd = (fall.whole & 1) != 0;
-  for (int n = 0; n < count; ++n) {
-    power[n] = 1 / square[n];
-  }
-  for (int n = 0; n < count; ++n) {
-    value[n] = odd ? std::sqrt(power[n]) : 1;
-  }
-  for (int rest = fall.whole >> 1; rest != 0; rest >>= 1) {
-    const bool taken = (rest & 1) != 0;
-    for (int n = 0; n < count; ++n) {
-      value[n] *= taken ? power[n] : 1;
-      power[n] *= power[n];
-    }
-  }
-}
-
-template <int count>
-SEMBLANCE_INLINE void Emit(const DistanceBatch& b, int first, const Vec3& p,
-                           const DistanceFall& fall, double* emission) {
-  Seen<count> seen;
-  See<count>(b, first, p, seen);
-  std::array<double, count> square{}, value{};
-  for (int n = 0; n < count; ++n) {
-    const double beside2 = seen.over[n] > 0 ? 0 : seen.beside2[n];
-    square[n] = std::max(seen.z[n] * seen.z[n] + beside2, b.floor_mm2[first + n]);
-  }
-  InversePowers<count>(fall, square, value);
-  for (int n = 0; n < count; ++n) {
-    const int l = first + n;
-    const double falling = b.gain[l] * value[n];
-    const double beyond = falling < fall.cut ? 0 : std::min(falling, fall.most);
-    const double solid = seen.over[n] > 0 ? fall.most : 0;
-    const double either = seen.z[n] < 0 ? solid : beyond;
-    emission[n] = seen.z[n] + b.advance_mm[l] > 0 ? either : 0;
-  }
+template <class N>
+SEMBLANCE_INLINE N Emit(const DistanceBatch& b, int first, const Vec3& p, const DistanceFall& fall,
+                        int whole) {
+  const Seen<N> seen = See<N>(b, first, p);
+  const N nothing{}, most = All<N>(fall.most);
+  const N beside2 = seen.within >= 0 ? nothing : seen.beside2;
+  const N square = Greater<N>(seen.z * seen.z + beside2, Load<N>(b.floor_mm2, first));
+  const N falling = Load<N>(b.gain, first) * InversePowerOf(square, fall.decay, whole);
+  const N beyond = falling < fall.cut ? nothing : Smaller(falling, most);
+  const N solid = seen.within >= 0 ? most : nothing;
+  const N either = seen.z < 0 ? solid : beyond;
+  return seen.z + Load<N>(b.advance_mm, first) > 0 ? either : nothing;
 }
 
 }  // namespace
@@ -121,14 +80,28 @@ void DistanceBatch::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c,
 
 SEMBLANCE_WIDE void EmitByDistance(const DistanceBatch& batch, const Vec3& p,
                                    const DistanceFall& fall, DistanceBatch::Lanes& emission) {
-  Emit<DistanceBatch::kLanes>(batch, 0, p, fall, emission.data());
+  for (int first = 0; first < DistanceBatch::kLanes; first += kWidth<Wide>) {
+    Store(Emit<Wide>(batch, first, p, fall, fall.whole), emission, first);
+  }
+}
+
+SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceBatch> batches,
+                                    std::span<const std::int32_t> runs, const Vec3& p,
+                                    const DistanceFall& fall) {
+  constexpr int kUsual = 6;  // the default decay
+  Wide sum{};
+  for (const std::int32_t run : runs) {
+    const DistanceBatch& batch = batches[run / 2];
+    const int first = run % 2 * kWidth<Wide>;
+    sum += fall.whole == kUsual ? Emit<Wide>(batch, first, p, fall, kUsual)
+                                : Emit<Wide>(batch, first, p, fall, fall.whole);
+  }
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
 double EmitByDistance(const DistanceBatch& batch, int lane, const Vec3& p,
                       const DistanceFall& fall) {
-  double emission = 0;
-  Emit<1>(batch, lane, p, fall, &emission);
-  return emission;
+  return Emit<double>(batch, lane, p, fall, fall.whole);
 }
 
 }  // namespace semblance

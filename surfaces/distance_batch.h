@@ -4,6 +4,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <span>
 
 #include "surfaces/geometry.h"
 
@@ -19,7 +21,7 @@ struct DistanceFall {
 
 // Triangles side by side, one a lane, each in the plane of where it emits from: first corner at the
 // origin, second on the x axis, third above it. A lane that was not set emits nothing.
-struct DistanceBatch {
+struct alignas(64) DistanceBatch {
   static constexpr int kLanes = 8;
   using Lanes = std::array<double, kLanes>;
   struct Edge {
@@ -41,6 +43,9 @@ struct DistanceBatch {
 // What each lane emits at p: 0 at heights <= 0 over its triangle's plane.
 void EmitByDistance(const DistanceBatch& batch, const Vec3& p, const DistanceFall& fall,
                     DistanceBatch::Lanes& emission);
+// The sum of that over runs of four lanes; run r is half r % 2 of batch r / 2.
+double SumByDistance(std::span<const DistanceBatch> batches, std::span<const std::int32_t> runs,
+                     const Vec3& p, const DistanceFall& fall);
 double EmitByDistance(const DistanceBatch& batch, int lane, const Vec3& p,
                       const DistanceFall& fall);
 

@@ -29,6 +29,10 @@ class DistanceFalloff {
   DistanceFall Fall() const {
     return {k_, k_ == std::floor(k_) ? static_cast<int>(k_) : -1, cut_, kMostEmission};
   }
+  ReachFall Reach() const {
+    const DistanceFall fall = Fall();
+    return {fall.decay, fall.whole, false, cut_};
+  }
   double At(const EmitterTriangle& t, double squared, double depth_share) const {
     const double emission = t.gain * power_(std::max(squared, t.Floor2(depth_share)));
     return emission < cut_ ? 0 : std::min(emission, kMostEmission);
@@ -48,6 +52,7 @@ class ThesisKernel {
   double Most(double squared, double) const { return falloff_.Power(squared); }
   double Cut() const { return falloff_.Cut(); }
   DistanceFall Fall() const { return falloff_.Fall(); }
+  ReachFall Reach() const { return falloff_.Reach(); }
   double Advance(const EmitterTriangle&) const { return 0; }
   double Floor(const EmitterTriangle& t) const { return std::sqrt(t.Floor2(1)); }
   double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
@@ -70,6 +75,7 @@ class SplitKernel {
   double Most(double squared, double) const { return falloff_.Power(squared); }
   double Cut() const { return falloff_.Cut(); }
   DistanceFall Fall() const { return falloff_.Fall(); }
+  ReachFall Reach() const { return falloff_.Reach(); }
   double Advance(const EmitterTriangle& t) const { return t_ * t.depth_mm; }
   double Floor(const EmitterTriangle& t) const { return std::sqrt(t.Floor2(1 - t_)); }
   double EmittingDepth(const EmitterTriangle& t) const { return (1 - t_) * t.depth_mm; }

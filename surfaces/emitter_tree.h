@@ -36,15 +36,16 @@ struct EmitterNode {
   }
 };
 
-// Each leaf begins at a multiple of the batches' lanes.
+// Each leaf begins at a multiple of four, and what Near visits at one of the batches' lanes.
 class EmitterTree {
  public:
   explicit EmitterTree(std::vector<EmitterTriangle>& emitters) {
     Split(emitters, 0, static_cast<int>(emitters.size()));
   }
 
-  // Calls visit(leaf) for each leaf that is not left out, in a fixed order. A node is left out
-  // where bound(node), the most that it emits, is at most `least`; returns the sum of those bounds.
+  // Calls visit(node) for nodes of a few leaves, or one, that are not left out, in a fixed order. A
+  // node is left out where bound(node), the most that it emits, is at most `least`; returns the sum
+  // of those bounds.
   template <class Bound, class Visit>
   double Near(double least, const Bound& bound, const Visit& visit) const {
     std::array<int, 64> stack;
@@ -56,7 +57,7 @@ class EmitterTree {
       const double most = bound(node);
       if (most <= least) {
         left_out += most;
-      } else if (node.left < 0) {
+      } else if (node.end - node.begin <= kFew) {
         visit(node);
       } else {
         stack[size++] = node.right;
@@ -67,8 +68,8 @@ class EmitterTree {
   }
 
  private:
-  static constexpr int kLeaf = FlatBatch::kLanes;
-  static_assert(kLeaf == DistanceBatch::kLanes);
+  static constexpr int kBatch = FlatBatch::kLanes, kLeaf = 4, kFew = 4 * kBatch;
+  static_assert(kBatch == DistanceBatch::kLanes);
 
   int Split(std::vector<EmitterTriangle>& emitters, int begin, int end) {
     const int self = static_cast<int>(nodes_.size());
@@ -94,7 +95,8 @@ class EmitterTree {
     if (end - begin > kLeaf) {
       int axis = 0;
       centers.sizes().maxCoeff(&axis);
-      const int middle = begin + ((end - begin) / 2 + kLeaf - 1) / kLeaf * kLeaf;  // full leaves
+      const int unit = end - begin > kBatch ? kBatch : kLeaf;  // which the left half fills
+      const int middle = begin + ((end - begin) / 2 + unit - 1) / unit * unit;
       std::nth_element(emitters.begin() + begin, emitters.begin() + middle, emitters.begin() + end,
                        [axis](const EmitterTriangle& a, const EmitterTriangle& b) {
                          return a.centroid[axis] < b.centroid[axis];

@@ -10,130 +10,150 @@
 namespace semblance {
 namespace {
 
-constexpr int kLanes = FlatBatch::kLanes;
 constexpr double kTiny = 1e-300;  // mm^2
-using Lanes = FlatBatch::Lanes;
 
-// Squared longest edge over squared distance up to which 1, 4 and 16 parts do.
-constexpr std::array<double, 3> kMostShare = {0.04, 0.12, 0.45};
-
-// A part's centroid: that of the triangle + ab u + ac v.
-struct Part {
-  double u, v;
+// A point of a triangle, its centroid + ab u + ac v, and its share of the mean.
+struct Sample {
+  double u, v, weight;
 };
 
-// The parts of a triangle cut into 4^level.
-template <int level>
-constexpr auto Parts() {
-  constexpr int rows = 1 << level;
-  std::array<Part, rows * rows> parts{};
-  int count = 0;
-  for (int i = 0; i < rows; ++i) {
-    for (int j = 0; i + j < rows; ++j) {
-      for (int third = 1; third <= 2 && i + j + third <= rows; ++third) {
-        parts[count++] = {(i + third / 3.0) / rows - 1.0 / 3, (j + third / 3.0) / rows - 1.0 / 3};
+// Weights of the corners of three samples that are alike; the third is what is left of 1.
+constexpr void Append(double corner, double weight, Sample*& to) {
+  const double third = 1.0 / 3, other = 1 - 2 * corner;
+  *to++ = {corner - third, corner - third, weight};
+  *to++ = {other - third, corner - third, weight};
+  *to++ = {corner - third, other - third, weight};
+}
+
+// Dunavant 1985: exact to degree 4 and to degree 6.
+constexpr auto kSix = [] {
+  std::array<Sample, 6> samples{};
+  Sample* to = samples.data();
+  Append(0.445948490915965, 0.223381589678011, to);
+  Append(0.091576213509771, 0.109951743655322, to);
+  return samples;
+}();
+constexpr auto kTwelve = [] {
+  std::array<Sample, 12> samples{};
+  Sample* to = samples.data();
+  Append(0.249286745170910, 0.116786275726379, to);
+  Append(0.063089014491502, 0.050844906370207, to);
+  constexpr double third = 1.0 / 3;
+  constexpr std::array<double, 3> corners = {0.310352451033785, 0.053145049844816,
+                                             0.636502499121399};
+  for (int n = 0; n < 3; ++n) {
+    for (int m = 0; m < 3; ++m) {
+      if (n != m) {
+        *to++ = {corners[n] - third, corners[m] - third, 0.082851075618374};
       }
     }
   }
-  return parts;
-}
+  return samples;
+}();
 
-constexpr auto kOne = Parts<0>();
-constexpr auto kFour = Parts<1>();
-constexpr auto kSixteen = Parts<2>();
+// Squared longest edge over squared distance up to which the centroid and the second derivative
+// there, six and twelve samples keep within 1 %, for powers up to 9.
+constexpr std::array<double, 3> kMostShare = {0.04, 0.35, 0.9};
 
-std::span<const Part> PartsOf(int level) {
-  return level == 0   ? std::span<const Part>(kOne)
-         : level == 1 ? std::span<const Part>(kFour)
-                      : std::span<const Part>(kSixteen);
-}
+// Some lanes, from `first` on.
+struct Four {
+  const FlatBatch& batch;
+  int first;
+  Wide dx, dy, dz, r2, inverse2;  // of the point from the centroid
+  Wide height, share;             // the squared longest edge over the squared distance
 
-// Per lane: the vector from the centroid to p, the height, and the squared longest edge over the
-// squared distance.
-struct Seen {
-  std::array<Lanes, 3> from{};
-  Lanes height{}, share{};
+  SEMBLANCE_INLINE Wide Of(const FlatBatch::Lanes& lanes) const { return Load<Wide>(lanes, first); }
 };
 
-SEMBLANCE_INLINE Seen See(const FlatBatch& batch, const Vec3& p) {
-  const double x = p.x(), y = p.y(), z = p.z();
-  Seen seen;
-  for (int l = 0; l < kLanes; ++l) {
-    const double dx = x - batch.at[0][l], dy = y - batch.at[1][l], dz = z - batch.at[2][l];
-    seen.from[0][l] = dx;
-    seen.from[1][l] = dy;
-    seen.from[2][l] = dz;
-    seen.height[l] = dx * batch.normal[0][l] + dy * batch.normal[1][l] + dz * batch.normal[2][l];
-    seen.share[l] = batch.longest_mm2[l] / std::max(dx * dx + dy * dy + dz * dz, kTiny);
-  }
+SEMBLANCE_INLINE Four See(const FlatBatch& b, int first, const Vec3& p) {
+  Four seen{b, first, {}, {}, {}, {}, {}, {}, {}};
+  seen.dx = p.x() - seen.Of(b.at[0]);
+  seen.dy = p.y() - seen.Of(b.at[1]);
+  seen.dz = p.z() - seen.Of(b.at[2]);
+  seen.r2 =
+      Greater<Wide>(seen.dx * seen.dx + seen.dy * seen.dy + seen.dz * seen.dz, All<Wide>(kTiny));
+  seen.height = seen.dx * seen.Of(b.normal[0]) + seen.dy * seen.Of(b.normal[1]) +
+                seen.dz * seen.Of(b.normal[2]);
+  seen.inverse2 = 1 / seen.r2;
+  seen.share = seen.Of(b.longest_mm2) * seen.inverse2;
   return seen;
 }
 
-// value <- value * square^exponent.
-SEMBLANCE_INLINE void Raise(Lanes& value, Lanes& square, int exponent) {
-  for (; exponent != 0; exponent >>= 1) {
-    if ((exponent & 1) != 0) {
-      for (int l = 0; l < kLanes; ++l) {
-        value[l] *= square[l];
+// By the centroid, corrected by half the trace of the integrand's Hessian times the triangle's
+// covariance. The depth over its mean changes with the integrand (tilt) and on its own (bow).
+SEMBLANCE_INLINE Wide MeanFromAfar(const Four& seen, int power) {
+  const FlatBatch& b = seen.batch;
+  const Wide along_ab =
+      seen.dx * seen.Of(b.ab[0]) + seen.dy * seen.Of(b.ab[1]) + seen.dz * seen.Of(b.ab[2]);
+  const Wide along_ac =
+      seen.dx * seen.Of(b.ac[0]) + seen.dy * seen.Of(b.ac[1]) + seen.dz * seen.Of(b.ac[2]);
+  const Wide along_bc = along_ac - along_ab, inverse2 = seen.inverse2;
+  const Wide along2 =
+      (along_ab * along_ab + along_ac * along_ac + along_bc * along_bc) * (1.0 / 36);
+  Wide bend =
+      1 + (0.5 * power) * inverse2 * ((power + 2.0) * along2 * inverse2 - seen.Of(b.spread_mm2));
+  if (b.sloped) {
+    const Wide tilt = power * inverse2 *
+                      (seen.dx * seen.Of(b.tilt_mm[0]) + seen.dy * seen.Of(b.tilt_mm[1]) +
+                       seen.dz * seen.Of(b.tilt_mm[2]));
+    bend += (power - 3.0) * (tilt + 0.5 * (power - 4) * seen.Of(b.bow));
+  }
+  return bend * InversePowerOf(seen.r2, power, power);
+}
+
+SEMBLANCE_INLINE Wide MeanOfSamples(const Four& seen, std::span<const Sample> samples, int power) {
+  const FlatBatch& b = seen.batch;
+  Wide sum{};
+  for (const Sample& s : samples) {
+    const Wide dx = seen.dx - s.u * seen.Of(b.ab[0]) - s.v * seen.Of(b.ac[0]);
+    const Wide dy = seen.dy - s.u * seen.Of(b.ab[1]) - s.v * seen.Of(b.ac[1]);
+    const Wide dz = seen.dz - s.u * seen.Of(b.ab[2]) - s.v * seen.Of(b.ac[2]);
+    const Wide r2 = Greater<Wide>(dx * dx + dy * dy + dz * dz, All<Wide>(kTiny));
+    Wide value = s.weight * InversePowerOf(r2, power, power);
+    if (b.sloped) {
+      Wide depth = 1 + s.u * seen.Of(b.rise_ab) + s.v * seen.Of(b.rise_ac);
+      for (int rest = power - 3; rest > 0; rest >>= 1) {
+        value = (rest & 1) != 0 ? value * depth : value;
+        depth *= depth;
       }
     }
-    for (int l = 0; l < kLanes; ++l) {
-      square[l] *= square[l];
-    }
+    sum += value;
   }
+  return sum;
 }
 
-// Multiplies by the depth over its mean, to the power k: at the part's centroid, and how it changes
-// from there with the integrand (tilt) and on its own (bow).
-SEMBLANCE_INLINE void Weigh(const FlatBatch& batch, const Part& part, double smaller, int k,
-                            const Lanes& tilt, Lanes& value, Lanes& bend) {
-  Lanes share{}, weight{};
-  for (int l = 0; l < kLanes; ++l) {
-    share[l] = 1 + part.u * batch.rise_ab[l] + part.v * batch.rise_ac[l];
-    weight[l] = 1;
-    bend[l] += smaller * k * (tilt[l] / share[l] + 0.5 * (k - 1) * batch.bow[l]);
+// Adds what four lanes emit; returns those that are too near, as bits. fixed: the power, or 0 where
+// only the fall knows it.
+template <int fixed>
+SEMBLANCE_INLINE unsigned AddFour(const FlatBatch& batch, int first, const Vec3& p,
+                                  const FlatFall& fall, Wide& sum) {
+  const int power = fixed > 0 ? fixed : fall.power;
+  const Four seen = See(batch, first, p);
+  const Wide share = seen.height > 0 ? seen.share : Wide{};
+  unsigned near = 0, ways = 0;  // ways: of taking the mean that some lane needs, as bits
+  for (int l = 0; l < kWidth<Wide>; ++l) {
+    const unsigned way = static_cast<unsigned>(share[l] > fall.most_share[0]) +
+                         static_cast<unsigned>(share[l] > fall.most_share[1]) +
+                         static_cast<unsigned>(share[l] > fall.most_share[2]);
+    near |= static_cast<unsigned>(way == 3) << l;
+    ways |= static_cast<unsigned>(share[l] > 0) << way;
   }
-  Raise(weight, share, k);
-  for (int l = 0; l < kLanes; ++l) {
-    value[l] *= weight[l];
+  Wide mean{};
+  if ((ways & 1) != 0) {
+    mean = share <= All<Wide>(fall.most_share[0]) ? MeanFromAfar(seen, power) : mean;
   }
-}
-
-// Adds each triangle's integrand at one part's centroid, corrected by half the trace of its Hessian
-// times the part's covariance, which is `smaller` times the triangle's.
-SEMBLANCE_INLINE void AddPart(const FlatBatch& batch, const Seen& seen, const Part& part,
-                              double smaller, int power, Lanes& sum) {
-  Lanes value{}, square{}, bend{}, tilt{};
-  for (int l = 0; l < kLanes; ++l) {
-    const double dx = seen.from[0][l] - part.u * batch.ab[0][l] - part.v * batch.ac[0][l];
-    const double dy = seen.from[1][l] - part.u * batch.ab[1][l] - part.v * batch.ac[1][l];
-    const double dz = seen.from[2][l] - part.u * batch.ab[2][l] - part.v * batch.ac[2][l];
-    const double along_ab = dx * batch.ab[0][l] + dy * batch.ab[1][l] + dz * batch.ab[2][l];
-    const double along_ac = dx * batch.ac[0][l] + dy * batch.ac[1][l] + dz * batch.ac[2][l];
-    const double along_bc = along_ac - along_ab;
-    const double along2 = (along_ab * along_ab + along_ac * along_ac + along_bc * along_bc) / 36;
-    const double inverse2 = 1 / std::max(dx * dx + dy * dy + dz * dz, kTiny);
-    bend[l] = 1 + smaller * (0.5 * power * inverse2) *
-                      ((power + 2) * along2 * inverse2 - batch.spread_mm2[l]);
-    value[l] = inverse2;
-    square[l] = inverse2;
-    tilt[l] = power * inverse2 *
-              (dx * batch.tilt_mm[0][l] + dy * batch.tilt_mm[1][l] + dz * batch.tilt_mm[2][l]);
+  if ((ways & 2) != 0) {
+    const Wide six = MeanOfSamples(seen, kSix, power);
+    mean = share > All<Wide>(fall.most_share[0]) ? six : mean;
   }
-  if ((power & 1) != 0) {
-    for (int l = 0; l < kLanes; ++l) {
-      value[l] = std::sqrt(value[l]);
-    }
-    Raise(value, square, power >> 1);
-  } else {
-    Raise(value, square, (power >> 1) - 1);
+  if ((ways & 4) != 0) {
+    const Wide twelve = MeanOfSamples(seen, kTwelve, power);
+    mean = share > All<Wide>(fall.most_share[1]) ? twelve : mean;
   }
-  if (batch.sloped) {
-    Weigh(batch, part, smaller, power - 3, tilt, value, bend);
-  }
-  for (int l = 0; l < kLanes; ++l) {
-    sum[l] += value[l] * bend[l];
-  }
+  const Wide emission = seen.Of(batch.gain) * seen.height * mean;
+  const Wide taken = share > All<Wide>(fall.most_share[2]) ? Wide{} : emission;
+  sum += share > 0 ? taken : Wide{};
+  return near;
 }
 
 }  // namespace
@@ -168,33 +188,26 @@ void FlatBatch::SetSlope(int lane, const Vec3& slope) {
   bow[lane] = tilt.dot(slope);
 }
 
-SEMBLANCE_WIDE unsigned EmitFlat(const FlatBatch& batch, const Vec3& p, int power,
-                                 FlatBatch::Lanes& emission) {
-  const Seen seen = See(batch, p);
-  double most = 0;
-  unsigned near = 0;
-  for (int l = 0; l < kLanes; ++l) {
-    const bool emits = seen.height[l] > 0 && batch.gain[l] > 0;
-    most = emits ? std::max(most, seen.share[l]) : most;
-    near |= emits && seen.share[l] > kMostShare.back() ? 1U << l : 0U;
+FlatFall::FlatFall(int of_power) : power(of_power) {
+  const double of_share = std::min(1.0, std::pow(9.0 / power, 1.6));  // by experiment
+  for (std::size_t n = 0; n < most_share.size(); ++n) {
+    most_share[n] = of_share * kMostShare[n];
   }
-  emission.fill(0);
-  if (most == 0) {
-    return 0;  // p is behind them all
+}
+
+SEMBLANCE_WIDE void AddFlat(std::span<const FlatBatch> batches, std::span<const std::int32_t> runs,
+                            const Vec3& p, const FlatFall& fall, FlatWalk& walk) {
+  constexpr int kUsual = 9;  // of the default decay
+  Wide sum = Load<Wide>(walk.sum, 0);
+  walk.near = 0;
+  while (walk.next < runs.size() && walk.near == 0) {
+    const std::int32_t run = runs[walk.next++];
+    const FlatBatch& batch = batches[run / 2];
+    const int first = run % 2 * kWidth<Wide>;
+    walk.near = fall.power == kUsual ? AddFour<kUsual>(batch, first, p, fall, sum)
+                                     : AddFour<0>(batch, first, p, fall, sum);
   }
-  const std::span<const Part> parts = PartsOf(most <= kMostShare[0]   ? 0
-                                              : most <= kMostShare[1] ? 1
-                                                                      : 2);
-  const double smaller = 1.0 / static_cast<double>(parts.size());
-  Lanes sum{};
-  for (const Part& part : parts) {
-    AddPart(batch, seen, part, smaller, power, sum);
-  }
-  for (int l = 0; l < kLanes; ++l) {
-    const bool taken = seen.height[l] > 0 && (near >> l & 1U) == 0;
-    emission[l] = taken ? batch.gain[l] * seen.height[l] * (sum[l] * smaller) : 0;
-  }
-  return near;
+  Store(sum, walk.sum, 0);
 }
 
 }  // namespace semblance

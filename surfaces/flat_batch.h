@@ -4,6 +4,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <span>
 
 #include "surfaces/geometry.h"
 
@@ -11,7 +13,7 @@ namespace semblance {
 
 // Triangles side by side, one a lane, so that the compiler can take several in one instruction. A
 // lane that was not set emits nothing.
-struct FlatBatch {
+struct alignas(64) FlatBatch {
   static constexpr int kLanes = 8;
   using Lanes = std::array<double, kLanes>;
 
@@ -36,11 +38,29 @@ struct FlatBatch {
   void SetSlope(int lane, const Vec3& slope);
 };
 
-// gain * height * the mean of |p - q|^-power, where sloped weighted by (depth over its mean)^(power
-// - 3), over each triangle, 0 at height <= 0; power >= 1. The
-// mean is that of 1, 4 or 16 equal parts, as p is near, each taken at its centroid with the
-// integrand's second derivative: within 1 %, and far nearer than that as a rule. Returns the lanes
-// that are too near for 16, as bits; their emission is 0. The same bits whatever the processor.
-unsigned EmitFlat(const FlatBatch& batch, const Vec3& p, int power, FlatBatch::Lanes& emission);
+// How the integrand falls: 1 / distance^power.
+struct FlatFall {
+  explicit FlatFall(int of_power);  // >= 1
+
+  int power;
+  // Squared longest edge over squared distance up to which each way of taking the mean does.
+  std::array<double, 3> most_share{};
+};
+
+// Where a walk along runs of four lanes has come to.
+struct FlatWalk {
+  std::size_t next = 0;  // of the runs
+  std::array<double, 4> sum{};
+  unsigned near = 0;  // lanes of the last run that are to be added otherwise, as bits
+};
+
+// Adds, lane by lane, gain * height * the mean of |p - q|^-power, where sloped weighted by (depth
+// over its mean)^(power - 3), over the triangles of runs of four lanes; nothing at height <= 0. Run
+// r is half r % 2 of batch r / 2. The mean is taken at the centroid with the integrand's second
+// derivative, or at 6 or 12 points, as p is near: within 1 %, and far nearer than that as a rule.
+// Stops after a run with lanes that are too near for that; nothing is added for them. The same bits
+// whatever the processor.
+void AddFlat(std::span<const FlatBatch> batches, std::span<const std::int32_t> runs, const Vec3& p,
+             const FlatFall& fall, FlatWalk& walk);
 
 }  // namespace semblance

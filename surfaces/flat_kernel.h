@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "surfaces/emitter.h"
+#include "surfaces/emitter_reach.h"
 #include "surfaces/emitter_triangle.h"
 #include "surfaces/flat_batch.h"
 #include "surfaces/polygon_integral.h"
@@ -23,7 +26,8 @@ class FlatKernel {
       : k_(o.decay),
         closed_(o.decay == std::floor(o.decay) ? static_cast<int>(o.decay) + 1 : -1),
         flat_share_(closed_ > 0 ? std::pow(kLostDigits, 2.0 / closed_) : 0),
-        power_(o.decay + 3) {}
+        power_(o.decay + 3),
+        fall_(std::max(closed_, 1) + 2) {}
   double Gain(const EmitterTriangle& t) const {
     return (k_ + 1) / (2 * std::numbers::pi) * std::pow(t.depth_mm, k_) * t.area_mm2;
   }
@@ -42,21 +46,25 @@ class FlatKernel {
     return t.gain * height * ClosedForm(t, p, std::max(height, lowest)) / t.area_mm2;
   }
   bool Batches() const { return closed_ > 0; }
-  // All emissions of a batch whose first triangle is given.
-  double Batch(const FlatBatch& batch, const EmitterTriangle* first, const Vec3& p) const {
-    FlatBatch::Lanes emission;
-    const unsigned near = EmitFlat(batch, p, closed_ + 2, emission);
-    double sum = 0;
-    for (int l = 0; l < FlatBatch::kLanes; ++l) {
-      sum += (near >> l & 1U) != 0 ? Near(first[l], p) : emission[l];
+  // All emissions of runs of four of the emitters, of which the batches are.
+  double Sum(std::span<const FlatBatch> batches, std::span<const std::int32_t> runs,
+             std::span<const EmitterTriangle> emitters, const Vec3& p) const {
+    FlatWalk walk;
+    while (walk.next < runs.size()) {
+      AddFlat(batches, runs, p, fall_, walk);
+      for (unsigned near = walk.near; near != 0; near &= near - 1) {
+        const int lane = std::countr_zero(near);
+        walk.sum[lane] += Near(emitters[4 * runs[walk.next - 1] + lane], p);
+      }
     }
-    return sum;
+    return (walk.sum[0] + walk.sum[1]) + (walk.sum[2] + walk.sum[3]);
   }
   double Decay() const { return k_; }
   double Most(double squared, double height) const {
     return std::min(height, std::sqrt(squared)) * power_(squared);
   }
   double Cut() const { return 0; }
+  ReachFall Reach() const { return {k_ + 3, closed_ > 0 ? closed_ + 2 : -1, true, 0}; }
   double Advance(const EmitterTriangle&) const { return 0; }
   double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
   // What the triangle would emit if all of it were this far and had this share of its depth, at
@@ -148,6 +156,7 @@ class FlatKernel {
   int closed_;         // n of IntegrateInversePower; -1 where there is no closed form
   double flat_share_;  // height^2 over distance^2 that the closed form needs
   InversePower power_;
+  FlatFall fall_;  // where there is a closed form
 };
 
 }  // namespace semblance

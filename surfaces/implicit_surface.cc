@@ -6,9 +6,10 @@
 #include <numeric>
 
 #include "surfaces/emitter_bounds.h"
+#include "surfaces/emitter_reach.h"
 #include "surfaces/emitter_tree.h"
 #include "surfaces/make_emitters.h"
-#include "surfaces/near_leaves.h"
+#include "surfaces/near_emitters.h"
 
 namespace semblance {
 namespace {
@@ -17,6 +18,10 @@ EmitterDepth DepthOver(const Emitter& emitter) {
   const auto* flat = std::get_if<FlatEmitter>(&emitter);
   return flat ? flat->depth : EmitterDepth::kMean;
 }
+
+constexpr int kRun = 4, kRunsOfBatch = FlatBatch::kLanes / kRun;
+static_assert(FlatBatch::kLanes == DistanceBatch::kLanes &&
+              FlatBatch::kLanes == EmitterReach::kLanes);
 
 // Integrals of a flat emitter by two numerical ways, each within 1 %.
 constexpr double kFlatShare = 0.025;
@@ -50,9 +55,47 @@ std::vector<DistanceBatch> MakeDistanceBatches(const EmitterKernel& kernel,
   return batches;
 }
 
+std::vector<EmitterReach> MakeReaches(const std::vector<EmitterTriangle>& emitters) {
+  constexpr std::size_t kLanes = EmitterReach::kLanes;
+  std::vector<EmitterReach> batches((emitters.size() + kLanes - 1) / kLanes);
+  for (std::size_t e = 0; e < emitters.size(); ++e) {
+    batches[e / kLanes].Set(static_cast<int>(e % kLanes), emitters[e]);
+  }
+  return batches;
+}
+
+// Takes what together is at most `budget` from the least of some numbers >= 0: sets each of these
+// to 0 and returns their sum. By powers of 2, so that nothing is sorted.
+double TakeLeast(double budget, std::vector<double>& most) {
+  if (!(budget > 0)) {
+    return 0;
+  }
+  constexpr int kPowers = 40;
+  const auto exponent = [](double value) {
+    return static_cast<int>(std::bit_cast<std::uint64_t>(value) >> 52);
+  };
+  const int first = exponent(budget);
+  std::array<double, kPowers> sums{};  // [n]: of numbers of about budget / 2^n
+  for (const double value : most) {
+    const int power = first - exponent(value);
+    if (power >= 0) {
+      sums[std::min(power, kPowers - 1)] += value;
+    }
+  }
+  int last = kPowers;
+  double taken = 0;
+  while (last > 0 && taken + sums[last - 1] <= budget) {
+    taken += sums[--last];
+  }
+  for (double& value : most) {
+    value = first - exponent(value) >= last ? 0 : value;
+  }
+  return taken;
+}
+
 // Of the cubes that share a list of what is near.
 double CubeSize(const std::vector<EmitterTriangle>& emitters) {
-  constexpr double kOfDepth = 0.4;
+  constexpr double kOfDepth = 0.7;
   const double sum =
       std::accumulate(emitters.begin(), emitters.end(), 0.0,
                       [](double s, const EmitterTriangle& t) { return s + t.depth_mm; });
@@ -66,7 +109,8 @@ struct ImplicitSurface::Impl {
       : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
         emitters(MakeEmitters(skull, depth_mm, DepthOver(options.emitter), kernel)),
         tree(emitters),
-        near_leaves(CubeSize(emitters)),
+        reaches(MakeReaches(emitters)),
+        near_table(CubeSize(emitters)),
         tail_error(options.tail_error),
         decay(std::visit([](const auto& k) { return k.Decay(); }, kernel)) {
     std::visit([this](const auto& k) { MakeBatches(k); }, kernel);
@@ -82,10 +126,11 @@ struct ImplicitSurface::Impl {
     distance_batches = MakeDistanceBatches(k, emitters);
   }
 
-  // The leaves that points of a box may have to sum: all others together emit at most half of the
-  // tail error. The first guess at what a node may emit and be left out nearly always does.
+  // The emitters that points of a box have to sum: all others together emit at most the tail error.
+  // Nodes that are not left out are looked at emitter by emitter.
+  // The first guess at what a node may emit and be left out nearly always does.
   template <class EmitterKernel>
-  NearLeaves NearBox(const EmitterKernel& k, const Box3& box) const {
+  NearEmitters NearBox(const EmitterKernel& k, const Box3& box, double& left_out) const {
     constexpr double kFirstShare = 1.0 / 128;
     const double cut = (1 - kRounding) * k.Cut();
     const Vec3 center = box.center(), half = 0.5 * box.sizes();
@@ -101,39 +146,49 @@ struct ImplicitSurface::Impl {
       const double share = k.Most(distance2, height);
       return node.greatest_gain * share < cut ? 0 : node.gain * share;
     };
-    NearLeaves near;
+    std::vector<std::int32_t> leaves;
     double least = kFirstShare * tail_error;
     do {
-      near.leaves.clear();
-      near.left_out = tree.Near(least, bound, [&](const EmitterNode& leaf) {
-        near.leaves.push_back({leaf.box.min(), leaf.box.max(), leaf.MostHeight(center, half),
-                               leaf.gain, leaf.greatest_gain, leaf.begin, leaf.end});
+      leaves.clear();
+      left_out = tree.Near(least, bound, [&](const EmitterNode& node) {
+        for (int e = node.begin; e < node.end; e += EmitterReach::kLanes) {
+          leaves.push_back(e / EmitterReach::kLanes);
+        }
       });
       least /= 8;
-    } while (near.left_out > 0.5 * tail_error);
+    } while (left_out > 0.5 * tail_error);
+    return NearOf(leaves, k.Reach(), center, half, left_out);
+  }
+
+  // Of some leaves' emitters, without such that together emit at most what is left of the tail
+  // error.
+  NearEmitters NearOf(const std::vector<std::int32_t>& leaves, const ReachFall& fall,
+                      const Vec3& center, const Vec3& half, double& left_out) const {
+    constexpr int kLanes = EmitterReach::kLanes;
+    const int count = static_cast<int>(emitters.size());
+    std::vector<double> most(kLanes * leaves.size(), 0);
+    EmitterReach::Lanes lanes;
+    for (std::size_t n = 0; n < leaves.size(); ++n) {
+      MostInBox(reaches[leaves[n]], center, half, fall, lanes);
+      std::copy_n(lanes.begin(), std::min(kLanes, count - kLanes * leaves[n]),
+                  most.begin() + kLanes * n);
+    }
+    left_out += TakeLeast(tail_error - left_out, most);
+    NearEmitters near;
+    for (std::size_t n = 0; n < most.size(); n += kRun) {
+      if (most[n] > 0 || most[n + 1] > 0 || most[n + 2] > 0 || most[n + 3] > 0) {
+        near.push_back(kRunsOfBatch * leaves[n / kLanes] + (n % kLanes != 0 ? 1 : 0));
+      }
+    }
     return near;
   }
 
-  // Visits the leaves near p such that all others together emit at most the tail error.
-  template <class EmitterKernel, class Visit>
-  void Near(const EmitterKernel& k, const Vec3& p, const Visit& visit) const {
-    constexpr double kLeast = 1.0 / 32;  // of the tail error
-    const double cut = (1 - kRounding) * k.Cut(), least = kLeast * tail_error;
-    const NearLeavesTable::List near =
-        near_leaves.Find(p, [&](const Box3& box) { return NearBox(k, box); });
-    double rest = tail_error - near->left_out;
-    for (const NearLeaf& leaf : near->leaves) {
-      const double distance2 = leaf.SquaredDistance(p);
-      if (distance2 > 0) {
-        const double share = k.Most(distance2, leaf.height);
-        const double most = leaf.greatest_gain * share < cut ? 0 : leaf.gain * share;
-        if (most <= least && most <= rest) {
-          rest -= most;
-          continue;
-        }
-      }
-      visit(leaf);
-    }
+  template <class EmitterKernel>
+  NearEmittersTable::List Near(const EmitterKernel& k, const Vec3& p) const {
+    return near_table.Find(p, [&](const Box3& box) {
+      double left_out = 0;
+      return NearBox(k, box, left_out);
+    });
   }
 
   double Emission(const FlatKernel& k, int e, const Vec3& p) const {
@@ -146,37 +201,39 @@ struct ImplicitSurface::Impl {
     return EmitByDistance(distance_batches[e / kLanes], e % kLanes, p, k.Fall());
   }
 
-  double LeafSum(const FlatKernel& k, int begin, int end, const Vec3& p) const {
-    if (k.Batches()) {
-      return k.Batch(flat_batches[begin / FlatBatch::kLanes], &emitters[begin], p);
+  double SumOf(const FlatKernel& k, const NearEmitters& list, const Vec3& p) const {
+    if (!k.Batches()) {
+      return SumOneByOne(k, list, p);
     }
+    return k.Sum(flat_batches, list, emitters, p);
+  }
+  double SumOneByOne(const FlatKernel& k, const NearEmitters& list, const Vec3& p) const {
     double sum = 0;
-    for (int e = begin; e < end; ++e) {
-      sum += Emission(k, e, p);
+    for (const std::int32_t run : list) {
+      const int end = std::min<int>(kRun * (run + 1), static_cast<int>(emitters.size()));
+      for (int e = kRun * run; e < end; ++e) {
+        sum += Emission(k, e, p);
+      }
     }
     return sum;
   }
   template <class EmitterKernel>
-  double LeafSum(const EmitterKernel& k, int begin, int, const Vec3& p) const {
-    DistanceBatch::Lanes emission;
-    EmitByDistance(distance_batches[begin / DistanceBatch::kLanes], p, k.Fall(), emission);
-    return std::accumulate(emission.begin(), emission.end(), 0.0);
+  double SumOf(const EmitterKernel& k, const NearEmitters& list, const Vec3& p) const {
+    return SumByDistance(distance_batches, list, p, k.Fall());
   }
 
   template <class EmitterKernel>
   double Sum(const EmitterKernel& k, const Vec3& p, std::int64_t& evaluations) const {
-    double sum = 0;
-    Near(k, p, [&](const NearLeaf& leaf) {
-      evaluations += leaf.end - leaf.begin;
-      sum += LeafSum(k, leaf.begin, leaf.end, p);
-    });
-    return sum;
+    const NearEmittersTable::List list = Near(k, p);
+    evaluations += static_cast<std::int64_t>(kRun * list->size());
+    return SumOf(k, *list, p);
   }
 
   Kernel kernel;
   std::vector<EmitterTriangle> emitters;
   EmitterTree tree;
-  NearLeavesTable near_leaves;
+  std::vector<EmitterReach> reaches;  // of the tree's leaves
+  NearEmittersTable near_table;
   std::vector<FlatBatch> flat_batches;  // of the tree's leaves; or
   std::vector<DistanceBatch> distance_batches;
   double tail_error, decay;
@@ -241,17 +298,19 @@ void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> em
 }
 
 EmissionBounds ImplicitSurface::BoundsIn(const Box3& box) const {
-  const NearLeaves near =
-      std::visit([&](const auto& kernel) { return impl_->NearBox(kernel, box); }, impl_->kernel);
+  double left_out = 0;
+  const NearEmitters near = std::visit(
+      [&](const auto& kernel) { return impl_->NearBox(kernel, box, left_out); }, impl_->kernel);
   std::vector<std::int32_t> emitters;
-  for (const NearLeaf& leaf : near.leaves) {
-    for (int e = leaf.begin; e < leaf.end; ++e) {
+  for (const std::int32_t run : near) {
+    const auto end = std::min<std::int32_t>(kRun * (run + 1), static_cast<int>(EmitterCount()));
+    for (std::int32_t e = kRun * run; e < end; ++e) {
       emitters.push_back(e);
     }
   }
   std::vector<EmissionBounds> bounds(emitters.size());
   BoundsIn(box, emitters, bounds);
-  EmissionBounds sum{-impl_->tail_error, near.left_out};
+  EmissionBounds sum{-impl_->tail_error, left_out};
   for (const EmissionBounds& one : bounds) {
     sum.least += one.least;
     sum.most += one.most;
@@ -274,13 +333,9 @@ Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
 double ImplicitSurface::TailError() const { return impl_->tail_error; }
 
 std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
-  std::int64_t count = 0;
-  std::visit(
-      [&](const auto& kernel) {
-        impl_->Near(kernel, p, [&count](const NearLeaf& leaf) { count += leaf.end - leaf.begin; });
-      },
-      impl_->kernel);
-  return count;
+  const std::size_t runs =
+      std::visit([&](const auto& kernel) { return impl_->Near(kernel, p)->size(); }, impl_->kernel);
+  return std::min(EmitterCount(), static_cast<std::int64_t>(kRun * runs));
 }
 
 std::int64_t ImplicitSurface::EmitterCount() const {

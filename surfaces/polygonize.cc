@@ -146,6 +146,9 @@ void SearchCrossings(const ScalarField& field, const SampleGrid& grid,
   std::vector<std::int64_t> counts(crossings.edges.size(), 0);
   ParallelFor(crossings.edges.size(), context.threads, 64, [&](std::size_t n) {
     CrossedEdge& edge = crossings.edges[n];
+    if (std::isfinite(edge.at)) {
+      return;
+    }
     const std::array<int, 3> low = grid.At(edge.id / 3);
     std::array<int, 3> high = low;
     ++high[edge.id % 3];
@@ -198,6 +201,20 @@ PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid
                                 const EdgeSearchOptions& options, const RunContext& context) {
   CheckGrid(grid);
   Crossings crossings = Continuation(field, grid, context).Run(seed_cells);
+  SearchCrossings(field, grid, options, context, crossings);
+  return MeshOf(grid, std::move(crossings));
+}
+
+PolygonizeResult PolygonizeLargestFrom(const ScalarField& field, const SampleGrid& grid,
+                                       std::span<const std::int64_t> seed_cells,
+                                       const EdgeSearchOptions& options,
+                                       const RunContext& context) {
+  CheckGrid(grid);
+  Crossings crossings = Continuation(field, grid, context).Run(seed_cells);
+  const std::vector<bool> may_be_largest = EdgesOfLargest(grid, crossings);
+  for (std::size_t n = 0; n < crossings.edges.size(); ++n) {
+    crossings.edges[n].at = may_be_largest[n] ? kNaN : 0.5;
+  }
   SearchCrossings(field, grid, options, context, crossings);
   return MeshOf(grid, std::move(crossings));
 }

@@ -92,6 +92,12 @@ PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid
                                 std::span<const std::int64_t> seed_cells,
                                 const EdgeSearchOptions& options, const RunContext& context);
 
+// The same; crossings are searched only where the component with the greatest volume may have them,
+// those of other components (inner sheets, fragments) stay in the middle of their edges.
+PolygonizeResult PolygonizeLargestFrom(const ScalarField& field, const SampleGrid& grid,
+                                       std::span<const std::int64_t> seed_cells,
+                                       const EdgeSearchOptions& options, const RunContext& context);
+
 // Marching cubes over samples that are there already, one a corner in the grid's order; crossings
 // by linear interpolation.
 PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleGrid& grid,

@@ -91,11 +91,10 @@ struct Polygonize {
 
   PolygonizeResult operator()(const NarrowBand& band) const {
     return Counted(surface, [&](const ScalarField& field) {
-      return PolygonizeFrom(field, grid,
-                            band.components == FollowedComponents::kAll
-                                ? UnprovenCells(surface, grid, context)
-                                : std::vector<std::int64_t>(seed_cells.begin(), seed_cells.end()),
-                            options, context);
+      return band.components == FollowedComponents::kAll
+                 ? PolygonizeFrom(field, grid, UnprovenCells(surface, grid, context), options,
+                                  context)
+                 : PolygonizeLargestFrom(field, grid, seed_cells, options, context);
     });
   }
   PolygonizeResult operator()(const BruteForce&) const {

@@ -29,9 +29,11 @@ template <class Visitor>
 void Fields(Visitor& visit, NarrowBand& o) {
   visit(
       FieldInfo{.name = "components",
-                .doc = "outermost: of the surface only what is connected to its outermost points; "
-                       "all: no component of it in the grid is missed, at many times the cost, so "
-                       "that sheets and fragments that are dropped are counted"},
+                .doc =
+                    "outermost: of the surface only what is connected to its outermost points, and "
+                    "exactly only the component with the greatest volume; "
+                    "all: no component of it in the grid is missed, at many times the cost, so "
+                    "that sheets and fragments that are dropped are counted"},
       o.components);
 }
 

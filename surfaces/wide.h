@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the batches of emitters are compiled. For flat_batch.cc and distance_batch.cc alone.
+// Four numbers in one register, and how the batches of emitters are compiled. For the batches
+// alone: their files have compiler options of their own.
 #pragma once
+
+#include <array>
+#include <cmath>
+#include <cstring>
 
 // Wider instructions where the processor has them. They round alike: nothing is contracted. Under a
 // sanitizer the choice at load time would run before the sanitizer does.
@@ -13,3 +18,77 @@
 
 // Inlined, so that each clone has it in its own instructions.
 #define SEMBLANCE_INLINE [[gnu::always_inline]] inline
+
+namespace semblance {
+
+using Wide = double __attribute__((vector_size(32)));
+
+// What follows is for N = Wide or double, and gives the same bits for both.
+template <class N>
+inline constexpr int kWidth = sizeof(N) / sizeof(double);
+
+template <class N, std::size_t count>
+SEMBLANCE_INLINE N Load(const std::array<double, count>& from, int first) {
+  N n;
+  std::memcpy(&n, from.data() + first, sizeof(n));
+  return n;
+}
+template <class N, std::size_t count>
+SEMBLANCE_INLINE void Store(const N& n, std::array<double, count>& to, int first) {
+  std::memcpy(to.data() + first, &n, sizeof(n));
+}
+
+template <class N>
+SEMBLANCE_INLINE N Greater(const N& a, const N& b) {
+  return a > b ? a : b;
+}
+template <class N>
+SEMBLANCE_INLINE N Smaller(const N& a, const N& b) {
+  return a < b ? a : b;
+}
+template <class N>
+SEMBLANCE_INLINE N All(double value) {
+  return N{} + value;
+}
+template <class N>
+SEMBLANCE_INLINE N Magnitude(const N& a) {
+  return Greater(a, -a);
+}
+
+template <class N>
+SEMBLANCE_INLINE N SquareRoot(const N& a) {
+  double root[kWidth<N>];
+  std::memcpy(root, &a, sizeof(a));
+  for (double& r : root) {
+    r = std::sqrt(r);
+  }
+  N n;
+  std::memcpy(&n, root, sizeof(n));
+  return n;
+}
+
+// square^(-power / 2); whole: the power if it is whole, else -1.
+template <class N>
+SEMBLANCE_INLINE N InversePowerOf(const N& square, double power, int whole) {
+  if (whole < 0) {
+    double result[kWidth<N>];
+    std::memcpy(result, &square, sizeof(square));
+    for (double& r : result) {
+      r = std::pow(r, -0.5 * power);
+    }
+    N n;
+    std::memcpy(&n, result, sizeof(n));
+    return n;
+  }
+  N factor = 1 / square;
+  N result = (whole & 1) != 0 ? SquareRoot(factor) : All<N>(1);
+  for (int rest = whole >> 1; rest != 0; rest >>= 1) {
+    if ((rest & 1) != 0) {
+      result *= factor;
+    }
+    factor *= factor;
+  }
+  return result;
+}
+
+}  // namespace semblance

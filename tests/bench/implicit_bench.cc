@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 
 #include <chrono>
+#include <numeric>
 
 #include "surfaces/flat_batch.h"
 #include "surfaces/implicit_face.h"
@@ -286,14 +287,15 @@ void Kernel() {
       batches[b].Set(l, at, at + Vec3(1, 0, 0), at + Vec3(0, 1, 0), Vec3::UnitZ(), 1);
     }
   }
+  std::array<std::int32_t, 64> runs;
+  std::iota(runs.begin(), runs.end(), 0);
+  const FlatFall fall(9);
   constexpr int kRounds = 40000;
   const double bare = CpuSeconds([&] {
-    FlatBatch::Lanes emission;
     for (int n = 0; n < kRounds; ++n) {
-      for (const FlatBatch& batch : batches) {
-        EmitFlat(batch, Vec3(0.001 * n, 4, 40), 9, emission);
-        sum += emission[0];
-      }
+      FlatWalk walk;
+      AddFlat(batches, runs, Vec3(0.001 * n, 4, 40), fall, walk);
+      sum += walk.sum[0];
     }
   });
   const double ours = double(emitters) / seconds,

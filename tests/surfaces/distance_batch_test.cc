@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "surfaces/point_triangle.h"
 #include "tests/testing/shapes.h"
 
@@ -62,6 +64,12 @@ TEST_P(DistanceBatchTest, EachLaneIsTheEmitterAloneAndTheThesis) {
     const Vec3 p = random.InBox(-9, 9);
     DistanceBatch::Lanes emission;
     EmitByDistance(batch, p, GetParam(), emission);
+    const std::vector<DistanceBatch> one = {batch};
+    const std::vector<std::int32_t> first = {0}, both = {0, 1};
+    const double first_sum = (emission[0] + emission[1]) + (emission[2] + emission[3]);
+    EXPECT_EQ(SumByDistance(one, first, p, GetParam()), first_sum);
+    const double sum = std::accumulate(emission.begin(), emission.end(), 0.0);
+    EXPECT_NEAR(SumByDistance(one, both, p, GetParam()), sum, 1e-14 * sum);
     for (int lane = 0; lane < DistanceBatch::kLanes; ++lane) {
       EXPECT_EQ(emission[lane], EmitByDistance(batch, lane, p, GetParam()));
       const double expected = lane < set ? Emission(triangles[lane], p, GetParam()) : 0;

@@ -5,6 +5,7 @@
 
 #include "surfaces/crossings.h"
 #include "surfaces/error.h"
+#include "surfaces/implicit_face.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
@@ -119,6 +120,32 @@ TEST(Polygonize, ContinuationGivesTheMeshOfAllCells) {
   EXPECT_EQ(from.mesh.points, all.mesh.points);
   EXPECT_EQ(from.mesh.triangles, all.mesh.triangles);
   EXPECT_LT(from.summary.corner_evaluations, all.summary.corner_evaluations / 3);
+}
+
+// A ball with a hollow that comes within half a cell of its surface on one side, so that cells are
+// crossed by both.
+double HollowBall(const Vec3& p) {
+  return std::min(Ball(p), (p - Vec3(-0.6, 0.1, 0.2)).norm() - 7.6);
+}
+
+TEST(Polygonize, TheLargestComponentIsThatOfAllCellsAndOthersCostNoSearch) {
+  const SampleGrid grid = CubeGrid(12, 25);
+  std::vector<std::int64_t> seeds;
+  for (int i = 0; i + 1 < 25; ++i) {
+    if ((HollowBall(grid.Corner(i, 12, 12)) > 0) != (HollowBall(grid.Corner(i + 1, 12, 12)) > 0)) {
+      seeds.push_back(grid.Index(i, 12, 12));
+    }
+  }
+  const EdgeSearchOptions bisection{.method = EdgeSearch::kBisection, .tolerance = 1e-3};
+  const PolygonizeResult all = PolygonizeFrom(HollowBall, grid, seeds, bisection, {}),
+                         largest = PolygonizeLargestFrom(HollowBall, grid, seeds, bisection, {});
+  int dropped = 0;
+  const TriMesh ball = KeepOutermost(all.mesh, dropped);
+  EXPECT_EQ(dropped, 1);
+  EXPECT_EQ(largest.mesh.triangles, all.mesh.triangles);
+  EXPECT_EQ(KeepOutermost(largest.mesh, dropped).points, ball.points);
+  EXPECT_EQ(largest.summary.edge_evaluations,
+            all.summary.edge_evaluations / all.mesh.points.size() * ball.points.size());
 }
 
 TEST(Polygonize, ThreadsChangeNoBit) {

@@ -1,48 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which leaves of the tree of emitters a point has to sum, found once for all points of a small
-// cube of space. For implicit_surface.cc alone.
+// Which emitters a point has to sum, found once for all points of a small cube of space. For
+// implicit_surface.cc alone.
 #pragma once
 
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <vector>
 
-#include "surfaces/emitter_tree.h"
+#include "surfaces/emitter_triangle.h"
 
 namespace semblance {
 
-// A leaf as any point of a cube sees it.
-struct NearLeaf {
-  Vec3 low, high;  // of its box
-  double height;   // not less than that of any point of the cube over any of its planes
-  double gain, greatest_gain;
-  int begin, end;  // emitters
-
-  double SquaredDistance(const Vec3& p) const {
-    double sum = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double d = std::max(0.0, std::max(low[axis] - p[axis], p[axis] - high[axis]));
-      sum += d * d;
-    }
-    return sum;
-  }
-};
-
-struct NearLeaves {
-  std::vector<NearLeaf> leaves;  // in the tree's order
-  double left_out = 0;           // the most that all others together emit in the cube
-};
+// Runs of four emitters, each by the number of its first over four, in the tree's order.
+using NearEmitters = std::vector<std::int32_t>;
 
 // Lists of cubes of a lattice. They are kept in a table of fixed size, where a new one may put out
 // an old one: what is found for a point depends on the point alone.
-class NearLeavesTable {
+class NearEmittersTable {
  public:
-  using List = std::shared_ptr<const NearLeaves>;
+  using List = std::shared_ptr<const NearEmitters>;
 
   // cube_mm > 0.
-  explicit NearLeavesTable(double cube_mm) : cube_mm_(cube_mm), slots_(kSlots) {}
+  explicit NearEmittersTable(double cube_mm) : cube_mm_(cube_mm), slots_(kSlots) {}
 
   // make(box) gives the list of a cube. Safe from several threads at once.
   template <class Make>
@@ -55,7 +37,7 @@ class NearLeavesTable {
         return slot.list;
       }
     }
-    List list = std::make_shared<const NearLeaves>(make(BoxOf(cube)));
+    List list = std::make_shared<const NearEmitters>(make(BoxOf(cube)));
     const std::lock_guard lock(slot.mutex);
     slot.cube = cube;
     slot.list = list;
@@ -63,7 +45,8 @@ class NearLeavesTable {
   }
 
  private:
-  static constexpr std::size_t kSlots = 4096;  // a power of 2
+  static constexpr std::size_t kSlots = 16384;  // a power of 2
+
   struct Slot {
     std::mutex mutex;
     Vec3 cube = Vec3::Zero();
