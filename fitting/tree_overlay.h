@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where an adaptive fit takes finer vertices.
+#pragma once
+
+#include <vector>
+
+#include "fitting/fit_schedule.h"
+#include "fitting/offset_tree.h"
+
+namespace semblance {
+
+// Where a leaf of the measured tree has a point farther off than the plan's tolerance: the vertices
+// over its coarsest ancestor (or itself) that is not wholly overlaid yet. Sorted; none are edited.
+std::vector<VertexId> FinerVertices(const OffsetTree& tree, const AdaptivePlan& plan);
+
+}  // namespace semblance

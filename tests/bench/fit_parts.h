@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The parts of fit_bench; each prints its lines.
+#pragma once
+
+#include "tests/bench/fit_measure.h"
+
+namespace semblance::bench {
+
+// The adaptive fit of the head-like surface (scattered_data.h) at 1e4, 1e5 and 1e6 points, against
+// figures of peers that are not in Debian.
+void RunHead();
+
+// The same at 1e5 points against FITPACK and ITK, where their Debian packages are there.
+void RunPeers();
+
+// Points whose (u,v) are off, until the surface is where it should be.
+void RunRelaxation();
+
+// 1e6 points on one level against a direct solve of the same normal equations.
+void RunLinear();
+
+// `count` points of the head with noise 1e-4; finer vertices where a point is farther off than the
+// tolerance. Errors on a grid of 400 x 400 that was not fitted.
+Measured MeasureHead(int count, double tolerance);
+
+}  // namespace semblance::bench
