@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <random>
-#include <set>
 
 #include "fitting/sparse_factor.h"
 #include "fitting/term_cost.h"
@@ -18,36 +18,39 @@ namespace {
 
 constexpr Eigen::Index kExact = 256;  // unknowns
 constexpr int kProbes = 32;
+constexpr int kRoughProbes = 8;  // to find the decade
 
-Eigen::MatrixXd ProbesFor(Eigen::Index unknowns) {
+Eigen::MatrixXd ProbesFor(Eigen::Index unknowns, int count) {
   if (unknowns <= kExact) {
     return Eigen::MatrixXd::Identity(unknowns, unknowns);
   }
   constexpr std::uint64_t kRandomSeed = 1;
   std::mt19937_64 bits(kRandomSeed);
-  Eigen::MatrixXd probes(unknowns, kProbes);
+  Eigen::MatrixXd probes(unknowns, count);
   for (Eigen::Index k = 0; k < probes.size(); ++k) {
-    probes(k / kProbes, k % kProbes) = (bits() >> 63) != 0 ? 1 : -1;
+    probes(k / count, k % count) = (bits() >> 63) != 0 ? 1 : -1;
   }
   return probes;
 }
 
 class WeightSearch {
  public:
-  explicit WeightSearch(const WeightProblem& problem)
-      : problem_(problem), probes_(ProbesFor(problem.points.rows())) {
+  // probes: of the trace, if it is not taken exactly.
+  WeightSearch(const WeightProblem& problem, int probes)
+      : problem_(problem), probes_(ProbesFor(problem.points.rows(), probes)) {
     influenced_ = problem.points.selfadjointView<Eigen::Lower>() * probes_;
   }
 
   // NaN scores are never the best.
-  void Try(double weight) {
-    if (!tried_.insert(weight).second) {
-      return;
+  WeightChoice Try(double weight) {
+    const auto [at, added] = tried_.try_emplace(weight);
+    if (added) {
+      at->second = At(weight);
     }
-    const WeightChoice choice = At(weight);
-    if (choice.score < best_.score || std::isnan(best_.score)) {
-      best_ = choice;
+    if (at->second.score < best_.score || std::isnan(best_.score)) {
+      best_ = at->second;
     }
+    return at->second;
   }
   const WeightChoice& best() const { return best_; }
 
@@ -69,7 +72,7 @@ class WeightSearch {
         problem_.misfit - 2 * step.cwiseProduct(problem_.points_right).sum() +
         step.cwiseProduct(problem_.points.selfadjointView<Eigen::Lower>() * step).sum();
     const double trace = probes_.cwiseProduct(factor.Solve(influenced_)).sum() /
-                         (probes_.rows() <= kExact ? 1.0 : kProbes);
+                         (probes_.rows() <= kExact ? 1.0 : static_cast<double>(probes_.cols()));
     const double left = 1 - trace / problem_.count;
     const double score = left > 1e-6 ? std::max(misfit, 0.0) / (left * left) : kNaN;
     return {.weight = weight, .score = score, .degrees_of_freedom = trace};
@@ -77,7 +80,7 @@ class WeightSearch {
 
   const WeightProblem& problem_;
   Eigen::MatrixXd probes_, influenced_;
-  std::set<double> tried_;
+  std::map<double, WeightChoice> tried_;
   WeightChoice best_;
 };
 
@@ -124,19 +127,53 @@ void CheckSeparable(std::span<const Term> terms) {
 
 }  // namespace
 
-WeightChoice ChooseWeight(const WeightProblem& problem, double near) {
-  WeightSearch search(problem);
+namespace {
+
+// The best decade, from smooth to rough until the score has plainly turned: where points are many,
+// rougher is dearer to try and no longer in question.
+double BestDecade(const WeightProblem& problem, double near) {
+  constexpr double kTurned = 1.05;
+  WeightSearch search(problem, kRoughProbes);
   const double even =
       problem.points.diagonal().sum() / std::max(problem.smooth.diagonal().sum(), 1e-300);
-  for (int decade = near > 0 ? -1 : -10; decade <= (near > 0 ? 1 : 4); ++decade) {
-    search.Try((near > 0 ? near : even) * std::pow(10.0, decade));
+  int turned = 0;
+  for (int decade = near > 0 ? 1 : 4; decade >= (near > 0 ? -1 : -10) && turned < 2; --decade) {
+    const double score = search.Try((near > 0 ? near : even) * std::pow(10.0, decade)).score;
+    turned = score > kTurned * search.best().score ? turned + 1 : 0;
   }
+  return search.best().weight;
+}
+
+// The smoothest that the points do not tell from the best: the score is flat, and in a gap, of
+// which no point knows, the rougher ones swing.
+WeightChoice SmoothestAsGood(WeightSearch& search) {
+  constexpr double kAsGood = 1.01;
+  WeightChoice choice = search.best();
+  for (int k = 0; k < 12; ++k) {
+    const WeightChoice next = search.Try(choice.weight * std::sqrt(std::sqrt(10.0)));
+    if (!(next.score <= kAsGood * search.best().score)) {
+      break;
+    }
+    choice = next;
+  }
+  return choice;
+}
+
+}  // namespace
+
+WeightChoice ChooseWeight(const WeightProblem& problem, double near) {
+  const double decade = BestDecade(problem, near);
+  if (std::isnan(decade)) {
+    return {};
+  }
+  WeightSearch search(problem, kProbes);
+  search.Try(decade);
   for (const double factor : {std::sqrt(10.0), std::sqrt(std::sqrt(10.0))}) {
     const double middle = search.best().weight;
     search.Try(middle * factor);
     search.Try(middle / factor);
   }
-  return search.best();
+  return SmoothestAsGood(search);
 }
 
 int AutoTerm(std::span<const Term> terms) {

@@ -14,7 +14,7 @@
 #include "fitting/normal_equations.h"
 #include "fitting/normal_noise.h"
 #include "fitting/reweighting.h"
-#include "fitting/sparse_factor.h"
+#include "fitting/surface_space.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
 
@@ -166,10 +166,6 @@ SparseMatrix NormalOf(const LevelView& view, std::span<const Term> terms,
   return matrix.Lower();
 }
 
-SparseFactor FactorOf(const SparseMatrix& lower) {
-  return {lower, 1e-11 * std::max(lower.diagonal().maxCoeff(), 1e-300)};
-}
-
 // A'W times the points' errors along one coordinate.
 Eigen::MatrixXd Pull(const LevelView& view, const std::vector<double>& weights,
                      const PointErrors& errors, int coordinate) {
@@ -186,7 +182,7 @@ Eigen::MatrixXd Pull(const LevelView& view, const std::vector<double>& weights,
 
 // trace(M^-1 A'WA), a point at a time.
 double Determined(const LevelView& view, const std::vector<double>& weights,
-                  const SparseFactor& factor) {
+                  const SpaceFactor& factor) {
   const auto count = static_cast<Eigen::Index>(weights.size());
   const auto vertices = static_cast<Eigen::Index>(view.start.vertices.size());
   double trace = 0;
@@ -214,7 +210,7 @@ struct ErrorSpread::Model {
   std::vector<double> weights;                 // of the points, in the cost
   SparseMatrix others;                         // P, lower
   SparseMatrix normal;                         // M, lower
-  SparseFactor factor;                         // of M
+  SpaceFactor factor;                          // of M
   std::array<Eigen::MatrixXd, 3> points = {};  // M^-1 A'W root of each coordinate, transposed
   Eigen::MatrixXd undone = {};                 // vertices x 3, mm
   double determined = kNaN;
@@ -229,7 +225,7 @@ struct ErrorSpread::Model {
         weights(CostWeights(view, terms, view.start)),
         others(OthersOf(view, terms)),
         normal(NormalOf(view, terms, weights)),
-        factor(FactorOf(normal)) {}
+        factor(normal, SpaceOf(fitted, fitted_level)) {}
 
   void Solve(const PointErrors& errors) {
     for (int c = 0; c < 3; ++c) {

@@ -6,13 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 #include <variant>
 
 #include "fitting/auto_weight.h"
 #include "fitting/level_view.h"
 #include "fitting/normal_equations.h"
 #include "fitting/normal_noise.h"
-#include "fitting/sparse_factor.h"
+#include "fitting/surface_space.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
 
@@ -104,29 +105,26 @@ void AddModel(const LevelView& view, std::span<const double> sd_mm, std::span<co
   AddPrior(view, terms, PriorScale(view, sd_mm, terms), sink);
 }
 
-// Keeps what nothing holds from being zero.
-SparseFactor FactorOf(const SparseMatrix& lower) {
-  const double largest = std::max(lower.diagonal().maxCoeff(), 1e-12);
-  return {lower, 1e-11 * largest};
-}
-
-void RequireFactor(const SparseFactor& factor) {
+void RequireFactor(const SpaceFactor& factor) {
   if (!factor.usable()) {
     throw InputError("posterior: the normal matrix has no factor; add a prior or smoothness term");
   }
 }
 
-}  // namespace
-
-std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double> sd_mm,
-                                   std::span<const Term> given, std::span<const Vec2> uv) {
-  Check(view, sd_mm, given);
-  double chosen = kNaN;
-  const std::vector<Term> terms = WithChosenWeight(view, given, chosen);
+SparseMatrix NormalOf(const LevelView& view, std::span<const double> sd_mm,
+                      std::span<const Term> terms) {
   NormalMatrix normal(view.grid);
   AddModel(view, sd_mm, terms, normal);
-  const SparseMatrix lower = normal.Lower();
-  const SparseFactor factor = FactorOf(lower);
+  return normal.Lower();
+}
+
+std::vector<double> SigmaWithin(const LevelView& view, std::span<const double> sd_mm,
+                                std::span<const Term> given, std::span<const Vec2> uv,
+                                SparseMatrix space) {
+  Check(view, sd_mm, given);
+  double chosen = kNaN;
+  const SparseMatrix lower = NormalOf(view, sd_mm, WithChosenWeight(view, given, chosen));
+  const SpaceFactor factor(lower, std::move(space));
   RequireFactor(factor);
   constexpr std::size_t kAtOnce = 64;  // right-hand sides, to bound the memory
   std::vector<double> sigma;
@@ -141,28 +139,19 @@ std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double
     }
     const Eigen::VectorXd variances = stencils.cwiseProduct(factor.Solve(stencils)).colwise().sum();
     for (const double variance : variances) {
-      sigma.push_back(std::sqrt(variance));
+      sigma.push_back(std::sqrt(std::max(variance, 0.0)));
     }
   }
   return sigma;
 }
 
-std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineSurface& rest,
-                                   const FitTarget& target, std::span<const double> sd_mm,
-                                   int level, std::span<const Term> terms,
-                                   std::span<const Vec2> uv) {
-  return PosteriorSigma(ViewOfLevel(surface, rest, target, level), sd_mm, terms, uv);
-}
-
-std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const double> sd_mm,
-                                         std::span<const Term> given, int count,
-                                         std::uint64_t random_seed) {
+std::vector<ControlNet> SamplesWithin(const LevelView& view, std::span<const double> sd_mm,
+                                      std::span<const Term> given, int count,
+                                      std::uint64_t random_seed, SparseMatrix space) {
   Check(view, sd_mm, given);
   double chosen = kNaN;
   const std::vector<Term> terms = WithChosenWeight(view, given, chosen);
-  NormalMatrix matrix(view.grid);
-  AddModel(view, sd_mm, terms, matrix);
-  const SparseFactor factor = FactorOf(matrix.Lower());
+  const SpaceFactor factor(NormalOf(view, sd_mm, terms), std::move(space));
   RequireFactor(factor);
   NormalNumbers normal(random_seed);
   std::vector<ControlNet> samples;
@@ -178,6 +167,27 @@ std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const 
   return samples;
 }
 
+}  // namespace
+
+std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double> sd_mm,
+                                   std::span<const Term> terms, std::span<const Vec2> uv) {
+  return SigmaWithin(view, sd_mm, terms, uv, {});
+}
+
+std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineSurface& rest,
+                                   const FitTarget& target, std::span<const double> sd_mm,
+                                   int level, std::span<const Term> terms,
+                                   std::span<const Vec2> uv) {
+  return SigmaWithin(ViewOfLevel(surface, rest, target, level), sd_mm, terms, uv,
+                     SpaceOf(surface, level));
+}
+
+std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const double> sd_mm,
+                                         std::span<const Term> terms, int count,
+                                         std::uint64_t random_seed) {
+  return SamplesWithin(view, sd_mm, terms, count, random_seed, {});
+}
+
 std::vector<HSplineSurface> PosteriorSamples(const HSplineSurface& surface,
                                              const HSplineSurface& rest, const FitTarget& target,
                                              std::span<const double> sd_mm, int level,
@@ -185,7 +195,8 @@ std::vector<HSplineSurface> PosteriorSamples(const HSplineSurface& surface,
                                              std::uint64_t random_seed) {
   std::vector<HSplineSurface> samples;
   const LevelView view = ViewOfLevel(surface, rest, target, level);
-  for (const ControlNet& net : PosteriorSamples(view, sd_mm, terms, count, random_seed)) {
+  for (const ControlNet& net :
+       SamplesWithin(view, sd_mm, terms, count, random_seed, SpaceOf(surface, level))) {
     samples.push_back(surface);
     samples.back().SetNet(level, net);
   }

@@ -25,7 +25,9 @@ std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double
                                    std::span<const Term> terms, std::span<const Vec2> uv);
 
 // The same for one level of a surface that was fitted to `target` (fit.h), whose finer detail is
-// taken as known: give the finest level of the schedule. rest: the placed template.
+// taken as known: give the finest level of the schedule. Where only some of the level's vertices
+// are edited (adaptive fits), the surface is taken to move as those and the coarser ones can, no
+// more (surface_space.h). rest: the placed template.
 std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineSurface& rest,
                                    const FitTarget& target, std::span<const double> sd_mm,
                                    int level, std::span<const Term> terms,

@@ -2,7 +2,9 @@
 #include "fitting/tree_overlay.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <tuple>
 
 namespace semblance {
 namespace {
@@ -34,10 +36,47 @@ std::vector<VertexId> MissingOver(const OffsetTree& tree, const PatchId& patch, 
   return missing;
 }
 
+// How many points the patches of a tree hold.
+class PatchCounts {
+ public:
+  explicit PatchCounts(const OffsetTree& tree) : shape_(tree.shape()) {
+    for (const TreeNode& node : tree.nodes()) {
+      counts_.emplace(KeyOf(node.patch), node.range.size());
+    }
+  }
+
+  // Of the eight patches around one, those that have plainly fewer points than it: a gap, or its
+  // edge. A quarter is seldom by chance where there are min_points.
+  std::vector<PatchId> EmptierAround(const PatchId& patch) const {
+    const std::size_t own = counts_.at(KeyOf(patch));
+    std::vector<PatchId> emptier;
+    for (int k = 0; k < 9; ++k) {
+      PatchId other{patch.level, patch.i + k % 3 - 1, patch.j + k / 3 - 1};
+      if (shape_.closure == Closure::kPeriodicU) {
+        const int around = shape_.PatchesU(patch.level);
+        other.i = (other.i + around) % around;
+      }
+      const auto found = counts_.find(KeyOf(other));
+      if (found != counts_.end() && 4 * found->second < own) {
+        emptier.push_back(other);
+      }
+    }
+    return emptier;
+  }
+
+ private:
+  using Key = std::tuple<int, int, int>;
+  static Key KeyOf(const PatchId& p) { return {p.level, p.i, p.j}; }
+
+  HSplineShape shape_;
+  std::map<Key, std::size_t> counts_;
+};
+
 }  // namespace
 
 std::vector<VertexId> FinerVertices(const OffsetTree& tree, const AdaptivePlan& plan) {
   const double most = plan.tolerance_mm * plan.tolerance_mm;
+  const PatchCounts counts(tree);
   std::set<VertexId> finer;
   for (const TreeNode& leaf : tree.nodes()) {
     if (leaf.children >= 0 || !(leaf.sums.largest > most) ||
@@ -48,10 +87,15 @@ std::vector<VertexId> FinerVertices(const OffsetTree& tree, const AdaptivePlan& 
       const int shift = leaf.patch.level - level;
       const PatchId patch{level, leaf.patch.i >> shift, leaf.patch.j >> shift};
       const std::vector<VertexId> missing = MissingOver(tree, patch, plan.margin);
-      finer.insert(missing.begin(), missing.end());
-      if (!missing.empty()) {
-        break;
+      if (missing.empty()) {
+        continue;
       }
+      finer.insert(missing.begin(), missing.end());
+      for (const PatchId& gap : counts.EmptierAround(patch)) {
+        const std::vector<VertexId> into = MissingOver(tree, gap, plan.margin);
+        finer.insert(into.begin(), into.end());
+      }
+      break;
     }
   }
   return {finer.begin(), finer.end()};

@@ -10,7 +10,9 @@
 namespace semblance {
 
 // Where a leaf of the measured tree has a point farther off than the plan's tolerance: the vertices
-// over its coarsest ancestor (or itself) that is not wholly overlaid yet. Sorted; none are edited.
+// over its coarsest ancestor (or itself) that is not wholly overlaid yet; and over the patches
+// beside that one which hold plainly fewer points, for where detail ends at the edge of a gap,
+// coarse vertices take its place and swing. Sorted; none are edited.
 std::vector<VertexId> FinerVertices(const OffsetTree& tree, const AdaptivePlan& plan);
 
 }  // namespace semblance

@@ -8,10 +8,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "fitting/fit.h"
 #include "fitting/normal_equations.h"
 #include "fitting/term_cost.h"
 #include "surfaces/error.h"
 #include "tests/testing/level_views.h"
+#include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -199,6 +201,65 @@ TEST(Posterior, WrongInputIsNamed) {
   EXPECT_THAT(message(), ::testing::HasSubstr("point 3 is 0 mm"));
   problem.sd_mm.pop_back();
   EXPECT_THAT(message(), ::testing::HasSubstr("24 standard deviations for 25 points"));
+}
+
+// Of places where the clean surface is known, and directions: the share whose error is within the
+// interval that should hold 90 % of them. The points' deviation is taken from the residuals.
+template <class Clean>
+double Coverage(const Clean& clean, int count, double noise, const HSplineShape& shape,
+                const SchedulePlan& plan) {
+  const FitTarget target = testing::Scattered(clean, count, noise, 206);
+  const HSplineSurface start = testing::PlainStart(shape);
+  const std::vector<Term> terms = {PointTerm{}};
+  const FitResult fit = Fit(start, target, {},
+                            {.schedule = {{shape.max_level, 1}},
+                             .terms = terms,
+                             .plan = plan,
+                             .solver = LevelSolver::kFastest},
+                            {});
+  const LevelSummary& last = fit.levels.back();
+  const double sd = fit.point_rms_mm / std::sqrt(3 * (1 - last.rank / static_cast<double>(count)));
+  Random random(3);
+  std::vector<Vec2> uv;
+  for (int k = 0; k < 1000; ++k) {
+    uv.emplace_back(random.Uniform(0, 1), random.Uniform(0, 1));
+  }
+  const std::vector<double> sigma = PosteriorSigma(
+      fit.surface, start, target, std::vector<double>(count, sd), last.level, terms, uv);
+  int within = 0;
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    const Vec3 error = fit.surface.Point(uv[k]) - clean(uv[k]);
+    within += static_cast<int>((error.array().abs() <= 1.645 * sigma[k]).count());
+  }
+  return within / 3000.0;
+}
+
+struct Scan {
+  int count;
+  double noise;
+  int level;
+  AdaptivePlan adaptive;
+};
+
+template <class Clean>
+void ExpectCalibrated(const Clean& clean, const Scan& scan, Closure closure) {
+  const auto coverage = [&](const SchedulePlan& plan, int finest) {
+    return Coverage(clean, scan.count, scan.noise,
+                    {.patches_u = 8, .patches_v = 8, .max_level = finest, .closure = closure},
+                    plan);
+  };
+  for (const double share :
+       {coverage(ListedPlan{}, scan.level), coverage(scan.adaptive, scan.adaptive.finest)}) {
+    EXPECT_GT(share, 0.85);
+    EXPECT_LT(share, 0.95);
+  }
+}
+
+TEST(Posterior, NineInTenPlacesAreWithinTheirIntervalWhateverThePlan) {
+  ExpectCalibrated(testing::FrankePoint, {10000, 1e-3, 2, {.tolerance_mm = 4e-3, .finest = 3}},
+                   Closure::kOpen);
+  ExpectCalibrated(testing::HeadPoint, {10000, 1e-4, 3, {.tolerance_mm = 4e-4, .finest = 4}},
+                   Closure::kPeriodicU);
 }
 
 }  // namespace
