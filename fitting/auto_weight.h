@@ -32,10 +32,11 @@ struct WeightChoice {
 };
 
 // The lambda that makes misfit(lambda) / (1 - trace / count)^2 least (Craven & Wahba 1979): by
-// decades, from smooth to rough until the score has turned, then between them. The trace is exact
-// for up to 256 unknowns; else that of Hutchinson's estimator with 32 fixed probes, good to a few
-// parts in a thousand (8 while it goes by decades). near: a weight to search
-// around (a decade up and down); 0: everywhere.
+// decades, from smooth to rough until the score has turned, then between them; and of those within
+// 1 % of the least score the largest, which bridges gaps best. The trace is exact for up to 256
+// unknowns; else that of Hutchinson's estimator with 32 fixed probes, good to a few parts in a
+// thousand (8 while it goes by decades). near: a weight to search around (a decade up and down); 0:
+// everywhere.
 WeightChoice ChooseWeight(const WeightProblem& problem, double near = 0);
 
 // The terms with numbers for `auto`, for the solve of `view`. At most one may be `auto`, and then

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The fit against its peers: many points on one level, the adaptive fit of a head-like surface, and
-// relaxation.
+// The fit against its peers: many points on one level, the adaptive fit of a head-like surface,
+// points that were held out, and relaxation.
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "tests/bench/fit_parts.h"
 
 // One BLAS thread for every case; OpenBLAS looks at the variable only when it is loaded.
-// fit_bench [head] [peers] [relax] [linear]: parts; none: all of them.
+// fit_bench [head] [peers] [heldout] [relax] [linear]: parts; none: all of them.
 int main(int argc, char** argv) {
   if (std::getenv("OPENBLAS_NUM_THREADS") == nullptr) {
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
@@ -25,6 +25,9 @@ int main(int argc, char** argv) {
   }
   if (wanted("peers")) {
     semblance::bench::RunPeers();
+  }
+  if (wanted("heldout")) {
+    semblance::bench::RunHeldOut();
   }
   if (wanted("relax")) {
     semblance::bench::RunRelaxation();

@@ -13,6 +13,10 @@ void RunHead();
 // The same at 1e5 points against FITPACK and ITK, where their Debian packages are there.
 void RunPeers();
 
+// Points held out of a terrain and of a deep-drawn part with gaps, with `weight: auto`, against MBA
+// and FITPACK at their best.
+void RunHeldOut();
+
 // Points whose (u,v) are off, until the surface is where it should be.
 void RunRelaxation();
 
