@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kAtBase_mm = 1e-6;  // so near, a dowel stands alone
 constexpr double kReach = 4;         // times the furthest dowel's distance
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Of each dowel, all dowels with their distances: the nearest hundred in order, then the rest.
 class Neighbourhoods {
@@ -47,7 +46,7 @@ struct Range {
 };
 
 Range RangeOf(const std::vector<DepthSample>& samples, const Vec3& p) {
-  double least2 = kInfinity, most2 = 0;
+  double least2 = std::numeric_limits<double>::infinity(), most2 = 0;
   Range range;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const double distance2 = (samples[k].base - p).squaredNorm();
