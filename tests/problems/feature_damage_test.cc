@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ namespace semblance {
 namespace {
 
 double StrainOfFeatures(const std::string& rule) {
-  const std::string config = std::string(SEMBLANCE_SOURCE_DIR) + "/configs/phantom.yaml";
+  const auto config = std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "configs/phantom.yaml";
   const std::vector<std::string> overrides = {"subject.rings=40", "implicit.resolution=48",
                                               "uncertainty.sigma=false",
                                               fmt::format("fit.features={}", rule)};
