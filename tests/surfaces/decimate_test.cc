@@ -13,18 +13,10 @@
 namespace semblance {
 namespace {
 
+using testing::Joined;
 using testing::Plate;
 using testing::Random;
 using testing::SphereMesh;
-
-TriMesh Joined(TriMesh a, const TriMesh& b) {
-  const auto offset = static_cast<std::int32_t>(a.points.size());
-  a.points.insert(a.points.end(), b.points.begin(), b.points.end());
-  for (const Triangle& t : b.triangles) {
-    a.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-  }
-  return a;
-}
 
 TriMesh Torus(int around, int across) {
   TriMesh mesh;

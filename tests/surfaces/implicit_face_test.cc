@@ -11,6 +11,7 @@
 namespace semblance {
 namespace {
 
+using testing::Joined;
 using testing::Plate;
 using testing::SphereMesh;
 
@@ -20,15 +21,6 @@ void ExpectClosedManifold(const TriMesh& mesh) {
   EXPECT_EQ(edges.non_manifold, 0);
   EXPECT_EQ(edges.inconsistent, 0);
   EXPECT_GT(SignedVolume(mesh), 0);
-}
-
-TriMesh Joined(TriMesh a, const TriMesh& b) {
-  const auto offset = static_cast<std::int32_t>(a.points.size());
-  a.points.insert(a.points.end(), b.points.begin(), b.points.end());
-  for (const Triangle& t : b.triangles) {
-    a.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-  }
-  return a;
 }
 
 TEST(ImplicitFace, OverASphereItIsASphereClosedAndManifold) {

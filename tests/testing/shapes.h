@@ -58,6 +58,16 @@ inline TriMesh SphereMesh(const Vec3& center, double radius, int rings) {
   return mesh;
 }
 
+// Two meshes as one, in parts.
+inline TriMesh Joined(TriMesh a, const TriMesh& b) {
+  const auto offset = static_cast<std::int32_t>(a.points.size());
+  a.points.insert(a.points.end(), b.points.begin(), b.points.end());
+  for (const Triangle& t : b.triangles) {
+    a.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  }
+  return a;
+}
+
 // Uniform numbers from a fixed seed; the same on every machine.
 class Random {
  public:
