@@ -3,6 +3,7 @@
 // implicit_surface.cc alone.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -24,42 +25,52 @@ class NearEmittersTable {
   using List = std::shared_ptr<const NearEmitters>;
 
   // cube_mm > 0.
-  explicit NearEmittersTable(double cube_mm) : cube_mm_(cube_mm), slots_(kSlots) {}
+  explicit NearEmittersTable(double cube_mm) : cube_mm_(cube_mm), sets_(kSets) {}
 
   // make(box) gives the list of a cube. Safe from several threads at once.
   template <class Make>
   List Find(const Vec3& p, const Make& make) const {
     const Vec3 cube = (p / cube_mm_).array().floor();
-    Slot& slot = slots_[SlotOf(cube)];
+    Set& set = sets_[SetOf(cube)];
     {
-      const std::lock_guard lock(slot.mutex);
-      if (slot.list && slot.cube == cube) {
-        return slot.list;
+      const std::lock_guard lock(set.mutex);
+      for (const Slot& slot : set.slots) {
+        if (slot.list && slot.cube == cube) {
+          return slot.list;
+        }
       }
     }
     List list = std::make_shared<const NearEmitters>(make(BoxOf(cube)));
-    const std::lock_guard lock(slot.mutex);
-    slot.cube = cube;
-    slot.list = list;
+    const std::lock_guard lock(set.mutex);
+    set.slots[set.next] = {cube, list};
+    set.next = (set.next + 1) % set.slots.size();
     return list;
   }
 
  private:
-  static constexpr std::size_t kSlots = 16384;  // a power of 2
+  static constexpr std::size_t kSets = 8192;
 
   struct Slot {
-    std::mutex mutex;
     Vec3 cube = Vec3::Zero();
     List list;
   };
+  // Cubes that share a place in the table: with four of them, cubes of one surface, some tens of
+  // thousands at most, seldom put each other out.
+  struct Set {
+    std::mutex mutex;
+    std::array<Slot, 4> slots;
+    std::size_t next = 0;  // that is filled
+  };
 
-  static std::size_t SlotOf(const Vec3& cube) {
+  static std::size_t SetOf(const Vec3& cube) {
     std::uint64_t hash = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      hash = (hash ^ std::bit_cast<std::uint64_t>(cube[axis])) * 0x9E3779B97F4A7C15ULL;
-      hash ^= hash >> 32;
+      hash += std::bit_cast<std::uint64_t>(cube[axis]);
+      hash = (hash ^ (hash >> 30)) * 0xBF58476D1CE4E5B9ULL;  // splitmix64
+      hash = (hash ^ (hash >> 27)) * 0x94D049BB133111EBULL;
+      hash ^= hash >> 31;
     }
-    return hash % kSlots;
+    return hash % kSets;
   }
   Box3 BoxOf(const Vec3& cube) const {
     const Vec3 low = cube_mm_ * cube;
@@ -68,7 +79,7 @@ class NearEmittersTable {
   }
 
   double cube_mm_;
-  mutable std::vector<Slot> slots_;
+  mutable std::vector<Set> sets_;
 };
 
 }  // namespace semblance
