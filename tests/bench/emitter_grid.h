@@ -36,8 +36,8 @@ class EmitterGrid {
   std::array<int, 3> CellOf(const Vec3& p) const {
     std::array<int, 3> cell;
     for (int axis = 0; axis < 3; ++axis) {
-      cell[axis] = std::clamp(static_cast<int>((p[axis] - low_[axis]) / cell_mm_), 0,
-                              counts_[axis] - 1);
+      cell[axis] =
+          std::clamp(static_cast<int>((p[axis] - low_[axis]) / cell_mm_), 0, counts_[axis] - 1);
     }
     return cell;
   }
