@@ -24,7 +24,8 @@ namespace {
 constexpr Eigen::Index kAtOnce = 64;  // right-hand sides, to bound the memory
 
 template <class T>
-constexpr bool kIsPoints = std::is_same_v<T, PointTerm> || std::is_same_v<T, TangentPointTerm>;
+constexpr bool kIsPoints = std::is_same_v<T, PointTerm> || std::is_same_v<T, LandmarkTerm> ||
+                           std::is_same_v<T, TangentPointTerm>;
 
 // The terms that are not of the points, as rows.
 void AddOthers(std::span<const Term> terms, const LevelView& view, RowSink& sink) {

@@ -40,7 +40,10 @@ PatchGrid GridOf(const HSplineShape& shape, int level) {
 
 // The detail that finer levels add at uv is taken off the point that the level aims at.
 Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
-  Observation o{.uv = point.uv, .position = point.position, .weight = point.weight};
+  Observation o{.uv = point.uv,
+                .position = point.position,
+                .weight = point.weight,
+                .landmark = IsLandmark(point)};
   if (aim == FitAim::kSurface && level < surface.shape().max_level) {
     o.position -= surface.Point(point.uv) - surface.LevelDerivative(level, point.uv);
   }

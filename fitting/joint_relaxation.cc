@@ -10,10 +10,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "fitting/blas_threads.h"
 #include "fitting/relaxer.h"
+#include "fitting/seeding.h"
 #include "fitting/term_cost.h"
 #include "surfaces/bspline_basis.h"
 #include "surfaces/error.h"
@@ -163,6 +165,9 @@ class JointRound {
   // The way that each corner would like to go, zero for other points.
   std::vector<Vec2> Solved();
   void AddPoints(ControlNet& net, std::vector<Vec2>& places, ceres::Problem& problem) const;
+  void AddPoint(const FitPoint& point, std::size_t k, double scale,
+                std::unique_ptr<ceres::LossFunction> loss, ControlNet& net,
+                std::vector<Vec2>& places, ceres::Problem& problem) const;
   void AddPenalties(std::vector<Vec2>& places, ceres::Problem& problem) const;
   void Bound(std::vector<Vec2>& places, ceres::Problem& problem) const;
 
@@ -228,25 +233,42 @@ class JointRound {
 
 void JointRound::AddPoints(ControlNet& net, std::vector<Vec2>& places,
                            ceres::Problem& problem) const {
+  const double landmark_sum = level_.view.LandmarkWeightSum();
   for (const Term& term : level_.terms) {
     const auto* const points = std::get_if<PointTerm>(&term);
-    for (std::size_t k = 0; points != nullptr && points->weight > 0 && k < places.size(); ++k) {
-      const int corner = relaxer_.order()[k];
-      const PatchIndex patch = PatchAt(level_.view.grid, start_[corner]);
-      std::vector<double*> blocks = {places[k].data()};
-      for (const int vertex : level_.view.grid.PatchVertices(patch.i, patch.j)) {
-        blocks.push_back(net.vertices[vertex].data());
-      }
-      for (const int m : relaxer_.members(corner)) {
+    const auto* const landmarks = std::get_if<LandmarkTerm>(&term);
+    if (WeightOf(term) <= 0 || (points == nullptr && landmarks == nullptr)) {
+      continue;
+    }
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      for (const int m : relaxer_.members(relaxer_.order()[k])) {
         const FitPoint& p = target_.points[m];
-        const double scale = points->weight * p.weight / weight_sum_;
-        auto loss = points->loss == RobustLoss::kNone ? nullptr : MakeLoss(*points, scale);
-        problem.AddResidualBlock(
-            new JointPointCost(level_, patch, p.position, loss ? 1 : std::sqrt(scale)),
-            loss.release(), blocks);
+        if (points != nullptr) {
+          const double scale = points->weight * p.weight / weight_sum_;
+          AddPoint(p, k, scale,
+                   points->loss == RobustLoss::kNone ? nullptr : MakeLoss(*points, scale), net,
+                   places, problem);
+        } else if (IsLandmark(p)) {
+          AddPoint(p, k, landmarks->weight * p.weight / landmark_sum, nullptr, net, places,
+                   problem);
+        }
       }
     }
   }
+}
+
+// At the k-th place; scale: of its squared distance, which a loss has in itself.
+void JointRound::AddPoint(const FitPoint& point, std::size_t k, double scale,
+                          std::unique_ptr<ceres::LossFunction> loss, ControlNet& net,
+                          std::vector<Vec2>& places, ceres::Problem& problem) const {
+  const PatchIndex patch = PatchAt(level_.view.grid, start_[relaxer_.order()[k]]);
+  std::vector<double*> blocks = {places[k].data()};
+  for (const int vertex : level_.view.grid.PatchVertices(patch.i, patch.j)) {
+    blocks.push_back(net.vertices[vertex].data());
+  }
+  problem.AddResidualBlock(
+      new JointPointCost(level_, patch, point.position, loss ? 1 : std::sqrt(scale)),
+      loss.release(), blocks);
 }
 
 void JointRound::AddPenalties(std::vector<Vec2>& places, ceres::Problem& problem) const {
@@ -315,7 +337,7 @@ std::vector<Vec2> JointRound::Solved() {
   for (const Term& term : level_.terms) {
     std::visit(
         [&]<class T>(const T& t) {
-          if (!std::is_same_v<T, PointTerm> && t.weight > 0) {
+          if (!std::is_same_v<T, PointTerm> && !std::is_same_v<T, LandmarkTerm> && t.weight > 0) {
             AddResiduals(t, level_.view, net, problem);
           }
         },

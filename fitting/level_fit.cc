@@ -52,6 +52,14 @@ void CheckView(const LevelView& view, std::span<const Term> terms) {
         "fit a face to a skull",
         TermName(*bone)));
   }
+  const bool landmarks = std::any_of(terms.begin(), terms.end(), [](const Term& term) {
+    return WeightOf(term) > 0 && std::holds_alternative<LandmarkTerm>(term);
+  });
+  if (landmarks && !(view.LandmarkWeightSum() > 0)) {
+    throw InputError(
+        "level fit: the term 'landmarks' looks at standard landmarks, and no point is one; leave "
+        "it out, or fit a face to dowels at sites");
+  }
 }
 
 // Patches are named by their first vertex.
@@ -143,6 +151,14 @@ double LevelView::WeightSum() const {
   double sum = 0;
   for (const Observation& o : observations) {
     sum += o.weight;
+  }
+  return sum;
+}
+
+double LevelView::LandmarkWeightSum() const {
+  double sum = 0;
+  for (const Observation& o : observations) {
+    sum += o.landmark ? o.weight : 0;
   }
   return sum;
 }

@@ -19,6 +19,7 @@ struct Observation {
   Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
   Vec3 position = Vec3::Constant(kNaN);  // mm
   double weight = 1;                     // > 0, relative to the other points
+  bool landmark = false;                 // a standard one, for LandmarkTerm
 };
 
 // A point whose foot on the bone is known; all less what finer levels add to it.
@@ -40,6 +41,7 @@ struct LevelView {
   std::vector<int> held = {};  // vertices that a PriorTerm with held_only looks at, each once
 
   double WeightSum() const;  // of the observations
+  double LandmarkWeightSum() const;
 };
 
 struct PatchCoverage {

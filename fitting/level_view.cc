@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "fitting/seeding.h"
 #include "surfaces/error.h"
 
 namespace semblance {
@@ -30,7 +31,10 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
       .observations = {}};
   for (const FitPoint& p : target.points) {
     const Vec3 finer = surface.Point(p.uv) - surface.LevelDerivative(level, p.uv);
-    view.observations.push_back({.uv = p.uv, .position = p.position - finer, .weight = p.weight});
+    view.observations.push_back({.uv = p.uv,
+                                 .position = p.position - finer,
+                                 .weight = p.weight,
+                                 .landmark = IsLandmark(p)});
   }
   return view;
 }

@@ -65,6 +65,18 @@ class PatchBuffer {
   std::vector<Row> rows_;
 };
 
+// The rows of those observations that are taken.
+template <class Taken>
+void AddWeighted(const LevelView& view, double scale, const Taken& taken, RowSink& sink) {
+  PatchBuffer buffer(sink);
+  for (const Observation& o : view.observations) {
+    if (taken(o)) {
+      buffer.Add(view.grid.StencilAt(o.uv), o.position, std::sqrt(scale * o.weight));
+    }
+  }
+  buffer.Flush();
+}
+
 }  // namespace
 
 std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale) {
@@ -80,12 +92,14 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scal
 }
 
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink) {
-  const double scale = term.weight / view.WeightSum();
-  PatchBuffer buffer(sink);
-  for (const Observation& o : view.observations) {
-    buffer.Add(view.grid.StencilAt(o.uv), o.position, std::sqrt(scale * o.weight));
-  }
-  buffer.Flush();
+  AddWeighted(
+      view, term.weight / view.WeightSum(), [](const Observation&) { return true; }, sink);
+}
+
+void AddRows(const LandmarkTerm& term, const LevelView& view, RowSink& sink) {
+  AddWeighted(
+      view, term.weight / view.LandmarkWeightSum(), [](const Observation& o) { return o.landmark; },
+      sink);
 }
 
 void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
@@ -104,6 +118,15 @@ double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& 
     sum += o.weight * Rho(term, (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm());
   }
   return view.observations.empty() ? 0 : term.weight * sum / view.WeightSum();
+}
+
+double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNet& net) {
+  double sum = 0;
+  for (const Observation& o : view.observations) {
+    sum += o.landmark ? o.weight * (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm()
+                      : 0;
+  }
+  return sum > 0 ? term.weight * sum / view.LandmarkWeightSum() : 0;
 }
 
 }  // namespace semblance

@@ -38,6 +38,18 @@ void Fields(Visitor& visit, PointTerm& o) {
         o.loss_width_mm);
 }
 
+// The standard landmarks are met for their own sake, in addition to what the points give them and
+// however many seeds there are: weight * sum_i w_i |S(u_i,v_i) - p_i|^2 / sum_i w_i over them
+// alone, mm^2.
+struct LandmarkTerm {
+  static constexpr std::string_view kName = "landmarks";
+  double weight = 1;
+};
+template <class Visitor>
+void Fields(Visitor& visit, LandmarkTerm& o) {
+  WeightField(visit, o.weight);
+}
+
 // The surface may slide along itself (tangent-distance minimisation): weight * the mean over the
 // points, by their weights, of (n . d)^2 + tangential |d - n (n . d)|^2, mm^2; d = S(u,v) - p and n
 // the unit normal at (u,v) of the level's surface before the solve. For points whose (u,v) are only

@@ -88,7 +88,8 @@ void AddPrior(const LevelView& view, std::span<const Term> terms, double scale, 
     std::visit(
         [&]<class T>(T t) {
           t.weight = scale * t.weight;
-          if constexpr (RowTerm<T> && !std::is_same_v<T, PointTerm>) {
+          if constexpr (RowTerm<T> && !std::is_same_v<T, PointTerm> &&
+                        !std::is_same_v<T, LandmarkTerm>) {
             AddRows(t, view, sink);
           }
         },

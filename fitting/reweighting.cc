@@ -22,7 +22,7 @@ struct Reweighted {
 
   Reweighted(const LevelView& given, std::span<const Term> all) : view(given) {
     for (const Term& term : all) {
-      if (!std::holds_alternative<PointTerm>(term)) {
+      if (!std::holds_alternative<PointTerm>(term) && !std::holds_alternative<LandmarkTerm>(term)) {
         terms.push_back(term);
       }
     }
@@ -56,19 +56,18 @@ double Move(const ControlNet& from, const ControlNet& to) {
 
 std::vector<double> CostWeights(const LevelView& view, std::span<const Term> terms,
                                 const ControlNet& net) {
-  double sum = 0;
-  for (const Observation& o : view.observations) {
-    sum += o.weight;
-  }
+  const double sum = view.WeightSum(), landmarks = view.LandmarkWeightSum();
   std::vector<double> weights;
   for (const Observation& o : view.observations) {
     const double squared = (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm();
-    double factor = 0;
+    double factor = 0;  // over the points' weights
     for (const Term& term : terms) {
       if (const auto* const points = std::get_if<PointTerm>(&term)) {
         factor += points->weight * RhoSlope(*points, squared);
       } else if (const auto* const tangent = std::get_if<TangentPointTerm>(&term)) {
         factor += tangent->weight;
+      } else if (const auto* const landmark = std::get_if<LandmarkTerm>(&term)) {
+        factor += o.landmark ? landmark->weight * sum / landmarks : 0;
       }
     }
     weights.push_back(factor * o.weight / sum);

@@ -219,4 +219,6 @@ SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
 
 bool IsSeeded(const FitPoint& point) { return point.label.starts_with(kPrefix); }
 
+bool IsLandmark(const FitPoint& point) { return !point.label.empty() && !IsSeeded(point); }
+
 }  // namespace semblance

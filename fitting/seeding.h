@@ -88,5 +88,7 @@ SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
 
 // Whether a point of a target was made by SeedDowels, by its label.
 bool IsSeeded(const FitPoint& point);
+// Whether it is one that has a name of its own: a dowel at a site.
+bool IsLandmark(const FitPoint& point);
 
 }  // namespace semblance

@@ -14,8 +14,9 @@
 
 namespace semblance {
 
-using Term = std::variant<PointTerm, PriorTerm, SmoothnessTerm, MembraneTerm, TangentPointTerm,
-                          SymmetryTerm, NonPenetrationTerm, SpringTerm, DistortionTerm>;
+using Term =
+    std::variant<PointTerm, PriorTerm, SmoothnessTerm, MembraneTerm, TangentPointTerm, SymmetryTerm,
+                 NonPenetrationTerm, SpringTerm, DistortionTerm, LandmarkTerm>;
 
 inline std::string_view TermName(const Term& term) {
   return std::visit([](const auto& t) { return t.kName; }, term);

@@ -18,6 +18,7 @@ namespace semblance {
 // The rows of a term that is the same for x, y and z (PointTerm: without a loss); their sum of
 // squares equals TermCost.
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const LandmarkTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
@@ -60,6 +61,7 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scal
 
 // The cost of a term as term.h states it, mm^2.
 double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const PriorTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net);

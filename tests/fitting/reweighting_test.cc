@@ -14,18 +14,21 @@ using testing::Observe;
 using testing::Sheet;
 using testing::View;
 
-// 400 points on 12 patches, one in twenty of them 4 mm off.
+// 400 points on 12 patches, one in twenty of them 4 mm off, one in fifty a landmark.
 LevelView ViewWithOutliers() {
   std::vector<Observation> observations = Observe(Sheet(4, 3, 1, 2), 400, 3, 0.3);
   for (std::size_t k = 0; k < observations.size(); k += 20) {
     observations[k].position += Vec3(0, 0, 4);
+  }
+  for (std::size_t k = 7; k < observations.size(); k += 50) {
+    observations[k].landmark = true;
   }
   return View(Sheet(4, 3, 1, 1), std::move(observations));
 }
 
 std::vector<Term> RobustTerms(RobustLoss loss, double width_mm) {
   return {PointTerm{.weight = 2, .loss = loss, .loss_width_mm = width_mm},
-          MembraneTerm{.weight = 0.02}, PriorTerm{.weight = 1e-4}};
+          LandmarkTerm{.weight = 0.5}, MembraneTerm{.weight = 0.02}, PriorTerm{.weight = 1e-4}};
 }
 
 double CostOf(const LevelView& view, const std::vector<Term>& terms, const ControlNet& net) {

@@ -138,6 +138,41 @@ TEST(Terms, TangentPointsWithoutSlidingArePoints) {
   EXPECT_NEAR(TermCost(TangentPointTerm{.tangential = 0.1}, flat, flat.start), 2.5, 1e-12);
 }
 
+TEST(Terms, LandmarksAreThePointsThatAreLandmarks) {
+  const LevelView view = NoisyView();
+  LevelView alone = view;
+  std::erase_if(alone.observations, [](const Observation& o) { return !o.landmark; });
+  ASSERT_EQ(alone.observations.size(), 16u);
+  const double points = TermCost(PointTerm{.weight = 3}, alone, view.start);
+  EXPECT_NEAR(TermCost(LandmarkTerm{.weight = 3}, view, view.start), points, 1e-12 * points);
+  EXPECT_GT(std::abs(TermCost(PointTerm{.weight = 3}, view, view.start) - points), 1e-3);
+}
+
+// Among points that say something else, the more the landmarks weigh the nearer the surface is.
+TEST(Terms, LandmarksAreMetTheMoreTheyWeigh) {
+  LevelView view = NoisyView();
+  for (Observation& o : view.observations) {
+    o.position.z() += o.landmark ? 5 : 0;
+  }
+  double last = std::numeric_limits<double>::infinity();
+  for (const double weight : {0.0, 0.1, 1.0, 1e4}) {
+    const std::array<Term, 2> terms = {PointTerm{}, LandmarkTerm{.weight = weight}};
+    const double misfit = TermCost(LandmarkTerm{}, view, FitLevel(view, terms).net);
+    EXPECT_LT(misfit, 0.9 * last);
+    last = misfit;
+  }
+  EXPECT_LT(last, 0.1);
+}
+
+TEST(Terms, LandmarksAreAskedForWhereThereAreNone) {
+  LevelView view = NoisyView();
+  for (Observation& o : view.observations) {
+    o.landmark = false;
+  }
+  const std::array<Term, 2> terms = {PointTerm{}, LandmarkTerm{}};
+  EXPECT_THROW(FitLevel(view, terms), InputError);
+}
+
 // Mirrored at the sheet's plane x = 40, wherever the whole is turned to.
 TEST(Terms, MirroredDisplacementsAreSymmetric) {
   LevelView view = NoisyView();

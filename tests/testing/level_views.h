@@ -79,9 +79,12 @@ inline void StandOnBone(LevelView& view) {
   }
 }
 
-// 320 points on 12 patches, enough in each to be reduced.
+// 320 points on 12 patches, enough in each to be reduced; every twentieth is a landmark.
 inline LevelView NoisyView() {
   LevelView view = View(Sheet(4, 3, 2, 1), Observe(Sheet(4, 3, 3, 2), 320, 3, 1));
+  for (std::size_t k = 0; k < view.observations.size(); k += 20) {
+    view.observations[k].landmark = true;
+  }
   StandOnBone(view);
   return view;
 }
