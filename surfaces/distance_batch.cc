@@ -52,6 +52,33 @@ SEMBLANCE_INLINE N Emit(const DistanceBatch& b, int first, const Vec3& p, const 
   return seen.z + Load<N>(b.advance_mm, first) > 0 ? either : nothing;
 }
 
+SEMBLANCE_INLINE bool Reaches(const RunReach& reach, const Vec3& p) {
+  const double dx = p.x() - reach.center.x(), dy = p.y() - reach.center.y(),
+               dz = p.z() - reach.center.z();
+  return dx * dx + dy * dy + dz * dz <= reach.squared_mm2;
+}
+
+RunReach ReachOf(const DistanceBatch& batch, int first, const DistanceFall& fall) {
+  constexpr double kSlack = 1 + 1e-9;
+  const auto at = [](const std::array<DistanceBatch::Lanes, 3>& lanes, int l) {
+    return Vec3(lanes[0][l], lanes[1][l], lanes[2][l]);
+  };
+  Box3 box;
+  double furthest_mm = 0;  // from a triangle: where it emits, or is solid
+  for (int l = first; l < first + kWidth<Wide> && batch.gain[l] > 0; ++l) {
+    const Vec3 a = at(batch.corner, l), x = at(batch.along, l), y = at(batch.across, l);
+    box.extend(a).extend(a + batch.ab.length[l] * x);
+    box.extend(a + batch.ac.length[l] * (batch.ac.x[l] * x + batch.ac.y[l] * y));
+    const double emitting_mm = std::pow(batch.gain[l] / fall.cut, 1 / fall.decay);
+    furthest_mm = std::max({furthest_mm, emitting_mm, batch.advance_mm[l]});
+  }
+  if (box.isEmpty()) {
+    return {};
+  }
+  const double radius_mm = 0.5 * box.diagonal().norm() + furthest_mm;
+  return {box.center(), kSlack * radius_mm * radius_mm};
+}
+
 }  // namespace
 
 void DistanceBatch::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c,
@@ -85,16 +112,37 @@ SEMBLANCE_WIDE void EmitByDistance(const DistanceBatch& batch, const Vec3& p,
   }
 }
 
+std::vector<RunReach> ReachesOf(std::span<const DistanceBatch> batches, const DistanceFall& fall) {
+  std::vector<RunReach> reaches(2 * batches.size());
+  for (std::size_t run = 0; run < reaches.size(); ++run) {
+    reaches[run] = ReachOf(batches[run / 2], run % 2 * kWidth<Wide>, fall);
+  }
+  return reaches;
+}
+
+// Which of the runs reach p is found first, without a branch that could be guessed wrong.
 SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceBatch> batches,
+                                    std::span<const RunReach> reaches,
                                     std::span<const std::int32_t> runs, const Vec3& p,
                                     const DistanceFall& fall) {
   constexpr int kUsual = 6;  // the default decay
+  constexpr std::size_t kAtOnce = 256;
+  std::array<std::int32_t, kAtOnce> reaching;
   Wide sum{};
-  for (const std::int32_t run : runs) {
-    const DistanceBatch& batch = batches[run / 2];
-    const int first = run % 2 * kWidth<Wide>;
-    sum += fall.whole == kUsual ? Emit<Wide>(batch, first, p, fall, kUsual)
-                                : Emit<Wide>(batch, first, p, fall, fall.whole);
+  while (!runs.empty()) {
+    const auto some = runs.first(std::min(kAtOnce, runs.size()));
+    std::size_t count = 0;
+    for (const std::int32_t run : some) {
+      reaching[count] = run;
+      count += Reaches(reaches[run], p) ? 1 : 0;
+    }
+    for (std::size_t n = 0; n < count; ++n) {
+      const DistanceBatch& batch = batches[reaching[n] / 2];
+      const int first = reaching[n] % 2 * kWidth<Wide>;
+      sum += fall.whole == kUsual ? Emit<Wide>(batch, first, p, fall, kUsual)
+                                  : Emit<Wide>(batch, first, p, fall, fall.whole);
+    }
+    runs = runs.subspan(some.size());
   }
   return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }

@@ -93,13 +93,18 @@ double TakeLeast(double budget, std::vector<double>& most) {
   return taken;
 }
 
-// Of the cubes that share a list of what is near.
-double CubeSize(const std::vector<EmitterTriangle>& emitters) {
-  constexpr double kOfDepth = 0.7;
+// Of the cubes that share a list of what is near. With a cut a point passes quickly over what does
+// not reach it, so that larger ones pay.
+double CubeSize(const std::vector<EmitterTriangle>& emitters, bool cut) {
+  const double of_depth = cut ? 1 : 0.7;
   const double sum =
       std::accumulate(emitters.begin(), emitters.end(), 0.0,
                       [](double s, const EmitterTriangle& t) { return s + t.depth_mm; });
-  return kOfDepth * sum / static_cast<double>(emitters.size());
+  return of_depth * sum / static_cast<double>(emitters.size());
+}
+
+bool HasCut(const Kernel& kernel) {
+  return std::visit([](const auto& k) { return k.Cut(); }, kernel) > 0;
 }
 
 }  // namespace
@@ -110,7 +115,7 @@ struct ImplicitSurface::Impl {
         emitters(MakeEmitters(skull, depth_mm, DepthOver(options.emitter), kernel)),
         tree(emitters),
         reaches(MakeReaches(emitters)),
-        near_table(CubeSize(emitters)),
+        near_table(CubeSize(emitters, HasCut(kernel))),
         tail_error(options.tail_error),
         decay(std::visit([](const auto& k) { return k.Decay(); }, kernel)) {
     std::visit([this](const auto& k) { MakeBatches(k); }, kernel);
@@ -124,6 +129,7 @@ struct ImplicitSurface::Impl {
   template <class EmitterKernel>
   void MakeBatches(const EmitterKernel& k) {
     distance_batches = MakeDistanceBatches(k, emitters);
+    run_reaches = ReachesOf(distance_batches, k.Fall());
   }
 
   // The emitters that points of a box have to sum: all others together emit at most the tail error.
@@ -219,7 +225,7 @@ struct ImplicitSurface::Impl {
   }
   template <class EmitterKernel>
   double SumOf(const EmitterKernel& k, const NearEmitters& list, const Vec3& p) const {
-    return SumByDistance(distance_batches, list, p, k.Fall());
+    return SumByDistance(distance_batches, run_reaches, list, p, k.Fall());
   }
 
   template <class EmitterKernel>
@@ -236,6 +242,7 @@ struct ImplicitSurface::Impl {
   NearEmittersTable near_table;
   std::vector<FlatBatch> flat_batches;  // of the tree's leaves; or
   std::vector<DistanceBatch> distance_batches;
+  std::vector<RunReach> run_reaches;  // of the distance batches
   double tail_error, decay;
 };
 
