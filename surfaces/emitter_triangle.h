@@ -59,8 +59,7 @@ struct EmitterTriangle {
   }
 };
 
-// Distance from p to the triangle moved by `shift` along its normal, squared, and the height over
-// its plane.
+// From p to the triangle, wherever it was moved to.
 inline double SquaredDistance(const EmitterTriangle& t, const Vec3& p) {
   const Vec3 ap = p - t.a, bp = p - t.b, cp = p - t.c;
   const double out_ab = ap.dot(t.edge_normal_a), out_bc = bp.dot(t.edge_normal_b),
