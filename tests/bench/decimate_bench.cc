@@ -9,20 +9,15 @@
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/GarlandHeckbert_plane_policies.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 
-#include <filesystem>
-
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
-#include "problems/phantom.h"
-#include "surfaces/decimate.h"
 #include "surfaces/implicit_face.h"
-#include "surfaces/mesh_io.h"
 #include "surfaces/mesh_query.h"
-#include "surfaces/skull_fill.h"
 #include "tests/bench/entry.h"
+#include "tests/bench/real_head.h"
 
 namespace semblance {
 namespace {
@@ -212,8 +207,7 @@ void Tolerances(const std::string& subject, const TriMesh& dense) {
 }
 
 // A real skull's shell, and ever fewer triangles asked for.
-void Skull(const std::filesystem::path& file) {
-  const TriMesh shell = FillSkull(ReadMesh(file), WrapFill{.edge_mm = 1}, {});
+void Skull(const TriMesh& shell) {
   Compare("skull_", shell, 1);
   for (const int target : {40000, 20000, 10000, 5000, 100}) {
     const DecimateResult result = Decimate(shell, {.target_triangles = target});
@@ -232,11 +226,8 @@ void RunAll() {
   const TriMesh dense = BuildImplicitFace(phantom.skull, phantom.depth_mm, options, {}).dense;
   Compare("", dense, 5);
   Tolerances("", dense);
-  const std::filesystem::path skull = SEMBLANCE_SOURCE_DIR "/../shared/data/cranium/skull.ply";
-  if (std::filesystem::exists(skull)) {
-    Skull(skull);
-  } else {
-    fmt::print(stderr, "decimate_bench: no {}, the real skull is skipped\n", skull.string());
+  if (const std::optional<TriMesh> shell = bench::RealShell("the real skull")) {
+    Skull(*shell);
   }
 }
 

@@ -2,16 +2,12 @@
 // How far the implicit surface depends on the skull's mesh: 10, 40 and 160 thousand triangles of
 // one skull, each emitter, over the whole skull and where the coarser skull itself is the finer
 // one.
-#include <filesystem>
 #include <map>
 
-#include "surfaces/decimate.h"
 #include "surfaces/implicit_surface.h"
-#include "surfaces/mesh_io.h"
 #include "surfaces/mesh_query.h"
-#include "surfaces/skull_fill.h"
 #include "tests/bench/entry.h"
-#include "tests/bench/phantom_head.h"
+#include "tests/bench/real_head.h"
 
 namespace semblance {
 namespace {
@@ -124,19 +120,13 @@ void MeasureAll() {
     phantoms.push_back(bench::PhantomHead(rings));
   }
   Independence("phantom", phantoms);
-  const std::filesystem::path cranium = SEMBLANCE_SOURCE_DIR "/../shared/data/cranium/skull.ply";
-  if (!std::filesystem::exists(cranium)) {
-    fmt::print(stderr, "independence_bench: no {}, the real head is skipped\n", cranium.string());
+  const std::optional<TriMesh> shell = bench::RealShell("the real head");
+  if (!shell) {
     return;
   }
-  const TriMesh shell = FillSkull(ReadMesh(cranium), WrapFill{.edge_mm = 1}, {});
   std::vector<Head> heads;
   for (const int count : {10000, 40000, 160000}) {
-    Head head{Decimate(shell, {.target_triangles = count}).mesh, {}};
-    for (const Vec3& p : head.skull.points) {
-      head.depth_mm.push_back(7 + 3 * std::sin(0.03 * p.x()) * std::cos(0.04 * p.z()));
-    }
-    heads.push_back(std::move(head));
+    heads.push_back(bench::RealHead(*shell, count));
   }
   Independence("cranium", heads);
 }
