@@ -115,13 +115,14 @@ std::vector<std::vector<double>> CompleteTable(const std::vector<Treatment>& tre
   return rows;
 }
 
+// Of two treatments or more.
 ReportSection RankSection(const std::vector<Treatment>& ranked) {
   ReportSection section{.heading = "Do the treatments differ?"};
   const auto rows = CompleteTable(ranked);
-  if (static_cast<int>(rows.size()) < kLeastSubjects || ranked.size() < 2) {
+  if (static_cast<int>(rows.size()) < kLeastSubjects) {
     section.paragraphs = {fmt::format(
         "{} subjects have a value for all {} treatments. That is too few for a test: at least {} "
-        "subjects and 2 treatments are needed. The differences above stand for themselves.",
+        "subjects are needed. The differences above stand for themselves.",
         rows.size(), ranked.size(), kLeastSubjects)};
     return section;
   }
@@ -323,7 +324,9 @@ std::string StudyReportHtml(const StudyResults& results, const SceneCollection& 
                             "cumulative distribution of the metric, one line a treatment"}};
     }
     report.sections.push_back(treatments);
-    report.sections.push_back(RankSection(ranked));
+    if (ranked.size() > 1) {
+      report.sections.push_back(RankSection(ranked));
+    }
     report.sections.push_back({.heading = "Behind the metric",
                                .paragraphs = {},
                                .images = {},
