@@ -189,6 +189,13 @@ TEST_F(StudyTest, WhatIsMissingIsCountedAndSaid) {
   EXPECT_THAT(ReadFileBytes(folder_ / "run" / "report.html"), HasSubstr("too few for a test"));
 }
 
+TEST_F(StudyTest, OfOneTreatmentNoDifferenceIsAsked) {
+  RunStudy(Plan("grid: {landmarks.max_distance_mm: [50]}\n"), folder_ / "run", {}, {});
+  const std::string report = Tables(folder_ / "run").at("report.html");
+  EXPECT_THAT(report, HasSubstr("Behind the metric"));
+  EXPECT_THAT(report, Not(HasSubstr("Do the treatments differ?")));
+}
+
 TEST_F(StudyTest, AFolderOfAnotherPlanIsLeftAlone) {
   RunStudy(Plan(kSmall), folder_ / "run", {.shard = 1, .shards = 4}, {});
   EXPECT_THAT(WordsOf<IoError>(
