@@ -57,7 +57,9 @@ TEST(TileSolver, FindsWhatSingleVerticesFind) {
   ExpectAllAgree(NoisyView(), separable, 1e-9);
   for (const Term& term : separable) {
     if (!std::holds_alternative<PointTerm>(term)) {
-      ExpectAllAgree(NoisyView(), {PointTerm{}, term}, 1e-6);
+      // Landmarks do not hold the vertices at the border that points hardly hold.
+      const bool more_points = std::holds_alternative<LandmarkTerm>(term);
+      ExpectAllAgree(NoisyView(), {PointTerm{}, term}, more_points ? 1e-4 : 1e-6);
     }
   }
 }
