@@ -88,7 +88,7 @@ class Continuation {
     return unknown;
   }
   void Evaluate(const std::vector<std::int64_t>& unknown) {
-    ParallelFor(unknown.size(), context_.threads, 64, [&](std::size_t n) {
+    ParallelFor(unknown.size(), context_.threads, 8, [&](std::size_t n) {
       const std::array<int, 3> at = grid_.At(unknown[n]);
       corners_.Set(at, field_(grid_.Corner(at[0], at[1], at[2])));
     });
