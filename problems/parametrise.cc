@@ -91,18 +91,38 @@ Parametrisation ParametersOf(const PointTable& table, const GivenParameters& giv
   return result;
 }
 
-Parametrisation ParametersOf(const PointTable& table, const PlaneParameters&) {
-  const Principal principal = PrincipalOf(table.positions);
+// Directions of u and v, unit.
+using PlaneAxes = std::array<Vec3, 2>;
+
+PlaneAxes LeastSquaresPlane(std::span<const Vec3> positions) {
+  const Principal principal = PrincipalOf(positions);
   if (!(principal.spreads[1] > 1e-20 * principal.spreads[2])) {
     Fail("the points lie on a line and span no plane; give (u,v), or other points");
   }
-  const Vec3 u = principal.axes.col(2), v = principal.axes.col(1);
+  return {principal.axes.col(2), principal.axes.col(1)};
+}
+
+PlaneAxes PlaneAcross(const Vec3& normal) {
+  if (!normal.allFinite()) {
+    Fail("the plane's normal is not finite; give three numbers");
+  }
+  const Vec3 unit = normal.normalized();
+  Eigen::Index flattest = 0;
+  unit.cwiseAbs().minCoeff(&flattest);
+  const Vec3 axis = Vec3::Unit(flattest), u = (axis - axis.dot(unit) * unit).normalized();
+  return {u, unit.cross(u)};
+}
+
+Parametrisation ParametersOf(const PointTable& table, const PlaneParameters& plane) {
+  const Vec3 normal(plane.normal[0], plane.normal[1], plane.normal[2]);
+  const auto [u, v] = normal.isZero(0) ? LeastSquaresPlane(table.positions) : PlaneAcross(normal);
+  const Vec3 mean = MeanOf(table.positions);
   Parametrisation result{.uv = {}, .kind = "plane"};
   for (const Vec3& p : table.positions) {
-    result.uv.emplace_back((p - principal.mean).dot(u), (p - principal.mean).dot(v));
+    result.uv.emplace_back((p - mean).dot(u), (p - mean).dot(v));
   }
-  Normalise(0, "the plane's longer axis", result.uv);
-  Normalise(1, "the plane's shorter axis", result.uv);
+  Normalise(0, "the plane's u", result.uv);
+  Normalise(1, "the plane's v", result.uv);
   return result;
 }
 

@@ -33,13 +33,20 @@ void Fields(Visitor& visit, GivenParameters& o) {
   visit(FieldInfo{.name = "v_range", .doc = "what of the column v becomes 0 and 1"}, o.v_range);
 }
 
-// Orthogonal projection on the plane of least squares; u along its longest direction. For points
-// that do not fold over it.
+// Orthogonal projection on the plane of least squares, u along its longest direction; or on that
+// across a normal, u along the coordinate axis nearest to it, the first of equals. For points that
+// do not fold over it.
 struct PlaneParameters {
   static constexpr std::string_view kName = "plane";
+  std::array<double, 3> normal = {0, 0, 0};
 };
 template <class Visitor>
-void Fields(Visitor&, PlaneParameters&) {}
+void Fields(Visitor& visit, PlaneParameters& o) {
+  visit(FieldInfo{.name = "normal",
+                  .doc = "direction of the heights, such as [0, 0, 1] for a terrain; [0, 0, 0] "
+                         "takes that in which the points spread least"},
+        o.normal);
+}
 
 // Angle around an axis and height along it, for points that go round; u is the angle, closed.
 struct CylinderParameters {

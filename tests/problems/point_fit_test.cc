@@ -74,6 +74,33 @@ TEST_F(PointFitCommand, FrankesFunctionAndTheHeadComeOut) {
   EXPECT_GT(ReadMesh(folder_ / "head/surface.ply").triangles.size(), 1000u);
 }
 
+// With more vertices than the points determine, cross-validation leaves them their noise, 1e-3 each
+// way. A coarser level than the configuration's, which takes a minute.
+TEST_F(PointFitCommand, AHeightFieldKeepsItsNoise) {
+  Write("franke.csv", Csv(Scattered(FrankePoint, 5000, 1e-3, 1), /*with_uv=*/false));
+  const auto outcome = Call(fmt::format(
+      "fit franke.csv {}/height_field.yaml --set \"fit.schedule=[{{level: 3, fraction: 1}}]\" "
+      "--out out --quiet",
+      kConfigs));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "out/result.json"));
+  EXPECT_EQ(json["control_vertices"]["by_level"].size(), 4u);
+  const double noise = std::sqrt(3) * 1e-3;
+  EXPECT_GT(json["rms_mm"], 0.8 * noise);
+  EXPECT_LT(json["rms_mm"], 1.05 * noise);
+}
+
+// Steep heights, whose least spread is not upward, over the plane that is said.
+TEST(PointFit, APlaneAcrossANormalHasItsHeights) {
+  const PointTable table = TableOf(Scattered(FrankePoint, 2000, 0, 1));
+  const Parametrisation p = Parametrise(table, PlaneParameters{.normal = {0, 0, 2}});
+  EXPECT_EQ(p.kind, "plane");
+  for (std::size_t k = 0; k < p.uv.size(); ++k) {
+    EXPECT_NEAR(p.uv[k].x(), table.positions[k].x(), 2e-3);  // the points nearly fill the square
+    EXPECT_NEAR(p.uv[k].y(), table.positions[k].y(), 2e-3);
+  }
+}
+
 TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
   Write("bad.csv", "x,y,z\n0,0,zero\n");
