@@ -90,8 +90,8 @@ SparseMatrix SpaceOf(const HSplineSurface& surface, int level) {
 
 SpaceFactor::SpaceFactor(const SparseMatrix& lower, SparseMatrix space) : space_(std::move(space)) {
   const SparseMatrix within = Within(lower, space_);
-  factor_ = std::make_unique<SparseFactor>(within,
-                                           1e-11 * std::max(within.diagonal().maxCoeff(), 1e-12));
+  factor_ =
+      std::make_unique<SparseFactor>(within, 1e-11 * std::max(within.diagonal().maxCoeff(), 1e-12));
 }
 
 Eigen::MatrixXd SpaceFactor::Solve(const Eigen::MatrixXd& right) const {
