@@ -130,13 +130,15 @@ SEMBLANCE_INLINE unsigned AddFour(const FlatBatch& batch, int first, const Vec3&
   const int power = fixed > 0 ? fixed : fall.power;
   const Four seen = See(batch, first, p);
   const Wide share = seen.height > 0 ? seen.share : Wide{};
+  std::array<double, kWidth<Wide>> shares;  // g++ 12 miscompiles share[l] where bounds are checked
+  Store(share, shares, 0);
   unsigned near = 0, ways = 0;  // ways: of taking the mean that some lane needs, as bits
   for (int l = 0; l < kWidth<Wide>; ++l) {
-    const unsigned way = static_cast<unsigned>(share[l] > fall.most_share[0]) +
-                         static_cast<unsigned>(share[l] > fall.most_share[1]) +
-                         static_cast<unsigned>(share[l] > fall.most_share[2]);
+    const unsigned way = static_cast<unsigned>(shares[l] > fall.most_share[0]) +
+                         static_cast<unsigned>(shares[l] > fall.most_share[1]) +
+                         static_cast<unsigned>(shares[l] > fall.most_share[2]);
     near |= static_cast<unsigned>(way == 3) << l;
-    ways |= static_cast<unsigned>(share[l] > 0) << way;
+    ways |= static_cast<unsigned>(shares[l] > 0) << way;
   }
   Wide mean{};
   if ((ways & 1) != 0) {
