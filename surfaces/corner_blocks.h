@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "surfaces/marching_cubes.h"
 #include "surfaces/polygonize.h"
 
 namespace semblance {
@@ -23,9 +24,15 @@ class CornerBlocks {
     block_.resize(std::size_t(blocks_[0]) * blocks_[1] * blocks_[2]);
   }
 
-  // True the first time for a cell (by its lowest corner), or for a corner.
-  bool FirstVisit(const Place& cell) { return First(BlockOf(cell).visited, cell); }
-  bool FirstAsked(const Place& corner) { return First(BlockOf(corner).asked, corner); }
+  // Bits that are kept of a cell (by its lowest corner); none at first.
+  EdgeBits& EdgesOf(const Place& cell) { return BlockOf(cell).edges[Within(cell)]; }
+  // True the first time for a corner.
+  bool FirstAsked(const Place& corner) {
+    auto bit = BlockOf(corner).asked[Within(corner)];
+    const bool first = !bit;
+    bit = true;
+    return first;
+  }
 
   // Of corners that were asked for; different corners may be set from several threads at once.
   void Set(const Place& corner, double value) {
@@ -37,7 +44,8 @@ class CornerBlocks {
   static constexpr int kEdge = 8, kCorners = kEdge * kEdge * kEdge;
   struct Block {
     std::array<double, kCorners> value;
-    std::bitset<kCorners> asked, visited;
+    std::array<EdgeBits, kCorners> edges{};
+    std::bitset<kCorners> asked;
   };
 
   static std::size_t Within(const Place& at) {
@@ -53,11 +61,6 @@ class CornerBlocks {
       block = std::make_unique<Block>();
     }
     return *block;
-  }
-  static bool First(std::bitset<kCorners>& bits, const Place& at) {
-    const bool first = !bits[Within(at)];
-    bits.set(Within(at));
-    return first;
   }
 
   std::array<int, 3> blocks_{};

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace semblance {
 namespace {
@@ -98,38 +97,15 @@ std::vector<Triangle> Connect(const SampleGrid& grid, const Crossings& crossings
       }
     }
     for (const auto& corners : MarchingCubesCases()[cell.mask]) {
+      if ((cell.edges >> corners[0] & 1) == 0) {
+        continue;  // of another sheet in the cell
+      }
       triangles.push_back({static_cast<std::int32_t>(place[corners[0]]),
                            static_cast<std::int32_t>(place[corners[1]]),
                            static_cast<std::int32_t>(place[corners[2]])});
     }
   }
   return triangles;
-}
-
-void SortEdges(std::vector<CrossedEdge>& edges) {
-  std::sort(edges.begin(), edges.end(),
-            [](const CrossedEdge& a, const CrossedEdge& b) { return a.id < b.id; });
-}
-
-struct VolumeRange {
-  double least, most;
-};
-
-// Of each component, as its points move on their edges: it stays in the cells that it crosses, of
-// which there are not more than triangles.
-std::vector<VolumeRange> VolumesWithinCells(const SampleGrid& grid, const TriMesh& mesh,
-                                            const Components& components) {
-  const double cell = grid.cell_mm.prod();
-  std::vector<VolumeRange> volumes(components.count, {0, 0});
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const Triangle& c = mesh.triangles[t];
-    const Vec3 a = mesh.points[c[0]] - grid.origin, b = mesh.points[c[1]] - grid.origin,
-               d = mesh.points[c[2]] - grid.origin;
-    const double volume = a.dot(b.cross(d)) / 6;
-    volumes[components.of_triangle[t]].least += volume - cell;
-    volumes[components.of_triangle[t]].most += volume + cell;
-  }
-  return volumes;
 }
 
 bool TouchesBorder(const SampleGrid& grid, const std::vector<CrossedCell>& cells) {
@@ -154,34 +130,10 @@ double SearchCrossing(double from, double to, const EdgeSearchOptions& options,
       {0, from, 1, to}, options.tolerance, field, evaluations);
 }
 
-std::vector<bool> EdgesOfLargest(const SampleGrid& grid, Crossings& crossings) {
-  SortEdges(crossings.edges);
-  TriMesh mesh;
-  for (CrossedEdge edge : crossings.edges) {
-    edge.at = 0.5;
-    mesh.points.push_back(PointOn(grid, edge));
-  }
-  mesh.triangles = Connect(grid, crossings);
-  const Components components = ConnectedComponents(mesh);
-  const std::vector<VolumeRange> volumes = VolumesWithinCells(grid, mesh, components);
-  double largest = -std::numeric_limits<double>::infinity();
-  for (const VolumeRange& volume : volumes) {
-    largest = std::max(largest, volume.least);
-  }
-  std::vector<bool> may(crossings.edges.size(), false);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (volumes[components.of_triangle[t]].most >= largest) {
-      for (const std::int32_t edge : mesh.triangles[t]) {
-        may[edge] = true;
-      }
-    }
-  }
-  return may;
-}
-
 PolygonizeResult MeshOf(const SampleGrid& grid, Crossings crossings) {
   std::vector<CrossedEdge>& edges = crossings.edges;
-  SortEdges(edges);
+  std::sort(edges.begin(), edges.end(),
+            [](const CrossedEdge& a, const CrossedEdge& b) { return a.id < b.id; });
   PolygonizeResult result;
   result.mesh.points.reserve(edges.size());
   for (const CrossedEdge& edge : edges) {

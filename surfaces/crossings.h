@@ -11,8 +11,9 @@
 namespace semblance {
 
 struct CrossedCell {
-  std::int64_t index;  // of its lowest corner
-  std::uint8_t mask;   // bit c: corner c is inside; neither 0 nor 255
+  std::int64_t index;          // of its lowest corner
+  std::uint8_t mask;           // bit c: corner c is inside; neither 0 nor 255
+  EdgeBits edges = kAllEdges;  // those whose crossings, if any, are the mesh's
 };
 
 // A grid edge on which the sign changes. id: three times its lower corner plus its axis.
@@ -31,13 +32,16 @@ struct Crossings {
 // The edge of a cell, as CrossedEdge::id.
 std::int64_t EdgeId(const SampleGrid& grid, const std::array<int, 3>& cell, const CellEdge& edge);
 
-// Calls visit(edge) for the crossed edges of a cell that no other cell of the grid would name:
-// those from its lowest corner and, where the grid ends, those that have no cell of their own.
+// Calls visit(edge) for the crossed edges of a cell that are the mesh's and that no other cell of
+// the grid would name: those from its lowest corner and, where the grid ends, those that have no
+// cell of their own.
 template <class Visit>
-void ForEachOwnEdge(const SampleGrid& grid, const std::array<int, 3>& cell, int mask,
-                    const Visit& visit) {
-  for (const CellEdge& edge : kCellEdges) {
-    if ((mask >> edge.from & 1) == (mask >> edge.to & 1)) {
+void ForEachOwnEdge(const SampleGrid& grid, const CrossedCell& crossed, const Visit& visit) {
+  const std::array<int, 3> cell = grid.At(crossed.index);
+  for (std::size_t e = 0; e < kCellEdges.size(); ++e) {
+    const CellEdge& edge = kCellEdges[e];
+    if ((crossed.edges >> e & 1) == 0 ||
+        (crossed.mask >> edge.from & 1) == (crossed.mask >> edge.to & 1)) {
       continue;
     }
     bool owned_by_next = false;
@@ -54,10 +58,6 @@ void ForEachOwnEdge(const SampleGrid& grid, const std::array<int, 3>& cell, int 
 // `evaluations`.
 double SearchCrossing(double from, double to, const EdgeSearchOptions& options,
                       const std::function<double(double)>& field, std::int64_t& evaluations);
-
-// Puts the edges in the order of their ids and tells which of them the component of the mesh with
-// the greatest volume may have, wherever on their edges the crossings are.
-std::vector<bool> EdgesOfLargest(const SampleGrid& grid, Crossings& crossings);
 
 // The mesh: points in the order of the edges' ids, triangles in that of the cells.
 PolygonizeResult MeshOf(const SampleGrid& grid, Crossings crossings);

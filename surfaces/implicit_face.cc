@@ -39,10 +39,10 @@ int ExtremePoint(const TriMesh& shell, std::span<const double> depth_mm, const V
   return extreme;
 }
 
-// The four cells around the last edge, going outward along an axis from a corner near `start`, on
-// which the field turns negative. False if it is positive up to the grid's end.
+// The cell above the last edge, going outward along an axis from a corner near `start`, on which
+// the field turns negative, and that edge. False if it is positive up to the grid's end.
 bool AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& start, int axis,
-                 int step, std::vector<std::int64_t>& seeds) {
+                 int step, std::vector<SeedCell>& seeds) {
   std::array<int, 3> at;
   for (int a = 0; a < 3; ++a) {
     at[a] = std::clamp(static_cast<int>(std::lround((start[a] - grid.origin[a]) / grid.cell_mm[a])),
@@ -61,18 +61,13 @@ bool AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& s
     return !inside;
   }
   at[axis] = crossing;
-  for (int n = 0; n < 4; ++n) {
-    std::array<int, 3> cell = at;
-    cell[(axis + 1) % 3] -= n & 1;
-    cell[(axis + 2) % 3] -= n >> 1;
-    seeds.push_back(grid.Index(cell[0], cell[1], cell[2]));
-  }
+  seeds.push_back({grid.Index(at[0], at[1], at[2]), EdgeBits(1 << EdgeFrom(0, axis))});
   return true;
 }
 
 // False if the surface leaves the grid, as far as is seen from the shell's extreme points.
 bool FindSeeds(const TriMesh& shell, std::span<const double> depth_mm, const ScalarField& field,
-               const SampleGrid& grid, std::vector<std::int64_t>& seeds) {
+               const SampleGrid& grid, std::vector<SeedCell>& seeds) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const int step : {-1, 1}) {
       const Vec3 direction = step * Vec3::Unit(axis);
@@ -93,7 +88,7 @@ PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_
   const ScalarField field = [&surface](const Vec3& p) { return surface.Flattened(p); };
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
     const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
-    std::vector<std::int64_t> seeds;
+    std::vector<SeedCell> seeds;
     if (!FindSeeds(shell, depth_mm, field, grid, seeds)) {
       continue;
     }

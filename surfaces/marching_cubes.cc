@@ -83,33 +83,64 @@ int Triangulate(const Loop& loop, int first, int last, CaseTriangles& triangles)
   return fewest;
 }
 
-CaseTriangles TrianglesOfCase(int mask) {
+std::vector<Loop> LoopsOfCase(int mask) {
   std::array<int, 12> next = LinkCrossings(mask);
-  CaseTriangles triangles;
+  std::vector<Loop> loops;
   for (int start = 0; start < 12; ++start) {
     Loop loop;
     for (int e = start; e >= 0 && next[e] >= 0;) {
       loop.push_back(static_cast<std::uint8_t>(e));
       e = std::exchange(next[e], -1);
     }
-    if (loop.size() >= 3) {
-      Triangulate(loop, 0, static_cast<int>(loop.size()) - 1, triangles);
+    if (!loop.empty()) {
+      loops.push_back(std::move(loop));
     }
   }
+  return loops;
+}
+
+CaseTriangles TrianglesOfCase(int mask) {
+  CaseTriangles triangles;
+  for (const Loop& loop : LoopsOfCase(mask)) {
+    Triangulate(loop, 0, static_cast<int>(loop.size()) - 1, triangles);
+  }
   return triangles;
+}
+
+std::array<EdgeBits, 12> JoinedEdgesOfCase(int mask) {
+  std::array<EdgeBits, 12> joined{};
+  for (const Loop& loop : LoopsOfCase(mask)) {
+    EdgeBits bits = 0;
+    for (const std::uint8_t e : loop) {
+      bits |= EdgeBits(1 << e);
+    }
+    for (const std::uint8_t e : loop) {
+      joined[e] = bits;
+    }
+  }
+  return joined;
+}
+
+// One entry a case.
+template <class OfCase>
+auto AllCases(const OfCase& of_case) {
+  std::array<decltype(of_case(0)), 256> cases;
+  for (int mask = 0; mask < 256; ++mask) {
+    cases[mask] = of_case(mask);
+  }
+  return cases;
 }
 
 }  // namespace
 
 const std::array<std::vector<std::array<std::uint8_t, 3>>, 256>& MarchingCubesCases() {
-  static const auto kCases = [] {
-    std::array<CaseTriangles, 256> cases;
-    for (int mask = 0; mask < 256; ++mask) {
-      cases[mask] = TrianglesOfCase(mask);
-    }
-    return cases;
-  }();
+  static const auto kCases = AllCases(TrianglesOfCase);
   return kCases;
+}
+
+const std::array<std::array<EdgeBits, 12>, 256>& MarchingCubesLoops() {
+  static const auto kLoops = AllCases(JoinedEdgesOfCase);
+  return kLoops;
 }
 
 }  // namespace semblance

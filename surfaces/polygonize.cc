@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "surfaces/corner_blocks.h"
 #include "surfaces/crossings.h"
@@ -36,48 +38,95 @@ bool IsCell(const SampleGrid& grid, const std::array<int, 3>& cell) {
          cell[1] + 1 < grid.counts[1] && cell[2] + 1 < grid.counts[2];
 }
 
-// Corners of a cell on its lower or upper face across an axis, as a mask.
-int FaceMask(int axis, int upper) {
-  int mask = 0;
-  for (int c = 0; c < 8; ++c) {
-    mask |= ((c >> axis & 1) == upper) << c;
+// The edges of a cell that lie on one of its faces, and what the cell beyond it calls them: each
+// moves there along the axis.
+struct FaceEdges {
+  EdgeBits on = 0;
+  std::array<std::uint8_t, 12> beyond{};
+};
+
+FaceEdges EdgesOfFace(int axis, int upper) {
+  FaceEdges face;
+  for (int e = 0; e < 12; ++e) {
+    const CellEdge& edge = kCellEdges[e];
+    if (edge.axis != axis && (edge.from >> axis & 1) == upper) {
+      face.on |= EdgeBits(1 << e);
+      face.beyond[e] = static_cast<std::uint8_t>(EdgeFrom(edge.from ^ (1 << axis), edge.axis));
+    }
   }
-  return mask;
+  return face;
 }
 
-// Goes on from crossed cells to their neighbours, wave by wave, until no new cell is crossed.
+// [2 axis + upper]
+std::array<FaceEdges, 6> AllFaces() {
+  std::array<FaceEdges, 6> faces;
+  for (int f = 0; f < 6; ++f) {
+    faces[f] = EdgesOfFace(f / 2, f % 2);
+  }
+  return faces;
+}
+
+// Goes on from crossed cells to their neighbours, wave by wave, along what hangs together: of two
+// sheets in one cell only that which it came along. In `edges`, what a cell is known to have of
+// that.
 class Continuation {
  public:
   Continuation(const ScalarField& field, const SampleGrid& grid, const RunContext& context)
-      : field_(field), grid_(grid), context_(context), corners_(grid) {}
+      : field_(field), grid_(grid), context_(context), corners_(grid), faces_(AllFaces()) {}
 
-  Crossings Run(std::span<const std::int64_t> seeds) {
-    std::vector<std::int64_t> wave;
-    for (const std::int64_t cell : seeds) {
-      Visit(grid_.At(cell), wave);
+  void Follow(std::span<const SeedCell> seeds) {
+    for (const SeedCell& seed : seeds) {
+      Visit(grid_.At(seed.cell), seed.edges);
     }
-    while (!wave.empty()) {
+    while (!next_.empty()) {
       context_.ThrowIfStopped();
       context_.Report("polygonize");
+      const std::vector<SeedCell> wave = std::exchange(next_, {});
       Evaluate(UnknownCorners(wave));
-      wave = Cross(wave);
+      for (const SeedCell& cell : wave) {
+        Cross(cell);
+      }
     }
-    std::sort(crossings_.cells.begin(), crossings_.cells.end(),
-              [](const CrossedCell& a, const CrossedCell& b) { return a.index < b.index; });
-    AppendEdges();
+  }
+  bool Reached(const SeedCell& seed) {
+    return (seed.edges & ~corners_.EdgesOf(grid_.At(seed.cell))) == 0;
+  }
+  // From now on all sheets in a cell count as one.
+  void TakeWholeCells() {
+    whole_cells_ = true;
+    for (const std::int64_t cell : std::vector(cells_)) {
+      Visit(grid_.At(cell), kAllEdges);
+    }
+  }
+  // The cells in ascending order, and their edges.
+  Crossings Take() {
+    std::sort(cells_.begin(), cells_.end());
+    for (const std::int64_t cell : cells_) {
+      Record(cell);
+    }
     return std::move(crossings_);
   }
 
  private:
-  void Visit(const std::array<int, 3>& cell, std::vector<std::int64_t>& wave) {
-    if (IsCell(grid_, cell) && corners_.FirstVisit(cell)) {
-      wave.push_back(grid_.Index(cell[0], cell[1], cell[2]));
+  void Visit(const std::array<int, 3>& cell, EdgeBits edges) {
+    if (!IsCell(grid_, cell)) {
+      return;
+    }
+    EdgeBits& known = corners_.EdgesOf(cell);
+    const EdgeBits fresh = edges & ~known;
+    if (fresh != 0) {
+      const std::int64_t index = grid_.Index(cell[0], cell[1], cell[2]);
+      if (known == 0) {
+        cells_.push_back(index);
+      }
+      known |= fresh;
+      next_.push_back({index, fresh});
     }
   }
-  std::vector<std::int64_t> UnknownCorners(const std::vector<std::int64_t>& wave) {
+  std::vector<std::int64_t> UnknownCorners(const std::vector<SeedCell>& wave) {
     std::vector<std::int64_t> unknown;
-    for (const std::int64_t cell : wave) {
-      const std::array<int, 3> at = grid_.At(cell);
+    for (const SeedCell& cell : wave) {
+      const std::array<int, 3> at = grid_.At(cell.cell);
       for (int c = 0; c < 8; ++c) {
         const std::array<int, 3> corner = CornerOf(at, c);
         if (corners_.FirstAsked(corner)) {
@@ -101,54 +150,56 @@ class Continuation {
     }
     return mask;
   }
-  std::vector<std::int64_t> Cross(const std::vector<std::int64_t>& wave) {
-    std::vector<std::int64_t> next;
-    for (const std::int64_t cell : wave) {
-      const std::array<int, 3> at = grid_.At(cell);
-      const int mask = MaskOf(at);
-      if (mask == 0 || mask == 255) {
-        continue;
+  void Cross(const SeedCell& cell) {
+    const std::array<int, 3> at = grid_.At(cell.cell);
+    const auto& joined = MarchingCubesLoops()[MaskOf(at)];
+    EdgeBits crossed = 0;
+    for (int e = 0; e < 12; ++e) {
+      crossed |= (cell.edges >> e & 1) != 0 ? joined[e] : EdgeBits{0};
+    }
+    corners_.EdgesOf(at) |= crossed;
+    for (int f = 0; f < 6; ++f) {
+      EdgeBits beyond = 0;
+      for (EdgeBits on = crossed & faces_[f].on; on != 0; on &= EdgeBits(on - 1)) {
+        beyond |= EdgeBits(1 << faces_[f].beyond[std::countr_zero(on)]);
       }
-      crossings_.cells.push_back({cell, static_cast<std::uint8_t>(mask)});
-      for (int axis = 0; axis < 3; ++axis) {
-        for (int upper = 0; upper < 2; ++upper) {
-          const int face = FaceMask(axis, upper);
-          if ((mask & face) != 0 && (mask & face) != face) {
-            std::array<int, 3> neighbour = at;
-            neighbour[axis] += upper ? 1 : -1;
-            Visit(neighbour, next);
-          }
-        }
+      if (beyond != 0) {
+        std::array<int, 3> neighbour = at;
+        neighbour[f / 2] += f % 2 != 0 ? 1 : -1;
+        Visit(neighbour, whole_cells_ ? kAllEdges : beyond);
       }
     }
-    return next;
   }
-  void AppendEdges() {
-    for (const CrossedCell& cell : crossings_.cells) {
-      const std::array<int, 3> at = grid_.At(cell.index);
-      ForEachOwnEdge(grid_, at, cell.mask, [&](const CellEdge& edge) {
-        crossings_.edges.push_back({EdgeId(grid_, at, edge), corners_.Get(CornerOf(at, edge.from)),
-                                    corners_.Get(CornerOf(at, edge.to))});
-      });
+  void Record(std::int64_t cell) {
+    const std::array<int, 3> at = grid_.At(cell);
+    const int mask = MaskOf(at);
+    if (mask == 0 || mask == 255) {
+      return;
     }
+    crossings_.cells.push_back({cell, static_cast<std::uint8_t>(mask), corners_.EdgesOf(at)});
+    ForEachOwnEdge(grid_, crossings_.cells.back(), [&](const CellEdge& edge) {
+      crossings_.edges.push_back({EdgeId(grid_, at, edge), corners_.Get(CornerOf(at, edge.from)),
+                                  corners_.Get(CornerOf(at, edge.to))});
+    });
   }
 
   const ScalarField& field_;
   const SampleGrid& grid_;
   const RunContext& context_;
   CornerBlocks corners_;
+  std::array<FaceEdges, 6> faces_;
+  bool whole_cells_ = false;
+  std::vector<std::int64_t> cells_;  // that were visited
+  std::vector<SeedCell> next_;       // wave
   Crossings crossings_;
 };
 
-void SearchCrossings(const ScalarField& field, const SampleGrid& grid,
-                     const EdgeSearchOptions& options, const RunContext& context,
-                     Crossings& crossings) {
+PolygonizeResult Searched(const ScalarField& field, const SampleGrid& grid,
+                          const EdgeSearchOptions& options, const RunContext& context,
+                          Crossings crossings) {
   std::vector<std::int64_t> counts(crossings.edges.size(), 0);
   ParallelFor(crossings.edges.size(), context.threads, 64, [&](std::size_t n) {
     CrossedEdge& edge = crossings.edges[n];
-    if (std::isfinite(edge.at)) {
-      return;
-    }
     const std::array<int, 3> low = grid.At(edge.id / 3);
     std::array<int, 3> high = low;
     ++high[edge.id % 3];
@@ -159,6 +210,7 @@ void SearchCrossings(const ScalarField& field, const SampleGrid& grid,
   });
   crossings.summary.edge_evaluations =
       std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
+  return MeshOf(grid, std::move(crossings));
 }
 
 // Marches through all cells; layer(k, values) gives the values of the k-th layer of corners.
@@ -192,31 +244,30 @@ PolygonizeResult PolygonizeAll(const ScalarField& field, const SampleGrid& grid,
     });
   });
   crossings.summary.corner_evaluations = grid.CornerCount();
-  SearchCrossings(field, grid, options, context, crossings);
-  return MeshOf(grid, std::move(crossings));
+  return Searched(field, grid, options, context, std::move(crossings));
 }
 
 PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
-                                std::span<const std::int64_t> seed_cells,
-                                const EdgeSearchOptions& options, const RunContext& context) {
+                                std::span<const SeedCell> seeds, const EdgeSearchOptions& options,
+                                const RunContext& context) {
   CheckGrid(grid);
-  Crossings crossings = Continuation(field, grid, context).Run(seed_cells);
-  SearchCrossings(field, grid, options, context, crossings);
-  return MeshOf(grid, std::move(crossings));
+  Continuation continuation(field, grid, context);
+  continuation.Follow(seeds);
+  return Searched(field, grid, options, context, continuation.Take());
 }
 
-PolygonizeResult PolygonizeLargestFrom(const ScalarField& field, const SampleGrid& grid,
-                                       std::span<const std::int64_t> seed_cells,
-                                       const EdgeSearchOptions& options,
-                                       const RunContext& context) {
+PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& grid,
+                                   std::span<const SeedCell> seeds,
+                                   const EdgeSearchOptions& options, const RunContext& context) {
   CheckGrid(grid);
-  Crossings crossings = Continuation(field, grid, context).Run(seed_cells);
-  const std::vector<bool> may_be_largest = EdgesOfLargest(grid, crossings);
-  for (std::size_t n = 0; n < crossings.edges.size(); ++n) {
-    crossings.edges[n].at = may_be_largest[n] ? kNaN : 0.5;
+  Continuation continuation(field, grid, context);
+  continuation.Follow(seeds.first(std::min<std::size_t>(1, seeds.size())));
+  const auto reached = [&](const SeedCell& seed) { return continuation.Reached(seed); };
+  if (!std::all_of(seeds.begin(), seeds.end(), reached)) {
+    continuation.TakeWholeCells();
+    continuation.Follow(seeds);
   }
-  SearchCrossings(field, grid, options, context, crossings);
-  return MeshOf(grid, std::move(crossings));
+  return Searched(field, grid, options, context, continuation.Take());
 }
 
 PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleGrid& grid,

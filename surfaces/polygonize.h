@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "surfaces/fields.h"
+#include "surfaces/marching_cubes.h"
 #include "surfaces/run_context.h"
 #include "surfaces/tri_mesh.h"
 
@@ -84,19 +85,25 @@ struct PolygonizeResult {
 PolygonizeResult PolygonizeAll(const ScalarField& field, const SampleGrid& grid,
                                const EdgeSearchOptions& options, const RunContext& context);
 
-// Only the cells that the surface crosses, found from the given cells (index of their lowest
-// corner) by going on across every face that the surface crosses (Wyvill et al. 1986; Bloomenthal
-// 1988). Finds the components that touch a seed cell, whole, and no others. Memory grows with the
-// surface, not with the grid.
-PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
-                                std::span<const std::int64_t> seed_cells,
-                                const EdgeSearchOptions& options, const RunContext& context);
+// Where a surface is to be followed from.
+struct SeedCell {
+  std::int64_t cell;           // index of its lowest corner
+  EdgeBits edges = kAllEdges;  // those whose crossings, if there are any, the surface has
+};
 
-// The same; crossings are searched only where the component with the greatest volume may have them,
-// those of other components (inner sheets, fragments) stay in the middle of their edges.
-PolygonizeResult PolygonizeLargestFrom(const ScalarField& field, const SampleGrid& grid,
-                                       std::span<const std::int64_t> seed_cells,
-                                       const EdgeSearchOptions& options, const RunContext& context);
+// Only the cells that the surface crosses, found from the seeds by going on across every face that
+// it crosses (Wyvill et al. 1986; Bloomenthal 1988). Finds the components that touch a seed, whole,
+// and no others: not even such as share a cell with them. Memory grows with the surface, not with
+// the grid.
+PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
+                                std::span<const SeedCell> seeds, const EdgeSearchOptions& options,
+                                const RunContext& context);
+
+// The component that passes through all the seeds. If the first seed's does not, since cells are
+// too coarse for it, what touches the seeds, and whatever shares a cell with that, and so on.
+PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& grid,
+                                   std::span<const SeedCell> seeds,
+                                   const EdgeSearchOptions& options, const RunContext& context);
 
 // Marching cubes over samples that are there already, one a corner in the grid's order; crossings
 // by linear interpolation.

@@ -26,7 +26,7 @@ PolygonizeResult Counted(const ImplicitSurface& surface, const Polygonize& polyg
 
 // Appends the cells of a cube of `size` cells where bounds do not prove that there is no surface.
 void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid,
-                    const std::array<int, 3>& low, int size, std::vector<std::int64_t>& cells) {
+                    const std::array<int, 3>& low, int size, std::vector<SeedCell>& cells) {
   constexpr int kLeast = 2;  // below, corners cost less than bounds
   std::array<int, 3> end;
   for (int axis = 0; axis < 3; ++axis) {
@@ -53,14 +53,14 @@ void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid,
   for (int k = low[2]; k < end[2]; ++k) {
     for (int j = low[1]; j < end[1]; ++j) {
       for (int i = low[0]; i < end[0]; ++i) {
-        cells.push_back(grid.Index(i, j, k));
+        cells.push_back({grid.Index(i, j, k)});
       }
     }
   }
 }
 
-std::vector<std::int64_t> UnprovenCells(const ImplicitSurface& surface, const SampleGrid& grid,
-                                        const RunContext& context) {
+std::vector<SeedCell> UnprovenCells(const ImplicitSurface& surface, const SampleGrid& grid,
+                                    const RunContext& context) {
   constexpr int kCube = 16;
   std::vector<std::array<int, 3>> cubes;
   for (int k = 0; k < grid.counts[2]; k += kCube) {
@@ -70,13 +70,13 @@ std::vector<std::int64_t> UnprovenCells(const ImplicitSurface& surface, const Sa
       }
     }
   }
-  std::vector<std::vector<std::int64_t>> found(cubes.size());
+  std::vector<std::vector<SeedCell>> found(cubes.size());
   ParallelFor(cubes.size(), context.threads, 4, [&](std::size_t n) {
     context.ThrowIfStopped();
     AppendUnproven(surface, grid, cubes[n], kCube, found[n]);
   });
-  std::vector<std::int64_t> cells;
-  for (const std::vector<std::int64_t>& some : found) {
+  std::vector<SeedCell> cells;
+  for (const std::vector<SeedCell>& some : found) {
     cells.insert(cells.end(), some.begin(), some.end());
   }
   return cells;
@@ -85,7 +85,7 @@ std::vector<std::int64_t> UnprovenCells(const ImplicitSurface& surface, const Sa
 struct Polygonize {
   const ImplicitSurface& surface;
   const SampleGrid& grid;
-  std::span<const std::int64_t> seed_cells;
+  std::span<const SeedCell> seeds;
   const EdgeSearchOptions& options;
   const RunContext& context;
 
@@ -94,7 +94,7 @@ struct Polygonize {
       return band.components == FollowedComponents::kAll
                  ? PolygonizeFrom(field, grid, UnprovenCells(surface, grid, context), options,
                                   context)
-                 : PolygonizeLargestFrom(field, grid, seed_cells, options, context);
+                 : PolygonizeThrough(field, grid, seeds, options, context);
     });
   }
   PolygonizeResult operator()(const BruteForce&) const {
@@ -113,10 +113,10 @@ struct Polygonize {
 }  // namespace
 
 PolygonizeResult PolygonizeSurface(const Polygonizer& polygonizer, const ImplicitSurface& surface,
-                                   const SampleGrid& grid, std::span<const std::int64_t> seed_cells,
+                                   const SampleGrid& grid, std::span<const SeedCell> seeds,
                                    const EdgeSearchOptions& options, const RunContext& context) {
   CheckGrid(grid);
-  return std::visit(Polygonize{surface, grid, seed_cells, options, context}, polygonizer);
+  return std::visit(Polygonize{surface, grid, seeds, options, context}, polygonizer);
 }
 
 }  // namespace semblance

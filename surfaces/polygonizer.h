@@ -12,14 +12,14 @@
 
 namespace semblance {
 
-// The components of the surface that are followed: those that the outermost surface's seeds touch,
-// or all in the grid, inner sheets and fragments too.
+// The components of the surface that are followed: that which passes through the outermost
+// surface's seeds, or all in the grid, inner sheets and fragments too.
 enum class FollowedComponents { kOutermost, kAll };
 constexpr auto EnumNames(FollowedComponents) {
   return std::to_array<std::string_view>({"outermost", "all"});
 }
 
-// From cells on the surface on to their neighbours: PolygonizeFrom. To miss no component it also
+// From cells on the surface on to their neighbours: PolygonizeThrough. To miss no component it also
 // starts wherever bounds on the field do not prove that there is no surface. All threads.
 struct NarrowBand {
   static constexpr std::string_view kName = "narrow_band";
@@ -28,12 +28,13 @@ struct NarrowBand {
 template <class Visitor>
 void Fields(Visitor& visit, NarrowBand& o) {
   visit(
-      FieldInfo{.name = "components",
-                .doc =
-                    "outermost: of the surface only what is connected to its outermost points, and "
-                    "exactly only the component with the greatest volume; "
-                    "all: no component of it in the grid is missed, at many times the cost, so "
-                    "that sheets and fragments that are dropped are counted"},
+      FieldInfo{
+          .name = "components",
+          .doc = "outermost: of the surface only the component through its outermost points, or, "
+                 "where cells are too coarse for these to hang together, also what shares cells "
+                 "with it; "
+                 "all: no component of it in the grid is missed, at many times the cost, so "
+                 "that sheets and fragments that are dropped are counted"},
       o.components);
 }
 
@@ -81,10 +82,10 @@ void Fields(Visitor& visit, MinMaxOctree& o) {
 
 using Polygonizer = std::variant<NarrowBand, BruteForce, McOctree, MinMaxOctree>;
 
-// The surface Flattened = 0 in the grid. seed_cells: where NarrowBand starts. Throws InputError for
+// The surface Flattened = 0 in the grid. seeds: where NarrowBand starts. Throws InputError for
 // a grid that is none.
 PolygonizeResult PolygonizeSurface(const Polygonizer& polygonizer, const ImplicitSurface& surface,
-                                   const SampleGrid& grid, std::span<const std::int64_t> seed_cells,
+                                   const SampleGrid& grid, std::span<const SeedCell> seeds,
                                    const EdgeSearchOptions& options, const RunContext& context);
 
 }  // namespace semblance

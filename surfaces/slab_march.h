@@ -81,7 +81,7 @@ class SlabMarch {
     }
     const std::array<int, 3> cell = {i, j, slab_};
     crossings_.cells.push_back({grid_.Index(i, j, slab_), static_cast<std::uint8_t>(mask)});
-    ForEachOwnEdge(grid_, cell, mask, [&](const CellEdge& edge) {
+    ForEachOwnEdge(grid_, crossings_.cells.back(), [&](const CellEdge& edge) {
       CrossedEdge crossed{EdgeId(grid_, cell, edge), At(i, j, edge.from), At(i, j, edge.to)};
       search(crossed);
       crossings_.edges.push_back(crossed);

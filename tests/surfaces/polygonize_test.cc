@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "surfaces/crossings.h"
 #include "surfaces/error.h"
 #include "surfaces/implicit_face.h"
@@ -19,19 +21,24 @@ SampleGrid CubeGrid(double half, int n) {
 
 double Ball(const Vec3& p) { return 10 - (p - Vec3(0.3, -0.2, 0.1)).norm(); }
 
-TEST(Polygonize, EveryRandomFieldIsWatertightManifoldAndConsistent) {
-  for (std::uint64_t random_seed = 0; random_seed < 1000; ++random_seed) {
-    Random random(random_seed);
-    const SampleGrid grid = CubeGrid(1, 7);
-    std::vector<float> samples(grid.CornerCount(), -1);
-    for (int k = 1; k < 6; ++k) {
-      for (int j = 1; j < 6; ++j) {
-        for (int i = 1; i < 6; ++i) {
-          samples[grid.Index(i, j, k)] = static_cast<float>(random.Uniform(-1, 1));
-        }
+// Negative on the grid's border.
+std::vector<float> RandomSamples(const SampleGrid& grid, std::uint64_t random_seed) {
+  Random random(random_seed);
+  std::vector<float> samples(grid.CornerCount(), -1);
+  for (int k = 1; k + 1 < grid.counts[2]; ++k) {
+    for (int j = 1; j + 1 < grid.counts[1]; ++j) {
+      for (int i = 1; i + 1 < grid.counts[0]; ++i) {
+        samples[grid.Index(i, j, k)] = static_cast<float>(random.Uniform(-1, 1));
       }
     }
-    const PolygonizeResult result = PolygonizeSamples(samples, grid, {});
+  }
+  return samples;
+}
+
+TEST(Polygonize, EveryRandomFieldIsWatertightManifoldAndConsistent) {
+  for (std::uint64_t random_seed = 0; random_seed < 1000; ++random_seed) {
+    const SampleGrid grid = CubeGrid(1, 7);
+    const PolygonizeResult result = PolygonizeSamples(RandomSamples(grid, random_seed), grid, {});
     const EdgeReport edges = CheckEdges(result.mesh);
     EXPECT_EQ(edges.boundary, 0) << random_seed;
     EXPECT_EQ(edges.non_manifold, 0) << random_seed;
@@ -105,18 +112,19 @@ TEST(SearchCrossing, IsWithinTheToleranceHoweverSharpTheBend) {
   }
 }
 
+// The outermost cell that the surface crosses on the line through the middle.
+SeedCell SeedOnLine(const ScalarField& field, const SampleGrid& grid) {
+  int i = 0;
+  while (!(field(grid.Corner(i + 1, 12, 12)) > 0)) {
+    ++i;
+  }
+  return {grid.Index(i, 12, 12)};
+}
+
 TEST(Polygonize, ContinuationGivesTheMeshOfAllCells) {
   const SampleGrid grid = CubeGrid(12, 25);
   const PolygonizeResult all = PolygonizeAll(Ball, grid, {}, {});
-  // The cell that the surface crosses on the line through the ball's middle.
-  std::vector<std::int64_t> seeds;
-  for (int i = 0; i + 1 < 25; ++i) {
-    if ((Ball(grid.Corner(i, 12, 12)) > 0) != (Ball(grid.Corner(i + 1, 12, 12)) > 0)) {
-      seeds.push_back(grid.Index(i, 12, 12));
-      break;
-    }
-  }
-  const PolygonizeResult from = PolygonizeFrom(Ball, grid, seeds, {}, {});
+  const PolygonizeResult from = PolygonizeFrom(Ball, grid, {{SeedOnLine(Ball, grid)}}, {}, {});
   EXPECT_EQ(from.mesh.points, all.mesh.points);
   EXPECT_EQ(from.mesh.triangles, all.mesh.triangles);
   EXPECT_LT(from.summary.corner_evaluations, all.summary.corner_evaluations / 3);
@@ -128,24 +136,56 @@ double HollowBall(const Vec3& p) {
   return std::min(Ball(p), (p - Vec3(-0.6, 0.1, 0.2)).norm() - 7.6);
 }
 
-TEST(Polygonize, TheLargestComponentIsThatOfAllCellsAndOthersCostNoSearch) {
+TEST(Polygonize, ContinuationFollowsOneOfTwoSheetsInACell) {
   const SampleGrid grid = CubeGrid(12, 25);
-  std::vector<std::int64_t> seeds;
-  for (int i = 0; i + 1 < 25; ++i) {
-    if ((HollowBall(grid.Corner(i, 12, 12)) > 0) != (HollowBall(grid.Corner(i + 1, 12, 12)) > 0)) {
-      seeds.push_back(grid.Index(i, 12, 12));
-    }
-  }
-  const EdgeSearchOptions bisection{.method = EdgeSearch::kBisection, .tolerance = 1e-3};
-  const PolygonizeResult all = PolygonizeFrom(HollowBall, grid, seeds, bisection, {}),
-                         largest = PolygonizeLargestFrom(HollowBall, grid, seeds, bisection, {});
+  const PolygonizeResult all = PolygonizeAll(HollowBall, grid, {}, {});
   int dropped = 0;
-  const TriMesh ball = KeepOutermost(all.mesh, dropped);
-  EXPECT_EQ(dropped, 1);
-  EXPECT_EQ(largest.mesh.triangles, all.mesh.triangles);
-  EXPECT_EQ(KeepOutermost(largest.mesh, dropped).points, ball.points);
-  EXPECT_EQ(largest.summary.edge_evaluations,
-            all.summary.edge_evaluations / all.mesh.points.size() * ball.points.size());
+  const TriMesh outer = KeepOutermost(all.mesh, dropped);
+  ASSERT_EQ(dropped, 1);
+  SeedCell seed = SeedOnLine(HollowBall, grid);
+  seed.edges = EdgeBits(1 << EdgeFrom(0, 0));
+  const PolygonizeResult from = PolygonizeFrom(HollowBall, grid, {{seed}}, {}, {});
+  EXPECT_EQ(from.mesh.points, outer.points);
+  EXPECT_EQ(from.mesh.triangles, outer.triangles);
+  const PolygonizeResult solid = PolygonizeFrom(Ball, grid, {{SeedOnLine(Ball, grid)}}, {}, {});
+  EXPECT_EQ(from.summary.active_cells, solid.summary.active_cells);
+  EXPECT_EQ(from.summary.corner_evaluations, solid.summary.corner_evaluations);
+}
+
+// In random fields sheets share cells of all kinds.
+TEST(Polygonize, ContinuationFromEachComponentGivesThatComponent) {
+  for (std::uint64_t random_seed = 0; random_seed < 20; ++random_seed) {
+    const SampleGrid grid = CubeGrid(1, 9);
+    const std::vector<float> samples = RandomSamples(grid, random_seed);
+    const ScalarField nearest = [&](const Vec3& p) {
+      const Vec3 at = (p - grid.origin).cwiseQuotient(grid.cell_mm);
+      return samples[grid.Index(static_cast<int>(std::lround(at.x())),
+                                static_cast<int>(std::lround(at.y())),
+                                static_cast<int>(std::lround(at.z())))];
+    };
+    const TriMesh all = PolygonizeAll(nearest, grid, {}, {}).mesh;
+    std::map<std::vector<double>, std::size_t> triangles_of;  // by the points of a component
+    for (std::int64_t corner = 0; corner < grid.CornerCount(); ++corner) {
+      const auto [i, j, k] = grid.At(corner);
+      if (i + 1 == grid.counts[0] || (samples[corner] > 0) == (samples[corner + 1] > 0)) {
+        continue;
+      }
+      const SeedCell seed{corner, EdgeBits(1 << EdgeFrom(0, 0))};
+      const TriMesh one = PolygonizeFrom(nearest, grid, {{seed}}, {}, {}).mesh;
+      ASSERT_EQ(ConnectedComponents(one).count, 1);
+      std::vector<double> points;
+      for (const Vec3& p : one.points) {
+        points.insert(points.end(), p.begin(), p.end());
+      }
+      triangles_of[points] = one.triangles.size();
+    }
+    EXPECT_EQ(triangles_of.size(), ConnectedComponents(all).count);
+    std::size_t followed = 0;
+    for (const auto& [points, triangles] : triangles_of) {
+      followed += triangles;
+    }
+    EXPECT_EQ(followed, all.triangles.size());
+  }
 }
 
 TEST(Polygonize, ThreadsChangeNoBit) {
