@@ -52,20 +52,20 @@ SEMBLANCE_INLINE N Emit(const DistanceBatch& b, int first, const Vec3& p, const 
   return seen.z + Load<N>(b.advance_mm, first) > 0 ? either : nothing;
 }
 
-SEMBLANCE_INLINE bool Reaches(const RunReach& reach, const Vec3& p) {
+SEMBLANCE_INLINE bool Reaches(const BatchReach& reach, const Vec3& p) {
   const double dx = p.x() - reach.center.x(), dy = p.y() - reach.center.y(),
                dz = p.z() - reach.center.z();
   return dx * dx + dy * dy + dz * dz <= reach.squared_mm2;
 }
 
-RunReach ReachOf(const DistanceBatch& batch, int first, const DistanceFall& fall) {
+BatchReach ReachOf(const DistanceBatch& batch, const DistanceFall& fall) {
   constexpr double kSlack = 1 + 1e-9;
   const auto at = [](const std::array<DistanceBatch::Lanes, 3>& lanes, int l) {
     return Vec3(lanes[0][l], lanes[1][l], lanes[2][l]);
   };
   Box3 box;
   double furthest_mm = 0;  // from a triangle: where it emits, or is solid
-  for (int l = first; l < first + kWidth<Wide> && batch.gain[l] > 0; ++l) {
+  for (int l = 0; l < DistanceBatch::kLanes && batch.gain[l] > 0; ++l) {
     const Vec3 a = at(batch.corner, l), x = at(batch.along, l), y = at(batch.across, l);
     box.extend(a).extend(a + batch.ab.length[l] * x);
     box.extend(a + batch.ac.length[l] * (batch.ac.x[l] * x + batch.ac.y[l] * y));
@@ -107,44 +107,46 @@ void DistanceBatch::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c,
 
 SEMBLANCE_WIDE void EmitByDistance(const DistanceBatch& batch, const Vec3& p,
                                    const DistanceFall& fall, DistanceBatch::Lanes& emission) {
-  for (int first = 0; first < DistanceBatch::kLanes; first += kWidth<Wide>) {
-    Store(Emit<Wide>(batch, first, p, fall, fall.whole), emission, first);
-  }
+  Store(Emit<Wider>(batch, 0, p, fall, fall.whole), emission, 0);
 }
 
-std::vector<RunReach> ReachesOf(std::span<const DistanceBatch> batches, const DistanceFall& fall) {
-  std::vector<RunReach> reaches(2 * batches.size());
-  for (std::size_t run = 0; run < reaches.size(); ++run) {
-    reaches[run] = ReachOf(batches[run / 2], run % 2 * kWidth<Wide>, fall);
+std::vector<BatchReach> ReachesOf(std::span<const DistanceBatch> batches,
+                                  const DistanceFall& fall) {
+  std::vector<BatchReach> reaches;
+  for (const DistanceBatch& batch : batches) {
+    reaches.push_back(ReachOf(batch, fall));
   }
   return reaches;
 }
 
-// Which of the runs reach p is found first, without a branch that could be guessed wrong.
+// Which of the batches reach p is found first, without a branch that could be guessed wrong.
 SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceBatch> batches,
-                                    std::span<const RunReach> reaches,
-                                    std::span<const std::int32_t> runs, const Vec3& p,
-                                    const DistanceFall& fall) {
+                                    std::span<const BatchReach> reaches,
+                                    std::span<const std::int32_t> which, const Vec3& p,
+                                    const DistanceFall& fall, std::int64_t& reaching) {
   constexpr int kUsual = 6;  // the default decay
   constexpr std::size_t kAtOnce = 256;
-  std::array<std::int32_t, kAtOnce> reaching;
-  Wide sum{};
-  while (!runs.empty()) {
-    const auto some = runs.first(std::min(kAtOnce, runs.size()));
+  std::array<std::int32_t, kAtOnce> found;
+  Wider sum{};
+  while (!which.empty()) {
+    const auto some = which.first(std::min(kAtOnce, which.size()));
     std::size_t count = 0;
-    for (const std::int32_t run : some) {
-      reaching[count] = run;
-      count += Reaches(reaches[run], p) ? 1 : 0;
+    for (const std::int32_t batch : some) {
+      found[count] = batch;
+      count += Reaches(reaches[batch], p) ? 1 : 0;
     }
     for (std::size_t n = 0; n < count; ++n) {
-      const DistanceBatch& batch = batches[reaching[n] / 2];
-      const int first = reaching[n] % 2 * kWidth<Wide>;
-      sum += fall.whole == kUsual ? Emit<Wide>(batch, first, p, fall, kUsual)
-                                  : Emit<Wide>(batch, first, p, fall, fall.whole);
+      const DistanceBatch& batch = batches[found[n]];
+      sum += fall.whole == kUsual ? Emit<Wider>(batch, 0, p, fall, kUsual)
+                                  : Emit<Wider>(batch, 0, p, fall, fall.whole);
     }
-    runs = runs.subspan(some.size());
+    reaching += static_cast<std::int64_t>(count);
+    which = which.subspan(some.size());
   }
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+  DistanceBatch::Lanes lanes;
+  Store(sum, lanes, 0);
+  return ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) +
+         ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
 }
 
 double EmitByDistance(const DistanceBatch& batch, int lane, const Vec3& p,

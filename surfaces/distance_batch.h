@@ -41,20 +41,21 @@ struct alignas(64) DistanceBatch {
   Lanes advance_mm{}, floor_mm2{}, gain{};
 };
 
-// A ball around four lanes beyond which the cut leaves nothing of what they emit.
-struct RunReach {
+// A ball around a batch beyond which the cut leaves nothing of what it emits.
+struct BatchReach {
   Vec3 center = Vec3::Zero();
   double squared_mm2 = -1;  // of its radius; infinite without a cut
 };
-// Of all runs; run r is half r % 2 of batch r / 2.
-std::vector<RunReach> ReachesOf(std::span<const DistanceBatch> batches, const DistanceFall& fall);
+std::vector<BatchReach> ReachesOf(std::span<const DistanceBatch> batches, const DistanceFall& fall);
 
 // What each lane emits at p: 0 at heights <= 0 over its triangle's plane.
 void EmitByDistance(const DistanceBatch& batch, const Vec3& p, const DistanceFall& fall,
                     DistanceBatch::Lanes& emission);
-// The sum of that over some runs of four lanes; reaches: ReachesOf(batches, fall).
-double SumByDistance(std::span<const DistanceBatch> batches, std::span<const RunReach> reaches,
-                     std::span<const std::int32_t> runs, const Vec3& p, const DistanceFall& fall);
+// The sum of that over some batches, by their numbers; reaches: ReachesOf(batches, fall). Adds to
+// `reaching` how many of them reach p.
+double SumByDistance(std::span<const DistanceBatch> batches, std::span<const BatchReach> reaches,
+                     std::span<const std::int32_t> which, const Vec3& p, const DistanceFall& fall,
+                     std::int64_t& reaching);
 double EmitByDistance(const DistanceBatch& batch, int lane, const Vec3& p,
                       const DistanceFall& fall);
 

@@ -14,10 +14,11 @@
 
 namespace semblance {
 
-// Each kernel: Gain(t) sets EmitterTriangle::gain; what a triangle emits at a height > 0 is at most
-// most_gain * Most(distance^2, height), distances taken to the triangle and where it is moved to,
-// by Advance(t) along its normal, and 0 where it would be less than Cut(). FlatKernel emits by
-// itself; the others, from distances of at least Floor(t), as Fall() says (distance_batch.h).
+// Each kernel: its emitters are summed in runs of kRun; Gain(t) sets EmitterTriangle::gain; what a
+// triangle emits at a height > 0 is at most most_gain * Most(distance^2, height), distances taken
+// to the triangle and where it is moved to, by Advance(t) along its normal, and 0 where it would be
+// less than Cut(). FlatKernel emits by itself; the others, from distances of at least Floor(t), as
+// Fall() says (distance_batch.h).
 
 // gain / distance^k of the thesis's emitters; 0 where that is less than the cut.
 class DistanceFalloff {
@@ -45,6 +46,7 @@ class DistanceFalloff {
 
 class ThesisKernel {
  public:
+  static constexpr int kRun = DistanceBatch::kLanes;
   explicit ThesisKernel(const ThesisEmitter& o) : falloff_(o.decay, o.cut_below) {}
   double Gain(const EmitterTriangle& t) const { return std::pow(t.depth_mm, falloff_.Decay()); }
   double AtDistance(const EmitterTriangle& t, double d) const { return falloff_.At(t, d * d, 1); }
@@ -63,6 +65,7 @@ class ThesisKernel {
 
 class SplitKernel {
  public:
+  static constexpr int kRun = DistanceBatch::kLanes;
   explicit SplitKernel(const SplitEmitter& o) : t_(o.split), falloff_(o.decay, o.cut_below) {}
   double Gain(const EmitterTriangle& t) const {
     return std::pow(EmittingDepth(t), falloff_.Decay());

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "surfaces/distance_batch.h"
@@ -25,6 +27,20 @@ struct EmitterNode {
   double gain = 0;                              // sum over its emitters
   double greatest_gain = 0;
 
+  void Add(const EmitterTriangle& t) {
+    for (const Vec3& corner : {t.a, t.b, t.c}) {
+      box.extend(corner).extend(corner + t.moved);
+    }
+    normals.extend(t.normal);
+    gain += t.most_gain;
+    greatest_gain = std::max(greatest_gain, t.most_gain);
+  }
+  void Add(const EmitterNode& part) {
+    box.extend(part.box);
+    normals.extend(part.normals);
+    gain += part.gain;
+    greatest_gain = std::max(greatest_gain, part.greatest_gain);
+  }
   // Not less than the height of any point within half of p, each way, over the plane of any of its
   // emitters.
   double MostHeight(const Vec3& p, const Vec3& half) const {
@@ -39,8 +55,22 @@ struct EmitterNode {
 // Each leaf begins at a multiple of four, and what Near visits at one of the batches' lanes.
 class EmitterTree {
  public:
+  // Puts the emitters in the tree's order.
   explicit EmitterTree(std::vector<EmitterTriangle>& emitters) {
-    Split(emitters, 0, static_cast<int>(emitters.size()));
+    std::vector<Item> items(emitters.size());
+    for (std::size_t e = 0; e < items.size(); ++e) {
+      items[e] = {emitters[e].centroid, static_cast<std::int32_t>(e)};
+    }
+    Split(items, 0, static_cast<int>(items.size()));
+    std::vector<EmitterTriangle> ordered;
+    ordered.reserve(items.size());
+    for (const Item& item : items) {
+      ordered.push_back(emitters[item.emitter]);
+    }
+    emitters = std::move(ordered);
+    for (auto node = nodes_.rbegin(); node != nodes_.rend(); ++node) {  // children first
+      Enclose(emitters, *node);
+    }
   }
 
   // Calls visit(node) for nodes of a few leaves, or one, that are not left out, in a fixed order. A
@@ -71,41 +101,49 @@ class EmitterTree {
   static constexpr int kBatch = FlatBatch::kLanes, kLeaf = 4, kFew = 4 * kBatch;
   static_assert(kBatch == DistanceBatch::kLanes);
 
-  int Split(std::vector<EmitterTriangle>& emitters, int begin, int end) {
+  struct Item {
+    Vec3 centroid;
+    std::int32_t emitter;
+  };
+
+  int Split(std::vector<Item>& items, int begin, int end) {
     const int self = static_cast<int>(nodes_.size());
     nodes_.emplace_back();
     nodes_[self].begin = begin;
     nodes_[self].end = end;
-    Box3 centers;
-    EmitterNode& node = nodes_[self];
-    for (int e = begin; e < end; ++e) {
-      const EmitterTriangle& t = emitters[e];
-      for (const Vec3& corner : {t.a, t.b, t.c}) {
-        node.box.extend(corner).extend(corner + t.moved);
-      }
-      centers.extend(t.centroid);
-      node.normals.extend(t.normal);
-      node.gain += t.most_gain;
-      node.greatest_gain = std::max(node.greatest_gain, t.most_gain);
+    if (end - begin <= kLeaf) {
+      return self;
     }
-    for (int e = begin; e < end; ++e) {
+    Box3 centroids;
+    for (int n = begin; n < end; ++n) {
+      centroids.extend(items[n].centroid);
+    }
+    int axis = 0;
+    centroids.sizes().maxCoeff(&axis);
+    const int unit = end - begin > kBatch ? kBatch : kLeaf;  // which the left half fills
+    const int middle = begin + ((end - begin) / 2 + unit - 1) / unit * unit;
+    std::nth_element(
+        items.begin() + begin, items.begin() + middle, items.begin() + end,
+        [axis](const Item& a, const Item& b) { return a.centroid[axis] < b.centroid[axis]; });
+    const int left = Split(items, begin, middle), right = Split(items, middle, end);
+    nodes_[self].left = left;
+    nodes_[self].right = right;
+    return self;
+  }
+
+  void Enclose(const std::vector<EmitterTriangle>& emitters, EmitterNode& node) const {
+    if (node.left < 0) {
+      for (int e = node.begin; e < node.end; ++e) {
+        node.Add(emitters[e]);
+      }
+    } else {
+      node.Add(nodes_[node.left]);
+      node.Add(nodes_[node.right]);
+    }
+    for (int e = node.begin; e < node.end; ++e) {
       const EmitterTriangle& t = emitters[e];
       node.lowest_mm = std::min(node.lowest_mm, t.normal.dot(t.a - node.box.center()));
     }
-    if (end - begin > kLeaf) {
-      int axis = 0;
-      centers.sizes().maxCoeff(&axis);
-      const int unit = end - begin > kBatch ? kBatch : kLeaf;  // which the left half fills
-      const int middle = begin + ((end - begin) / 2 + unit - 1) / unit * unit;
-      std::nth_element(emitters.begin() + begin, emitters.begin() + middle, emitters.begin() + end,
-                       [axis](const EmitterTriangle& a, const EmitterTriangle& b) {
-                         return a.centroid[axis] < b.centroid[axis];
-                       });
-      const int left = Split(emitters, begin, middle), right = Split(emitters, middle, end);
-      nodes_[self].left = left;
-      nodes_[self].right = right;
-    }
-    return self;
   }
 
   std::vector<EmitterNode> nodes_;

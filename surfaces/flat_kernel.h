@@ -22,6 +22,7 @@ namespace semblance {
 // midpoints (exact for quadratics) of ever smaller triangles.
 class FlatKernel {
  public:
+  static constexpr int kRun = FlatBatch::kLanes / 2;
   explicit FlatKernel(const FlatEmitter& o)
       : k_(o.decay),
         closed_(o.decay == std::floor(o.decay) ? static_cast<int>(o.decay) + 1 : -1),
@@ -54,7 +55,7 @@ class FlatKernel {
       AddFlat(batches, runs, p, fall_, walk);
       for (unsigned near = walk.near; near != 0; near &= near - 1) {
         const int lane = std::countr_zero(near);
-        walk.sum[lane] += Near(emitters[4 * runs[walk.next - 1] + lane], p);
+        walk.sum[lane] += Near(emitters[kRun * runs[walk.next - 1] + lane], p);
       }
     }
     return (walk.sum[0] + walk.sum[1]) + (walk.sum[2] + walk.sum[3]);

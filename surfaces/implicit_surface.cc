@@ -19,7 +19,6 @@ EmitterDepth DepthOver(const Emitter& emitter) {
   return flat ? flat->depth : EmitterDepth::kMean;
 }
 
-constexpr int kRun = 4, kRunsOfBatch = FlatBatch::kLanes / kRun;
 static_assert(FlatBatch::kLanes == DistanceBatch::kLanes &&
               FlatBatch::kLanes == EmitterReach::kLanes);
 
@@ -96,7 +95,7 @@ double TakeLeast(double budget, std::vector<double>& most) {
 // Of the cubes that share a list of what is near. With a cut a point passes quickly over what does
 // not reach it, so that larger ones pay.
 double CubeSize(const std::vector<EmitterTriangle>& emitters, bool cut) {
-  const double of_depth = cut ? 1 : 0.7;
+  const double of_depth = cut ? 1.25 : 0.7;
   const double sum =
       std::accumulate(emitters.begin(), emitters.end(), 0.0,
                       [](double s, const EmitterTriangle& t) { return s + t.depth_mm; });
@@ -129,7 +128,7 @@ struct ImplicitSurface::Impl {
   template <class EmitterKernel>
   void MakeBatches(const EmitterKernel& k) {
     distance_batches = MakeDistanceBatches(k, emitters);
-    run_reaches = ReachesOf(distance_batches, k.Fall());
+    batch_reaches = ReachesOf(distance_batches, k.Fall());
   }
 
   // The emitters that points of a box have to sum: all others together emit at most the tail error.
@@ -163,11 +162,12 @@ struct ImplicitSurface::Impl {
       });
       least /= 8;
     } while (left_out > 0.5 * tail_error);
-    return NearOf(leaves, k.Reach(), center, half, left_out);
+    return NearOf<EmitterKernel::kRun>(leaves, k.Reach(), center, half, left_out);
   }
 
   // Of some leaves' emitters, without such that together emit at most what is left of the tail
   // error.
+  template <int kRun>
   NearEmitters NearOf(const std::vector<std::int32_t>& leaves, const ReachFall& fall,
                       const Vec3& center, const Vec3& half, double& left_out) const {
     constexpr int kLanes = EmitterReach::kLanes;
@@ -182,8 +182,8 @@ struct ImplicitSurface::Impl {
     left_out += TakeLeast(tail_error - left_out, most);
     NearEmitters near;
     for (std::size_t n = 0; n < most.size(); n += kRun) {
-      if (most[n] > 0 || most[n + 1] > 0 || most[n + 2] > 0 || most[n + 3] > 0) {
-        near.push_back(kRunsOfBatch * leaves[n / kLanes] + (n % kLanes != 0 ? 1 : 0));
+      if (*std::max_element(most.begin() + n, most.begin() + n + kRun) > 0) {
+        near.push_back((kLanes * leaves[n / kLanes] + static_cast<int>(n % kLanes)) / kRun);
       }
     }
     return near;
@@ -207,32 +207,40 @@ struct ImplicitSurface::Impl {
     return EmitByDistance(distance_batches[e / kLanes], e % kLanes, p, k.Fall());
   }
 
-  double SumOf(const FlatKernel& k, const NearEmitters& list, const Vec3& p) const {
+  double SumOf(const FlatKernel& k, const NearEmitters& list, const Vec3& p,
+               std::int64_t& evaluations) const {
+    evaluations += static_cast<std::int64_t>(FlatKernel::kRun * list.size());
     if (!k.Batches()) {
       return SumOneByOne(k, list, p);
     }
     return k.Sum(flat_batches, list, emitters, p);
   }
-  double SumOneByOne(const FlatKernel& k, const NearEmitters& list, const Vec3& p) const {
-    double sum = 0;
+  template <int kRun, class Visit>
+  void ForEachOf(const NearEmitters& list, const Visit& visit) const {
     for (const std::int32_t run : list) {
       const int end = std::min<int>(kRun * (run + 1), static_cast<int>(emitters.size()));
       for (int e = kRun * run; e < end; ++e) {
-        sum += Emission(k, e, p);
+        visit(e);
       }
     }
+  }
+  double SumOneByOne(const FlatKernel& k, const NearEmitters& list, const Vec3& p) const {
+    double sum = 0;
+    ForEachOf<FlatKernel::kRun>(list, [&](int e) { sum += Emission(k, e, p); });
     return sum;
   }
   template <class EmitterKernel>
-  double SumOf(const EmitterKernel& k, const NearEmitters& list, const Vec3& p) const {
-    return SumByDistance(distance_batches, run_reaches, list, p, k.Fall());
+  double SumOf(const EmitterKernel& k, const NearEmitters& list, const Vec3& p,
+               std::int64_t& evaluations) const {
+    std::int64_t reaching = 0;
+    const double sum = SumByDistance(distance_batches, batch_reaches, list, p, k.Fall(), reaching);
+    evaluations += EmitterKernel::kRun * reaching;
+    return sum;
   }
 
   template <class EmitterKernel>
   double Sum(const EmitterKernel& k, const Vec3& p, std::int64_t& evaluations) const {
-    const NearEmittersTable::List list = Near(k, p);
-    evaluations += static_cast<std::int64_t>(kRun * list->size());
-    return SumOf(k, *list, p);
+    return SumOf(k, *Near(k, p), p, evaluations);
   }
 
   Kernel kernel;
@@ -242,7 +250,7 @@ struct ImplicitSurface::Impl {
   NearEmittersTable near_table;
   std::vector<FlatBatch> flat_batches;  // of the tree's leaves; or
   std::vector<DistanceBatch> distance_batches;
-  std::vector<RunReach> run_reaches;  // of the distance batches
+  std::vector<BatchReach> batch_reaches;  // of the distance batches
   double tail_error, decay;
 };
 
@@ -306,15 +314,13 @@ void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> em
 
 EmissionBounds ImplicitSurface::BoundsIn(const Box3& box) const {
   double left_out = 0;
-  const NearEmitters near = std::visit(
-      [&](const auto& kernel) { return impl_->NearBox(kernel, box, left_out); }, impl_->kernel);
   std::vector<std::int32_t> emitters;
-  for (const std::int32_t run : near) {
-    const auto end = std::min<std::int32_t>(kRun * (run + 1), static_cast<int>(EmitterCount()));
-    for (std::int32_t e = kRun * run; e < end; ++e) {
-      emitters.push_back(e);
-    }
-  }
+  std::visit(
+      [&]<class EmitterKernel>(const EmitterKernel& kernel) {
+        const NearEmitters near = impl_->NearBox(kernel, box, left_out);
+        impl_->ForEachOf<EmitterKernel::kRun>(near, [&](int e) { emitters.push_back(e); });
+      },
+      impl_->kernel);
   std::vector<EmissionBounds> bounds(emitters.size());
   BoundsIn(box, emitters, bounds);
   EmissionBounds sum{-impl_->tail_error, left_out};
@@ -340,9 +346,12 @@ Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
 double ImplicitSurface::TailError() const { return impl_->tail_error; }
 
 std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
-  const std::size_t runs =
-      std::visit([&](const auto& kernel) { return impl_->Near(kernel, p)->size(); }, impl_->kernel);
-  return std::min(EmitterCount(), static_cast<std::int64_t>(kRun * runs));
+  return std::visit(
+      [&]<class EmitterKernel>(const EmitterKernel& kernel) {
+        const auto runs = static_cast<std::int64_t>(impl_->Near(kernel, p)->size());
+        return std::min(EmitterCount(), EmitterKernel::kRun * runs);
+      },
+      impl_->kernel);
 }
 
 std::int64_t ImplicitSurface::EmitterCount() const {

@@ -15,7 +15,7 @@
 
 namespace semblance {
 
-// Runs of four emitters, each by the number of its first over four, in the tree's order.
+// Runs of emitters, each by the number of its first over their length, in the tree's order.
 using NearEmitters = std::vector<std::int32_t>;
 
 // Lists of cubes of a lattice. They are kept in a table of fixed size, where a new one may put out

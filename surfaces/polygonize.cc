@@ -82,7 +82,7 @@ class Continuation {
       context_.ThrowIfStopped();
       context_.Report("polygonize");
       const std::vector<SeedCell> wave = std::exchange(next_, {});
-      Evaluate(UnknownCorners(wave));
+      Evaluate(UnknownCorners());
       for (const SeedCell& cell : wave) {
         Cross(cell);
       }
@@ -123,10 +123,11 @@ class Continuation {
       next_.push_back({index, fresh});
     }
   }
-  std::vector<std::int64_t> UnknownCorners(const std::vector<SeedCell>& wave) {
+  // Of the cells that are new.
+  std::vector<std::int64_t> UnknownCorners() {
     std::vector<std::int64_t> unknown;
-    for (const SeedCell& cell : wave) {
-      const std::array<int, 3> at = grid_.At(cell.cell);
+    for (; known_cells_ < cells_.size(); ++known_cells_) {
+      const std::array<int, 3> at = grid_.At(cells_[known_cells_]);
       for (int c = 0; c < 8; ++c) {
         const std::array<int, 3> corner = CornerOf(at, c);
         if (corners_.FirstAsked(corner)) {
@@ -190,6 +191,7 @@ class Continuation {
   std::array<FaceEdges, 6> faces_;
   bool whole_cells_ = false;
   std::vector<std::int64_t> cells_;  // that were visited
+  std::size_t known_cells_ = 0;      // of these, whose corners are known
   std::vector<SeedCell> next_;       // wave
   Crossings crossings_;
 };

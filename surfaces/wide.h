@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Four numbers in one register, and how the batches of emitters are compiled. For the batches
-// alone: their files have compiler options of their own.
+// Four or eight numbers in one register, and how the batches of emitters are compiled. For the
+// batches alone: their files have compiler options of their own.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 // sanitizer the choice at load time would run before the sanitizer does.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__)
-#define SEMBLANCE_WIDE __attribute__((target_clones("avx2", "default")))
+#define SEMBLANCE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
 #define SEMBLANCE_WIDE
 #endif
@@ -22,8 +22,9 @@
 namespace semblance {
 
 using Wide = double __attribute__((vector_size(32)));
+using Wider = double __attribute__((vector_size(64)));
 
-// What follows is for N = Wide or double, and gives the same bits for both.
+// What follows is for N = Wider, Wide or double, and gives the same bits for both.
 template <class N>
 inline constexpr int kWidth = sizeof(N) / sizeof(double);
 
