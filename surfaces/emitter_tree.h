@@ -52,7 +52,8 @@ struct EmitterNode {
   }
 };
 
-// Each leaf begins at a multiple of four, and what Near visits at one of the batches' lanes.
+// Each leaf begins at a multiple of four, nodes of more than four at one of the batches' lanes.
+// Each 16, 64 or 256 that begin at a multiple of that are a node.
 class EmitterTree {
  public:
   // Puts the emitters in the tree's order.
@@ -73,32 +74,32 @@ class EmitterTree {
     }
   }
 
-  // Calls visit(node) for nodes of a few leaves, or one, that are not left out, in a fixed order. A
-  // node is left out where bound(node), the most that it emits, is at most `least`; returns the sum
-  // of those bounds.
-  template <class Bound, class Visit>
-  double Near(double least, const Bound& bound, const Visit& visit) const {
+  const std::vector<EmitterNode>& nodes() const { return nodes_; }
+
+  // Goes down from the root in a fixed order, by the nodes' numbers: no further where done(node),
+  // and visits those of at most `few` emitters where not.
+  template <class Done, class Visit>
+  void Descend(int few, const Done& done, const Visit& visit) const {
     std::array<int, 64> stack;
     int size = 0;
-    double left_out = 0;
     stack[size++] = 0;
     while (size > 0) {
-      const EmitterNode& node = nodes_[stack[--size]];
-      const double most = bound(node);
-      if (most <= least) {
-        left_out += most;
-      } else if (node.end - node.begin <= kFew) {
-        visit(node);
+      const int n = stack[--size];
+      const EmitterNode& node = nodes_[n];
+      if (done(n)) {
+        continue;
+      }
+      if (node.end - node.begin <= few) {
+        visit(n);
       } else {
         stack[size++] = node.right;
         stack[size++] = node.left;
       }
     }
-    return left_out;
   }
 
  private:
-  static constexpr int kBatch = FlatBatch::kLanes, kLeaf = 4, kFew = 4 * kBatch;
+  static constexpr int kBatch = FlatBatch::kLanes, kLeaf = 4;
   static_assert(kBatch == DistanceBatch::kLanes);
 
   struct Item {
@@ -120,7 +121,10 @@ class EmitterTree {
     }
     int axis = 0;
     centroids.sizes().maxCoeff(&axis);
-    const int unit = end - begin > kBatch ? kBatch : kLeaf;  // which the left half fills
+    int unit = kLeaf;  // which the left half fills
+    for (const int block : {kBatch, 16, 64, 256}) {
+      unit = end - begin > block ? block : unit;
+    }
     const int middle = begin + ((end - begin) / 2 + unit - 1) / unit * unit;
     std::nth_element(
         items.begin() + begin, items.begin() + middle, items.begin() + end,

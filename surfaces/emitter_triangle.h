@@ -47,8 +47,9 @@ struct EmitterTriangle {
   // depth_mm, which is their mean, and its gradient over depth_mm, in the plane; 1 / mm.
   double least_share = 1, most_share = 1;
   Vec3 slope = Vec3::Zero();
-  Vec3 edge_normal_a, edge_normal_b,
-      edge_normal_c;  // in the plane, out of the triangle, across ab, bc, ca
+  // In the plane, out of the triangle, across ab, bc, ca.
+  Vec3 edge_normal_a = Vec3::Constant(kNaN), edge_normal_b = edge_normal_a,
+       edge_normal_c = edge_normal_a;
 
   bool IsSloped() const { return most_share > least_share; }
 

@@ -60,6 +60,7 @@ class FlatKernel {
     }
     return (walk.sum[0] + walk.sum[1]) + (walk.sum[2] + walk.sum[3]);
   }
+  int Power() const { return fall_.power; }  // of the batches and clusters
   double Decay() const { return k_; }
   double Most(double squared, double height) const {
     return std::min(height, std::sqrt(squared)) * power_(squared);

@@ -6,8 +6,7 @@
 #include <numeric>
 
 #include "surfaces/emitter_bounds.h"
-#include "surfaces/emitter_reach.h"
-#include "surfaces/emitter_tree.h"
+#include "surfaces/emitter_search.h"
 #include "surfaces/make_emitters.h"
 #include "surfaces/near_emitters.h"
 
@@ -54,44 +53,6 @@ std::vector<DistanceBatch> MakeDistanceBatches(const EmitterKernel& kernel,
   return batches;
 }
 
-std::vector<EmitterReach> MakeReaches(const std::vector<EmitterTriangle>& emitters) {
-  constexpr std::size_t kLanes = EmitterReach::kLanes;
-  std::vector<EmitterReach> batches((emitters.size() + kLanes - 1) / kLanes);
-  for (std::size_t e = 0; e < emitters.size(); ++e) {
-    batches[e / kLanes].Set(static_cast<int>(e % kLanes), emitters[e]);
-  }
-  return batches;
-}
-
-// Takes what together is at most `budget` from the least of some numbers >= 0: sets each of these
-// to 0 and returns their sum. By powers of 2, so that nothing is sorted.
-double TakeLeast(double budget, std::vector<double>& most) {
-  if (!(budget > 0)) {
-    return 0;
-  }
-  constexpr int kPowers = 40;
-  const auto exponent = [](double value) {
-    return static_cast<int>(std::bit_cast<std::uint64_t>(value) >> 52);
-  };
-  const int first = exponent(budget);
-  std::array<double, kPowers> sums{};  // [n]: of numbers of about budget / 2^n
-  for (const double value : most) {
-    const int power = first - exponent(value);
-    if (power >= 0) {
-      sums[std::min(power, kPowers - 1)] += value;
-    }
-  }
-  int last = kPowers;
-  double taken = 0;
-  while (last > 0 && taken + sums[last - 1] <= budget) {
-    taken += sums[--last];
-  }
-  for (double& value : most) {
-    value = first - exponent(value) >= last ? 0 : value;
-  }
-  return taken;
-}
-
 // Of the cubes that share a list of what is near. With a cut a point passes quickly over what does
 // not reach it, so that larger ones pay.
 double CubeSize(const std::vector<EmitterTriangle>& emitters, bool cut) {
@@ -112,8 +73,7 @@ struct ImplicitSurface::Impl {
   Impl(const TriMesh& skull, std::span<const double> depth_mm, const ImplicitOptions& options)
       : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
         emitters(MakeEmitters(skull, depth_mm, DepthOver(options.emitter), kernel)),
-        tree(emitters),
-        reaches(MakeReaches(emitters)),
+        search(emitters, kernel, options.tail_error),
         near_table(CubeSize(emitters, HasCut(kernel))),
         tail_error(options.tail_error),
         decay(std::visit([](const auto& k) { return k.Decay(); }, kernel)) {
@@ -131,69 +91,11 @@ struct ImplicitSurface::Impl {
     batch_reaches = ReachesOf(distance_batches, k.Fall());
   }
 
-  // The emitters that points of a box have to sum: all others together emit at most the tail error.
-  // Nodes that are not left out are looked at emitter by emitter.
-  // The first guess at what a node may emit and be left out nearly always does.
-  template <class EmitterKernel>
-  NearEmitters NearBox(const EmitterKernel& k, const Box3& box, double& left_out) const {
-    constexpr double kFirstShare = 1.0 / 128;
-    const double cut = (1 - kRounding) * k.Cut();
-    const Vec3 center = box.center(), half = 0.5 * box.sizes();
-    const auto bound = [&](const EmitterNode& node) {
-      const double height = node.MostHeight(center, half);
-      if (height <= 0) {
-        return 0.0;
-      }
-      const double distance2 = node.box.squaredExteriorDistance(box);
-      if (distance2 <= 0) {
-        return std::numeric_limits<double>::infinity();
-      }
-      const double share = k.Most(distance2, height);
-      return node.greatest_gain * share < cut ? 0 : node.gain * share;
-    };
-    std::vector<std::int32_t> leaves;
-    double least = kFirstShare * tail_error;
-    do {
-      leaves.clear();
-      left_out = tree.Near(least, bound, [&](const EmitterNode& node) {
-        for (int e = node.begin; e < node.end; e += EmitterReach::kLanes) {
-          leaves.push_back(e / EmitterReach::kLanes);
-        }
-      });
-      least /= 8;
-    } while (left_out > 0.5 * tail_error);
-    return NearOf<EmitterKernel::kRun>(leaves, k.Reach(), center, half, left_out);
-  }
-
-  // Of some leaves' emitters, without such that together emit at most what is left of the tail
-  // error.
-  template <int kRun>
-  NearEmitters NearOf(const std::vector<std::int32_t>& leaves, const ReachFall& fall,
-                      const Vec3& center, const Vec3& half, double& left_out) const {
-    constexpr int kLanes = EmitterReach::kLanes;
-    const int count = static_cast<int>(emitters.size());
-    std::vector<double> most(kLanes * leaves.size(), 0);
-    EmitterReach::Lanes lanes;
-    for (std::size_t n = 0; n < leaves.size(); ++n) {
-      MostInBox(reaches[leaves[n]], center, half, fall, lanes);
-      std::copy_n(lanes.begin(), std::min(kLanes, count - kLanes * leaves[n]),
-                  most.begin() + kLanes * n);
-    }
-    left_out += TakeLeast(tail_error - left_out, most);
-    NearEmitters near;
-    for (std::size_t n = 0; n < most.size(); n += kRun) {
-      if (*std::max_element(most.begin() + n, most.begin() + n + kRun) > 0) {
-        near.push_back((kLanes * leaves[n / kLanes] + static_cast<int>(n % kLanes)) / kRun);
-      }
-    }
-    return near;
-  }
-
   template <class EmitterKernel>
   NearEmittersTable::List Near(const EmitterKernel& k, const Vec3& p) const {
     return near_table.Find(p, [&](const Box3& box) {
       double left_out = 0;
-      return NearBox(k, box, left_out);
+      return search.InBox(k, box, FarField::kClusters, left_out);
     });
   }
 
@@ -209,15 +111,17 @@ struct ImplicitSurface::Impl {
 
   double SumOf(const FlatKernel& k, const NearEmitters& list, const Vec3& p,
                std::int64_t& evaluations) const {
-    evaluations += static_cast<std::int64_t>(FlatKernel::kRun * list.size());
+    evaluations +=
+        FlatKernel::kRun * std::ssize(list.runs) + ClusterBatch::kLanes * std::ssize(list.clusters);
     if (!k.Batches()) {
       return SumOneByOne(k, list, p);
     }
-    return k.Sum(flat_batches, list, emitters, p);
+    return k.Sum(flat_batches, list.runs, emitters, p) +
+           SumClusters(search.clusters(), list.clusters, p, k.Power());
   }
   template <int kRun, class Visit>
   void ForEachOf(const NearEmitters& list, const Visit& visit) const {
-    for (const std::int32_t run : list) {
+    for (const std::int32_t run : list.runs) {
       const int end = std::min<int>(kRun * (run + 1), static_cast<int>(emitters.size()));
       for (int e = kRun * run; e < end; ++e) {
         visit(e);
@@ -233,7 +137,8 @@ struct ImplicitSurface::Impl {
   double SumOf(const EmitterKernel& k, const NearEmitters& list, const Vec3& p,
                std::int64_t& evaluations) const {
     std::int64_t reaching = 0;
-    const double sum = SumByDistance(distance_batches, batch_reaches, list, p, k.Fall(), reaching);
+    const double sum =
+        SumByDistance(distance_batches, batch_reaches, list.runs, p, k.Fall(), reaching);
     evaluations += EmitterKernel::kRun * reaching;
     return sum;
   }
@@ -245,8 +150,7 @@ struct ImplicitSurface::Impl {
 
   Kernel kernel;
   std::vector<EmitterTriangle> emitters;
-  EmitterTree tree;
-  std::vector<EmitterReach> reaches;  // of the tree's leaves
+  EmitterSearch search;
   NearEmittersTable near_table;
   std::vector<FlatBatch> flat_batches;  // of the tree's leaves; or
   std::vector<DistanceBatch> distance_batches;
@@ -317,13 +221,13 @@ EmissionBounds ImplicitSurface::BoundsIn(const Box3& box) const {
   std::vector<std::int32_t> emitters;
   std::visit(
       [&]<class EmitterKernel>(const EmitterKernel& kernel) {
-        const NearEmitters near = impl_->NearBox(kernel, box, left_out);
+        const NearEmitters near = impl_->search.InBox(kernel, box, FarField::kNone, left_out);
         impl_->ForEachOf<EmitterKernel::kRun>(near, [&](int e) { emitters.push_back(e); });
       },
       impl_->kernel);
   std::vector<EmissionBounds> bounds(emitters.size());
   BoundsIn(box, emitters, bounds);
-  EmissionBounds sum{-impl_->tail_error, left_out};
+  EmissionBounds sum{-impl_->tail_error, left_out + impl_->tail_error};
   for (const EmissionBounds& one : bounds) {
     sum.least += one.least;
     sum.most += one.most;
@@ -348,7 +252,7 @@ double ImplicitSurface::TailError() const { return impl_->tail_error; }
 std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
   return std::visit(
       [&]<class EmitterKernel>(const EmitterKernel& kernel) {
-        const auto runs = static_cast<std::int64_t>(impl_->Near(kernel, p)->size());
+        const std::int64_t runs = std::ssize(impl_->Near(kernel, p)->runs);
         return std::min(EmitterCount(), EmitterKernel::kRun * runs);
       },
       impl_->kernel);

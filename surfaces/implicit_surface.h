@@ -22,8 +22,9 @@ void Fields(Visitor& visit, ImplicitOptions& o) {
   visit(FieldInfo{.name = "tail_error",
                   .min = 0,
                   .max = 0.1,
-                  .doc = "bound on what all emitters together that are too far to be summed could "
-                         "add, where 1 is the surface; 0 sums all"},
+                  .doc = "bound on the error of the far field, which is summed by clusters of "
+                         "emitters or, where they are too far for that, left out, where 1 is the "
+                         "surface; 0 sums every emitter"},
         o.tail_error);
 }
 
@@ -69,9 +70,9 @@ class ImplicitSurface {
   // The emitter, or the moved triangle of `split`, and d = l m^(1/k) around it (thesis 3.2.2): the
   // distance at which m of the thesis's emitters would just make a surface.
   Box3 InfluenceBox(std::int32_t emitter, double m) const;
-  double TailError() const;
+  double TailError() const;  // by which Value may be off, either way
 
-  // Emitters that the tail bound makes Value(p) sum.
+  // Emitters that the tail bound makes Value(p) sum one by one.
   std::int64_t EmittersNear(const Vec3& p) const;
   std::int64_t EmitterCount() const;
   double MaxDepth_mm() const;

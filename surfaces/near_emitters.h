@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which emitters a point has to sum, found once for all points of a small cube of space. For
-// implicit_surface.cc alone.
+// Which emitters a point has to sum, found once for all points of a small cube of space. For the
+// implicit surface alone.
 #pragma once
 
 #include <array>
@@ -15,8 +15,11 @@
 
 namespace semblance {
 
-// Runs of emitters, each by the number of its first over their length, in the tree's order.
-using NearEmitters = std::vector<std::int32_t>;
+struct NearEmitters {
+  std::vector<std::int32_t> runs;  // each by the number of its first over its length, in the tree's
+                                   // order
+  std::vector<std::int32_t> clusters;  // batches of them, by number
+};
 
 // Lists of cubes of a lattice. They are kept in a table of fixed size, where a new one may put out
 // an old one: what is found for a point depends on the point alone.

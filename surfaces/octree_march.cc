@@ -83,7 +83,8 @@ class MinMaxRule {
       least += bounds[n].least;
       most += bounds[n].most;
     }
-    node.divided = most + node.influence.slack > 1 && least - surface_.TailError() < 1;
+    node.divided =
+        most + node.influence.slack + surface_.TailError() > 1 && least - surface_.TailError() < 1;
     node.empty = !node.divided;
   }
 
@@ -180,7 +181,7 @@ class ListedField {
     const double sum = surface_.SumOf(influence_.emitters, p);
     summary_.emitter_evaluations += static_cast<std::int64_t>(influence_.emitters.size());
     const bool inside = (1 - share) * sum - surface_.TailError() > 1;
-    const bool outside = (1 + share) * (sum + influence_.slack) < 1;
+    const bool outside = (1 + share) * (sum + influence_.slack) + surface_.TailError() < 1;
     return inside || outside ? surface_.Flatten(sum)
                              : surface_.Flattened(p, summary_.emitter_evaluations);
   }
