@@ -24,8 +24,12 @@ class CornerBlocks {
     block_.resize(std::size_t(blocks_[0]) * blocks_[1] * blocks_[2]);
   }
 
-  // Bits that are kept of a cell (by its lowest corner); none at first.
-  EdgeBits& EdgesOf(const Place& cell) { return BlockOf(cell).edges[Within(cell)]; }
+  // What is kept of a cell (by its lowest corner); nothing at first.
+  struct Cell {
+    EdgeBits edges = 0;
+    std::uint8_t mask = 0;
+  };
+  Cell& CellAt(const Place& cell) { return BlockOf(cell).cells[Within(cell)]; }
   // True the first time for a corner.
   bool FirstAsked(const Place& corner) {
     auto bit = BlockOf(corner).asked[Within(corner)];
@@ -44,7 +48,7 @@ class CornerBlocks {
   static constexpr int kEdge = 8, kCorners = kEdge * kEdge * kEdge;
   struct Block {
     std::array<double, kCorners> value;
-    std::array<EdgeBits, kCorners> edges{};
+    std::array<Cell, kCorners> cells{};
     std::bitset<kCorners> asked;
   };
 

@@ -83,13 +83,16 @@ class Continuation {
       context_.Report("polygonize");
       const std::vector<SeedCell> wave = std::exchange(next_, {});
       Evaluate(UnknownCorners());
+      for (; known_cells_ < cells_.size(); ++known_cells_) {
+        SetMask(grid_.At(cells_[known_cells_]));
+      }
       for (const SeedCell& cell : wave) {
         Cross(cell);
       }
     }
   }
   bool Reached(const SeedCell& seed) {
-    return (seed.edges & ~corners_.EdgesOf(grid_.At(seed.cell))) == 0;
+    return (seed.edges & ~corners_.CellAt(grid_.At(seed.cell)).edges) == 0;
   }
   // From now on all sheets in a cell count as one.
   void TakeWholeCells() {
@@ -112,7 +115,7 @@ class Continuation {
     if (!IsCell(grid_, cell)) {
       return;
     }
-    EdgeBits& known = corners_.EdgesOf(cell);
+    EdgeBits& known = corners_.CellAt(cell).edges;
     const EdgeBits fresh = edges & ~known;
     if (fresh != 0) {
       const std::int64_t index = grid_.Index(cell[0], cell[1], cell[2]);
@@ -126,8 +129,8 @@ class Continuation {
   // Of the cells that are new.
   std::vector<std::int64_t> UnknownCorners() {
     std::vector<std::int64_t> unknown;
-    for (; known_cells_ < cells_.size(); ++known_cells_) {
-      const std::array<int, 3> at = grid_.At(cells_[known_cells_]);
+    for (std::size_t n = known_cells_; n < cells_.size(); ++n) {
+      const std::array<int, 3> at = grid_.At(cells_[n]);
       for (int c = 0; c < 8; ++c) {
         const std::array<int, 3> corner = CornerOf(at, c);
         if (corners_.FirstAsked(corner)) {
@@ -144,21 +147,22 @@ class Continuation {
     });
     crossings_.summary.corner_evaluations += static_cast<std::int64_t>(unknown.size());
   }
-  int MaskOf(const std::array<int, 3>& cell) const {
-    int mask = 0;
+  void SetMask(const std::array<int, 3>& cell) {
+    std::uint8_t mask = 0;
     for (int c = 0; c < 8; ++c) {
-      mask |= (corners_.Get(CornerOf(cell, c)) > 0) << c;
+      mask |= static_cast<std::uint8_t>((corners_.Get(CornerOf(cell, c)) > 0) << c);
     }
-    return mask;
+    corners_.CellAt(cell).mask = mask;
   }
   void Cross(const SeedCell& cell) {
     const std::array<int, 3> at = grid_.At(cell.cell);
-    const auto& joined = MarchingCubesLoops()[MaskOf(at)];
+    CornerBlocks::Cell& kept = corners_.CellAt(at);
+    const auto& joined = loops_[kept.mask];
     EdgeBits crossed = 0;
     for (int e = 0; e < 12; ++e) {
       crossed |= (cell.edges >> e & 1) != 0 ? joined[e] : EdgeBits{0};
     }
-    corners_.EdgesOf(at) |= crossed;
+    kept.edges |= crossed;
     for (int f = 0; f < 6; ++f) {
       EdgeBits beyond = 0;
       for (EdgeBits on = crossed & faces_[f].on; on != 0; on &= EdgeBits(on - 1)) {
@@ -173,11 +177,11 @@ class Continuation {
   }
   void Record(std::int64_t cell) {
     const std::array<int, 3> at = grid_.At(cell);
-    const int mask = MaskOf(at);
-    if (mask == 0 || mask == 255) {
+    const CornerBlocks::Cell& kept = corners_.CellAt(at);
+    if (kept.mask == 0 || kept.mask == 255) {
       return;
     }
-    crossings_.cells.push_back({cell, static_cast<std::uint8_t>(mask), corners_.EdgesOf(at)});
+    crossings_.cells.push_back({cell, kept.mask, kept.edges});
     ForEachOwnEdge(grid_, crossings_.cells.back(), [&](const CellEdge& edge) {
       crossings_.edges.push_back({EdgeId(grid_, at, edge), corners_.Get(CornerOf(at, edge.from)),
                                   corners_.Get(CornerOf(at, edge.to))});
@@ -189,6 +193,7 @@ class Continuation {
   const RunContext& context_;
   CornerBlocks corners_;
   std::array<FaceEdges, 6> faces_;
+  const std::array<std::array<EdgeBits, 12>, 256>& loops_ = MarchingCubesLoops();
   bool whole_cells_ = false;
   std::vector<std::int64_t> cells_;  // that were visited
   std::size_t known_cells_ = 0;      // of these, whose corners are known

@@ -70,44 +70,41 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// The thesis's case: n = 150, k = 6, t = 0.5, on 40 thousand triangles.
-void AgainstThesis() {
-  const Head head = PhantomHead(kRings[1]);
+// The thesis's case: n = 150, k = 6, t = 0.5, on 40 thousand triangles. Medians of some runs in
+// turns.
+void AgainstPeer(const Head& head, const std::string& name, const Polygonizer& peer, int runs,
+                 double goal) {
   const SplitEmitter emitter{.cut_below = 0.002};
-  const Run ours = Build(head, Options(emitter, NarrowBand{}, 150));
-  const std::vector<std::pair<std::string, Polygonizer>> peers = {
-      {"minmax_octree", MinMaxOctree{.least_emission = 0.002}},
-      {"mc_octree", McOctree{}},
-      {"brute_force", BruteForce{}}};
-  for (const auto& [name, peer] : peers) {
-    const bool headline = name == "minmax_octree";
-    std::vector<double> our_s, their_s;
-    PolygonizeSummary b;
-    for (int n = 0; n < (headline ? 5 : 1); ++n) {  // interleaved
-      our_s.push_back(Build(head, Options(emitter, NarrowBand{}, 150)).seconds);
-      const Run theirs = Build(head, Options(emitter, peer, 150));
-      their_s.push_back(theirs.seconds);
-      b = theirs.face.counts;
-    }
-    const PolygonizeSummary& a = ours.face.counts;
-    Report({"implicit.vs_" + name, Median(our_s), Median(their_s), Median(their_s) / Median(our_s),
-            headline ? 5 : kNaN},
-           "thesis");
-    Report({"implicit.emitters_vs_" + name, double(a.emitter_evaluations),
-            double(b.emitter_evaluations + b.bound_evaluations),
-            double(b.emitter_evaluations + b.bound_evaluations) / double(a.emitter_evaluations),
-            kNaN, "emitters and bounds"},
-           "thesis");
-    Report({"implicit.evaluations_vs_" + name, double(a.corner_evaluations + a.edge_evaluations),
-            double(b.corner_evaluations + b.edge_evaluations),
-            double(b.corner_evaluations + b.edge_evaluations) /
-                double(a.corner_evaluations + a.edge_evaluations),
-            kNaN, "points"},
-           "thesis");
+  std::vector<double> our_s, their_s;
+  PolygonizeSummary a, b;
+  for (int n = 0; n < runs; ++n) {
+    const Run ours = Build(head, Options(emitter, NarrowBand{}, 150)),
+              theirs = Build(head, Options(emitter, peer, 150));
+    our_s.push_back(ours.seconds);
+    their_s.push_back(theirs.seconds);
+    a = ours.face.counts;
+    b = theirs.face.counts;
   }
-  Report({"implicit.thesis_case_triangles", double(ours.face.dense.triangles.size()), kNaN, kNaN,
-          kNaN, "triangles"},
-         "thesis");
+  const auto report = [&](const std::string& of, double ours, double theirs, double to_meet,
+                          const std::string& unit) {
+    Report({"implicit." + of + "_" + name, ours, theirs, theirs / ours, to_meet, unit}, "thesis");
+  };
+  report("vs", Median(our_s), Median(their_s), goal, "s");
+  report("emitters_vs", double(a.emitter_evaluations),
+         double(b.emitter_evaluations + b.bound_evaluations), kNaN, "emitters and bounds");
+  report("evaluations_vs", double(a.corner_evaluations + a.edge_evaluations),
+         double(b.corner_evaluations + b.edge_evaluations), kNaN, "points");
+}
+
+void AgainstThesis() {
+  const MinMaxOctree minmax{.least_emission = 0.002};
+  const Head head = PhantomHead(kRings[1]);
+  AgainstPeer(head, "minmax_octree", minmax, 5, 5);
+  AgainstPeer(head, "mc_octree", McOctree{}, 1, kNaN);
+  AgainstPeer(head, "brute_force", BruteForce{}, 1, kNaN);
+  if (const std::optional<TriMesh> shell = bench::RealShell("implicit.vs_minmax_octree_skull")) {
+    AgainstPeer(bench::RealHead(*shell, 40000), "minmax_octree_skull", minmax, 3, 5);
+  }
 }
 
 // Every crossed cell's corners once, every crossed edge once: fewer evaluations cannot do.
