@@ -52,12 +52,14 @@ class CornerBlocks {
     std::bitset<kCorners> asked;
   };
 
+  // Places are not negative, and so divided as unsigned.
   static std::size_t Within(const Place& at) {
-    return at[0] % kEdge + kEdge * (at[1] % kEdge + kEdge * (at[2] % kEdge));
+    const auto within = [&at](int axis) { return std::size_t(at[axis]) % kEdge; };
+    return within(0) + kEdge * (within(1) + kEdge * within(2));
   }
   std::size_t Number(const Place& at) const {
-    return at[0] / kEdge +
-           std::size_t(blocks_[0]) * (at[1] / kEdge + std::size_t(blocks_[1]) * (at[2] / kEdge));
+    const auto block = [&at](int axis) { return std::size_t(at[axis]) / kEdge; };
+    return block(0) + std::size_t(blocks_[0]) * (block(1) + std::size_t(blocks_[1]) * block(2));
   }
   Block& BlockOf(const Place& at) {
     std::unique_ptr<Block>& block = block_[Number(at)];

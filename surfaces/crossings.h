@@ -2,6 +2,7 @@
 // What a march over a grid finds, and the mesh that marching cubes makes of it.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -38,10 +39,9 @@ std::int64_t EdgeId(const SampleGrid& grid, const std::array<int, 3>& cell, cons
 template <class Visit>
 void ForEachOwnEdge(const SampleGrid& grid, const CrossedCell& crossed, const Visit& visit) {
   const std::array<int, 3> cell = grid.At(crossed.index);
-  for (std::size_t e = 0; e < kCellEdges.size(); ++e) {
-    const CellEdge& edge = kCellEdges[e];
-    if ((crossed.edges >> e & 1) == 0 ||
-        (crossed.mask >> edge.from & 1) == (crossed.mask >> edge.to & 1)) {
+  for (EdgeBits rest = crossed.edges; rest != 0; rest &= EdgeBits(rest - 1)) {
+    const CellEdge& edge = kCellEdges[std::countr_zero(rest)];
+    if ((crossed.mask >> edge.from & 1) == (crossed.mask >> edge.to & 1)) {
       continue;
     }
     bool owned_by_next = false;

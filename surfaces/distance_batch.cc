@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "surfaces/wide.h"
 
@@ -52,10 +53,25 @@ SEMBLANCE_INLINE N Emit(const DistanceBatch& b, int first, const Vec3& p, const 
   return seen.z + Load<N>(b.advance_mm, first) > 0 ? either : nothing;
 }
 
-SEMBLANCE_INLINE bool Reaches(const BatchReach& reach, const Vec3& p) {
-  const double dx = p.x() - reach.center.x(), dy = p.y() - reach.center.y(),
-               dz = p.z() - reach.center.z();
-  return dx * dx + dy * dy + dz * dz <= reach.squared_mm2;
+// Appends to `found` those of some batches, at most eight, that reach p; without a branch that
+// could be guessed wrong. Writes one more than it appends.
+SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> which,
+                                              const EightReaches& reaches, const Vec3& p,
+                                              std::int32_t* found) {
+  Wider squared{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const Wider from = p[axis] - Load<Wider>(reaches.center[axis], 0);
+    squared += from * from;
+  }
+  const auto reach = squared <= Load<Wider>(reaches.squared_mm2, 0);  // -1 or 0, a lane
+  std::array<std::int64_t, DistanceBatch::kLanes> minus;
+  static_assert(sizeof(reach) == sizeof(minus));
+  std::memcpy(minus.data(), &reach, sizeof(minus));
+  for (std::size_t n = 0; n < which.size(); ++n) {
+    *found = which[n];
+    found -= minus[n];
+  }
+  return found;
 }
 
 BatchReach ReachOf(const DistanceBatch& batch, const DistanceFall& fall) {
@@ -119,29 +135,41 @@ std::vector<BatchReach> ReachesOf(std::span<const DistanceBatch> batches,
   return reaches;
 }
 
-// Which of the batches reach p is found first, without a branch that could be guessed wrong.
+std::vector<EightReaches> SideBySide(std::span<const BatchReach> reaches,
+                                     std::span<const std::int32_t> which) {
+  constexpr std::size_t kLanes = DistanceBatch::kLanes;
+  std::vector<EightReaches> eights((which.size() + kLanes - 1) / kLanes);
+  for (std::size_t n = 0; n < which.size(); ++n) {
+    const BatchReach& reach = reaches[which[n]];
+    EightReaches& eight = eights[n / kLanes];
+    for (int axis = 0; axis < 3; ++axis) {
+      eight.center[axis][n % kLanes] = reach.center[axis];
+    }
+    eight.squared_mm2[n % kLanes] = reach.squared_mm2;
+  }
+  return eights;
+}
+
 SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceBatch> batches,
-                                    std::span<const BatchReach> reaches,
-                                    std::span<const std::int32_t> which, const Vec3& p,
+                                    std::span<const std::int32_t> which,
+                                    std::span<const EightReaches> reaches, const Vec3& p,
                                     const DistanceFall& fall, std::int64_t& reaching) {
   constexpr int kUsual = 6;  // the default decay
-  constexpr std::size_t kAtOnce = 256;
-  std::array<std::int32_t, kAtOnce> found;
+  constexpr std::size_t kLanes = DistanceBatch::kLanes, kAtOnce = 32;
+  std::array<std::int32_t, kLanes * kAtOnce + 1> found;
   Wider sum{};
-  while (!which.empty()) {
-    const auto some = which.first(std::min(kAtOnce, which.size()));
-    std::size_t count = 0;
-    for (const std::int32_t batch : some) {
-      found[count] = batch;
-      count += Reaches(reaches[batch], p) ? 1 : 0;
+  for (std::size_t begin = 0; begin < reaches.size(); begin += kAtOnce) {
+    std::int32_t* end = found.data();
+    for (std::size_t n = begin; n < std::min(begin + kAtOnce, reaches.size()); ++n) {
+      const auto rest = which.subspan(kLanes * n);
+      end = AppendReaching(rest.first(std::min(kLanes, rest.size())), reaches[n], p, end);
     }
-    for (std::size_t n = 0; n < count; ++n) {
-      const DistanceBatch& batch = batches[found[n]];
+    for (const std::int32_t* n = found.data(); n != end; ++n) {
+      const DistanceBatch& batch = batches[*n];
       sum += fall.whole == kUsual ? Emit<Wider>(batch, 0, p, fall, kUsual)
                                   : Emit<Wider>(batch, 0, p, fall, fall.whole);
     }
-    reaching += static_cast<std::int64_t>(count);
-    which = which.subspan(some.size());
+    reaching += end - found.data();
   }
   DistanceBatch::Lanes lanes;
   Store(sum, lanes, 0);

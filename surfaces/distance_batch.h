@@ -48,13 +48,22 @@ struct BatchReach {
 };
 std::vector<BatchReach> ReachesOf(std::span<const DistanceBatch> batches, const DistanceFall& fall);
 
+// Those of eight batches side by side.
+struct alignas(64) EightReaches {
+  std::array<DistanceBatch::Lanes, 3> center{};
+  DistanceBatch::Lanes squared_mm2{};
+};
+// Of some batches, by their numbers.
+std::vector<EightReaches> SideBySide(std::span<const BatchReach> reaches,
+                                     std::span<const std::int32_t> which);
+
 // What each lane emits at p: 0 at heights <= 0 over its triangle's plane.
 void EmitByDistance(const DistanceBatch& batch, const Vec3& p, const DistanceFall& fall,
                     DistanceBatch::Lanes& emission);
-// The sum of that over some batches, by their numbers; reaches: ReachesOf(batches, fall). Adds to
+// The sum of that over some batches, by their numbers; reaches: theirs, SideBySide. Adds to
 // `reaching` how many of them reach p.
-double SumByDistance(std::span<const DistanceBatch> batches, std::span<const BatchReach> reaches,
-                     std::span<const std::int32_t> which, const Vec3& p, const DistanceFall& fall,
+double SumByDistance(std::span<const DistanceBatch> batches, std::span<const std::int32_t> which,
+                     std::span<const EightReaches> reaches, const Vec3& p, const DistanceFall& fall,
                      std::int64_t& reaching);
 double EmitByDistance(const DistanceBatch& batch, int lane, const Vec3& p,
                       const DistanceFall& fall);

@@ -136,7 +136,7 @@ NearEmitters EmitterSearch::Choose(const std::vector<Candidate>& candidates, int
     errors.push_back(candidate.error);
   }
   left_out = settled.error + TakeLeast(tail_error_ - settled.error, errors);
-  NearEmitters near{{}, std::move(settled.clusters)};
+  NearEmitters near{{}, std::move(settled.clusters), {}};
   for (std::size_t n = 0; n < candidates.size(); ++n) {
     const Candidate& candidate = candidates[n];
     if (errors[n] > 0) {

@@ -41,6 +41,12 @@ struct EmitterNode {
     gain += part.gain;
     greatest_gain = std::max(greatest_gain, part.greatest_gain);
   }
+  // Not more than any of a part's planes is over this box's center.
+  double LowestOf(const EmitterNode& part) const {
+    const Vec3 to = part.box.center() - box.center();
+    return part.lowest_mm +
+           part.normals.min().cwiseProduct(to).cwiseMin(part.normals.max().cwiseProduct(to)).sum();
+  }
   // Not less than the height of any point within half of p, each way, over the plane of any of its
   // emitters.
   double MostHeight(const Vec3& p, const Vec3& half) const {
@@ -143,6 +149,11 @@ class EmitterTree {
     } else {
       node.Add(nodes_[node.left]);
       node.Add(nodes_[node.right]);
+    }
+    if (node.end - node.begin > 256) {  // one by one it would not be much better
+      node.lowest_mm =
+          std::min(node.LowestOf(nodes_[node.left]), node.LowestOf(nodes_[node.right]));
+      return;
     }
     for (int e = node.begin; e < node.end; ++e) {
       const EmitterTriangle& t = emitters[e];

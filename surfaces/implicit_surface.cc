@@ -56,7 +56,7 @@ std::vector<DistanceBatch> MakeDistanceBatches(const EmitterKernel& kernel,
 // Of the cubes that share a list of what is near. With a cut a point passes quickly over what does
 // not reach it, so that larger ones pay.
 double CubeSize(const std::vector<EmitterTriangle>& emitters, bool cut) {
-  const double of_depth = cut ? 1.25 : 0.7;
+  const double of_depth = cut ? 1.5 : 0.7;
   const double sum =
       std::accumulate(emitters.begin(), emitters.end(), 0.0,
                       [](double s, const EmitterTriangle& t) { return s + t.depth_mm; });
@@ -95,7 +95,11 @@ struct ImplicitSurface::Impl {
   NearEmittersTable::List Near(const EmitterKernel& k, const Vec3& p) const {
     return near_table.Find(p, [&](const Box3& box) {
       double left_out = 0;
-      return search.InBox(k, box, FarField::kClusters, left_out);
+      NearEmitters near = search.InBox(k, box, FarField::kClusters, left_out);
+      if (!batch_reaches.empty()) {
+        near.reaches = SideBySide(batch_reaches, near.runs);
+      }
+      return near;
     });
   }
 
@@ -138,7 +142,7 @@ struct ImplicitSurface::Impl {
                std::int64_t& evaluations) const {
     std::int64_t reaching = 0;
     const double sum =
-        SumByDistance(distance_batches, batch_reaches, list.runs, p, k.Fall(), reaching);
+        SumByDistance(distance_batches, list.runs, list.reaches, p, k.Fall(), reaching);
     evaluations += EmitterKernel::kRun * reaching;
     return sum;
   }

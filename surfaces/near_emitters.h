@@ -11,6 +11,7 @@
 #include <mutex>
 #include <vector>
 
+#include "surfaces/distance_batch.h"
 #include "surfaces/emitter_triangle.h"
 
 namespace semblance {
@@ -19,6 +20,7 @@ struct NearEmitters {
   std::vector<std::int32_t> runs;  // each by the number of its first over its length, in the tree's
                                    // order
   std::vector<std::int32_t> clusters;  // batches of them, by number
+  std::vector<EightReaches> reaches;   // of the runs, where the kernel has a cut
 };
 
 // Lists of cubes of a lattice. They are kept in a table of fixed size, where a new one may put out

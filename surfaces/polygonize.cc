@@ -159,8 +159,8 @@ class Continuation {
     CornerBlocks::Cell& kept = corners_.CellAt(at);
     const auto& joined = loops_[kept.mask];
     EdgeBits crossed = 0;
-    for (int e = 0; e < 12; ++e) {
-      crossed |= (cell.edges >> e & 1) != 0 ? joined[e] : EdgeBits{0};
+    for (EdgeBits rest = cell.edges; rest != 0; rest &= EdgeBits(rest - 1)) {
+      crossed |= joined[std::countr_zero(rest)];
     }
     kept.edges |= crossed;
     for (int f = 0; f < 6; ++f) {

@@ -64,13 +64,15 @@ TEST_P(DistanceBatchTest, EachLaneIsTheEmitterAloneAndTheThesis) {
     EmitByDistance(batch, p, GetParam(), emission);
     const std::vector<DistanceBatch> one = {batch};
     const std::vector<BatchReach> reaches = ReachesOf(one, GetParam());
-    const std::vector<std::int32_t> first = {0}, twice = {0, 0};
     const double sum = ((emission[0] + emission[1]) + (emission[2] + emission[3])) +
                        ((emission[4] + emission[5]) + (emission[6] + emission[7]));
     std::int64_t reaching = 0;
-    EXPECT_EQ(SumByDistance(one, reaches, first, p, GetParam(), reaching), sum);
+    const auto sum_of = [&](const std::vector<std::int32_t>& which) {
+      return SumByDistance(one, which, SideBySide(reaches, which), p, GetParam(), reaching);
+    };
+    EXPECT_EQ(sum_of({0}), sum);
     EXPECT_GE(reaching, sum > 0 ? 1 : 0);
-    EXPECT_EQ(SumByDistance(one, reaches, twice, p, GetParam(), reaching), 2 * sum);
+    EXPECT_EQ(sum_of({0, 0}), 2 * sum);
     for (int lane = 0; lane < DistanceBatch::kLanes; ++lane) {
       EXPECT_EQ(emission[lane], EmitByDistance(batch, lane, p, GetParam()));
       const double expected = lane < set ? Emission(triangles[lane], p, GetParam()) : 0;
