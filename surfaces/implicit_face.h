@@ -64,7 +64,9 @@ struct ImplicitFace {
   double cell_mm = kNaN;
   std::int64_t emitters = -1;
   double emitters_per_square_depth = kNaN;  // see ImplicitSurface
-  int dropped_components = -1;  // sheets and fragments that are not the outermost surface
+  // Sheets and fragments that were followed and are not the outermost surface: with narrow_band all
+  // that there are only where its components are `all`.
+  int dropped_components = -1;
   PolygonizeSummary counts;
   DecimateSummary decimation;      // before `project`
   std::vector<std::string> notes;  // what a reader should know, a line each
