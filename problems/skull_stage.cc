@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/skull_stage.h"
 
+#include "problems/cut_planes.h"
 #include "problems/implicit_cache.h"
 #include "problems/shell_dowels.h"
 #include "problems/stage_key.h"
@@ -43,6 +44,23 @@ std::shared_ptr<const DepthStage> MakeDepthStage(const Experiment& e, StageCache
                                [&] { return Make(e, cache, step, context); });
 }
 
+namespace {
+
+// The shell's depths, none on the lid that closes it where the scan was cut off: for a face that is
+// to end there.
+std::vector<double> DepthsToTheEnds(const DepthStage& stage) {
+  constexpr double kLid_mm = 1;
+  std::vector<double> depth_mm = stage.depth.depth_mm;
+  for (const CutPlane& plane : FindCutPlanes(stage.subject.skull)) {
+    for (std::size_t v = 0; v < depth_mm.size(); ++v) {
+      depth_mm[v] = plane.Beyond_mm(stage.shell.points[v]) > -kLid_mm ? kNaN : depth_mm[v];
+    }
+  }
+  return depth_mm;
+}
+
+}  // namespace
+
 std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache& cache,
                                                  StepClock& step, const RunContext& context) {
   return cache.Get<SkullStage>(StageKey("skull stage", e.subject, e.landmarks, e.tissue, e.network,
@@ -50,7 +68,10 @@ std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache
                                [&] {
                                  auto depth = MakeDepthStage(e, cache, step, context);
                                  ImplicitFace implicit = step("implicit face", [&] {
-                                   return CachedImplicitFace(depth->shell, depth->depth.depth_mm,
+                                   return CachedImplicitFace(depth->shell,
+                                                             e.implicit.ends == FaceEnds::kOpen
+                                                                 ? DepthsToTheEnds(*depth)
+                                                                 : depth->depth.depth_mm,
                                                              e.implicit, cache.disk(), context);
                                  });
                                  return SkullStage{std::move(depth), std::move(implicit)};

@@ -8,6 +8,7 @@
 
 #include "surfaces/crossings.h"
 #include "surfaces/error.h"
+#include "surfaces/open_ends.h"
 #include "surfaces/parallel.h"
 
 namespace semblance {
@@ -221,6 +222,9 @@ ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> dep
       Polygonize(shell, depth_mm, surface, options, context, face.cell_mm);
   face.counts = polygonized.summary;
   face.dense = KeepOutermost(polygonized.mesh, face.dropped_components);
+  if (options.ends == FaceEnds::kOpen) {
+    face.dense = OverDepths(face.dense, shell, depth_mm, context);
+  }
   context.Report("decimate");
   DecimateFace(options, face);
   if (options.project) {

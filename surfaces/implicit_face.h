@@ -2,10 +2,12 @@
 // The implicit face: from a skull's shell and its depths to a closed mesh, in one call.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "surfaces/decimate.h"
@@ -15,11 +17,16 @@
 
 namespace semblance {
 
+// What becomes of the face where the skull ends: it goes around the rim, or ends there too.
+enum class FaceEnds { kClosed, kOpen };
+constexpr auto EnumNames(FaceEnds) { return std::to_array<std::string_view>({"closed", "open"}); }
+
 struct ImplicitFaceOptions {
   ImplicitOptions field = {};
   int resolution = 150;
   Polygonizer polygonizer = NarrowBand{};
   EdgeSearchOptions edges = {};
+  FaceEnds ends = FaceEnds::kClosed;
   int target_triangles = 14000;
   std::optional<double> tolerance_mm = {};
   bool project = false;
@@ -37,6 +44,11 @@ void Fields(Visitor& visit, ImplicitFaceOptions& o) {
                   .doc = "how the surface is found in the grid; the mesh is the same"},
         o.polygonizer);
   visit(FieldInfo{.name = "edges", .doc = "how crossings are found"}, o.edges);
+  visit(FieldInfo{.name = "ends",
+                  .doc = "where the skull ends: closed, the face goes around its rim; open, only "
+                         "what lies over bone with a depth is kept, and nothing below a plane "
+                         "where the scan was cut off"},
+        o.ends);
   visit(
       FieldInfo{.name = "target_triangles",
                 .min = 100,
@@ -59,7 +71,7 @@ void Fields(Visitor& visit, ImplicitFaceOptions& o) {
 }
 
 struct ImplicitFace {
-  TriMesh dense;  // as polygonised: closed, manifold, outward
+  TriMesh dense;  // as polygonised: manifold, outward, closed or open at the skull's ends
   TriMesh mesh;   // decimated and, if asked for, projected
   double cell_mm = kNaN;
   std::int64_t emitters = -1;

@@ -69,6 +69,48 @@ TEST(ImplicitFace, AnOpenShellStillGivesAClosedFace) {
   ExpectClosedManifold(face.dense);
 }
 
+TEST(ImplicitFace, OpenEndsKeepWhatLiesOverTheShellAlone) {
+  const TriMesh plate = Plate(60, 20);  // 0 to 60 each way, facing +z
+  const ImplicitFace face =
+      BuildImplicitFace(plate, std::vector<double>(plate.points.size(), 6),
+                        {.resolution = 60, .ends = FaceEnds::kOpen, .target_triangles = 500}, {});
+  for (const TriMesh* mesh : {&face.dense, &face.mesh}) {
+    const EdgeReport edges = CheckEdges(*mesh);
+    EXPECT_GT(edges.boundary, 0);
+    EXPECT_EQ(edges.non_manifold, 0);
+    EXPECT_EQ(edges.inconsistent, 0);
+    EXPECT_EQ(ConnectedComponents(*mesh).count, 1);
+    const Box3 box = Bounds(*mesh);
+    EXPECT_GT(box.min().z(), 3);
+    EXPECT_LT(box.max().z(), 6.2);
+    EXPECT_NEAR(box.min().x(), 0, 2);
+    EXPECT_NEAR(box.max().y(), 60, 2);
+    for (const Triangle& t : mesh->triangles) {
+      EXPECT_GT(TriangleAreaVector(*mesh, t).z(), 0);
+    }
+  }
+}
+
+// Half of a sphere has a depth; and where all of a closed shell has, nothing ends.
+TEST(ImplicitFace, OpenEndsFollowWhereTheDepthIsKnown) {
+  const TriMesh sphere = SphereMesh({0, 0, 0}, 40, 24);
+  std::vector<double> all(sphere.points.size(), 6), half = all;
+  for (std::size_t v = 0; v < half.size(); ++v) {
+    half[v] = sphere.points[v].z() > -1 ? half[v] : kNaN;
+  }
+  const ImplicitFaceOptions closed{.resolution = 40},
+      open{.resolution = 40, .ends = FaceEnds::kOpen};
+  EXPECT_EQ(BuildImplicitFace(sphere, all, open, {}).dense.triangles,
+            BuildImplicitFace(sphere, all, closed, {}).dense.triangles);
+  const TriMesh dome = BuildImplicitFace(sphere, half, open, {}).dense;
+  EXPECT_GT(CheckEdges(dome).boundary, 0);
+  for (const Vec3& p : dome.points) {
+    EXPECT_GT(p.norm(), 42);
+    EXPECT_GT(p.z(), -5);
+  }
+  ExpectClosedManifold(BuildImplicitFace(sphere, half, closed, {}).dense);
+}
+
 TEST(ImplicitFace, ProjectedVerticesLieOnTheSurface) {
   const TriMesh sphere = SphereMesh({3, 2, 1}, 80, 20);
   std::vector<double> depth;
