@@ -24,12 +24,12 @@ TriMesh WithDepths(const TriMesh& shell, std::span<const double> depth_mm) {
   return Submesh(shell, keep);
 }
 
-using Edge = std::pair<std::int32_t, std::int32_t>;  // the lower vertex first
+using VertexPair = std::pair<std::int32_t, std::int32_t>;  // the lower vertex first
 
-Edge SideOf(const Triangle& t, int side) { return std::minmax(t[side], t[(side + 1) % 3]); }
+VertexPair SideOf(const Triangle& t, int side) { return std::minmax(t[side], t[(side + 1) % 3]); }
 
 // Where a point is that has the border of a mesh nearest to it, or the inside.
-enum class Place { kOver, kBehind, kPastBorder };
+enum class OverBorder { kOver, kBehind, kPastBorder };
 
 // A mesh with a border, and what is nearest to a point on it.
 class BorderedMesh {
@@ -48,14 +48,14 @@ class BorderedMesh {
     }
   }
 
-  Place PlaceOf(const Vec3& p) const {
+  OverBorder FindPlace(const Vec3& p) const {
     const MeshPoint nearest = query_.Closest(p);
     const Triangle& t = mesh_.triangles[nearest.triangle];
     if (IsAtBorder(t, nearest.position)) {
-      return Place::kPastBorder;
+      return OverBorder::kPastBorder;
     }
-    return (p - nearest.position).dot(TriangleAreaVector(mesh_, t)) > 0 ? Place::kOver
-                                                                        : Place::kBehind;
+    return (p - nearest.position).dot(TriangleAreaVector(mesh_, t)) > 0 ? OverBorder::kOver
+                                                                        : OverBorder::kBehind;
   }
 
  private:
@@ -76,29 +76,29 @@ class BorderedMesh {
 
   const TriMesh& mesh_;
   MeshQuery query_;
-  std::map<Edge, int> sides_;  // triangles of each
+  std::map<VertexPair, int> sides_;  // triangles of each
   std::vector<bool> on_border_;
 };
 
-std::vector<Place> PlacesOf(const TriMesh& face, const BorderedMesh& mesh,
-                            const RunContext& context) {
-  std::vector<Place> places(face.points.size());
+std::vector<OverBorder> PlacesOf(const TriMesh& face, const BorderedMesh& mesh,
+                                 const RunContext& context) {
+  std::vector<OverBorder> places(face.points.size());
   ParallelFor(face.points.size(), context.threads, 256,
-              [&](std::size_t v) { places[v] = mesh.PlaceOf(face.points[v]); });
+              [&](std::size_t v) { places[v] = mesh.FindPlace(face.points[v]); });
   return places;
 }
 
-bool HasCorner(const Triangle& t, const std::vector<Place>& places, Place place) {
+bool HasCorner(const Triangle& t, const std::vector<OverBorder>& places, OverBorder place) {
   return std::any_of(t.begin(), t.end(), [&](std::int32_t v) { return places[v] == place; });
 }
 
 // Triangles that are not past the border: neither with a corner there nor, on the far side, joined
 // to such. What seems to be behind elsewhere is beside a sharp edge.
-std::vector<bool> TrianglesOver(const TriMesh& face, const std::vector<Place>& places) {
+std::vector<bool> TrianglesOver(const TriMesh& face, const std::vector<OverBorder>& places) {
   std::vector<bool> doubtful;
   for (const Triangle& t : face.triangles) {
-    doubtful.push_back(HasCorner(t, places, Place::kPastBorder) ||
-                       HasCorner(t, places, Place::kBehind));
+    doubtful.push_back(HasCorner(t, places, OverBorder::kPastBorder) ||
+                       HasCorner(t, places, OverBorder::kBehind));
   }
   const Components pieces = ConnectedComponents(Submesh(face, doubtful));
   std::vector<bool> past(pieces.count, false);
@@ -106,7 +106,7 @@ std::vector<bool> TrianglesOver(const TriMesh& face, const std::vector<Place>& p
   for (std::size_t t = 0; t < doubtful.size(); ++t) {
     if (doubtful[t]) {
       const int piece = pieces.of_triangle[n++];
-      past[piece] = past[piece] || HasCorner(face.triangles[t], places, Place::kPastBorder);
+      past[piece] = past[piece] || HasCorner(face.triangles[t], places, OverBorder::kPastBorder);
     }
   }
   std::vector<bool> over;
@@ -144,7 +144,7 @@ void SplitFans(TriMesh& mesh) {
     }
     return corner;
   };
-  std::map<Edge, std::array<std::int32_t, 2>> first;  // of each edge, the corners at its ends
+  std::map<VertexPair, std::array<std::int32_t, 2>> first;  // of each edge, the corners at its ends
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (int side = 0; side < 3; ++side) {
       const auto here = static_cast<std::int32_t>(3 * t + side),
