@@ -7,9 +7,9 @@
 #include <cmath>
 #include <optional>
 
-#include "fitting/seeding.h"
-#include "fitting/tree_overlay.h"
-#include "fitting/tree_solver.h"
+#include "fitting/adaptive/tree_overlay.h"
+#include "fitting/adaptive/tree_solver.h"
+#include "fitting/problem/seeding.h"
 
 namespace semblance {
 namespace {

@@ -10,11 +10,11 @@
 #include <string>
 
 #include "fitting/adaptive_fit.h"
-#include "fitting/auto_weight.h"
 #include "fitting/fit_check.h"
-#include "fitting/joint_relaxation.h"
-#include "fitting/seeding.h"
-#include "surfaces/feature.h"
+#include "fitting/level/auto_weight.h"
+#include "fitting/problem/seeding.h"
+#include "fitting/relaxation/joint_relaxation.h"
+#include "surfaces/hspline_files/feature.h"
 
 namespace semblance {
 namespace {

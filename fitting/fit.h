@@ -7,14 +7,14 @@
 #include <string_view>
 #include <vector>
 
-#include "fitting/feature_rule.h"
-#include "fitting/fit_schedule.h"
-#include "fitting/fit_target.h"
-#include "fitting/level_fit.h"
-#include "fitting/relaxation.h"
-#include "fitting/term.h"
-#include "surfaces/hspline_surface.h"
-#include "surfaces/run_context.h"
+#include "fitting/level/level_fit.h"
+#include "fitting/problem/feature_rule.h"
+#include "fitting/problem/fit_schedule.h"
+#include "fitting/problem/fit_target.h"
+#include "fitting/relaxation/relaxation.h"
+#include "fitting/terms/term.h"
+#include "surfaces/base/run_context.h"
+#include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "surfaces/error.h"
+#include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {

@@ -5,18 +5,18 @@
 
 #include <variant>
 
-#include "interp/barycentric.h"
-#include "interp/biharmonic.h"
-#include "interp/depth_map.h"
-#include "interp/harmonic.h"
-#include "interp/inverse_distance.h"
-#include "interp/kriging.h"
-#include "interp/mean.h"
-#include "interp/moving_least_squares.h"
-#include "interp/natural_neighbour.h"
-#include "interp/nearest.h"
-#include "interp/network_spline.h"
-#include "interp/radial_basis.h"
+#include "interp/schemes/barycentric.h"
+#include "interp/schemes/biharmonic.h"
+#include "interp/schemes/depth_map.h"
+#include "interp/schemes/harmonic.h"
+#include "interp/schemes/inverse_distance.h"
+#include "interp/schemes/kriging.h"
+#include "interp/schemes/mean.h"
+#include "interp/schemes/moving_least_squares.h"
+#include "interp/schemes/natural_neighbour.h"
+#include "interp/schemes/nearest.h"
+#include "interp/schemes/network_spline.h"
+#include "interp/schemes/radial_basis.h"
 
 namespace semblance {
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <iterator>
 
-#include "problems/cut_planes.h"
-#include "problems/stage_key.h"
-#include "surfaces/mesh_query.h"
+#include "problems/pipeline/cut_planes.h"
+#include "problems/pipeline/stage_key.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

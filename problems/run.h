@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "problems/case.h"
-#include "problems/depth_comparison.h"
-#include "problems/face_metrics.h"
-#include "problems/feature_damage.h"
-#include "problems/skull_stage.h"
-#include "problems/uncertainty.h"
-#include "surfaces/tessellate.h"
+#include "problems/metrics/face_metrics.h"
+#include "problems/metrics/feature_damage.h"
+#include "problems/pipeline/case.h"
+#include "problems/pipeline/depth_comparison.h"
+#include "problems/pipeline/skull_stage.h"
+#include "problems/pipeline/uncertainty.h"
+#include "surfaces/hspline_query/tessellate.h"
 
 namespace semblance {
 

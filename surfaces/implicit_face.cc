@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "surfaces/crossings.h"
-#include "surfaces/error.h"
-#include "surfaces/open_ends.h"
-#include "surfaces/parallel.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/parallel.h"
+#include "surfaces/implicit/open_ends.h"
+#include "surfaces/marching/crossings.h"
 
 namespace semblance {
 namespace {

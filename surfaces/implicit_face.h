@@ -10,10 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "surfaces/decimate.h"
-#include "surfaces/implicit_surface.h"
-#include "surfaces/polygonizer.h"
-#include "surfaces/run_context.h"
+#include "surfaces/base/run_context.h"
+#include "surfaces/decimate/decimate.h"
+#include "surfaces/emitters/implicit_surface.h"
+#include "surfaces/implicit/polygonizer.h"
 
 namespace semblance {
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The floors of the design, enforced from the include lines: problems on top of interp and fitting,
-// both on top of surfaces; each third-party library only where it is allowed.
+// The floors and rooms of the design, enforced from the include lines: problems on top of interp
+// and fitting, both on top of surfaces; the rooms of a floor in layers without a circle; each
+// third-party library only where it is allowed.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -28,15 +29,89 @@ const std::map<std::string, std::set<std::string>> kFloorsBelow = {
     {"problems", {"problems", "interp", "fitting", "surfaces"}},
 };
 
+// The hall: the files that lie flat in a floor, which are its front door.
+constexpr char kHall[] = "";
+
+using Layers = std::vector<std::set<std::string>>;
+
+// The rooms of each floor, lower layers first. A file includes files of its own room and of lower
+// layers. docs/architecture.md draws the same order.
+const std::map<std::string, Layers> kRooms = {
+    {"surfaces",
+     {{"base"},
+      {"hspline", "mesh"},
+      {"decimate", "emitters", "hspline_query", "marching"},
+      {"hspline_files", "implicit"},
+      {kHall}}},
+    {"interp", {{"dowels"}, {"on_surface"}, {"schemes"}, {kHall}, {"evaluation"}}},
+    {"fitting",
+     {{"least_squares", "problem"},
+      {"terms"},
+      {"level"},
+      {"adaptive", "relaxation", "uncertainty"},
+      {kHall}}},
+    {"problems",
+     {{"config", "ct", "output"},
+      {"pictures", "subject"},
+      {"face_template"},
+      {"metrics"},
+      {"pipeline"},
+      {kHall},
+      {"report"},
+      {"points", "study"},
+      {"program"}}},
+};
+
+// The front doors, by stem. Nothing else lies flat in a floor but its CMakeLists.txt.
+const std::set<std::string> kFrontDoors = {
+    "surfaces/implicit_face", "interp/depth_scheme",  "fitting/fit",
+    "fitting/fit_check",      "fitting/adaptive_fit", "problems/run"};
+
+// A room is neither a cupboard nor a warehouse.
+constexpr int kFewestFiles = 4, kMostFiles = 30;
+
 // Where a library may be included: a regular expression over the path of the including file.
 const std::map<std::string, std::string> kLibraryPlaces = {
-    {"ceres/", R"(fitting/\w+(\.cc|_cost\.h)|interp/kriging_likelihood\.cc)"},
-    {"yaml-cpp/", R"(problems/config\.cc)"},
-    {"CGAL/", R"(\w+/\w+\.cc)"},
-    {"OpenMesh/", R"(surfaces/(tri_mesh\.h|mesh_io\.cc))"},
+    {"ceres/", R"(fitting/(\w+/)?\w+(\.cc|_cost\.h)|interp/schemes/kriging_likelihood\.cc)"},
+    {"yaml-cpp/", R"(problems/config/config\.cc)"},
+    {"CGAL/", R"(\w+/(\w+/)?\w+\.cc)"},
+    {"OpenMesh/", R"(surfaces/mesh/\w+\.cc)"},
 };
 
 std::string FloorOf(const std::string& path) { return path.substr(0, path.find('/')); }
+
+// The folder below the floor, or kHall.
+std::string RoomOf(const std::string& path) {
+  const std::size_t first = path.find('/'), second = path.find('/', first + 1);
+  return second == std::string::npos ? kHall : path.substr(first + 1, second - first - 1);
+}
+
+std::string StemOf(const std::string& path) { return path.substr(0, path.rfind('.')); }
+
+std::string RoomName(const std::string& floor, const std::string& room) {
+  return room == kHall ? "the front door of " + floor : floor + "/" + room;
+}
+
+// The layer of a room in its floor; -1 if the floor has no such room.
+int LayerOf(const std::string& floor, const std::string& room) {
+  const Layers& layers = kRooms.at(floor);
+  for (std::size_t k = 0; k < layers.size(); ++k) {
+    if (layers[k].contains(room)) {
+      return static_cast<int>(k);
+    }
+  }
+  return -1;
+}
+
+// Of two files of one floor.
+std::vector<std::string> CheckRooms(const std::string& file, const std::string& included) {
+  const std::string floor = FloorOf(file), from = RoomOf(file), to = RoomOf(included);
+  if (from == to || LayerOf(floor, to) < LayerOf(floor, from)) {
+    return {};
+  }
+  return {fmt::format("{} includes {}: {} stands no higher than {}, so it may not know it", file,
+                      included, RoomName(floor, from), RoomName(floor, to))};
+}
 
 std::vector<std::string> CheckInclude(const std::string& file, const std::string& included) {
   std::vector<std::string> faults;
@@ -50,6 +125,11 @@ std::vector<std::string> CheckInclude(const std::string& file, const std::string
       !below->second.contains(target)) {
     faults.push_back(
         fmt::format("{} includes {}: {} may not know {}", file, included, FloorOf(file), target));
+  }
+  if (kRooms.contains(target) && FloorOf(file) == target) {
+    for (std::string& fault : CheckRooms(file, included)) {
+      faults.push_back(std::move(fault));
+    }
   }
   for (const auto& [library, places] : kLibraryPlaces) {
     if (below != kFloorsBelow.end() && included.starts_with(library) &&
@@ -94,17 +174,78 @@ std::vector<fs::path> Sources() {
   return sources;
 }
 
-TEST(Architecture, EveryIncludeRespectsTheFloors) {
+std::string NameOf(const fs::path& path) {
+  return fs::relative(path, SEMBLANCE_SOURCE_DIR).generic_string();
+}
+
+TEST(Architecture, EveryIncludeRespectsTheFloorsAndRooms) {
   std::vector<std::string> faults;
   const std::vector<fs::path> sources = Sources();
   ASSERT_GT(sources.size(), 10u);
   for (const fs::path& source : sources) {
-    const std::string name = fs::relative(source, SEMBLANCE_SOURCE_DIR).generic_string();
-    for (std::string& fault : CheckSource(name, ReadText(source))) {
+    for (std::string& fault : CheckSource(NameOf(source), ReadText(source))) {
       faults.push_back(std::move(fault));
     }
   }
   EXPECT_THAT(faults, IsEmpty());
+}
+
+// Every file of the four floors, by floor and room.
+std::map<std::string, std::map<std::string, std::vector<std::string>>> FilesByRoom() {
+  std::map<std::string, std::map<std::string, std::vector<std::string>>> files;
+  for (const auto& [floor, layers] : kRooms) {
+    for (const auto& entry :
+         fs::recursive_directory_iterator(fs::path(SEMBLANCE_SOURCE_DIR) / floor)) {
+      if (entry.is_regular_file()) {
+        files[floor][RoomOf(NameOf(entry.path()))].push_back(NameOf(entry.path()));
+      }
+    }
+  }
+  return files;
+}
+
+TEST(Architecture, EveryFileLiesInARoomOfItsFloor) {
+  for (const auto& [floor, rooms] : FilesByRoom()) {
+    for (const auto& [room, files] : rooms) {
+      EXPECT_GE(LayerOf(floor, room), 0) << floor << "/" << room << " is not in kRooms";
+      if (room != kHall) {
+        EXPECT_GE(files.size(), kFewestFiles) << floor << "/" << room;
+        EXPECT_LE(files.size(), kMostFiles) << floor << "/" << room;
+      }
+    }
+  }
+}
+
+TEST(Architecture, OnlyFrontDoorsLieFlatInAFloor) {
+  auto files = FilesByRoom();
+  for (const auto& [floor, layers] : kRooms) {
+    for (const std::string& file : files[floor][kHall]) {
+      EXPECT_TRUE(file == floor + "/CMakeLists.txt" || kFrontDoors.contains(StemOf(file))) << file;
+    }
+  }
+}
+
+// tests/FLOOR/ROOM/foo_test.cc tests FLOOR/ROOM/foo.
+TEST(Architecture, TestsMirrorTheRooms) {
+  std::map<std::string, std::string> room_of_stem;  // FLOOR/foo
+  for (const fs::path& source : Sources()) {
+    const std::string name = NameOf(source);
+    room_of_stem[FloorOf(name) + "/" + source.stem().string()] = RoomOf(name);
+  }
+  for (const auto& [floor, layers] : kRooms) {
+    const fs::path tests = fs::path(SEMBLANCE_SOURCE_DIR) / "tests" / floor;
+    for (const auto& entry : fs::recursive_directory_iterator(tests)) {
+      const std::string stem = entry.path().stem().string();
+      const std::string room = RoomOf(fs::relative(entry.path(), tests.parent_path()).string());
+      if (!entry.is_regular_file() || !stem.ends_with("_test")) {
+        continue;
+      }
+      const auto tested = room_of_stem.find(floor + "/" + stem.substr(0, stem.size() - 5));
+      EXPECT_GE(LayerOf(floor, room), 0) << entry.path();
+      EXPECT_TRUE(tested == room_of_stem.end() || tested->second == room)
+          << entry.path() << " tests a file of " << RoomName(floor, tested->second);
+    }
+  }
 }
 
 TEST(Architecture, OnlyTheAgreedEntriesStandAtTheTop) {
@@ -113,7 +254,7 @@ TEST(Architecture, OnlyTheAgreedEntriesStandAtTheTop) {
       "README.md", "LICENSE", "Makefile", "CMakePresets.json", ".clang-format", ".clang-tidy",
       ".gitignore", ".ci", "docs",
       // not part of the project, and ignored by git
-      ".git", "build", "build-debug", "build-sanitize", "out", ".cache"};
+      ".git", "build", "build-debug", "build-sanitize", "build-quick", "out", ".cache"};
   for (const auto& entry : fs::directory_iterator(SEMBLANCE_SOURCE_DIR)) {
     EXPECT_TRUE(allowed.contains(entry.path().filename().string())) << entry.path();
   }
@@ -125,18 +266,18 @@ TEST(Architecture, PlantedViolationsAreFound) {
   const auto check = [](const std::string& file, const std::string& line) {
     return CheckSource(file, kSpdx + line + "\n");
   };
-  EXPECT_THAT(check("interp/a.cc", "#include \"fitting/fit.h\""),
+  EXPECT_THAT(check("interp/dowels/a.cc", "#include \"fitting/fit.h\""),
               ElementsAre(HasSubstr("interp may not know fitting")));
-  EXPECT_THAT(check("fitting/a.cc", "#include \"interp/dowel.h\""),
+  EXPECT_THAT(check("fitting/fit.cc", "#include \"interp/dowels/dowel.h\""),
               ElementsAre(HasSubstr("fitting may not know interp")));
-  EXPECT_THAT(check("surfaces/a.h", "#include \"problems/run.h\""),
+  EXPECT_THAT(check("surfaces/mesh/a.h", "#include \"problems/run.h\""),
               ElementsAre(HasSubstr("surfaces may not know problems")));
-  EXPECT_THAT(check("interp/a.cc", "  #  include <ceres/ceres.h>"),
+  EXPECT_THAT(check("interp/dowels/a.cc", "  #  include <ceres/ceres.h>"),
               ElementsAre(HasSubstr("ceres/")));
   EXPECT_THAT(check("fitting/fit.h", "#include <ceres/ceres.h>"), ElementsAre(HasSubstr("ceres/")));
   EXPECT_THAT(check("problems/run.cc", "#include <yaml-cpp/yaml.h>"),
               ElementsAre(HasSubstr("yaml-cpp/")));
-  EXPECT_THAT(check("surfaces/mesh_query.h", "#include <CGAL/AABB_tree.h>"),
+  EXPECT_THAT(check("surfaces/mesh/mesh_query.h", "#include <CGAL/AABB_tree.h>"),
               ElementsAre(HasSubstr("CGAL/")));
   EXPECT_THAT(check("problems/run.cc", "#include <OpenMesh/Core/IO/MeshIO.hh>"),
               ElementsAre(HasSubstr("OpenMesh/")));
@@ -146,18 +287,36 @@ TEST(Architecture, PlantedViolationsAreFound) {
               ElementsAre(HasSubstr("SPDX")));
 }
 
+TEST(Architecture, PlantedBackArrowsBetweenRoomsAreFound) {
+  const auto check = [](const std::string& file, const std::string& included) {
+    return CheckSource(file, fmt::format("{}#include \"{}\"\n", kSpdx, included));
+  };
+  EXPECT_THAT(check("surfaces/mesh/a.cc", "surfaces/decimate/decimate.h"),
+              ElementsAre(HasSubstr("surfaces/mesh stands no higher than surfaces/decimate")));
+  EXPECT_THAT(check("surfaces/mesh/a.cc", "surfaces/hspline/overlay.h"),
+              ElementsAre(HasSubstr("no higher")));
+  EXPECT_THAT(check("problems/pipeline/case.cc", "problems/run.h"),
+              ElementsAre(HasSubstr("no higher than the front door of problems")));
+  EXPECT_EQ(LayerOf("fitting", "nowhere"), -1);
+}
+
 TEST(Architecture, AllowedIncludesPass) {
   const auto check = [](const std::string& file, const std::string& line) {
     return CheckSource(file, kSpdx + line + "\n");
   };
-  EXPECT_THAT(check("problems/run.cc", "#include \"fitting/fit.h\"\n#include \"interp/dowel.h\""),
+  EXPECT_THAT(
+      check("problems/run.cc", "#include \"fitting/fit.h\"\n#include \"interp/dowels/dowel.h\""),
+      IsEmpty());
+  EXPECT_THAT(check("problems/report/run_folder.h", "#include \"problems/run.h\""), IsEmpty());
+  EXPECT_THAT(check("surfaces/mesh/a.cc", "#include \"surfaces/mesh/b.h\""), IsEmpty());
+  EXPECT_THAT(check("fitting/level/level_fit.cc", "#include <ceres/ceres.h>"), IsEmpty());
+  EXPECT_THAT(check("interp/schemes/kriging_likelihood.cc", "#include <ceres/gradient_problem.h>"),
               IsEmpty());
-  EXPECT_THAT(check("fitting/level_fit.cc", "#include <ceres/ceres.h>"), IsEmpty());
-  EXPECT_THAT(check("interp/kriging_likelihood.cc", "#include <ceres/gradient_problem.h>"),
+  EXPECT_THAT(check("fitting/terms/stencil_cost.h", "#include <ceres/sized_cost_function.h>"),
               IsEmpty());
-  EXPECT_THAT(check("fitting/stencil_cost.h", "#include <ceres/sized_cost_function.h>"), IsEmpty());
-  EXPECT_THAT(check("problems/config.cc", "#include <yaml-cpp/yaml.h>"), IsEmpty());
-  EXPECT_THAT(check("surfaces/mesh_io.cc", "#include <OpenMesh/Core/IO/MeshIO.hh>"), IsEmpty());
+  EXPECT_THAT(check("problems/config/config.cc", "#include <yaml-cpp/yaml.h>"), IsEmpty());
+  EXPECT_THAT(check("surfaces/mesh/mesh_io.cc", "#include <OpenMesh/Core/IO/MeshIO.hh>"),
+              IsEmpty());
   EXPECT_THAT(check("problems/run.cc", "// text about #include \"x\""), IsEmpty());
 }
 

@@ -15,7 +15,7 @@
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
 #include "surfaces/implicit_face.h"
-#include "surfaces/mesh_query.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "tests/bench/entry.h"
 #include "tests/bench/real_head.h"
 

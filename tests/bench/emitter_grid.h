@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "surfaces/implicit_surface.h"
+#include "surfaces/emitters/implicit_surface.h"
 
 namespace semblance::bench {
 

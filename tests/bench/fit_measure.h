@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "surfaces/geometry.h"
+#include "surfaces/base/geometry.h"
 
 namespace semblance::bench {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "fitting/fit.h"
-#include "surfaces/hspline_project.h"
+#include "surfaces/hspline_query/hspline_project.h"
 #include "tests/bench/fit_parts.h"
 #include "tests/testing/scattered_data.h"
 

@@ -17,8 +17,8 @@
 #include <gp_Pnt.hxx>
 #include <gp_Vec.hxx>
 
-#include "surfaces/hspline_batch.h"
-#include "surfaces/hspline_project.h"
+#include "surfaces/hspline_query/hspline_batch.h"
+#include "surfaces/hspline_query/hspline_project.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {

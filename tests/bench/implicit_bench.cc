@@ -12,7 +12,7 @@
 #include <chrono>
 #include <numeric>
 
-#include "surfaces/flat_batch.h"
+#include "surfaces/emitters/flat_batch.h"
 #include "surfaces/implicit_face.h"
 #include "tests/bench/entry.h"
 #include "tests/bench/real_head.h"

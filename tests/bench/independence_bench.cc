@@ -4,8 +4,8 @@
 // one.
 #include <map>
 
-#include "surfaces/implicit_surface.h"
-#include "surfaces/mesh_query.h"
+#include "surfaces/emitters/implicit_surface.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "tests/bench/entry.h"
 #include "tests/bench/real_head.h"
 

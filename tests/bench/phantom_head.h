@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "problems/phantom.h"
+#include "problems/subject/phantom.h"
 
 namespace semblance::bench {
 

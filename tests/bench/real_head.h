@@ -9,9 +9,9 @@
 #include <optional>
 #include <string>
 
-#include "surfaces/decimate.h"
-#include "surfaces/mesh_io.h"
-#include "surfaces/skull_fill.h"
+#include "surfaces/decimate/decimate.h"
+#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh/skull_fill.h"
 #include "tests/bench/phantom_head.h"
 
 namespace semblance::bench {

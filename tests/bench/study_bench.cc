@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "problems/study_report.h"
-#include "problems/study_run.h"
-#include "surfaces/whole_file.h"
+#include "problems/study/study_report.h"
+#include "problems/study/study_run.h"
+#include "surfaces/base/whole_file.h"
 
 namespace semblance {
 namespace {

@@ -3,7 +3,7 @@
 // vtkFlyingEdges3D makes triangles of the samples.
 #pragma once
 
-#include "surfaces/polygonize.h"
+#include "surfaces/marching/polygonize.h"
 
 namespace semblance::bench {
 

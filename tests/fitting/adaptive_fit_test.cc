@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cstring>
 
-#include "fitting/placement.h"
-#include "fitting/tree_system.h"
-#include "surfaces/error.h"
+#include "fitting/adaptive/tree_system.h"
+#include "fitting/problem/placement.h"
+#include "surfaces/base/error.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 

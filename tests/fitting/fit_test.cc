@@ -9,9 +9,9 @@
 #include <cstring>
 #include <map>
 
-#include "fitting/placement.h"
-#include "fitting/term_cost.h"
-#include "surfaces/error.h"
+#include "fitting/problem/placement.h"
+#include "fitting/terms/term_cost.h"
+#include "surfaces/base/error.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {

@@ -10,7 +10,7 @@
 #include <optional>
 #include <type_traits>
 
-#include "surfaces/error.h"
+#include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {

@@ -9,10 +9,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "problems/experiment_config.h"
-#include "problems/run_folder.h"
-#include "surfaces/mesh_query.h"
-#include "surfaces/whole_file.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/report/run_folder.h"
+#include "surfaces/base/whole_file.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 

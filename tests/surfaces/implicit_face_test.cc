@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "surfaces/error.h"
-#include "surfaces/mesh_query.h"
-#include "surfaces/skull_fill.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/skull_fill.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {

@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "surfaces/fields.h"
+#include "surfaces/base/fields.h"
 
 namespace semblance::testing {
 

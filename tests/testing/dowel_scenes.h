@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "interp/depth_input.h"
+#include "interp/dowels/depth_input.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {

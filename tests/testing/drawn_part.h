@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fitting/fit_target.h"
+#include "fitting/problem/fit_target.h"
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::testing {

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "fitting/level_fit.h"
+#include "fitting/level/level_fit.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "surfaces/control_net.h"
+#include "surfaces/hspline/control_net.h"
 
 namespace semblance::testing {
 

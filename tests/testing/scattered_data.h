@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "fitting/fit_target.h"
-#include "surfaces/hspline_surface.h"
+#include "fitting/problem/fit_target.h"
+#include "surfaces/hspline/hspline_surface.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "surfaces/tri_mesh.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::testing {
 

@@ -2,7 +2,7 @@
 // Random H-spline surfaces for law tests.
 #pragma once
 
-#include "surfaces/hspline_surface.h"
+#include "surfaces/hspline/hspline_surface.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {

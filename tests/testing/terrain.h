@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "surfaces/geometry.h"
+#include "surfaces/base/geometry.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {

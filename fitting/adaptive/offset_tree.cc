@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/adaptive/offset_tree.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+#include "surfaces/base/parallel.h"
+
+namespace semblance {
+namespace {
+
+PatchMatrix MatrixOf(const std::array<Vec3, 16>& vertices) {
+  PatchMatrix matrix;
+  for (int k = 0; k < 16; ++k) {
+    matrix.row(k) = vertices[k];
+  }
+  return matrix;
+}
+
+// The vertex among those of a patch that holds it.
+struct PatchSlot {
+  PatchId patch;
+  int index;  // [a + 4 b]
+};
+
+PatchSlot SlotOf(const HSplineShape& shape, const VertexId& v) {
+  const int i =
+      shape.closure == Closure::kPeriodicU ? v.i : std::min(v.i, shape.PatchesU(v.level) - 1);
+  const int j = std::min(v.j, shape.PatchesV(v.level) - 1);
+  return {{v.level, i, j}, v.i - i + 4 * (v.j - j)};
+}
+
+// A vertex where the coarser level alone would have it.
+Vec3 RefinedPlace(const HSplineSurface& surface, const VertexId& v) {
+  const PatchSlot slot = SlotOf(surface.shape(), v);
+  const PatchId parent{v.level - 1, slot.patch.i / 2, slot.patch.j / 2};
+  return RefinePatch(surface.PatchVertices(parent), slot.patch.i % 2, slot.patch.j % 2)[slot.index];
+}
+
+Vec3 PlaceOf(const HSplineSurface& surface, const VertexId& v) {
+  const PatchSlot slot = SlotOf(surface.shape(), v);
+  return surface.PatchVertices(slot.patch)[slot.index];
+}
+
+}  // namespace
+
+OffsetTree::OffsetTree(const HSplineSurface& start, const HSplineSurface& rest,
+                       const PointCloud& cloud)
+    : shape_(start.shape()), rest_(rest), cloud_(cloud) {
+  const ControlNet net = start.Net(0);
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      AddUnknown({0, i, j}, net.At(i, j));
+    }
+  }
+  for (int j = 0; j < shape_.patches_v; ++j) {
+    for (int i = 0; i < shape_.patches_u; ++i) {
+      AddNode({0, i, j}, -1, cloud.PatchOfLevel0(i, j));
+    }
+  }
+  std::vector<VertexId> edits;
+  for (const auto& [vertex, offset] : rest.Offsets()) {
+    edits.push_back(vertex);  // so that every leaf knows the template's shape
+  }
+  for (const auto& [vertex, offset] : start.Offsets()) {
+    edits.push_back(vertex);
+  }
+  Edit(edits);
+  for (TreeUnknown& unknown : unknowns_) {
+    if (unknown.vertex.level > 0) {
+      unknown.value = PlaceOf(start, unknown.vertex) - RefinedPlace(start, unknown.vertex);
+    }
+  }
+  Refresh();
+}
+
+int OffsetTree::finest() const {
+  int level = 0;
+  for (const TreeUnknown& unknown : unknowns_) {
+    level = std::max(level, unknown.vertex.level);
+  }
+  return level;
+}
+
+int OffsetTree::AddUnknown(const VertexId& vertex, const Vec3& value) {
+  const int next = static_cast<int>(unknowns_.size());
+  const auto [at, added] = unknown_of_.emplace(KeyOf(vertex.level, vertex.i, vertex.j), next);
+  if (added) {
+    unknowns_.push_back({vertex, value});
+  }
+  return at->second;
+}
+
+bool OffsetTree::IsEdited(const VertexId& vertex) const {
+  return unknown_of_.contains(KeyOf(vertex.level, vertex.i, vertex.j));
+}
+
+int OffsetTree::AddNode(const PatchId& patch, int parent, const PointCloud::Range& range) {
+  const int index = static_cast<int>(nodes_.size());
+  node_of_.emplace(KeyOf(patch.level, patch.i, patch.j), index);
+  TreeNode& node = nodes_.emplace_back();
+  node.patch = patch;
+  node.parent = parent;
+  node.range = range;
+  node.rest = MatrixOf(rest_.PatchVertices(patch));
+  return index;
+}
+
+void OffsetTree::Split(int index) {
+  const PatchId patch = nodes_[index].patch;
+  const PointCloud::Range range = nodes_[index].range;
+  nodes_[index].children = static_cast<int>(nodes_.size());
+  for (int child = 0; child < 4; ++child) {
+    const PatchId place{patch.level + 1, 2 * patch.i + child % 2, 2 * patch.j + child / 2};
+    AddNode(place, index, cloud_.Child(range, place));
+  }
+}
+
+int OffsetTree::EnsureNode(const PatchId& patch) {
+  const Key key = KeyOf(patch.level, patch.i, patch.j);
+  if (const auto found = node_of_.find(key); found != node_of_.end()) {
+    return found->second;
+  }
+  Split(EnsureNode({patch.level - 1, patch.i / 2, patch.j / 2}));
+  return node_of_.at(key);
+}
+
+void OffsetTree::Edit(std::span<const VertexId> vertices) {
+  std::vector<VertexId> sorted(vertices.begin(), vertices.end());
+  std::sort(sorted.begin(), sorted.end());
+  for (const VertexId& v : sorted) {
+    if (IsEdited(v)) {
+      continue;
+    }
+    AddUnknown(v, Vec3::Zero());
+    for (int j = std::max(v.j - 3, 0); j <= std::min(v.j, shape_.PatchesV(v.level) - 1); ++j) {
+      for (int a = v.i - 3; a <= v.i; ++a) {
+        const int n = shape_.PatchesU(v.level);
+        if (shape_.closure == Closure::kPeriodicU || (a >= 0 && a < n)) {
+          EnsureNode({v.level, (a % n + n) % n, j});
+        }
+      }
+    }
+  }
+  LinkUnknowns();
+  Refresh();
+}
+
+// Vertex i of a level is a sum of 2 i - 3 .. 2 i + 1 of the next.
+bool OffsetTree::IsCovered(const VertexId& v) const {
+  const int level = v.level + 1;
+  if (level > shape_.max_level) {
+    return false;
+  }
+  const bool periodic = shape_.closure == Closure::kPeriodicU;
+  for (int j = std::max(2 * v.j - 3, 0); j <= std::min(2 * v.j + 1, shape_.Rows(level) - 1); ++j) {
+    for (int i = 2 * v.i - 3; i <= 2 * v.i + 1; ++i) {
+      const bool inside = periodic || (i >= 0 && i < shape_.Columns(level));
+      if (inside && !IsEdited({level, (i + shape_.Columns(level)) % shape_.Columns(level), j})) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+void OffsetTree::LinkUnknowns() {
+  for (TreeUnknown& unknown : unknowns_) {
+    unknown.covered = IsCovered(unknown.vertex);
+  }
+  for (TreeNode& node : nodes_) {
+    const PatchId& p = node.patch;
+    for (int k = 0; k < 16; ++k) {
+      const int i = shape_.Column(p.level, p.i + k % 4);
+      const auto found = unknown_of_.find(KeyOf(p.level, i, p.j + k / 4));
+      node.unknowns[k] = found == unknown_of_.end() ? -1 : found->second;
+    }
+  }
+}
+
+// Parents stand before their children.
+void OffsetTree::Refresh() {
+  for (TreeNode& node : nodes_) {
+    const PatchId& p = node.patch;
+    const PatchMatrix before = node.vertices;
+    if (node.parent < 0) {
+      node.vertices.setZero();
+    } else {
+      node.vertices = RefinementMatrix(p.i % 2, p.j % 2) * nodes_[node.parent].vertices;
+    }
+    for (int k = 0; k < 16; ++k) {
+      if (node.unknowns[k] >= 0) {
+        node.vertices.row(k) += unknowns_[node.unknowns[k]].value.transpose();
+      }
+    }
+    node.measured = node.measured && node.vertices == before;
+  }
+}
+
+void OffsetTree::Move(const Eigen::MatrixX3d& step) {
+  for (std::size_t k = 0; k < unknowns_.size(); ++k) {
+    unknowns_[k].value += step.row(static_cast<Eigen::Index>(k)).transpose();
+  }
+  Refresh();
+}
+
+void OffsetTree::Measure(std::span<const double> factors, int threads,
+                         std::vector<double>* squares) {
+  std::vector<int> stale;
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const TreeNode& node = nodes_[k];
+    if (node.children < 0 && (!node.measured || !factors.empty() || squares != nullptr)) {
+      stale.push_back(static_cast<int>(k));
+    }
+  }
+  if (squares != nullptr) {
+    squares->resize(cloud_.points().size());
+  }
+  ParallelFor(stale.size(), threads, 1, [&](std::size_t k) {
+    TreeNode& node = nodes_[stale[k]];
+    const bool moments = !node.has_moments || !factors.empty();
+    PatchSums sums;
+    if (!moments) {
+      std::copy(&node.sums.moments[0][0], &node.sums.moments[0][0] + 56, &sums.moments[0][0]);
+    }
+    AddPoints(cloud_.Of(node.range), node.patch, node.vertices, moments,
+              {.factors = factors.empty() ? nullptr : factors.data() + node.range.begin,
+               .squares = squares == nullptr ? nullptr : squares->data() + node.range.begin},
+              sums);
+    node.sums = sums;
+    node.has_moments = node.measured = true;
+  });
+}
+
+void OffsetTree::Rebin() {
+  for (TreeNode& node : nodes_) {
+    node.range = node.parent < 0 ? cloud_.PatchOfLevel0(node.patch.i, node.patch.j)
+                                 : cloud_.Child(nodes_[node.parent].range, node.patch);
+    node.has_moments = node.measured = false;
+  }
+}
+
+double OffsetTree::Squares() const {
+  double sum = 0;
+  for (const TreeNode& node : nodes_) {
+    sum += node.children < 0 ? node.sums.squares : 0;
+  }
+  return sum;
+}
+
+// Level by level: an offset is measured from the next coarser surface, in its frame.
+HSplineSurface OffsetTree::Surface() const {
+  ControlNet net{shape_.Columns(0), shape_.Rows(0), {}};
+  std::vector<std::vector<const TreeUnknown*>> levels(shape_.max_level + 1);
+  for (const TreeUnknown& unknown : unknowns_) {
+    if (unknown.vertex.level == 0) {
+      net.vertices.push_back(unknown.value);
+    } else {
+      levels[unknown.vertex.level].push_back(&unknown);
+    }
+  }
+  HSplineSurface surface(shape_, net);
+  for (const auto& level : levels) {
+    std::map<VertexId, std::optional<Vec3>> offsets;
+    for (const TreeUnknown* unknown : level) {
+      const VertexId& v = unknown->vertex;
+      const SurfaceFrame frame = surface.LevelFrame(v.level - 1, surface.ParameterOf(v));
+      const Vec3 way = RefinedPlace(surface, v) + unknown->value - frame.point;
+      const bool world = shape_.reference == OffsetReference::kWorld;
+      offsets[v] = world ? way : Vec3(frame.axes.transpose() * way);
+    }
+    surface.SetOffsets(offsets);
+  }
+  return surface;
+}
+
+}  // namespace semblance

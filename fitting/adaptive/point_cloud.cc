@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/adaptive/point_cloud.h"
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+
+namespace semblance {
+namespace {
+
+constexpr int kBits = 18;  // of the place in a level-0 patch, along each side
+
+struct Key {
+  std::uint64_t value;
+  std::uint32_t index;
+};
+
+// Bits 0, 1, 2 .. of x at 0, 2, 4 ..
+std::uint64_t Spread(std::uint64_t x) {
+  x = (x | x << 16) & 0x0000FFFF0000FFFFu;
+  x = (x | x << 8) & 0x00FF00FF00FF00FFu;
+  x = (x | x << 4) & 0x0F0F0F0F0F0F0F0Fu;
+  x = (x | x << 2) & 0x3333333333333333u;
+  return (x | x << 1) & 0x5555555555555555u;
+}
+
+std::uint64_t Cell(double s) {
+  constexpr double kCells = 1 << kBits;
+  return std::min(static_cast<std::uint64_t>(s * kCells), (std::uint64_t{1} << kBits) - 1);
+}
+
+std::uint64_t PatchOf(const HSplineShape& shape, const PatchPlace& place) {
+  return place.patch.i + static_cast<std::uint64_t>(shape.patches_u) * place.patch.j;
+}
+
+Key KeyOf(const HSplineShape& shape, const Vec2& uv, std::size_t index) {
+  const PatchPlace place = Locate(shape, 0, uv);
+  const std::uint64_t z = Spread(Cell(place.s)) | Spread(Cell(place.t)) << 1;
+  return {PatchOf(shape, place) << (2 * kBits) | z, static_cast<std::uint32_t>(index)};
+}
+
+// Stable, digit by digit.
+void RadixSort(std::vector<Key>& keys) {
+  constexpr int kDigit = 11;
+  std::uint64_t all = 0;
+  for (const Key& key : keys) {
+    all |= key.value;
+  }
+  std::vector<Key> other(keys.size());
+  for (int shift = 0; shift < 64 && all >> shift != 0; shift += kDigit) {
+    const auto digit = [&](const Key& k) { return k.value >> shift & ((1u << kDigit) - 1); };
+    std::array<std::size_t, (1 << kDigit) + 1> starts{};
+    for (const Key& key : keys) {
+      ++starts[digit(key) + 1];
+    }
+    for (std::size_t d = 1; d < starts.size(); ++d) {
+      starts[d] += starts[d - 1];
+    }
+    for (const Key& key : keys) {
+      other[starts[digit(key)]++] = key;
+    }
+    keys.swap(other);
+  }
+}
+
+// Points of one cell: by their values.
+void SortTies(const FitTarget& target, std::vector<Key>& keys) {
+  const auto value = [&](const Key& key) {
+    const FitPoint& p = target.points[key.index];
+    return std::tuple(p.uv.x(), p.uv.y(), p.position.x(), p.position.y(), p.position.z(), p.weight);
+  };
+  for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
+    while (end < keys.size() && keys[end].value == keys[begin].value) {
+      ++end;
+    }
+    if (end - begin > 1) {
+      std::sort(keys.begin() + static_cast<std::ptrdiff_t>(begin),
+                keys.begin() + static_cast<std::ptrdiff_t>(end),
+                [&](const Key& a, const Key& b) { return value(a) < value(b); });
+    }
+  }
+}
+
+CloudPoint MakePoint(const HSplineShape& shape, const FitPoint& p) {
+  const PatchPlace place = Locate(shape, 0, p.uv);
+  return {.x = place.patch.i + place.s,
+          .y = place.patch.j + place.t,
+          .position = {p.position.x(), p.position.y(), p.position.z(), 0},
+          .weight = p.weight};
+}
+
+}  // namespace
+
+PointCloud::PointCloud(const HSplineShape& shape, const FitTarget& target) : shape_(shape) {
+  std::vector<Key> keys;
+  keys.reserve(target.points.size());
+  for (std::size_t k = 0; k < target.points.size(); ++k) {
+    keys.push_back(KeyOf(shape, target.points[k].uv, k));
+  }
+  RadixSort(keys);
+  SortTies(target, keys);
+  points_.reserve(keys.size());
+  given_.reserve(keys.size());
+  starts_.reserve(static_cast<std::size_t>(shape.patches_u) * shape.patches_v + 1);
+  for (const Key& key : keys) {
+    while (starts_.size() <= key.value >> (2 * kBits)) {
+      starts_.push_back(points_.size());
+    }
+    points_.push_back(MakePoint(shape, target.points[key.index]));
+    given_.push_back(key.index);
+    weight_sum_ += points_.back().weight;
+  }
+  starts_.resize(static_cast<std::size_t>(shape.patches_u) * shape.patches_v + 1, points_.size());
+}
+
+PointCloud::Range PointCloud::PatchOfLevel0(int i, int j) const {
+  const std::size_t patch = i + static_cast<std::size_t>(shape_.patches_u) * j;
+  return {starts_[patch], starts_[patch + 1]};
+}
+
+PointCloud::Range PointCloud::Child(const Range& parent, const PatchId& child) const {
+  const double scale = 1 << child.level;
+  const int last_u = shape_.PatchesU(child.level) - 1, last_v = shape_.PatchesV(child.level) - 1;
+  const auto place = [&](const CloudPoint& p) {  // among the four children, as on the Z-curve
+    const int i = std::min(static_cast<int>(p.x * scale), last_u),
+              j = std::min(static_cast<int>(p.y * scale), last_v);
+    return i % 2 + 2 * (j % 2);
+  };
+  const auto at = [&](int order) {
+    const auto first = points_.begin() + static_cast<std::ptrdiff_t>(parent.begin),
+               last = points_.begin() + static_cast<std::ptrdiff_t>(parent.end);
+    return static_cast<std::size_t>(
+        std::partition_point(first, last, [&](const CloudPoint& p) { return place(p) < order; }) -
+        points_.begin());
+  };
+  const int order = child.i % 2 + 2 * (child.j % 2);
+  return {at(order), at(order + 1)};
+}
+
+}  // namespace semblance

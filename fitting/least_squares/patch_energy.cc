@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/least_squares/patch_energy.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace semblance {
+namespace {
+
+using Gram = Eigen::Matrix4d;
+
+// Row a: coefficients of 1, t, t^2, t^3 of the a-th cubic B-spline segment on [0,1].
+Eigen::Matrix4d SegmentCoefficients() {
+  Eigen::Matrix4d c;
+  c << 1, -3, 3, -1,  //
+      4, 0, -6, 3,    //
+      1, 3, 3, -3,    //
+      0, 0, 0, 1;
+  return c / 6;
+}
+
+Eigen::Matrix4d Derivative(const Eigen::Matrix4d& c) {
+  Eigen::Matrix4d d = Eigen::Matrix4d::Zero();
+  for (int p = 1; p < 4; ++p) {
+    d.col(p - 1) = p * c.col(p);
+  }
+  return d;
+}
+
+// Integrals over [0,1] of products of the `order`-th derivatives of the four segments, order 0..2.
+Gram SegmentGram(int order) {
+  Eigen::Matrix4d c = SegmentCoefficients();
+  for (int k = 0; k < order; ++k) {
+    c = Derivative(c);
+  }
+  Eigen::Matrix4d moments;  // of t^(p + q)
+  for (int p = 0; p < 4; ++p) {
+    for (int q = 0; q < 4; ++q) {
+      moments(p, q) = 1.0 / (p + q + 1);
+    }
+  }
+  return c * moments * c.transpose();
+}
+
+// Integral over the patch of (d^k/ds^k d^l/dt^l f)^2.
+PatchForm DerivativeForm(int k, int l, double size_s, double size_t) {
+  const Gram s = SegmentGram(k) * std::pow(size_s, 1 - 2 * k);
+  const Gram t = SegmentGram(l) * std::pow(size_t, 1 - 2 * l);
+  PatchForm form;
+  for (int row = 0; row < 16; ++row) {
+    for (int col = 0; col < 16; ++col) {
+      form(row, col) = s(row % 4, col % 4) * t(row / 4, col / 4);
+    }
+  }
+  return form;
+}
+
+}  // namespace
+
+std::array<int, 16> PatchGrid::PatchVertices(int i, int j) const {
+  std::array<int, 16> vertices;
+  for (int k = 0; k < 16; ++k) {
+    vertices[k] = (i + k % 4) % Columns() + Columns() * (j + k / 4);
+  }
+  return vertices;
+}
+
+Stencil PatchGrid::StencilAt(const Vec2& uv, DerivativeOrder order) const {
+  const HSplineShape shape{.patches_u = patches_u,
+                           .patches_v = patches_v,
+                           .max_level = 0,
+                           .closure = periodic_u ? Closure::kPeriodicU : Closure::kOpen};
+  return semblance::StencilAt(shape, 0, uv, order);
+}
+
+PatchForm ThinPlateForm(double size_s, double size_t) {
+  return DerivativeForm(2, 0, size_s, size_t) + 2 * DerivativeForm(1, 1, size_s, size_t) +
+         DerivativeForm(0, 2, size_s, size_t);
+}
+
+PatchForm MembraneForm(double size_s, double size_t) {
+  return DerivativeForm(1, 0, size_s, size_t) + DerivativeForm(0, 1, size_s, size_t);
+}
+
+Eigen::MatrixXd FormRoot(const PatchForm& form) {
+  const Eigen::SelfAdjointEigenSolver<PatchForm> eigen(form);
+  const auto& values = eigen.eigenvalues();  // ascending
+  int null = 0;
+  while (null < 16 && values[null] <= 1e-13 * values[15]) {
+    ++null;
+  }
+  const int rank = 16 - null;
+  return values.tail(rank).cwiseSqrt().asDiagonal() *
+         eigen.eigenvectors().rightCols(rank).transpose();
+}
+
+double FormEnergy(const PatchForm& form, const PatchGrid& grid, const ControlNet& net) {
+  double energy = 0;
+  for (int j = 0; j < grid.patches_v; ++j) {
+    for (int i = 0; i < grid.patches_u; ++i) {
+      const std::array<int, 16> vertices = grid.PatchVertices(i, j);
+      Eigen::Matrix<double, 16, 3> x;
+      for (int k = 0; k < 16; ++k) {
+        x.row(k) = net.vertices[vertices[k]];
+      }
+      energy += (form * x).cwiseProduct(x).sum();
+    }
+  }
+  return energy;
+}
+
+Vec2 MeanLengths(const PatchGrid& grid, const ControlNet& net) {
+  const double size_u = 1.0 / grid.patches_u, size_v = 1.0 / grid.patches_v;
+  return {std::sqrt(FormEnergy(DerivativeForm(1, 0, size_u, size_v), grid, net)),
+          std::sqrt(FormEnergy(DerivativeForm(0, 1, size_u, size_v), grid, net))};
+}
+
+}  // namespace semblance

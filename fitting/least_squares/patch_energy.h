@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Energies of a uniform bicubic B-spline as exact quadratic forms of its control vertices.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/hspline_surface.h"
+
+namespace semblance {
+
+// How the patches of one level share its control vertices. The domain is patches_u x patches_v.
+struct PatchGrid {
+  int patches_u = 0;
+  int patches_v = 0;
+  bool periodic_u = false;
+
+  int Columns() const { return periodic_u ? patches_u : patches_u + 3; }
+  int Rows() const { return patches_v + 3; }
+  // The sixteen vertices of patch (i, j), the one at column a, row b of its 4 x 4 at a + 4 b. With
+  // periodic u a column stands at several a if patches_u < 4.
+  std::array<int, 16> PatchVertices(int i, int j) const;
+  // semblance::StencilAt on this net; its vertices are PatchVertices of the patch at uv.
+  Stencil StencilAt(const Vec2& uv, DerivativeOrder order = {}) const;
+};
+
+// x^T form x is the energy of one patch for one coordinate x (16) of its vertices.
+using PatchForm = Eigen::Matrix<double, 16, 16>;
+
+// Integral over a patch of size_s x size_t (mm) of f_ss^2 + 2 f_st^2 + f_tt^2; rank 13.
+PatchForm ThinPlateForm(double size_s, double size_t);
+// Integral over a patch of size_s x size_t (mm) of f_s^2 + f_t^2; rank 15.
+PatchForm MembraneForm(double size_s, double size_t);
+
+// R (rank x 16) with R^T R = form, which must be positive semidefinite.
+Eigen::MatrixXd FormRoot(const PatchForm& form);
+
+// Sum over all patches and the three coordinates of x^T form x.
+double FormEnergy(const PatchForm& form, const PatchGrid& grid, const ControlNet& net);
+
+// The lengths in mm that [0,1] stands for along u and v: root mean square over the domain of |S_u|
+// and of |S_v|. The same whatever level the surface is written at.
+Vec2 MeanLengths(const PatchGrid& grid, const ControlNet& net);
+
+}  // namespace semblance

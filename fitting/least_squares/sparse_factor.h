@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The sparse Cholesky factor of symmetric matrices.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "fitting/least_squares/normal_equations.h"
+
+namespace semblance {
+
+// Of `lower` (the lower triangle of a positive semidefinite matrix) + shift times the identity;
+// CHOLMOD, one thread.
+class SparseFactor {
+ public:
+  SparseFactor(const SparseMatrix& lower, double shift);
+  ~SparseFactor();
+  bool usable() const;  // false: not positive definite
+  Eigen::MatrixXd Solve(const Eigen::MatrixXd& right) const;
+  Eigen::VectorXd Pivots() const;  // squares of the factor's diagonal, in its own order
+
+ private:
+  struct Cholmod;
+  std::unique_ptr<Cholmod> cholmod_;
+};
+
+// The pivots of lower + shift; unless all exceed `enough`, by a slower factorisation that rounding
+// cannot stop, then with signs.
+Eigen::VectorXd Pivots(const SparseMatrix& lower, double shift, double enough);
+
+// Estimated rank of the matrix whose normal matrix `lower` is; it has so many rows.
+int NumericalRank(const SparseMatrix& lower, std::size_t rows);
+
+}  // namespace semblance

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/level/auto_weight.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <random>
+
+#include "fitting/least_squares/sparse_factor.h"
+#include "fitting/terms/term_cost.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+constexpr Eigen::Index kExact = 256;  // unknowns
+constexpr int kProbes = 32;
+constexpr int kRoughProbes = 8;  // to find the decade
+
+Eigen::MatrixXd ProbesFor(Eigen::Index unknowns, int count) {
+  if (unknowns <= kExact) {
+    return Eigen::MatrixXd::Identity(unknowns, unknowns);
+  }
+  constexpr std::uint64_t kRandomSeed = 1;
+  std::mt19937_64 bits(kRandomSeed);
+  Eigen::MatrixXd probes(unknowns, count);
+  for (Eigen::Index k = 0; k < probes.size(); ++k) {
+    probes(k / count, k % count) = (bits() >> 63) != 0 ? 1 : -1;
+  }
+  return probes;
+}
+
+class WeightSearch {
+ public:
+  // probes: of the trace, if it is not taken exactly.
+  WeightSearch(const WeightProblem& problem, int probes)
+      : problem_(problem), probes_(ProbesFor(problem.points.rows(), probes)) {
+    influenced_ = problem.points.selfadjointView<Eigen::Lower>() * probes_;
+  }
+
+  // NaN scores are never the best.
+  WeightChoice Try(double weight) {
+    const auto [at, added] = tried_.try_emplace(weight);
+    if (added) {
+      at->second = At(weight);
+    }
+    if (at->second.score < best_.score || std::isnan(best_.score)) {
+      best_ = at->second;
+    }
+    return at->second;
+  }
+  const WeightChoice& best() const { return best_; }
+
+ private:
+  WeightChoice At(double weight) const {
+    SparseMatrix lower = problem_.points + weight * problem_.smooth;
+    Eigen::MatrixX3d right = problem_.points_right + weight * problem_.smooth_right;
+    if (problem_.fixed.rows() > 0) {
+      lower += problem_.fixed;
+      right += problem_.fixed_right;
+    }
+    const double mean = lower.diagonal().mean();
+    const SparseFactor factor(lower, 1e-11 * std::max(mean, 1e-300));
+    if (!factor.usable()) {
+      return {};
+    }
+    const Eigen::MatrixXd step = factor.Solve(right);
+    const double misfit =
+        problem_.misfit - 2 * step.cwiseProduct(problem_.points_right).sum() +
+        step.cwiseProduct(problem_.points.selfadjointView<Eigen::Lower>() * step).sum();
+    const double trace = probes_.cwiseProduct(factor.Solve(influenced_)).sum() /
+                         (probes_.rows() <= kExact ? 1.0 : static_cast<double>(probes_.cols()));
+    const double left = 1 - trace / problem_.count;
+    const double score = left > 1e-6 ? std::max(misfit, 0.0) / (left * left) : kNaN;
+    return {.weight = weight, .score = score, .degrees_of_freedom = trace};
+  }
+
+  const WeightProblem& problem_;
+  Eigen::MatrixXd probes_, influenced_;
+  std::map<double, WeightChoice> tried_;
+  WeightChoice best_;
+};
+
+void AddTerm(const Term& term, const LevelView& view, RowSink& sink) {
+  std::visit(
+      [&]<class T>(const T& t) {
+        if constexpr (RowTerm<T>) {
+          AddRows(t, view, sink);
+        }
+      },
+      term);
+}
+
+// The matrix and right side of some terms at the view's start.
+struct Part {
+  SparseMatrix lower;
+  Eigen::MatrixX3d right;
+};
+
+Part PartOf(const LevelView& view, std::span<const Term> terms) {
+  NormalMatrix matrix(view.grid);
+  NormalResidual residual(view.start);
+  for (const Term& term : terms) {
+    if (WeightOf(term) > 0) {
+      AddTerm(term, view, matrix);
+      AddTerm(term, view, residual);
+    }
+  }
+  return {matrix.Lower(), residual.Sum()};
+}
+
+void CheckSeparable(std::span<const Term> terms) {
+  for (const Term& term : terms) {
+    const bool fine =
+        WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsSeparable(t); }, term);
+    if (!fine) {
+      throw InputError(
+          fmt::format("weight: auto cannot be chosen beside the term '{}' with a loss or coupled "
+                      "coordinates; give a number, or (points with a loss) take plan: adaptive",
+                      TermName(term)));
+    }
+  }
+}
+
+}  // namespace
+
+namespace {
+
+// The best decade, from smooth to rough until the score has plainly turned: where points are many,
+// rougher is dearer to try and no longer in question.
+double BestDecade(const WeightProblem& problem, double near) {
+  constexpr double kTurned = 1.05;
+  WeightSearch search(problem, kRoughProbes);
+  const double even =
+      problem.points.diagonal().sum() / std::max(problem.smooth.diagonal().sum(), 1e-300);
+  int turned = 0;
+  for (int decade = near > 0 ? 1 : 4; decade >= (near > 0 ? -1 : -10) && turned < 2; --decade) {
+    const double score = search.Try((near > 0 ? near : even) * std::pow(10.0, decade)).score;
+    turned = score > kTurned * search.best().score ? turned + 1 : 0;
+  }
+  return search.best().weight;
+}
+
+// The smoothest that the points do not tell from the best: the score is flat, and in a gap, of
+// which no point knows, the rougher ones swing.
+WeightChoice SmoothestAsGood(WeightSearch& search) {
+  constexpr double kAsGood = 1.01;
+  WeightChoice choice = search.best();
+  for (int k = 0; k < 12; ++k) {
+    const WeightChoice next = search.Try(choice.weight * std::sqrt(std::sqrt(10.0)));
+    if (!(next.score <= kAsGood * search.best().score)) {
+      break;
+    }
+    choice = next;
+  }
+  return choice;
+}
+
+}  // namespace
+
+WeightChoice ChooseWeight(const WeightProblem& problem, double near) {
+  const double decade = BestDecade(problem, near);
+  if (std::isnan(decade)) {
+    return {};
+  }
+  WeightSearch search(problem, kProbes);
+  search.Try(decade);
+  for (const double factor : {std::sqrt(10.0), std::sqrt(std::sqrt(10.0))}) {
+    const double middle = search.best().weight;
+    search.Try(middle * factor);
+    search.Try(middle / factor);
+  }
+  return SmoothestAsGood(search);
+}
+
+int AutoTerm(std::span<const Term> terms) {
+  int found = -1;
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    const bool automatic = std::visit(
+        []<class T>(const T& t) {
+          if constexpr (std::is_same_v<decltype(t.weight), AutoNumber>) {
+            return t.weight.automatic;
+          }
+          return false;
+        },
+        terms[k]);
+    if (automatic && found >= 0) {
+      throw InputError(
+          fmt::format("the terms '{}' and '{}' both have weight: auto; give one of them a number",
+                      TermName(terms[found]), TermName(terms[k])));
+    }
+    found = automatic ? static_cast<int>(k) : found;
+  }
+  return found;
+}
+
+void SetWeight(double weight, Term& term) {
+  std::visit(
+      [&]<class T>(T& t) {
+        if constexpr (std::is_same_v<decltype(t.weight), AutoNumber>) {
+          t.weight = weight;
+        }
+      },
+      term);
+}
+
+std::vector<Term> WithChosenWeight(const LevelView& view, std::span<const Term> terms,
+                                   double& chosen) {
+  chosen = kNaN;
+  std::vector<Term> result(terms.begin(), terms.end());
+  const int at = AutoTerm(terms);
+  if (at < 0) {
+    return result;
+  }
+  CheckSeparable(terms);
+  SetWeight(1, result[at]);
+  std::vector<Term> points, others;
+  for (int k = 0; k < static_cast<int>(result.size()); ++k) {
+    if (k != at) {
+      (std::holds_alternative<PointTerm>(result[k]) ? points : others).push_back(result[k]);
+    }
+  }
+  const Part data = PartOf(view, points), smooth = PartOf(view, std::span(&result[at], 1)),
+             fixed = PartOf(view, others);
+  double misfit = 0;
+  for (const Term& term : points) {
+    misfit += TermCost(std::get<PointTerm>(term), view, view.start);
+  }
+  chosen = ChooseWeight({.points = data.lower,
+                         .points_right = data.right,
+                         .smooth = smooth.lower,
+                         .smooth_right = smooth.right,
+                         .fixed = fixed.lower,
+                         .fixed_right = fixed.right,
+                         .misfit = misfit,
+                         .count = static_cast<double>(view.observations.size())})
+               .weight;
+  if (std::isnan(chosen)) {
+    throw InputError(
+        "weight: auto: no weight has a usable solve; more points than directions they determine "
+        "are needed, or give a number");
+  }
+  SetWeight(chosen, result[at]);
+  return result;
+}
+
+}  // namespace semblance

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/problem/fit_target.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+bool InDomain(const Vec2& uv) { return (uv.array() >= 0).all() && (uv.array() <= 1).all(); }
+
+}  // namespace
+
+void CheckTarget(const FitTarget& target) {
+  if (!target.feet.empty() && target.feet.size() != target.points.size()) {
+    throw InputError(fmt::format("fit target: {} feet on bone for {} points; give one a point",
+                                 target.feet.size(), target.points.size()));
+  }
+  for (std::size_t i = 0; i < target.points.size(); ++i) {
+    const FitPoint& p = target.points[i];
+    const auto fail = [&](const std::string& what) {
+      throw InputError(fmt::format("fit target: point {} ('{}'): {}", i, p.label, what));
+    };
+    if (!p.position.allFinite()) {
+      fail("its position is not finite; remove it or give three numbers in mm");
+    }
+    if (!InDomain(p.uv)) {
+      fail(fmt::format("(u,v) = ({}, {}) is outside [0,1] x [0,1]", p.uv.x(), p.uv.y()));
+    }
+    if (!(std::isfinite(p.weight) && p.weight > 0)) {
+      fail(fmt::format("weight {} is not a positive number", p.weight));
+    }
+    if (!target.feet.empty() && target.feet[i].foot.allFinite() &&
+        !(std::abs(target.feet[i].direction.norm() - 1) < 1e-6)) {
+      fail(fmt::format("its direction out of the bone has the length {}; give a unit vector",
+                       target.feet[i].direction.norm()));
+    }
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a surface is fitted to: points, each with the (u,v) at which the surface should meet it.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "surfaces/base/geometry.h"
+
+namespace semblance {
+
+struct FitPoint {
+  std::string label;  // site of a dowel, or the name of a seeded one; for reports
+  Vec3 position = Vec3::Constant(kNaN);  // mm
+  Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
+  double weight = 1;                     // > 0; relative to the other points
+};
+
+// Where a point stands on bone; for the terms that look at it.
+struct BoneFoot {
+  Vec3 foot = Vec3::Constant(kNaN);       // mm; NaN where it is not known
+  Vec3 direction = Vec3::Constant(kNaN);  // unit, out of the bone
+};
+
+struct FitTarget {
+  std::vector<FitPoint> points;
+  std::vector<BoneFoot> feet = {};  // one a point, or none
+};
+
+// Throws InputError, naming the point, if one has a position that is not finite, a (u,v) outside
+// the domain, a weight that is not positive and finite, or a foot without a unit direction; or if
+// there are feet, but not one a point.
+void CheckTarget(const FitTarget& target);
+
+}  // namespace semblance

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <CGAL/Delaunay_triangulation_2.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Triangulation_vertex_base_with_info_2.h>
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "fitting/least_squares/patch_energy.h"
+#include "fitting/relaxation/relaxation.h"
+
+namespace semblance {
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<int, Kernel>;
+using Storage = CGAL::Triangulation_data_structure_2<VertexBase>;
+using Delaunay = CGAL::Delaunay_triangulation_2<Kernel, Storage>;
+
+double DoubleArea(const std::array<int, 3>& t, std::span<const Vec2> uv) {
+  const Vec2 a = uv[t[1]] - uv[t[0]], b = uv[t[2]] - uv[t[0]];
+  return a.x() * b.y() - a.y() * b.x();
+}
+
+// Indices by u, then v, so that equal places are neighbours and the order given has no effect.
+std::vector<int> Ordered(std::span<const Vec2> uv) {
+  std::vector<int> order(uv.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return std::pair(uv[a].x(), uv[a].y()) < std::pair(uv[b].x(), uv[b].y());
+  });
+  return order;
+}
+
+Vec2 Lengths(const HSplineSurface& surface) {
+  const HSplineShape& shape = surface.shape();
+  const PatchGrid grid{.patches_u = shape.patches_u,
+                       .patches_v = shape.patches_v,
+                       .periodic_u = shape.closure == Closure::kPeriodicU};
+  return MeanLengths(grid, surface.Net(0));
+}
+
+}  // namespace
+
+DowelMesh::DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv,
+                     DowelLinks links)
+    : rest_uv_(uv.begin(), uv.end()), corner_(uv.size()), lengths_mm_(Lengths(template_surface)) {
+  std::iota(corner_.begin(), corner_.end(), 0);
+  if (links == DowelLinks::kDelaunay) {
+    Link(uv);
+  }
+}
+
+void DowelMesh::Link(std::span<const Vec2> uv) {
+  Delaunay delaunay;
+  for (const int k : Ordered(uv)) {
+    const Vec2 place = uv[k].cwiseProduct(lengths_mm_);
+    const std::size_t before = delaunay.number_of_vertices();
+    const auto vertex = delaunay.insert(Kernel::Point_2(place.x(), place.y()));
+    if (delaunay.number_of_vertices() > before) {
+      vertex->info() = k;
+    }
+    corner_[k] = vertex->info();
+  }
+  std::set<std::array<int, 2>> edges;
+  for (auto face = delaunay.finite_faces_begin(); face != delaunay.finite_faces_end(); ++face) {
+    const std::array<int, 3> t = {face->vertex(0)->info(), face->vertex(1)->info(),
+                                  face->vertex(2)->info()};
+    triangles_.push_back(t);
+    for (int k = 0; k < 3; ++k) {
+      edges.insert({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+    }
+  }
+  edges_.assign(edges.begin(), edges.end());
+}
+
+bool DowelMesh::Turned(const std::array<int, 3>& triangle, std::span<const Vec2> uv) const {
+  constexpr double kLeft = 0.01;  // of the area that it had in the template
+  return DoubleArea(triangle, uv) <= kLeft * DoubleArea(triangle, rest_uv_);
+}
+
+int DowelMesh::Flips(std::span<const Vec2> uv) const {
+  return static_cast<int>(std::count_if(triangles_.begin(), triangles_.end(),
+                                        [&](const auto& t) { return Turned(t, uv); }));
+}
+
+DowelMesh MeshOf(const HSplineSurface& rest, const FitTarget& target,
+                 const RelaxationOptions& options) {
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    uv.push_back(p.uv);
+  }
+  const bool neighbours = options.mode != RelaxationMode::kFootpoint &&
+                          (options.bunching > 0 || options.distortion > 0 || options.crease > 0);
+  return {rest, uv, options.barrier || neighbours ? DowelLinks::kDelaunay : DowelLinks::kNone};
+}
+
+}  // namespace semblance

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/relaxation/relaxer.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "fitting/problem/seeding.h"
+
+namespace semblance {
+namespace {
+
+Spot SpotAt(const HSplineSurface& surface, const Vec2& uv) {
+  const SurfaceFrame frame = surface.Frame(uv);
+  Vec3 normal = frame.Normal();
+  if (!normal.allFinite()) {
+    normal.setZero();
+  }
+  return {.point = frame.point, .du = frame.du, .dv = frame.dv, .normal = normal};
+}
+
+}  // namespace
+
+Relaxer::Relaxer(const HSplineSurface& surface, const HSplineSurface& rest, const DowelMesh& mesh,
+                 const RelaxationOptions& options, const FitTarget& target)
+    : surface_(surface), mesh_(mesh), options_(options), target_(target) {
+  if (options_.mode == RelaxationMode::kFootpoint) {
+    options_.bunching = options_.distortion = options_.crease = 0;
+  }
+  for (std::size_t k = 0; k < target.points.size(); ++k) {
+    uv_.push_back(target.points[k].uv);
+    rest_points_.push_back(rest.Point(mesh.rest_uv()[k]));
+    spots_.push_back(SpotAt(surface, uv_.back()));
+  }
+  LinkMembers();
+  LinkNeighbours();
+}
+
+void Relaxer::LinkMembers() {
+  members_.resize(uv_.size());
+  std::vector<double> weights;
+  for (std::size_t k = 0; k < uv_.size(); ++k) {
+    members_[mesh_.corner()[k]].push_back(static_cast<int>(k));
+    weights.push_back(target_.points[k].weight);
+  }
+  std::sort(weights.begin(), weights.end());
+  mean_weight_ = std::accumulate(weights.begin(), weights.end(), 0.0) /
+                 static_cast<double>(std::max<std::size_t>(weights.size(), 1));
+  for (std::size_t k = 0; k < uv_.size(); ++k) {
+    if (!members_[k].empty()) {
+      order_.push_back(static_cast<int>(k));
+    }
+  }
+  std::sort(order_.begin(), order_.end(), [&](int a, int b) {
+    const Vec2 &p = mesh_.rest_uv()[a], &q = mesh_.rest_uv()[b];
+    return std::pair(p.x(), p.y()) < std::pair(q.x(), q.y());
+  });
+}
+
+void Relaxer::LinkNeighbours() {
+  neighbours_.resize(uv_.size());
+  around_.resize(uv_.size());
+  for (const auto& [a, b] : mesh_.edges()) {
+    neighbours_[a].push_back(b);
+    neighbours_[b].push_back(a);
+  }
+  for (std::size_t t = 0; t < mesh_.triangles().size(); ++t) {
+    for (const int corner : mesh_.triangles()[t]) {
+      around_[corner].push_back(static_cast<int>(t));
+    }
+  }
+}
+
+void Relaxer::AddNeighbour(int corner, int other, const Vec2& uv, const Spot& spot, double share,
+                           LocalPenalty& local) const {
+  if (options_.bunching > 0) {
+    const Vec2 rest = mesh_.rest_uv()[corner] - mesh_.rest_uv()[other];
+    local.Add(share * options_.bunching, InMm(uv - uv_[other] - rest), InMm({1, 0}), InMm({0, 1}));
+  }
+  const double distance = RestDistance(corner, other);
+  const Vec3 way = spot.point - spots_[other].point;
+  const double length = way.norm();
+  if (options_.distortion > 0 && length > 0) {
+    const Vec3 along = way / length;
+    local.Add(share * options_.distortion, Vec3(length - distance, 0, 0),
+              Vec3(along.dot(spot.du), 0, 0), Vec3(along.dot(spot.dv), 0, 0));
+  }
+  if (options_.crease > 0) {
+    constexpr double kStep = 1e-5;
+    const Vec3 nu =
+        SpotAt(surface_, uv + Vec2(kStep, 0)).normal - SpotAt(surface_, uv - Vec2(kStep, 0)).normal;
+    const Vec3 nv =
+        SpotAt(surface_, uv + Vec2(0, kStep)).normal - SpotAt(surface_, uv - Vec2(0, kStep)).normal;
+    local.Add(share * options_.crease, distance * (spot.normal - spots_[other].normal),
+              distance * nu / (2 * kStep), distance * nv / (2 * kStep));
+  }
+}
+
+LocalPenalty Relaxer::LocalAt(int corner, const Vec2& uv, const Spot& spot, double distance) const {
+  LocalPenalty local;
+  for (const int m : members_[corner]) {
+    const FitPoint& p = target_.points[m];
+    local.Add(distance * p.weight / mean_weight_, spot.point - p.position, spot.du, spot.dv);
+    if (options_.standard > 0 && !IsSeeded(p)) {
+      local.Add(options_.standard, InMm(uv - mesh_.rest_uv()[corner]), InMm({1, 0}), InMm({0, 1}));
+    }
+  }
+  const double share =
+      1.0 / static_cast<double>(std::max<std::size_t>(neighbours_[corner].size(), 1));
+  for (const int other : neighbours_[corner]) {
+    AddNeighbour(corner, other, uv, spot, share, local);
+  }
+  return local;
+}
+
+LocalPenalty Relaxer::Held(int corner) const {
+  return LocalAt(corner, uv_[corner], spots_[corner], 0);
+}
+
+Eigen::Matrix2d Relaxer::DampingAt(const Spot& spot) const {
+  Eigen::Matrix<double, 3, 2> tangents;
+  tangents << spot.du, spot.dv;
+  Eigen::Matrix2d metric = tangents.transpose() * tangents;
+  metric.diagonal().array() += 1e-12 * metric.trace();
+  const double weight = std::max(options_.distance + options_.bunching + options_.distortion, 1e-6);
+  return ((options_.damping + 1e-9) * weight) * metric;
+}
+
+Vec2 Relaxer::LongestMove(int corner) const {
+  const Spot& spot = spots_[corner];
+  return options_.max_move_mm *
+         Vec2(1 / std::max(spot.du.norm(), 1e-9), 1 / std::max(spot.dv.norm(), 1e-9));
+}
+
+// Without a network nothing keeps a point from going round a closed surface.
+Vec2 Relaxer::Inside(const Vec2& uv) const {
+  const bool round = surface_.shape().closure == Closure::kPeriodicU && mesh_.triangles().empty();
+  const double u = round ? uv.x() - std::floor(uv.x()) : std::clamp(uv.x(), 0.0, 1.0);
+  return {u, std::clamp(uv.y(), 0.0, 1.0)};
+}
+
+void Relaxer::SetUv(const std::vector<Vec2>& uv) {
+  uv_ = uv;
+  for (std::size_t k = 0; k < uv_.size(); ++k) {
+    spots_[k] = SpotAt(surface_, uv_[k]);
+  }
+}
+
+// Levenberg's step, damped by the length of the move on the surface, and no longer than allowed.
+Vec2 Relaxer::StepOf(const LocalPenalty& local, const Spot& spot) const {
+  const Eigen::Matrix2d matrix = local.matrix + DampingAt(spot);
+  const Vec2 step = matrix.ldlt().solve(-local.gradient);
+  if (!step.allFinite()) {
+    return Vec2::Zero();
+  }
+  const double length = (spot.du * step.x() + spot.dv * step.y()).norm();
+  return length > options_.max_move_mm ? step * (options_.max_move_mm / length) : step;
+}
+
+int Relaxer::FlipsWith(int corner, const Vec2& uv) {
+  if (!options_.barrier) {
+    return 0;
+  }
+  const Vec2 kept = std::exchange(uv_[corner], uv);
+  int flips = 0;
+  for (const int t : around_[corner]) {
+    flips += mesh_.Turned(mesh_.triangles()[t], uv_) ? 1 : 0;
+  }
+  uv_[corner] = kept;
+  return flips;
+}
+
+// Halves the step until no triangle turns over and the corner's penalties fall; else stays.
+void Relaxer::MoveCorner(int corner, RelaxationSummary& summary) {
+  const LocalPenalty here = LocalAt(corner, uv_[corner], spots_[corner], options_.distance);
+  Vec2 step = StepOf(here, spots_[corner]);
+  int prevented = 0;
+  for (int halving = 0; halving < 8; ++halving, step /= 2) {
+    const Vec2 uv = Inside(uv_[corner] + step);
+    if (const int flips = FlipsWith(corner, uv); flips > 0) {
+      prevented = std::max(prevented, flips);
+      continue;
+    }
+    const Spot spot = SpotAt(surface_, uv);
+    if (LocalAt(corner, uv, spot, options_.distance).energy < here.energy) {
+      uv_[corner] = uv;
+      spots_[corner] = spot;
+      break;
+    }
+  }
+  summary.flips_prevented += prevented;
+  summary.steps_shortened += prevented > 0 ? 1 : 0;
+}
+
+void Relaxer::Round(RelaxationSummary& summary) {
+  for (const int corner : order_) {
+    MoveCorner(corner, summary);
+  }
+  for (std::size_t k = 0; k < uv_.size(); ++k) {
+    uv_[k] = uv_[mesh_.corner()[k]];
+    spots_[k] = spots_[mesh_.corner()[k]];
+  }
+}
+
+namespace {
+
+double MeanOf(std::vector<double> values) {
+  std::sort(values.begin(), values.end());  // whatever the order of the points
+  const double count = static_cast<double>(std::max<std::size_t>(values.size(), 1));
+  return std::accumulate(values.begin(), values.end(), 0.0) / count;
+}
+
+}  // namespace
+
+RelaxationPenalties Relaxer::Penalties() const {
+  std::vector<double> distance, standard, bunching, distortion, crease;
+  for (std::size_t k = 0; k < uv_.size(); ++k) {
+    distance.push_back((spots_[k].point - target_.points[k].position).squaredNorm());
+    if (!IsSeeded(target_.points[k])) {
+      standard.push_back(InMm(uv_[k] - mesh_.rest_uv()[k]).squaredNorm());
+    }
+  }
+  for (const auto& [a, b] : mesh_.edges()) {
+    const Vec2 rest = mesh_.rest_uv()[a] - mesh_.rest_uv()[b];
+    const double d = RestDistance(a, b);
+    bunching.push_back(InMm(uv_[a] - uv_[b] - rest).squaredNorm());
+    distortion.push_back(std::pow((spots_[a].point - spots_[b].point).norm() - d, 2));
+    crease.push_back(d * d * (spots_[a].normal - spots_[b].normal).squaredNorm());
+  }
+  return {.distance = MeanOf(distance),
+          .bunching = MeanOf(bunching),
+          .distortion = MeanOf(distortion),
+          .crease = MeanOf(crease),
+          .standard = MeanOf(standard)};
+}
+
+void MovePoints(const HSplineSurface& surface, const std::vector<Vec2>& uv, FitTarget& target,
+                RelaxationSummary& summary) {
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    FitPoint& p = target.points[k];
+    const double move_mm = (surface.Point(uv[k]) - surface.Point(p.uv)).norm();
+    summary.max_move_mm = std::max(summary.max_move_mm, move_mm);
+    p.uv = uv[k];
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <ceres/loss_function.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "fitting/least_squares/linear_cost.h"
+#include "fitting/terms/robust_loss.h"
+#include "fitting/terms/term_cost.h"
+
+namespace semblance {
+namespace {
+
+using Indices = std::array<int, 16>;
+
+// A loss looks at each point by itself, so robust points are not reduced.
+void AddByPoint(const PointTerm& term, const LevelView& view, ControlNet& net,
+                ceres::Problem& problem) {
+  const double scale = term.weight / view.WeightSum();
+  for (const Observation& o : view.observations) {
+    const Stencil s = view.grid.StencilAt(o.uv);
+    const Eigen::Map<const Eigen::Matrix<double, 1, 16>> row(s.weight.data());
+    AddLinearResidual(std::make_shared<const Eigen::MatrixXd>(row), o.position.transpose(), s.index,
+                      MakeLoss(term, scale * o.weight), net, problem);
+  }
+}
+
+// Rows of one patch are given on when another begins, or when they become many.
+class PatchBuffer {
+ public:
+  explicit PatchBuffer(RowSink& sink) : sink_(sink) {}
+
+  void Add(const Stencil& stencil, const Vec3& position, double factor) {
+    if (stencil.index != indices_ || rows_.size() == kMost) {
+      Flush();
+      indices_ = stencil.index;
+    }
+    Row& row = rows_.emplace_back();
+    for (int k = 0; k < 16; ++k) {
+      row[k] = factor * stencil.weight[k];
+    }
+    row.tail<3>() = factor * position;
+  }
+
+  void Flush() {
+    if (rows_.empty()) {
+      return;
+    }
+    const Eigen::Map<const Eigen::Matrix<double, 19, Eigen::Dynamic>> all(rows_.front().data(), 19,
+                                                                          rows_.size());
+    sink_.Add(std::make_shared<const Eigen::MatrixXd>(all.topRows<16>().transpose()),
+              all.bottomRows<3>().transpose(), indices_);
+    rows_.clear();
+  }
+
+ private:
+  using Row = Eigen::Matrix<double, 19, 1>;
+  static constexpr std::size_t kMost = 65536;  // rows; 10 MB
+
+  RowSink& sink_;
+  Indices indices_{};
+  std::vector<Row> rows_;
+};
+
+// The rows of those observations that are taken.
+template <class Taken>
+void AddWeighted(const LevelView& view, double scale, const Taken& taken, RowSink& sink) {
+  PatchBuffer buffer(sink);
+  for (const Observation& o : view.observations) {
+    if (taken(o)) {
+      buffer.Add(view.grid.StencilAt(o.uv), o.position, std::sqrt(scale * o.weight));
+    }
+  }
+  buffer.Flush();
+}
+
+}  // namespace
+
+std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale) {
+  std::unique_ptr<ceres::LossFunction> loss;
+  if (term.loss == RobustLoss::kHuber) {
+    loss = std::make_unique<ceres::HuberLoss>(term.loss_width_mm);
+  } else if (term.loss == RobustLoss::kTukey) {
+    loss = std::make_unique<ceres::TukeyLoss>(term.loss_width_mm);
+  } else {
+    loss = std::make_unique<ceres::CauchyLoss>(term.loss_width_mm);
+  }
+  return std::make_unique<ceres::ScaledLoss>(loss.release(), scale, ceres::TAKE_OWNERSHIP);
+}
+
+void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink) {
+  AddWeighted(
+      view, term.weight / view.WeightSum(), [](const Observation&) { return true; }, sink);
+}
+
+void AddRows(const LandmarkTerm& term, const LevelView& view, RowSink& sink) {
+  AddWeighted(
+      view, term.weight / view.LandmarkWeightSum(), [](const Observation& o) { return o.landmark; },
+      sink);
+}
+
+void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem) {
+  if (IsSeparable(term)) {
+    ProblemSink sink(net, problem);
+    AddRows(term, view, sink);
+  } else {
+    AddByPoint(term, view, net, problem);
+  }
+}
+
+double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net) {
+  double sum = 0;
+  for (const Observation& o : view.observations) {
+    sum += o.weight * Rho(term, (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm());
+  }
+  return view.observations.empty() ? 0 : term.weight * sum / view.WeightSum();
+}
+
+double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNet& net) {
+  double sum = 0;
+  for (const Observation& o : view.observations) {
+    sum += o.landmark ? o.weight * (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm()
+                      : 0;
+  }
+  return sum > 0 ? term.weight * sum / view.LandmarkWeightSum() : 0;
+}
+
+}  // namespace semblance

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Each term twice: as rows or residuals to minimise, and as the plain sum that its documentation
+// states.
+#pragma once
+
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+
+#include <memory>
+
+#include "fitting/least_squares/linear_cost.h"
+#include "fitting/least_squares/row_sink.h"
+#include "fitting/terms/level_view.h"
+#include "fitting/terms/term.h"
+
+namespace semblance {
+
+// The rows of a term that is the same for x, y and z (PointTerm: without a loss); their sum of
+// squares equals TermCost.
+void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const LandmarkTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
+
+// Terms that are |A X - B|^2 with the same A for x, y and z; then AddRows gives its rows.
+template <class T>
+concept RowTerm = requires(const T& term, const LevelView& view, RowSink& sink) {
+  AddRows(term, view, sink);
+};
+inline bool IsSeparable(const PointTerm& term) { return term.loss == RobustLoss::kNone; }
+template <class T>
+bool IsSeparable(const T&) {
+  return RowTerm<T>;
+}
+
+// Adds the residuals of a term over `net`, whose vertices become parameter blocks of 3 doubles. The
+// sum of their squares (robust: of their losses), which is twice Ceres' cost, equals TermCost but
+// for a constant: the points of a patch are reduced to at most 16 rows (row_reduction.h), without
+// what no net can change. Points are reduced best in the order of SortObservations.
+void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const TangentPointTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const NonPenetrationTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const SpringTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+void AddResiduals(const DistortionTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem);
+template <RowTerm T>
+void AddResiduals(const T& term, const LevelView& view, ControlNet& net, ceres::Problem& problem) {
+  ProblemSink sink(net, problem);
+  AddRows(term, view, sink);
+}
+
+// scale * rho of a squared distance in mm^2, for a term with a loss.
+std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale);
+
+// The cost of a term as term.h states it, mm^2.
+double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const PriorTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const TangentPointTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const NonPenetrationTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const SpringTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const DistortionTerm& term, const LevelView& view, const ControlNet& net);
+
+}  // namespace semblance

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tissue depth at every vertex of a skull: the value that passes from interpolation to the implicit
+// surface.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "surfaces/base/geometry.h"
+
+namespace semblance {
+
+enum class DepthStatus : std::uint8_t {
+  kAssigned,   // the scheme gave a depth
+  kOutside,    // in no dowel area; the depth, if finite, is the outside rule's
+  kNotFacing,  // in an area, but on bone that faces away from its dowels (inner table, far side)
+};
+
+// All vectors have one entry a vertex.
+struct DepthField {
+  std::vector<double> depth_mm;  // NaN where there is none: such a vertex does not emit
+  std::vector<DepthStatus> status;
+  std::vector<double> sd_mm;  // NaN where the scheme knows none
+};
+
+}  // namespace semblance

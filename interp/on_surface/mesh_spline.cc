@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/on_surface/mesh_spline.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "interp/on_surface/mesh_laplacian.h"
+#include "interp/on_surface/mesh_solver.h"
+#include "surfaces/base/parallel.h"
+#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/point_triangle.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kLeastSoftness = 1e-12;  // two dowels closest to one vertex must not be singular
+
+constexpr Eigen::Index kMostHeld = 64;       // functions held at a time: 8 bytes a vertex each
+constexpr std::size_t kSolvedTogether = 16;  // right sides solved at a time: 8 bytes a vertex each
+
+// The function's mean that one dowel speaks of: sum of weight times value, weights of sum 1.
+struct Place {
+  std::vector<std::pair<int, double>> weights;
+  int piece = 0;
+};
+
+Place PlaceOf(const Vec3& base, double radius_mm, const TriMesh& skull, const MeshQuery& query,
+              const MeshLaplacian& laplacian, const std::vector<int>& pieces) {
+  const MeshPoint closest = query.Closest(base);
+  const Triangle& t = skull.triangles[closest.triangle];
+  Place place;
+  place.piece = pieces[t[0]];
+  double sum = 0;
+  for (std::size_t i = 0; radius_mm > 0 && i < skull.points.size(); ++i) {
+    const bool near = (skull.points[i] - closest.position).norm() <= radius_mm;
+    if (near && pieces[i] == place.piece) {
+      place.weights.emplace_back(static_cast<int>(i), laplacian.area_mm2[i]);
+      sum += laplacian.area_mm2[i];
+    }
+  }
+  for (auto& weight : place.weights) {
+    weight.second /= sum;
+  }
+  if (place.weights.empty()) {
+    const Vec3 corners = ClosestPointOnTriangle(closest.position, skull.points[t[0]],
+                                                skull.points[t[1]], skull.points[t[2]])
+                             .weights;
+    place.weights = {{t[0], corners[0]}, {t[1], corners[1]}, {t[2], corners[2]}};
+  }
+  return place;
+}
+
+// Let b_i be the places, G the inverse of the energy's matrix on functions of mean 0, piece by
+// piece. The least energy with means d + residuals is u = sum_i l_i G b_i + a constant a piece,
+// where the l_i of a piece sum to 0: small equations in S_ij = b_i' G b_j, whatever the skull's
+// size. As the l_i sum to 0, S may have its means taken off, rows and columns, piece by piece.
+class Spline {
+ public:
+  Spline(const MeshSpline& options, const TriMesh& skull, const std::vector<DepthSample>& samples,
+         const RunContext& run)
+      : options_(options),
+        laplacian_(BuildLaplacian(skull)),
+        pieces_(Pieces(laplacian_.stiffness)),
+        solver_(skull.points, Grounded()) {
+    run.ThrowIfStopped();
+    piece_area_.resize(1 + *std::ranges::max_element(pieces_), 0);
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      piece_area_[pieces_[i]] += laplacian_.area_mm2[i];
+    }
+    const MeshQuery query(skull);
+    for (const DepthSample& sample : samples) {
+      places_.push_back(PlaceOf(sample.base, options.radius_mm, skull, query, laplacian_, pieces_));
+    }
+  }
+
+  std::vector<double> Solve(const std::vector<DepthSample>& samples, const RunContext& run) const {
+    const Eigen::Index n = Size();
+    const Eigen::MatrixXd kernel = Centred(Kernel(run));
+    const std::vector<int> used = UsedPieces();
+    const auto tail = static_cast<Eigen::Index>(used.size());
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + tail, n + tail);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(n + tail);
+    matrix.topLeftCorner(n, n) = kernel;
+    const double spread = kernel.diagonal().mean(), scale = spread > 0 ? spread : 1;
+    const double softness = std::max(options_.softness, kLeastSoftness) * scale;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      matrix(i, i) += softness;
+      const auto at = std::ranges::find(used, places_[i].piece) - used.begin();
+      matrix(i, n + at) = matrix(n + at, i) = scale;
+      right[i] = samples[i].depth_mm;
+    }
+    const Eigen::VectorXd pull = Eigen::PartialPivLU<Eigen::MatrixXd>(matrix).solve(right).head(n);
+    const Eigen::VectorXd varying = Varying(Combined(pull));
+    const Eigen::VectorXd constants =
+        MeanByPiece(right.head(n) - softness * pull - AtPlaces(varying));
+    std::vector<double> values(pieces_.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = constants[pieces_[i]] + varying[static_cast<Eigen::Index>(i)];
+    }
+    return values;
+  }
+
+ private:
+  Eigen::Index Size() const { return static_cast<Eigen::Index>(places_.size()); }
+
+  // The stiffness with one vertex a piece held, which changes no solution but for a constant.
+  Eigen::SparseMatrix<double> Grounded() const {
+    Eigen::SparseMatrix<double> matrix = laplacian_.stiffness;
+    std::vector<Eigen::Triplet<double>> held;
+    for (std::size_t i = 0, next = 0; i < pieces_.size(); ++i) {
+      if (pieces_[i] == static_cast<int>(next)) {
+        held.emplace_back(static_cast<int>(i), static_cast<int>(i), 1);
+        ++next;
+      }
+    }
+    Eigen::SparseMatrix<double> ground(matrix.rows(), matrix.cols());
+    ground.setFromTriplets(held.begin(), held.end());
+    return matrix + ground;
+  }
+
+  // On each piece, from each column: `share` times its sum over all of the piece.
+  void TakeShares(Eigen::MatrixXd& columns, const Eigen::VectorXd& summed,
+                  const Eigen::VectorXd& share) const {
+    Eigen::MatrixXd sums =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(piece_area_.size()), columns.cols());
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      sums.row(pieces_[i]) += summed[row] * columns.row(row);
+    }
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      columns.row(row) -= share[row] / piece_area_[pieces_[i]] * sums.row(pieces_[i]);
+    }
+  }
+
+  // One column a column of place weights.
+  Eigen::MatrixXd Combined(const Eigen::MatrixXd& of_place) const {
+    Eigen::MatrixXd right =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pieces_.size()), of_place.cols());
+    for (std::size_t k = 0; k < places_.size(); ++k) {
+      for (const auto& [vertex, weight] : places_[k].weights) {
+        right.row(vertex) += weight * of_place.row(static_cast<Eigen::Index>(k));
+      }
+    }
+    return right;
+  }
+
+  // G times right sides; of mean 0 on each piece. Where a right side's sum on a piece is not 0,
+  // what holds its vertex answers: the same for all places there, so nothing where the l_i sum to
+  // 0.
+  Eigen::MatrixXd Varying(const Eigen::MatrixXd& right) const {
+    const Eigen::MatrixXd values = HalfVarying(right);
+    return options_.energy == SplineEnergy::kLaplacian
+               ? HalfVarying(laplacian_.area_mm2.asDiagonal() * values)
+               : values;
+  }
+
+  // The same with the stiffness's inverse for G.
+  Eigen::MatrixXd HalfVarying(const Eigen::MatrixXd& right) const {
+    const Eigen::VectorXd& area = laplacian_.area_mm2;
+    Eigen::MatrixXd values = solver_.Solve(right);
+    TakeShares(values, area, Eigen::VectorXd::Ones(area.size()));
+    return values;
+  }
+
+  // The means of functions, one a column, at the places.
+  Eigen::MatrixXd AtPlaces(const Eigen::MatrixXd& values) const {
+    Eigen::MatrixXd at = Eigen::MatrixXd::Zero(Size(), values.cols());
+    for (Eigen::Index k = 0; k < Size(); ++k) {
+      for (const auto& [vertex, weight] : places_[k].weights) {
+        at.row(k) += weight * values.row(vertex);
+      }
+    }
+    return at;
+  }
+
+  // Over the places of each piece, of one value a place; NaN on pieces without one.
+  Eigen::VectorXd MeanByPiece(const Eigen::VectorXd& of_place) const {
+    const auto count = static_cast<Eigen::Index>(piece_area_.size());
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(count), places = sum;
+    for (Eigen::Index k = 0; k < Size(); ++k) {
+      sum[places_[k].piece] += of_place[k];
+      ++places[places_[k].piece];
+    }
+    return sum.cwiseQuotient(places);
+  }
+
+  // S without the means, piece by piece, of its columns and then of its rows.
+  Eigen::MatrixXd Centred(Eigen::MatrixXd matrix) const {
+    for (int side = 0; side < 2; ++side) {
+      for (Eigen::Index c = 0; c < Size(); ++c) {
+        const Eigen::VectorXd mean = MeanByPiece(matrix.col(c));
+        for (Eigen::Index r = 0; r < Size(); ++r) {
+          matrix(r, c) -= mean[places_[r].piece];
+        }
+      }
+      matrix.transposeInPlace();
+    }
+    return matrix;
+  }
+
+  // S, but for what centring takes off.
+  Eigen::MatrixXd Kernel(const RunContext& run) const {
+    const Eigen::Index n = Size();
+    const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMostHeld;
+    Eigen::MatrixXd held(inner_product ? laplacian_.area_mm2.size() : 0, n), kernel(n, n);
+    const std::size_t blocks = (places_.size() + kSolvedTogether - 1) / kSolvedTogether;
+    ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
+      run.ThrowIfStopped();
+      const auto first = static_cast<Eigen::Index>(block * kSolvedTogether);
+      const Eigen::Index count = std::min<Eigen::Index>(kSolvedTogether, n - first);
+      const Eigen::MatrixXd right =
+          Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count));
+      if (inner_product) {
+        held.middleCols(first, count) = HalfVarying(right);
+      } else {
+        kernel.middleCols(first, count) = AtPlaces(Varying(right));
+      }
+    });
+    return inner_product ? Products(held) : kernel;
+  }
+
+  // Twice the Laplacian makes an inner product of half-way functions: half of the solves.
+  Eigen::MatrixXd Products(const Eigen::MatrixXd& half_way) const {
+    return half_way.transpose() * laplacian_.area_mm2.asDiagonal() * half_way;
+  }
+
+  std::vector<int> UsedPieces() const {
+    std::vector<int> used;
+    for (const Place& place : places_) {
+      used.push_back(place.piece);
+    }
+    std::ranges::sort(used);
+    used.erase(std::unique(used.begin(), used.end()), used.end());
+    return used;
+  }
+
+  MeshSpline options_;
+  MeshLaplacian laplacian_;
+  std::vector<int> pieces_;
+  MeshSolver solver_;
+  std::vector<double> piece_area_;
+  std::vector<Place> places_;
+};
+
+}  // namespace
+
+std::vector<double> SolveMeshSpline(const MeshSpline& spline, std::string_view scheme,
+                                    const TriMesh& skull, const std::vector<DepthSample>& samples,
+                                    const RunContext& run) {
+  run.ThrowIfStopped();
+  CheckSurface(scheme, skull);
+  return Spline(spline, skull, samples, run).Solve(samples, run);
+}
+
+DepthField AssignSpline(const std::vector<double>& depth_mm, const DepthLimits& limits,
+                        const DepthInput& input, const std::vector<DepthSample>& samples,
+                        double max_angle_deg, const RunContext& run) {
+  return AssignWhereFacing(input, samples, max_angle_deg, run, [&](std::size_t i) {
+    return DepthValue{limits(depth_mm[i]), kNaN};
+  });
+}
+
+}  // namespace semblance

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/biharmonic.h"
+
+namespace semblance {
+
+DepthField InterpolateDepth(const Biharmonic& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
+  const MeshSpline spline{SplineEnergy::kLaplacian, 0, options.softness};
+  const std::vector<double> depth_mm =
+      SolveMeshSpline(spline, Biharmonic::kName, input.skull, samples, run);
+  return AssignSpline(depth_mm, DepthLimits(samples, options.clamp), input, samples,
+                      options.max_angle_deg, run);
+}
+
+}  // namespace semblance

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/depth_map.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+#include <vector>
+
+#include "surfaces/base/error.h"
+#include "surfaces/base/whole_file.h"
+#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/ply_layout.h"
+#include "surfaces/mesh/point_triangle.h"
+
+namespace semblance {
+namespace {
+
+// At least one; a cell may be empty.
+std::vector<std::string> CellsOf(std::string line) {
+  if (line.ends_with('\r')) {
+    line.pop_back();
+  }
+  std::vector<std::string> cells(1);
+  for (const char c : line) {
+    if (c == ',') {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
+  return cells;
+}
+
+// NaN for an empty cell.
+double NumberOf(const std::string& cell, const std::string& where, std::size_t line) {
+  if (cell.empty()) {
+    return kNaN;
+  }
+  char* end = nullptr;
+  const double value = std::strtod(cell.c_str(), &end);
+  if (end == cell.c_str() || *end != 0) {
+    throw InputError(fmt::format("{}:{}: '{}' is no number", where, line, cell));
+  }
+  return value;
+}
+
+std::vector<double> CsvColumn(const std::string& text, const std::string& name,
+                              const std::string& where) {
+  std::istringstream lines(text);
+  std::string line;
+  std::getline(lines, line);
+  const std::vector<std::string> header = CellsOf(line);
+  const auto column = std::ranges::find(header, name) - header.begin();
+  if (column == static_cast<std::ptrdiff_t>(header.size())) {
+    throw InputError(fmt::format("{}:1: there is no column '{}'; there are {}", where, name,
+                                 fmt::join(header, ", ")));
+  }
+  std::vector<double> values;
+  for (std::size_t number = 2; std::getline(lines, line); ++number) {
+    const std::vector<std::string> cells = CellsOf(line);
+    if (cells.size() != header.size()) {
+      throw InputError(fmt::format("{}:{}: {} cells, but the first line names {}", where, number,
+                                   cells.size(), header.size()));
+    }
+    values.push_back(NumberOf(cells[column], where, number));
+  }
+  return values;
+}
+
+// The map: a mesh and a depth at each of its vertices.
+struct MappedDepth {
+  TriMesh mesh;
+  std::vector<double> depth_mm;
+};
+
+bool IsCsv(const DepthMap& options) { return options.file.extension() == ".csv"; }
+
+MappedDepth ReadMap(const DepthMap& options, const TriMesh& skull) {
+  const std::string where = options.file.string();
+  if (IsCsv(options)) {
+    return {options.mesh.empty() ? skull : ReadMesh(options.mesh),
+            CsvColumn(ReadFileBytes(options.file), options.scalar, where)};
+  }
+  if (options.file.extension() != ".ply") {
+    throw InputError(
+        fmt::format("depth_map: '{}' is neither .ply nor .csv; give a mesh with a scalar or a "
+                    "table",
+                    where));
+  }
+  if (!options.mesh.empty()) {
+    throw InputError(
+        fmt::format("depth_map: mesh '{}' is given, but the file is a PLY and so a mesh itself; "
+                    "leave mesh empty",
+                    options.mesh.string()));
+  }
+  return {ReadMesh(options.file),
+          PlyVertexScalar(ReadFileBytes(options.file), options.scalar, where)};
+}
+
+void CheckMap(const MappedDepth& map, const DepthMap& options) {
+  const std::string where = options.file.string();
+  if (map.depth_mm.size() != map.mesh.points.size()) {
+    throw InputError(fmt::format(
+        "{}: {} depths for {} vertices of {}; there must be one a vertex", where,
+        map.depth_mm.size(), map.mesh.points.size(),
+        options.mesh.empty() ? std::string("the skull (after fill)") : options.mesh.string()));
+  }
+  for (std::size_t v = 0; v < map.depth_mm.size(); ++v) {
+    if (map.depth_mm[v] <= 0 || std::isinf(map.depth_mm[v])) {
+      throw InputError(fmt::format(
+          "{}: the depth of vertex {} is {} mm; it must be finite and above 0, or nan for none",
+          where, v, map.depth_mm[v]));
+    }
+  }
+}
+
+// NaN where a corner that counts has none.
+double DepthOn(const MappedDepth& map, int triangle, const Vec3& p) {
+  constexpr double kNothing = 1e-9;
+  const Triangle& t = map.mesh.triangles[triangle];
+  const Vec3 weights =
+      ClosestPointOnTriangle(p, map.mesh.points[t[0]], map.mesh.points[t[1]], map.mesh.points[t[2]])
+          .weights;
+  double depth = 0;
+  for (int k = 0; k < 3; ++k) {
+    depth += weights[k] > kNothing ? weights[k] * map.depth_mm[t[k]] : 0;
+  }
+  return depth;
+}
+
+}  // namespace
+
+DepthField InterpolateDepth(const DepthMap& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  run.ThrowIfStopped();
+  if (options.file.empty()) {
+    throw InputError("depth_map: no file is named; give a PLY or CSV with a depth per vertex");
+  }
+  const MappedDepth map = ReadMap(options, input.skull);
+  CheckMap(map, options);
+  DepthField field = EmptyDepthField(input.skull.points.size());
+  const MeshQuery query(map.mesh);
+  ForEachVertex(input, run, [&](std::size_t i) {
+    const Vec3& p = input.skull.points[i];
+    const MeshPoint nearest = query.Closest(p);
+    const double depth =
+        nearest.distance_mm <= options.reach_mm ? DepthOn(map, nearest.triangle, p) : kNaN;
+    field.depth_mm[i] = depth;
+    field.status[i] = std::isnan(depth) ? DepthStatus::kOutside : DepthStatus::kAssigned;
+  });
+  return field;
+}
+
+}  // namespace semblance

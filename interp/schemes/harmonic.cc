@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/harmonic.h"
+
+namespace semblance {
+
+DepthField InterpolateDepth(const Harmonic& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
+  const MeshSpline spline{SplineEnergy::kGradient, options.radius_mm, options.softness};
+  const std::vector<double> depth_mm =
+      SolveMeshSpline(spline, Harmonic::kName, input.skull, samples, run);
+  return AssignSpline(depth_mm, DepthLimits(samples, true), input, samples, options.max_angle_deg,
+                      run);
+}
+
+}  // namespace semblance

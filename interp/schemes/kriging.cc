@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/kriging.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "interp/schemes/kriging_likelihood.h"
+#include "interp/schemes/kriging_process.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr Eigen::Index kFitSamples = 200;  // enough for two numbers; the cost grows by the cube
+
+// The dowels' data and, along the bone, the way from each of them to each vertex.
+struct KrigingScene {
+  KrigingData data;
+  std::vector<Vec3> bases;
+  Eigen::MatrixXd to_vertex_mm;  // n x vertices; empty for straight distances
+
+  Eigen::VectorXd DistancesTo(const Vec3& p, std::size_t vertex) const {
+    if (to_vertex_mm.size() > 0) {
+      return to_vertex_mm.col(static_cast<Eigen::Index>(vertex));
+    }
+    Eigen::VectorXd distance_mm(data.depth_mm.size());
+    for (Eigen::Index k = 0; k < distance_mm.size(); ++k) {
+      distance_mm[k] = (bases[k] - p).norm();
+    }
+    return distance_mm;
+  }
+};
+
+// What each corner of its triangle counts at a point: barycentric, so none is below 0.
+Vec3 CornerShares(const TriMesh& mesh, const MeshPoint& at) {
+  const Triangle& triangle = mesh.triangles[at.triangle];
+  Vec3 area;
+  for (int corner = 0; corner < 3; ++corner) {
+    const Vec3 b = mesh.points[triangle[(corner + 1) % 3]] - at.position;
+    const Vec3 c = mesh.points[triangle[(corner + 2) % 3]] - at.position;
+    area[corner] = b.cross(c).norm();
+  }
+  return area.sum() > 0 ? Vec3(area / area.sum()) : Vec3(1, 0, 0);
+}
+
+// To the surface's points at the dowels' bases, by what is known at the corners around them.
+void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samples,
+                   const RunContext& run, KrigingScene& scene) {
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  scene.to_vertex_mm.resize(n, static_cast<Eigen::Index>(input.skull.points.size()));
+  ForEachGeodesic(Kriging::kName, input.skull, samples, run,
+                  [&](std::size_t k, const std::vector<double>& distance_mm) {
+                    scene.to_vertex_mm.row(static_cast<Eigen::Index>(k)) =
+                        Eigen::Map<const Eigen::RowVectorXd>(distance_mm.data(),
+                                                             scene.to_vertex_mm.cols());
+                  });
+  const MeshQuery query(input.skull);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const MeshPoint at = query.Closest(samples[j].base);
+    const Vec3 share = CornerShares(input.skull, at);
+    scene.data.distance_mm.row(j).setZero();
+    for (int corner = 0; corner < 3; ++corner) {
+      if (share[corner] > 0) {  // none of an infinite way
+        const int vertex = input.skull.triangles[at.triangle][corner];
+        scene.data.distance_mm.row(j) += share[corner] * scene.to_vertex_mm.col(vertex).transpose();
+      }
+    }
+    scene.data.distance_mm(j, j) = 0;
+  }
+}
+
+KrigingScene SceneOf(const Kriging& options, const DepthInput& input,
+                     const std::vector<DepthSample>& samples, const RunContext& run) {
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  KrigingScene scene{{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd(n)}, {}, {}};
+  for (const DepthSample& sample : samples) {
+    const auto i = static_cast<Eigen::Index>(scene.bases.size());
+    const double nugget_mm = options.nugget_share * sample.sd_mm;
+    scene.data.depth_mm[i] = sample.depth_mm;
+    scene.data.nugget_mm2[i] = std::isfinite(nugget_mm) ? nugget_mm * nugget_mm : 0;
+    scene.bases.push_back(sample.base);
+  }
+  if (options.distance == DowelDistance::kGeodesic) {
+    FindGeodesics(input, samples, run, scene);
+  } else {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      scene.data.distance_mm.row(j) = scene.DistancesTo(scene.bases[j], 0).transpose();
+    }
+  }
+  return scene;
+}
+
+// `count` samples, each the furthest from those before it, beginning with the first.
+std::vector<Eigen::Index> FarApart(const KrigingScene& scene, Eigen::Index count) {
+  const Eigen::Index n = scene.data.depth_mm.size();
+  std::vector<Eigen::Index> chosen;
+  Eigen::VectorXd distance = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::infinity());
+  for (Eigen::Index next = 0; static_cast<Eigen::Index>(chosen.size()) < std::min(n, count);) {
+    chosen.push_back(next);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      distance[i] = std::min(distance[i], (scene.bases[i] - scene.bases[next]).norm());
+    }
+    distance.maxCoeff(&next);
+  }
+  return chosen;
+}
+
+KrigingHyper HyperFor(const Kriging& options, const KrigingScene& scene, const RunContext& run) {
+  if (scene.data.depth_mm.size() <= kFitSamples) {
+    return FitHyper(options, scene.data, run);
+  }
+  const std::vector<Eigen::Index> some = FarApart(scene, kFitSamples);
+  return FitHyper(
+      options,
+      {scene.data.distance_mm(some, some), scene.data.depth_mm(some), scene.data.nugget_mm2(some)},
+      run);
+}
+
+}  // namespace
+
+KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run) {
+  CheckDepthInput(input);
+  const KrigingScene scene = SceneOf(options, input, DepthSamples(input.dowels), run);
+  const KrigingHyper hyper = HyperFor(options, scene, run);
+  return {hyper.length_mm, hyper.signal_mm,
+          KrigingProcess(options.covariance, scene.data, hyper).mean_mm()};
+}
+
+DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
+                                std::span<const Vec3> places, const RunContext& run) {
+  CheckDepthInput(input);
+  Kriging straight = options;
+  straight.distance = DowelDistance::kEuclidean;
+  const KrigingScene scene = SceneOf(straight, input, DepthSamples(input.dowels), run);
+  const auto count = static_cast<Eigen::Index>(places.size());
+  Eigen::MatrixXd to_dowels_mm(scene.data.depth_mm.size(), count), between_mm(count, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    to_dowels_mm.col(i) = scene.DistancesTo(places[i], 0);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      between_mm(i, j) = (places[i] - places[j]).norm();
+    }
+  }
+  return KrigingProcess(straight.covariance, scene.data, HyperFor(straight, scene, run))
+      .Posterior(to_dowels_mm, between_mm);
+}
+
+DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  run.ThrowIfStopped();
+  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
+  const DepthLimits limits(samples, options.clamp);
+  const KrigingScene scene = SceneOf(options, input, samples, run);
+  KrigingProcess process(options.covariance, scene.data, HyperFor(options, scene, run));
+  if (options.state_sd) {
+    process.PrepareSd();
+  }
+  return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
+    const Eigen::VectorXd distance_mm = scene.DistancesTo(input.skull.points[i], i);
+    if (!std::isfinite(distance_mm.minCoeff())) {
+      return DepthValue{};  // no dowel is reached along the bone
+    }
+    const DepthValue value = process.ValueAt(distance_mm);
+    return DepthValue{limits(value.mm), value.sd_mm};
+  });
+}
+
+}  // namespace semblance

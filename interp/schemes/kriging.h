@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Ordinary kriging: tissue depth as a Gaussian process in space, with a standard deviation.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "interp/dowels/depth_input.h"
+#include "interp/dowels/dowel_samples.h"
+#include "interp/on_surface/surface_distance.h"
+
+namespace semblance {
+
+enum class Covariance { kMatern12, kMatern32, kMatern52, kSquaredExponential };
+constexpr auto EnumNames(Covariance) {
+  return std::to_array<std::string_view>(
+      {"matern_1_2", "matern_3_2", "matern_5_2", "squared_exponential"});
+}
+
+struct Kriging {
+  static constexpr std::string_view kName = "kriging";
+  Covariance covariance = Covariance::kMatern32;
+  DowelDistance distance = DowelDistance::kEuclidean;
+  std::optional<double> length_mm = std::nullopt;
+  double length_prior_mm = 60;
+  double length_prior_spread = 0.5;
+  std::optional<double> signal_mm = std::nullopt;
+  double nugget_share = 1;
+  bool clamp = true;
+  bool state_sd = true;
+  double max_angle_deg = 90;
+};
+template <class Visitor>
+void Fields(Visitor& visit, Kriging& o) {
+  visit(FieldInfo{.name = "covariance",
+                  .doc = "of two depths by the distance of their places, from rough "
+                         "(matern_1_2, an exponential) to very smooth (squared_exponential, which "
+                         "oscillates between dowels that are far apart)"},
+        o.covariance);
+  DistanceField(visit, o.distance);
+  visit(FieldInfo{.name = "length_mm",
+                  .unit = "mm",
+                  .min = 1,
+                  .max = 1e4,
+                  .doc = "distance over which depths resemble each other; none: by maximum "
+                         "likelihood with the prior below"},
+        o.length_mm);
+  visit(FieldInfo{.name = "length_prior_mm",
+                  .unit = "mm",
+                  .min = 1,
+                  .max = 1e4,
+                  .doc = "median of the length's log-normal prior; some dozen dowels alone hardly "
+                         "determine a length, and their likelihood drifts to either end"},
+        o.length_prior_mm);
+  visit(FieldInfo{.name = "length_prior_spread",
+                  .min = 1e-3,
+                  .max = 10,
+                  .doc = "standard deviation of the length's logarithm in the prior: 0.5 means "
+                         "within a factor of 2.7 of the median with 95 %; large: likelihood alone"},
+        o.length_prior_spread);
+  visit(FieldInfo{.name = "signal_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 1e3,
+                  .doc = "standard deviation of the depth over the skull; none: by maximum "
+                         "likelihood"},
+        o.signal_mm);
+  visit(FieldInfo{.name = "nugget_share",
+                  .min = 0,
+                  .max = 10,
+                  .doc = "a dowel's depth is taken as uncertain by this times its sd_mm (none: "
+                         "certain); 0 honours every dowel, more smooths"},
+        o.nugget_share);
+  ClampField(visit, o.clamp);
+  visit(FieldInfo{.name = "state_sd",
+                  .doc = "give sd_mm at each vertex; costs the square of the number of dowels a "
+                         "vertex"},
+        o.state_sd);
+  MaxAngleField(visit, o.max_angle_deg);
+}
+
+// What the likelihood found, or the options fixed.
+struct KrigingModel {
+  double length_mm = kNaN;
+  double signal_mm = kNaN;
+  double mean_mm = kNaN;  // the process's mean, by generalised least squares
+};
+
+// The maximum of the restricted likelihood times the prior (kriging_likelihood.h). Of more than 200
+// dowels it uses 200 that lie far apart. Throws as InterpolateDepth.
+KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
+
+// Of the depths at some places, given the dowels, the model and the uncertain mean.
+struct DepthPosterior {
+  Eigen::VectorXd mean_mm;     // without `clamp`
+  Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is the square of the sd_mm below
+};
+
+// By straight distances, also where `options` says along the bone. Throws InputError as
+// CheckDepthInput.
+DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
+                                std::span<const Vec3> places, const RunContext& run);
+
+// Far from all dowels the depth is the process's mean. sd_mm is that of the process at the vertex,
+// given the dowels, the model and the uncertain mean; it does not hold the nugget of a further
+// measurement there, nor the uncertainty of length and signal. kNotFacing as AssignWhereFacing;
+// kOutside where no dowel is reached along the bone. There the smoother covariances are not always
+// definite; then the field smooths, and may miss certain dowels. It keeps 8 bytes a vertex and
+// dowel. Throws InputError as CheckDepthInput, or if the skull has no triangle to go along.
+DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
+
+}  // namespace semblance

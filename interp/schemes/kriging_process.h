@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The Gaussian process behind kriging, once its length and signal are known.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "interp/schemes/kriging.h"
+
+namespace semblance {
+
+// What a process is conditioned on: n dowels.
+struct KrigingData {
+  // n x n: row j, column k is the distance from dowel k to the base of dowel j. Along a surface it
+  // is only about symmetric, and may be infinite.
+  Eigen::MatrixXd distance_mm;
+  Eigen::VectorXd depth_mm;    // n
+  Eigen::VectorXd nugget_mm2;  // n: variance of each depth; 0: certain
+};
+
+struct KrigingHyper {
+  double length_mm = 1;
+  double signal_mm = 1;
+};
+
+// Correlation at a distance, and its derivative by the logarithm of the length.
+struct CorrelationValue {
+  double value = kNaN;
+  double by_log_length = kNaN;
+};
+// 1 at distance 0, 0 at an infinite one. As usual, the Matern family is scaled so that the length
+// means alike in all (Rasmussen & Williams 2006, eq. 4.14 to 4.18).
+CorrelationValue CorrelationAt(Covariance covariance, double distance_mm, double length_mm);
+
+// The dowels' covariance V = signal^2 K + nugget, factored, and the mean that belongs to it. Where
+// K is singular by rounding, or not positive definite (of distances along a surface), the diagonal
+// grows until it is.
+class KrigingProcess {
+ public:
+  KrigingProcess(Covariance covariance, const KrigingData& data, const KrigingHyper& hyper);
+
+  double mean_mm() const { return mean_mm_; }  // by generalised least squares
+
+  // log |V| + log 1'V^-1 1 + r'V^-1 r, r the depths less the mean: minus twice the restricted log
+  // likelihood, but for a constant (Harville 1974).
+  double Deviance() const;
+  // Its derivatives by the logarithms of the length and of the signal.
+  Vec2 DevianceGradient() const;
+
+  // Before the first ValueAt with an sd; costs the cube of n.
+  void PrepareSd();
+  // distance_mm: n, from each dowel to the place.
+  DepthValue ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm) const;
+  // Of m places together. to_dowels_mm: n x m; between_mm: m x m, symmetric.
+  DepthPosterior Posterior(const Eigen::MatrixXd& to_dowels_mm,
+                           const Eigen::MatrixXd& between_mm) const;
+
+ private:
+  void Factor(const KrigingData& data);
+  void FindWeights(const KrigingData& data);
+  Eigen::MatrixXd CovarianceAt(const Eigen::MatrixXd& distance_mm) const;
+  double Sd(const Eigen::VectorXd& with) const;
+
+  Covariance covariance_;
+  KrigingHyper hyper_;
+  double variance_mm2_;
+  Eigen::MatrixXd by_log_length_;  // of V
+  Eigen::VectorXd nugget_mm2_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::VectorXd inverse_ones_, inverse_residual_;
+  Eigen::VectorXd weights_;       // of the dowels' covariances at a place
+  Eigen::MatrixXd inverse_root_;  // empty without PrepareSd
+  double ones_ = 0, mean_mm_ = 0, misfit_ = 0;
+};
+
+}  // namespace semblance

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/natural_neighbour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "interp/dowels/dowel_samples.h"
+#include "interp/schemes/power_cell.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kAtBase_mm = 1e-6;  // so near, a dowel stands alone
+constexpr double kReach = 4;         // times the furthest dowel's distance
+
+// Of each dowel, all dowels with their distances: the nearest hundred in order, then the rest.
+class Neighbourhoods {
+ public:
+  struct Other {
+    int sample;
+    double distance_mm;
+  };
+
+  explicit Neighbourhoods(const std::vector<DepthSample>& samples) : others_(samples.size()) {
+    constexpr std::size_t kInOrder = 100;  // few points have neighbours further down
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      for (std::size_t other = 0; other < samples.size(); ++other) {
+        others_[k].push_back(
+            {static_cast<int>(other), (samples[other].base - samples[k].base).norm()});
+      }
+      const auto middle = others_[k].begin() + std::min(kInOrder, samples.size());
+      std::ranges::partial_sort(others_[k], middle, {}, &Other::distance_mm);
+    }
+  }
+  const std::vector<Other>& Of(int sample) const { return others_[sample]; }
+
+ private:
+  std::vector<std::vector<Other>> others_;
+};
+
+// The nearest dowel of a point, and how far it and the furthest are.
+struct Range {
+  int nearest = -1;
+  double nearest_mm = kNaN, furthest_mm = kNaN;
+};
+
+Range RangeOf(const std::vector<DepthSample>& samples, const Vec3& p) {
+  double least2 = std::numeric_limits<double>::infinity(), most2 = 0;
+  Range range;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const double distance2 = (samples[k].base - p).squaredNorm();
+    most2 = std::max(most2, distance2);
+    if (distance2 < least2) {
+      least2 = distance2;
+      range.nearest = static_cast<int>(k);
+    }
+  }
+  range.nearest_mm = std::sqrt(least2);
+  range.furthest_mm = std::sqrt(most2);
+  return range;
+}
+
+// The tangent plane at p. The first axis points to the nearest dowel, so that the reach turns with
+// the skull.
+struct TangentPlane {
+  Vec3 at, first, second;
+
+  TangentPlane(const Vec3& p, const Vec3& normal, const Vec3& nearest) : at(p) {
+    const Vec3 towards = nearest - p;
+    first = towards - normal.dot(towards) * normal;
+    first = first.norm() > kAtBase_mm ? first.normalized() : normal.unitOrthogonal();
+    second = normal.cross(first);
+  }
+  PowerSite SiteOf(const Vec3& base) const {
+    const Vec3 x = base - at;
+    return {{x.dot(first), x.dot(second)}, x.squaredNorm()};
+  }
+};
+
+// A point's cell, and the dowels that may have a part in it.
+struct Cell {
+  explicit Cell(double reach) : shape(reach) {}
+
+  PowerCell shape;
+  boost::container::small_vector<PowerSite, 48> sites;
+  boost::container::small_vector<int, 48> samples;  // each site's
+};
+
+// No dowel matters that is further from the nearest one than twice any place of the cell is: there,
+// the nearest one is nearer. And no place is further from it than the cell's furthest corner from
+// the point and the point from it.
+void CutCell(const std::vector<DepthSample>& samples, const Neighbourhoods& neighbourhoods,
+             const Range& range, const TangentPlane& plane, Cell& cell) {
+  constexpr double kSlack = 1 + 1e-9;
+  for (const Neighbourhoods::Other& other : neighbourhoods.Of(range.nearest)) {
+    const double corner_mm = std::sqrt(cell.shape.FurthestCorner2());
+    if (other.distance_mm <= 2 * kSlack * (corner_mm + range.nearest_mm)) {
+      const PowerSite site = plane.SiteOf(samples[other.sample].base);
+      cell.shape.Cut(site, static_cast<int>(cell.sites.size()));
+      cell.sites.push_back(site);
+      cell.samples.push_back(other.sample);
+    }
+  }
+}
+
+// use(site, weight) for each that has one.
+template <class Use>
+void ForEachWeight(NeighbourWeights kind, const Cell& cell, const Use& use) {
+  const CellPolygon& corners = cell.shape.polygon();
+  if (kind == NeighbourWeights::kSibson) {
+    SiteAreas areas;
+    FindParts({cell.sites.data(), cell.sites.size()}, corners, areas);
+    for (std::size_t k = 0; k < areas.size(); ++k) {
+      if (areas[k] > 0) {
+        use(k, areas[k]);
+      }
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vec2& next = corners[i + 1 < corners.size() ? i + 1 : 0].at;
+    const auto site = static_cast<std::size_t>(corners[i].edge);
+    use(site, (next - corners[i].at).norm() / cell.sites[site].place.norm());
+  }
+}
+
+DepthValue DepthAt(const std::vector<DepthSample>& samples, const Neighbourhoods& neighbourhoods,
+                   NeighbourWeights kind, const Vec3& p, const Vec3& normal) {
+  const Range range = RangeOf(samples, p);
+  const DepthSample& nearest = samples[range.nearest];
+  if (range.nearest_mm <= kAtBase_mm) {
+    return {nearest.depth_mm, nearest.sd_mm};
+  }
+  if (normal.squaredNorm() == 0) {
+    return {};  // no tangent plane
+  }
+  Cell cell(kReach * range.furthest_mm);
+  CutCell(samples, neighbourhoods, range, TangentPlane(p, normal, nearest.base), cell);
+  const CellPolygon& corners = cell.shape.polygon();
+  if (corners.empty() || std::ranges::count(corners, kOpenEdge, &CellCorner::edge) > 0) {
+    return {};
+  }
+  double sum = 0, depth = 0, sd = 0;
+  ForEachWeight(kind, cell, [&](std::size_t site, double weight) {
+    const DepthSample& sample = samples[cell.samples[site]];
+    sum += weight;
+    depth += weight * sample.depth_mm;
+    sd += weight * sample.sd_mm;
+  });
+  return sum > 0 ? DepthValue{depth / sum, sd / sum} : DepthValue{};
+}
+
+}  // namespace
+
+DepthField InterpolateDepth(const NaturalNeighbour& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
+  const DepthLimits limits(samples, true);
+  const Neighbourhoods neighbourhoods(samples);
+  return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
+    const DepthValue value =
+        DepthAt(samples, neighbourhoods, options.weights, input.skull.points[i], input.normals[i]);
+    return DepthValue{limits(value.mm), value.sd_mm};  // against rounding
+  });
+}
+
+}  // namespace semblance

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/outside_rule.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "interp/schemes/mean.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/point_triangle.h"
+
+namespace semblance {
+namespace {
+
+struct Depth {
+  double mm = kNaN;
+  double sd_mm = kNaN;
+};
+
+Depth SiteDepth(const std::string& site, std::span<const Dowel> dowels, const RunContext& run) {
+  const auto it = std::ranges::find(dowels, site, &Dowel::site);
+  if (it != dowels.end()) {
+    return {it->depth_mm, it->sd_mm};
+  }
+  const double mean = MeanDepth(dowels);
+  run.Report("outside rule",
+             fmt::format("no dowel at '{}'; the mean depth of all dowels, {:.2f} mm, is used "
+                         "instead",
+                         site, mean));
+  return {mean, kNaN};
+}
+
+// A triangle of the network with a sphere around it, which spares most of the closest points.
+struct Piece {
+  std::array<Vec3, 3> base;
+  Vec3 depth_mm;
+  Vec3 sd_mm;
+  Vec3 center;
+  double radius_mm = 0;
+};
+
+std::vector<Piece> MakePieces(const DepthInput& input) {
+  std::vector<Piece> pieces;
+  for (const std::array<int, 3>& area : input.network.areas) {
+    Piece piece;
+    for (int k = 0; k < 3; ++k) {
+      const Dowel& dowel = input.dowels[area[k]];
+      piece.base[k] = dowel.base;
+      piece.depth_mm[k] = dowel.depth_mm;
+      piece.sd_mm[k] = dowel.sd_mm;
+    }
+    piece.center = (piece.base[0] + piece.base[1] + piece.base[2]) / 3;
+    for (const Vec3& base : piece.base) {
+      piece.radius_mm = std::max(piece.radius_mm, (base - piece.center).norm());
+    }
+    pieces.push_back(piece);
+  }
+  return pieces;
+}
+
+struct NetworkPoint {
+  double distance_mm = std::numeric_limits<double>::infinity();
+  Depth depth;
+};
+
+NetworkPoint ClosestOnNetwork(const std::vector<Piece>& pieces, const Vec3& p) {
+  NetworkPoint closest;
+  for (const Piece& piece : pieces) {
+    const double reach = closest.distance_mm + piece.radius_mm;
+    if ((p - piece.center).squaredNorm() > reach * reach) {
+      continue;
+    }
+    const TrianglePoint on = ClosestPointOnTriangle(p, piece.base[0], piece.base[1], piece.base[2]);
+    const double distance = (p - on.position).norm();
+    if (distance < closest.distance_mm) {
+      closest = {distance, {on.weights.dot(piece.depth_mm), on.weights.dot(piece.sd_mm)}};
+    }
+  }
+  return closest;
+}
+
+// 0 up to `from`, 1 from `from + length` on, with a continuous slope between.
+double SmoothStep(double x, double from, double length) {
+  if (x <= from || x >= from + length) {
+    return x <= from ? 0 : 1;
+  }
+  const double t = (x - from) / length;
+  return t * t * (3 - 2 * t);
+}
+
+Depth Mix(const Depth& a, const Depth& b, double share_of_b) {
+  if (share_of_b == 0 || share_of_b == 1) {
+    return share_of_b == 0 ? a : b;  // the other one may have no sd
+  }
+  return {(1 - share_of_b) * a.mm + share_of_b * b.mm,
+          (1 - share_of_b) * a.sd_mm + share_of_b * b.sd_mm};
+}
+
+// depth_at(p) for each vertex that the scheme left.
+void Fill(const DepthInput& input, const RunContext& run, DepthField& field,
+          const std::function<Depth(const Vec3&)>& depth_at) {
+  ForEachVertex(input, run, [&](std::size_t i) {
+    if (field.status[i] != DepthStatus::kAssigned) {
+      const Depth depth = depth_at(input.skull.points[i]);
+      field.depth_mm[i] = depth.mm;
+      field.sd_mm[i] = depth.sd_mm;
+    }
+  });
+}
+
+void Apply(const ExtendNetwork& rule, const DepthInput& input, const RunContext& run,
+           DepthField& field) {
+  const Depth far = SiteDepth(rule.site, input.dowels, run);
+  const std::vector<Piece> pieces = MakePieces(input);
+  const double tissue_mm = MeanDepth(input.dowels);
+  Fill(input, run, field, [&](const Vec3& p) {
+    const NetworkPoint near = ClosestOnNetwork(pieces, p);
+    return Mix(near.depth, far, SmoothStep(near.distance_mm, tissue_mm, rule.blend_mm));
+  });
+}
+
+void Apply(const ConstantDepth& rule, const DepthInput& input, const RunContext& run,
+           DepthField& field) {
+  const Depth depth =
+      rule.depth_mm ? Depth{*rule.depth_mm, kNaN} : SiteDepth(rule.site, input.dowels, run);
+  Fill(input, run, field, [&](const Vec3&) { return depth; });
+}
+
+void Apply(const LeaveUnassigned&, const DepthInput& input, const RunContext& run,
+           DepthField& field) {
+  Fill(input, run, field, [](const Vec3&) { return Depth{}; });
+}
+
+void CheckField(const DepthInput& input, const DepthField& field) {
+  const std::size_t vertices = input.skull.points.size();
+  for (const std::size_t size : {field.depth_mm.size(), field.status.size(), field.sd_mm.size()}) {
+    if (size != vertices) {
+      throw InputError(fmt::format(
+          "depth field: {} entries for {} vertices; it must be of this skull", size, vertices));
+    }
+  }
+}
+
+}  // namespace
+
+DepthField ApplyOutsideRule(const OutsideRule& rule, const DepthInput& input, DepthField field,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  CheckField(input, field);
+  std::visit([&](const auto& options) { Apply(options, input, run, field); }, rule);
+  return field;
+}
+
+}  // namespace semblance

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The only file that knows yaml-cpp. It listens to the parser's events rather than load nodes,
+// because nodes have lost repeated keys, anchors and tags already.
+#include "problems/config/config.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/mark.h>
+#include <yaml-cpp/parser.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+
+#include "problems/config/config_bytes.h"
+
+namespace semblance {
+namespace {
+
+using SourcePtr = std::shared_ptr<const ConfigSource>;
+
+ConfigPlace PlaceAt(const SourcePtr& source, const YAML::Mark& mark) {
+  return {source, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1};
+}
+
+ConfigPlace EndOf(std::string_view text, const SourcePtr& source) {
+  const auto lines = std::count(text.begin(), text.end(), '\n');
+  const std::size_t last_break = text.rfind('\n');
+  const std::size_t line_begin = last_break == text.npos ? 0 : last_break + 1;
+  return {source, static_cast<int>(lines) + 1, static_cast<int>(text.size() - line_begin) + 1};
+}
+
+// Builds the tree of the first document, and complains about all that the tree cannot hold.
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  TreeBuilder(SourcePtr source, ConfigErrors& errors)
+      : source_(std::move(source)), errors_(errors) {
+    root_.place = {source_, 1, 1};
+  }
+
+  ConfigNode TakeRoot() { return std::move(root_); }
+
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    ++documents_;
+    if (documents_ == 2) {
+      errors_.Add(PlaceAt(source_, mark), "", "a second document begins here; a file holds one");
+    }
+  }
+  void OnDocumentEnd() override {}
+
+  void OnAnchor(const YAML::Mark& mark, const std::string& name) override {
+    AddError(mark,
+             fmt::format("anchors (&{}) are not read; repeat the entries or use base:", name));
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    AddError(mark, "aliases (*) are not read; repeat the entries or use base:");
+    SkipNode();
+  }
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { Add(At(mark)); }
+
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
+                const std::string& value) override {
+    ConfigNode node = At(mark);
+    node.kind = ConfigNode::Kind::kScalar;
+    node.text = value;
+    node.quoted = tag == "!";
+    if (tag != "!") {
+      RefuseTag(mark, tag);
+    }
+    Add(std::move(node));
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    Open(mark, tag, ConfigNode::Kind::kList);
+  }
+  void OnSequenceEnd() override { Close(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    Open(mark, tag, ConfigNode::Kind::kMap);
+  }
+  void OnMapEnd() override { Close(); }
+
+ private:
+  // A map or list that is not closed yet; for a map also the key that waits for its value.
+  struct Level {
+    ConfigNode node;
+    bool has_key = false;
+    bool is_key_good = false;
+    std::string key = {};
+    ConfigPlace key_place = {};
+  };
+
+  ConfigNode At(const YAML::Mark& mark) const {
+    ConfigNode node;
+    node.place = PlaceAt(source_, mark);
+    return node;
+  }
+
+  std::string Path() const {
+    std::string path;
+    for (const Level& level : levels_) {
+      if (level.node.IsList()) {
+        path = JoinPath(path, level.node.items.size());
+      } else if (level.has_key) {
+        path = JoinPath(path, level.key);
+      }
+    }
+    return path;
+  }
+
+  void AddError(const YAML::Mark& mark, std::string_view what) {
+    if (documents_ <= 1) {
+      errors_.Add(PlaceAt(source_, mark), Path(), what);
+    }
+  }
+
+  void RefuseTag(const YAML::Mark& mark, const std::string& tag) {
+    if (tag != "?" && !tag.empty()) {
+      AddError(mark, fmt::format("tags ({}) are not read; remove it", tag));
+    }
+  }
+
+  void Open(const YAML::Mark& mark, const std::string& tag, ConfigNode::Kind kind) {
+    RefuseTag(mark, tag);
+    levels_.push_back({.node = At(mark)});
+    levels_.back().node.kind = kind;
+  }
+
+  void Close() {
+    ConfigNode node = std::move(levels_.back().node);
+    levels_.pop_back();
+    Add(std::move(node));
+  }
+
+  void Add(ConfigNode node) {
+    if (levels_.empty()) {
+      if (documents_ <= 1) {
+        root_ = std::move(node);
+      }
+      return;
+    }
+    Level& level = levels_.back();
+    if (level.node.IsList()) {
+      level.node.items.push_back(std::move(node));
+    } else if (!level.has_key) {
+      TakeKey(level, node);
+    } else {
+      AddEntry(level, std::move(node));
+    }
+  }
+
+  // Leaves out a node that was complained about already: a key with its value, a value with its
+  // key, or the item of a list.
+  void SkipNode() {
+    if (!levels_.empty() && levels_.back().node.IsMap()) {
+      levels_.back().has_key = !levels_.back().has_key;
+      levels_.back().is_key_good = false;
+    }
+  }
+
+  void TakeKey(Level& level, const ConfigNode& node) {
+    level.is_key_good = node.IsScalar();
+    level.key = node.text;
+    level.key_place = node.place;
+    std::string what;
+    if (!node.IsScalar()) {
+      what = "a key must be a word";
+    } else if (node.text == "<<" && !node.quoted) {
+      what = "merge keys (<<) are not read; repeat the entries or use base:";
+    } else if (const ConfigPlace* first = FindKey(level.node, node.text)) {
+      what = fmt::format("the key stands twice; first at line {}, column {}", first->line,
+                         first->column);
+    }
+    if (!what.empty()) {
+      level.is_key_good = false;
+      if (documents_ <= 1) {
+        errors_.Add(node.place, node.IsScalar() ? JoinPath(Path(), node.text) : Path(), what);
+      }
+    }
+    level.has_key = true;
+  }
+
+  static const ConfigPlace* FindKey(const ConfigNode& map, const std::string& key) {
+    for (const ConfigNode::Entry& entry : map.entries) {
+      if (entry.key == key) {
+        return &entry.key_place;
+      }
+    }
+    return nullptr;
+  }
+
+  static void AddEntry(Level& level, ConfigNode value) {
+    level.has_key = false;
+    if (!level.is_key_good) {
+      return;
+    }
+    if (value.IsNull()) {
+      value.place = level.key_place;  // the parser's place of nothing is that of what follows
+    }
+    level.node.entries.push_back({level.key, level.key_place, std::move(value)});
+  }
+
+  SourcePtr source_;
+  ConfigErrors& errors_;
+  ConfigNode root_;
+  std::vector<Level> levels_;
+  int documents_ = 0;
+};
+
+// The state of one loading: what has been read so far, for cycles and for the order of errors.
+struct Loading {
+  ConfigErrors& errors;
+  int next_order = 0;
+  std::vector<std::filesystem::path> chain = {};  // the files that lie above, canonical
+};
+
+std::optional<std::string> ReadFile(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in || std::filesystem::is_directory(file)) {
+    return std::nullopt;
+  }
+  std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  return in.bad() ? std::nullopt : std::optional(std::move(bytes));
+}
+
+ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file, Loading& loading);
+
+ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, Loading& loading) {
+  const auto fail = [&](const std::string& what) {
+    loading.errors.Add(base.place, "base", what);
+    return ConfigNode::Map();
+  };
+  if (!base.IsScalar() || base.text.empty()) {
+    return fail("the path of a file is due");
+  }
+  const std::filesystem::path base_file = (file.parent_path() / base.text).lexically_normal();
+  const auto canonical = std::filesystem::weakly_canonical(base_file);
+  if (std::find(loading.chain.begin(), loading.chain.end(), canonical) != loading.chain.end()) {
+    return fail(fmt::format("'{}' would be its own base", base.text));
+  }
+  const std::optional<std::string> text = ReadFile(base_file);
+  if (!text) {
+    return fail(fmt::format("'{}' cannot be read; paths are relative to this file", base.text));
+  }
+  return LoadDocument(*text, base_file, loading);
+}
+
+ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file,
+                        Loading& loading) {
+  const ConfigSource source{.name = file.string(),
+                            .folder = std::filesystem::absolute(file).parent_path(),
+                            .order = loading.next_order++};
+  ConfigNode tree = ParseConfigText(text, source, loading.errors);
+  if (tree.IsNull()) {
+    tree.kind = ConfigNode::Kind::kMap;
+  } else if (!tree.IsMap()) {
+    loading.errors.Add(tree.place, "",
+                       fmt::format("a map of options is due at the top, but here is {}",
+                                   tree.IsList() ? "a list" : "a scalar"));
+    return ConfigNode::Map();
+  }
+  const auto entry = std::find_if(tree.entries.begin(), tree.entries.end(),
+                                  [](const auto& candidate) { return candidate.key == "base"; });
+  if (entry == tree.entries.end()) {
+    return tree;
+  }
+  const ConfigNode base = std::move(entry->value);
+  tree.entries.erase(entry);
+  loading.chain.push_back(std::filesystem::weakly_canonical(file));
+  return MergeTrees(LoadBase(base, file, loading), tree);
+}
+
+}  // namespace
+
+ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
+                           ConfigErrors& errors) {
+  const auto shared_source = std::make_shared<const ConfigSource>(source);
+  if (!RequireReadableBytes(text, shared_source, errors)) {
+    return ConfigNode::Map();
+  }
+  std::istringstream stream{std::string(text)};
+  TreeBuilder builder(shared_source, errors);
+  try {
+    YAML::Parser parser(stream);
+    // The second round is for the complaint about a second document.
+    if (parser.HandleNextDocument(builder)) {
+      parser.HandleNextDocument(builder);
+    }
+  } catch (const YAML::Exception& error) {
+    // The parser has no place for what ends too soon.
+    const bool is_at_end = error.msg.starts_with("end of ");
+    errors.Add(is_at_end ? EndOf(text, shared_source) : PlaceAt(shared_source, error.mark), "",
+               fmt::format("this is not YAML: {}", error.msg));
+    return ConfigNode::Map();
+  }
+  return builder.TakeRoot();
+}
+
+ConfigNode LoadConfigTextTree(std::string_view text, const std::filesystem::path& pretend_file,
+                              std::span<const std::string> overrides, const ConfigNode& defaults,
+                              ConfigErrors& errors) {
+  Loading loading{.errors = errors};
+  ConfigNode tree = LoadDocument(text, pretend_file, loading);
+  for (const std::string& override_text : overrides) {
+    ApplyOverride(override_text, loading.next_order++, defaults, tree, errors);
+  }
+  return tree;
+}
+
+ConfigNode LoadConfigTree(const std::filesystem::path& file, std::span<const std::string> overrides,
+                          const ConfigNode& defaults, ConfigErrors& errors) {
+  const std::optional<std::string> text = ReadFile(file);
+  if (!text) {
+    throw IoError(fmt::format("{}: cannot be read; check that the file exists", file.string()));
+  }
+  return LoadConfigTextTree(*text, file, overrides, defaults, errors);
+}
+
+void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
+                   ConfigNode& tree, ConfigErrors& errors) {
+  const ConfigSource source{.name = fmt::format("--set {}", override_text),
+                            .folder = std::filesystem::current_path(),
+                            .order = order,
+                            .has_lines = false};
+  const std::size_t equals = override_text.find('=');
+  const std::size_t errors_before = errors.size();
+  const ConfigPlace place{std::make_shared<const ConfigSource>(source)};
+  if (equals == override_text.npos) {
+    errors.Add(place, "", "an override is written path=value");
+    return;
+  }
+  const ConfigNode value = ParseConfigText(override_text.substr(equals + 1), source, errors);
+  if (errors.size() > errors_before) {
+    return;
+  }
+  try {
+    SetPath(tree, override_text.substr(0, equals), value, &defaults);
+  } catch (const ConfigError& error) {
+    errors.Add(place, "", error.what());
+  }
+}
+
+}  // namespace semblance

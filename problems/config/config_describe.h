@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The other direction of config_binder.h: values to trees, and types to descriptions.
+#pragma once
+
+#include <stdexcept>
+
+#include "problems/config/config_binder.h"
+
+namespace semblance::config_internal {
+
+// Scalars as they are read back: numbers in the fewest digits that give the same bits, paths
+// absolute.
+ConfigNode ScalarToTree(bool value);
+ConfigNode ScalarToTree(int value);
+ConfigNode ScalarToTree(std::uint64_t value);
+ConfigNode ScalarToTree(double value);
+ConfigNode ScalarToTree(const AutoNumber& value);
+ConfigNode ScalarToTree(const std::string& value);
+ConfigNode ScalarToTree(const std::filesystem::path& value);
+
+template <class T>
+ConfigNode ToTree(const T& value);
+
+template <class T>
+void FieldsToTree(const T& value, ConfigNode& map) {
+  const auto visit = [&](const FieldInfo& info, const auto& field) {
+    map.Set(info.name, ToTree(field));
+  };
+  T copy = value;  // Fields takes a value that it may write to
+  Fields(visit, copy);
+}
+
+template <class T>
+ConfigNode ItemsToTree(const T& value) {
+  ConfigNode node = kIs<T, std::map> ? ConfigNode::Map() : ConfigNode::List();
+  for (const auto& item : value) {
+    if constexpr (kIs<T, std::map>) {
+      node.Set(item.first, ToTree(item.second));
+    } else {
+      // Through the value's own type, as std::vector<bool> has items of another.
+      node.items.push_back(ToTree<typename T::value_type>(item));
+    }
+  }
+  return node;
+}
+
+template <class T>
+ConfigNode ToTree(const T& value) {
+  if constexpr (kIs<T, std::optional>) {
+    return value ? ToTree(*value) : ConfigNode{};
+  } else if constexpr (kIs<T, std::vector> || kIsArray<T> || kIs<T, std::map>) {
+    return ItemsToTree(value);
+  } else if constexpr (kIs<T, std::variant>) {
+    ConfigNode map = ConfigNode::Map();
+    map.Set("type", ConfigNode::Quoted(NamesOf(&value)[value.index()]));
+    std::visit([&](const auto& chosen) { FieldsToTree(chosen, map); }, value);
+    return map;
+  } else if constexpr (std::is_enum_v<T>) {
+    return ConfigNode::Quoted(WordsOf<T>().at(static_cast<std::size_t>(value)));
+  } else if constexpr (HasFields<T>) {
+    ConfigNode map = ConfigNode::Map();
+    FieldsToTree(value, map);
+    return map;
+  } else {
+    return ScalarToTree(value);
+  }
+}
+
+template <class T>
+ConfigType DescribeType();
+
+template <class T>
+std::vector<ConfigField> DescribeFields() {
+  std::vector<ConfigField> fields;
+  const auto visit = [&](const FieldInfo& info, const auto& field) {
+    if (info.name == "type") {
+      throw std::logic_error("a field may not be named `type`: that is the key of variants");
+    }
+    fields.push_back({info, DescribeType<std::remove_cvref_t<decltype(field)>>(), ToTree(field)});
+  };
+  T defaults{};
+  Fields(visit, defaults);
+  return fields;
+}
+
+template <class... Types>
+std::vector<ConfigAlternative> DescribeAlternatives(const std::variant<Types...>*) {
+  return {ConfigAlternative{std::string(Types::kName), DescribeFields<Types>()}...};
+}
+
+template <class T>
+constexpr ConfigType::Kind ScalarKind() {
+  using Kind = ConfigType::Kind;
+  if constexpr (std::is_same_v<T, bool>) {
+    return Kind::kBool;
+  } else if constexpr (std::is_same_v<T, int>) {
+    return Kind::kInteger;
+  } else if constexpr (std::is_same_v<T, std::uint64_t>) {
+    return Kind::kUnsigned;
+  } else if constexpr (std::is_same_v<T, double>) {
+    return Kind::kNumber;
+  } else if constexpr (std::is_same_v<T, AutoNumber>) {
+    return Kind::kAutoNumber;
+  } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
+    return Kind::kPath;
+  } else {
+    static_assert(std::is_same_v<T, std::string>, "a field of this type cannot be configured");
+    return Kind::kText;
+  }
+}
+
+template <class T>
+ConfigType DescribeType() {
+  using Kind = ConfigType::Kind;
+  ConfigType type;
+  if constexpr (kIs<T, std::optional> || kIs<T, std::vector>) {
+    type.kind = kIs<T, std::optional> ? Kind::kOptional : Kind::kList;
+    type.inner = {DescribeType<typename T::value_type>()};
+  } else if constexpr (kIsArray<T>) {
+    type.kind = Kind::kArray;
+    type.size = std::tuple_size_v<T>;
+    type.inner = {DescribeType<typename T::value_type>()};
+  } else if constexpr (kIs<T, std::map>) {
+    type.kind = Kind::kMap;
+    type.inner = {DescribeType<typename T::mapped_type>()};
+  } else if constexpr (kIs<T, std::variant>) {
+    type.kind = Kind::kVariant;
+    type.alternatives = DescribeAlternatives(static_cast<const T*>(nullptr));
+  } else if constexpr (std::is_enum_v<T>) {
+    type.kind = Kind::kWord;
+    type.words = WordsOf<T>();
+  } else if constexpr (HasFields<T>) {
+    type.kind = Kind::kStruct;
+    type.fields = DescribeFields<T>();
+  } else {
+    type.kind = ScalarKind<T>();
+  }
+  return type;
+}
+
+}  // namespace semblance::config_internal

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/config/config_reader.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <system_error>
+#include <vector>
+
+#include "problems/config/nearest_word.h"
+
+namespace semblance {
+namespace {
+
+void AddError(ConfigErrors& errors, const ConfigItem& item, std::string_view what) {
+  errors.Add(item.node.place, item.path, what);
+}
+
+// What stands there, for "a number is due, but here is ...".
+std::string Describe(const ConfigNode& node) {
+  switch (node.kind) {
+    case ConfigNode::Kind::kNull:
+      return "nothing (null)";
+    case ConfigNode::Kind::kMap:
+      return "a map";
+    case ConfigNode::Kind::kList:
+      return "a list";
+    default:
+      return node.quoted ? fmt::format("the text \"{}\"", node.text)
+                         : fmt::format("'{}'", node.text);
+  }
+}
+
+void AddKindError(ConfigErrors& errors, const ConfigItem& item, std::string_view due) {
+  AddError(errors, item, fmt::format("{} is due, but here is {}", due, Describe(item.node)));
+}
+
+bool RequireScalar(ConfigErrors& errors, const ConfigItem& item, std::string_view due) {
+  if (!item.node.IsScalar()) {
+    AddKindError(errors, item, due);
+  }
+  return item.node.IsScalar();
+}
+
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
+
+std::string_view WithoutSign(std::string_view text) {
+  const bool has_sign = text.starts_with('+') || text.starts_with('-');
+  return has_sign ? text.substr(1) : text;
+}
+
+// 010, 0o17, 0x1F, 0b11: numbers that readers of YAML disagree about.
+bool LooksLikeOtherBase(std::string_view text) {
+  const std::string_view digits = WithoutSign(text);
+  return digits.size() > 1 && digits[0] == '0' &&
+         (IsDigit(digits[1]) || std::string_view("xXoObB").find(digits[1]) != digits.npos);
+}
+
+bool LooksNonFinite(std::string_view text) {
+  const std::string_view bare = WithoutSign(text);
+  for (const std::string_view word : {".nan", ".inf", "nan", "inf", "infinity"}) {
+    if (bare.size() == word.size() && EditDistance(bare, word) == 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// from_chars takes no plus sign.
+std::string_view ForFromChars(std::string_view text) {
+  const bool has_plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
+  return has_plus ? text.substr(1) : text;
+}
+
+// The number in `text`, or nothing if it is not wholly one that std::from_chars knows.
+std::optional<double> ToDouble(std::string_view text, std::errc& error) {
+  const std::string_view bare = ForFromChars(text);
+  double value = 0;
+  const auto result = std::from_chars(bare.data(), bare.data() + bare.size(), value);
+  error = result.ec;
+  const bool all = !bare.empty() && result.ptr == bare.data() + bare.size();
+  return all && error != std::errc::invalid_argument ? std::optional(value) : std::nullopt;
+}
+
+// Complaints that whole and other numbers share. False if one was made.
+bool RequireNumberLike(ConfigErrors& errors, const ConfigItem& item, std::string_view due) {
+  if (!RequireScalar(errors, item, due)) {
+    return false;
+  }
+  const std::string& text = item.node.text;
+  std::errc error{};
+  if (item.node.quoted) {
+    const std::string remedy = ToDouble(text, error) ? "; remove the quotes" : "";
+    AddError(errors, item,
+             fmt::format("{} is due, but here is {}{}", due, Describe(item.node), remedy));
+  } else if (LooksNonFinite(text)) {
+    AddError(errors, item, fmt::format("'{}' is not finite; {} is due", text, due));
+  } else if (LooksLikeOtherBase(text)) {
+    AddError(errors, item,
+             fmt::format("'{}' is not plainly decimal; write {} without a leading 0", text, due));
+  } else {
+    return true;
+  }
+  return false;
+}
+
+template <class Number>
+bool RequireInRange(ConfigErrors& errors, const ConfigItem& item, Number value) {
+  const auto as_double = static_cast<double>(value);
+  if (as_double >= item.info.min && as_double <= item.info.max) {
+    return true;
+  }
+  AddError(errors, item,
+           fmt::format("{} is out of range; allowed is {}", item.node.text, RangeText(item.info)));
+  return false;
+}
+
+template <class Integer>
+void ReadInteger(ConfigErrors& errors, const ConfigItem& item, Integer& out) {
+  constexpr std::string_view kDue = "a whole number";
+  if (!RequireNumberLike(errors, item, kDue)) {
+    return;
+  }
+  const std::string_view bare = ForFromChars(item.node.text);
+  Integer value{};
+  const auto [end, error] = std::from_chars(bare.data(), bare.data() + bare.size(), value);
+  std::errc as_double{};
+  const bool is_whole =
+      WithoutSign(bare).find_first_not_of("0123456789") == bare.npos && !WithoutSign(bare).empty();
+  if (is_whole && (error != std::errc() || end != bare.data() + bare.size())) {
+    AddError(errors, item,
+             fmt::format("{} does not fit; allowed is {} to {}", item.node.text,
+                         std::numeric_limits<Integer>::min(), std::numeric_limits<Integer>::max()));
+  } else if (!is_whole && ToDouble(item.node.text, as_double)) {
+    AddError(errors, item,
+             fmt::format("a whole number is due, but here is {}; write it in digits alone",
+                         item.node.text));
+  } else if (!is_whole) {
+    AddKindError(errors, item, kDue);
+  } else if (RequireInRange(errors, item, value)) {
+    out = value;
+  }
+}
+
+}  // namespace
+
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, bool& out) {
+  const ConfigNode& node = item.node;
+  if (node.IsScalar() && !node.quoted && (node.text == "true" || node.text == "false")) {
+    out = node.text == "true";
+  } else {
+    AddKindError(errors, item, "true or false");
+  }
+}
+
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, int& out) {
+  ReadInteger(errors, item, out);
+}
+
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::uint64_t& out) {
+  ReadInteger(errors, item, out);
+}
+
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, double& out) {
+  if (!RequireNumberLike(errors, item, "a number")) {
+    return;
+  }
+  std::errc error{};
+  const std::optional<double> value = ToDouble(item.node.text, error);
+  if (!value) {
+    const bool has_comma = item.node.text.find(',') != std::string::npos;
+    AddError(errors, item,
+             fmt::format("a number is due, but here is {}{}", Describe(item.node),
+                         has_comma ? "; the decimal sign is a point" : ""));
+  } else if (error == std::errc::result_out_of_range || !std::isfinite(*value)) {
+    AddError(errors, item,
+             fmt::format("{} does not fit; a number between 1e-308 and 1e308 in size is due",
+                         item.node.text));
+  } else if (RequireInRange(errors, item, *value)) {
+    out = *value;
+  }
+}
+
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoNumber& out) {
+  if (item.node.IsScalar() && !item.node.quoted && item.node.text == "auto") {
+    out.automatic = true;
+    return;
+  }
+  const std::size_t before = errors.size();
+  ReadScalar(errors, item, out.value);
+  out.automatic = out.automatic && errors.size() != before;
+}
+
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::string& out) {
+  if (RequireScalar(errors, item, "a text")) {
+    out = item.node.text;
+  }
+}
+
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::path& out) {
+  if (!RequireScalar(errors, item, "a path")) {
+    return;
+  }
+  const std::string& text = item.node.text;
+  if (text.starts_with('~')) {
+    AddError(errors, item, fmt::format("'{}': ~ is not expanded; write the whole path", text));
+  } else if (text.empty()) {
+    out.clear();
+  } else {
+    const auto& source = item.node.place.source;
+    const std::filesystem::path folder = source ? source->folder : std::filesystem::path();
+    out = std::filesystem::absolute(folder / text).lexically_normal();
+  }
+}
+
+std::optional<std::size_t> ReadWord(ConfigErrors& errors, const ConfigItem& item,
+                                    std::string_view what, std::span<const std::string> words) {
+  if (!item.node.IsScalar()) {
+    AddError(errors, item,
+             fmt::format("a {} is due, but here is {}; known are: {}", what, Describe(item.node),
+                         fmt::join(words, ", ")));
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i] == item.node.text) {
+      return i;
+    }
+  }
+  const std::string nearest = NearestWord(item.node.text, words);
+  AddError(
+      errors, item,
+      fmt::format("unknown {} '{}'; known are: {}{}", what, item.node.text, fmt::join(words, ", "),
+                  nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+  return std::nullopt;
+}
+
+std::optional<std::size_t> ReadTypeName(ConfigErrors& errors, const ConfigItem& item,
+                                        std::span<const std::string> names,
+                                        std::optional<std::size_t> default_index) {
+  if (!item.node.IsMap()) {
+    return ReadWord(errors, item, "type", names);
+  }
+  if (const ConfigNode* type = item.node.Find("type")) {
+    return ReadWord(errors, {*type, JoinPath(item.path, "type"), item.info}, "type", names);
+  }
+  if (!default_index) {
+    AddError(errors, item, fmt::format("'type' is missing; known are: {}", fmt::join(names, ", ")));
+  }
+  return default_index;
+}
+
+bool RequireMap(ConfigErrors& errors, const ConfigItem& item) {
+  if (!item.node.IsMap()) {
+    AddKindError(errors, item, "a map");
+  }
+  return item.node.IsMap();
+}
+
+bool RequireList(ConfigErrors& errors, const ConfigItem& item) {
+  if (!item.node.IsList()) {
+    AddKindError(errors, item, "a list");
+  }
+  return item.node.IsList();
+}
+
+bool RequireSize(ConfigErrors& errors, const ConfigItem& item, std::optional<std::size_t> size) {
+  const std::size_t found = item.node.items.size();
+  const bool fits = size ? found == *size : static_cast<double>(found) >= item.info.min;
+  if (!fits) {
+    const std::string due =
+        size ? fmt::format("{}", *size) : fmt::format("at least {:g}", item.info.min);
+    AddError(errors, item, fmt::format("a list of {} is due, but here are {}", due, found));
+  }
+  return fits;
+}
+
+void RefuseUnknownKeys(ConfigErrors& errors, const ConfigItem& item,
+                       std::span<const std::string> known) {
+  for (const ConfigNode::Entry& entry : item.node.entries) {
+    bool is_known = false;
+    for (const std::string& name : known) {
+      is_known = is_known || name == entry.key;
+    }
+    if (!is_known) {
+      errors.Add(entry.key_place, JoinPath(item.path, entry.key),
+                 fmt::format("unknown key{}", Suggestion(entry.key, known)));
+    }
+  }
+}
+
+std::string JoinPath(std::string_view parent, std::string_view key) {
+  return parent.empty() ? std::string(key) : fmt::format("{}.{}", parent, key);
+}
+
+std::string JoinPath(std::string_view parent, std::size_t index) {
+  return fmt::format("{}[{}]", parent, index);
+}
+
+std::string RangeText(const FieldInfo& info) {
+  const bool has_min = std::isfinite(info.min), has_max = std::isfinite(info.max);
+  const std::string unit = info.unit.empty() ? "" : fmt::format(" {}", info.unit);
+  if (has_min && has_max) {
+    return fmt::format("{} to {}{}", info.min, info.max, unit);
+  }
+  if (has_min) {
+    return fmt::format("at least {}{}", info.min, unit);
+  }
+  return has_max ? fmt::format("at most {}{}", info.max, unit) : "";
+}
+
+}  // namespace semblance

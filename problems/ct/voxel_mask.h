@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Sets of voxels: pieces, floods, and growing by a distance.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "surfaces/base/geometry.h"
+
+namespace semblance {
+
+// The counts and spacing of a regular grid; its first axis runs fastest.
+struct VoxelGrid {
+  std::array<int, 3> counts = {0, 0, 0};
+  Vec3 spacing_mm = Vec3::Constant(kNaN);
+
+  std::int64_t Index(int i, int j, int k) const {
+    return i + std::int64_t{counts[0]} * (j + std::int64_t{counts[1]} * k);
+  }
+  std::int64_t Count() const { return std::int64_t{counts[0]} * counts[1] * counts[2]; }
+};
+
+// One entry a voxel, 1 in the set, 0 not.
+using VoxelMask = std::vector<std::uint8_t>;
+
+// The piece of each voxel by shared faces, numbered 0, 1, ... in order of the first voxel; -1 where
+// the mask is 0.
+struct VoxelPieces {
+  std::vector<std::int32_t> of_voxel;
+  std::vector<std::int64_t> sizes;  // voxels, one a piece
+};
+VoxelPieces FindPieces(const VoxelMask& mask, const VoxelGrid& grid);
+
+// The voxels of `allowed` that can be reached from those of `seeds` that are in it, by shared
+// faces.
+VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& seeds, const VoxelGrid& grid);
+
+// The voxels whose centre is within distance_mm (>= 0) of the centre of one in the mask. Exact.
+VoxelMask Grow(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads);
+
+}  // namespace semblance

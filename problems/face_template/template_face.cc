@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/face_template/template_face.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "problems/face_template/head_formula.h"
+#include "problems/face_template/template_sites.h"
+#include "problems/subject/phantom_shape.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+// ---------------------------------------------------------------------------------------------
+// Least squares of one level
+// ---------------------------------------------------------------------------------------------
+
+constexpr int kSamplesPerPatch = 6;
+
+using Matrix = Eigen::MatrixXd;
+
+enum class Direction { kU, kV };
+
+int Patches(const HSplineShape& shape, int level, Direction axis) {
+  return (axis == Direction::kU ? shape.patches_u : shape.patches_v) << level;
+}
+
+double SampleAt(int sample, int patches) {
+  return static_cast<double>(sample) / (kSamplesPerPatch * patches);
+}
+
+// Row s: the weights of the patches + 3 vertices of a line of the net at its sample s. The weights
+// of a stencil summed over the other direction are those of the line.
+Matrix Collocation(const HSplineShape& shape, int level, Direction axis) {
+  const int patches = Patches(shape, level, axis);
+  const int columns = Patches(shape, level, Direction::kU) + 3;
+  Matrix rows = Matrix::Zero(kSamplesPerPatch * patches + 1, patches + 3);
+  for (int s = 0; s < rows.rows(); ++s) {
+    const double t = SampleAt(s, patches);
+    const Stencil stencil =
+        StencilAt(shape, level, axis == Direction::kU ? Vec2(t, 0) : Vec2(0, t));
+    for (int k = 0; k < 16; ++k) {
+      const int vertex = stencil.index[k];
+      rows(s, axis == Direction::kU ? vertex % columns : vertex / columns) += stencil.weight[k];
+    }
+  }
+  return rows;
+}
+
+// (A^T A)^-1 A^T: from the samples of a line to its vertices.
+Matrix LeastSquares(const HSplineShape& shape, int level, Direction axis) {
+  const Matrix a = Collocation(shape, level, axis);
+  return (a.transpose() * a).ldlt().solve(a.transpose());
+}
+
+std::array<Matrix, 3> SampleFormula(int patches_u, int patches_v) {
+  std::array<Matrix, 3> samples;
+  samples.fill(Matrix(kSamplesPerPatch * patches_u + 1, kSamplesPerPatch * patches_v + 1));
+  for (int j = 0; j < samples[0].cols(); ++j) {
+    for (int i = 0; i < samples[0].rows(); ++i) {
+      const Vec3 p = HeadPoint(SampleAt(i, patches_u), SampleAt(j, patches_v));
+      for (int k = 0; k < 3; ++k) {
+        samples[k](i, j) = p[k];
+      }
+    }
+  }
+  return samples;
+}
+
+// The plain B-spline of one level that is closest to the formula over a grid of samples. On such a
+// grid the least squares of the surface is that of its columns, then its rows.
+ControlNet FitFormula(const HSplineShape& shape, int level) {
+  const Matrix along_u = LeastSquares(shape, level, Direction::kU);
+  const Matrix along_v = LeastSquares(shape, level, Direction::kV);
+  const auto samples =
+      SampleFormula(Patches(shape, level, Direction::kU), Patches(shape, level, Direction::kV));
+  ControlNet net{.columns = static_cast<int>(along_u.rows()),
+                 .rows = static_cast<int>(along_v.rows()),
+                 .vertices = {}};
+  net.vertices.resize(static_cast<std::size_t>(net.columns) * net.rows);
+  for (int k = 0; k < 3; ++k) {
+    const Matrix vertices = along_u * samples[k] * along_v.transpose();
+    for (int j = 0; j < net.rows; ++j) {
+      for (int i = 0; i < net.columns; ++i) {
+        net.At(i, j)[k] = vertices(i, j);
+      }
+    }
+  }
+  return net;
+}
+
+// Makes the net its own mirror image, so that rounding does not tell the sides apart.
+void MakeSymmetric(ControlNet& net) {
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; 2 * i < net.columns; ++i) {
+      Vec3& right = net.At(i, j);
+      Vec3& left = net.At(net.columns - 1 - i, j);
+      const Vec3 mirrored(-right.x(), right.y(), right.z());
+      left = (left + mirrored) / 2;
+      right = Vec3(-left.x(), left.y(), left.z());
+    }
+  }
+}
+
+// ---------------------------------------------------------------------------------------------
+// The surface and its features
+// ---------------------------------------------------------------------------------------------
+
+// Moves to the level's own least-squares fit each vertex that this moves by more than the
+// tolerance.
+void AddDetail(HSplineSurface& surface, int level, double tolerance_mm) {
+  ControlNet target = FitFormula(surface.shape(), level);
+  MakeSymmetric(target);
+  ControlNet net = surface.Net(level);
+  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+    if ((target.vertices[k] - net.vertices[k]).norm() > tolerance_mm) {
+      net.vertices[k] = target.vertices[k];
+    }
+  }
+  surface.SetNet(level, net);
+}
+
+struct FeatureRegion {
+  const char* name;
+  Sphere region;
+};
+
+const FeatureRegion kRegions[] = {
+    {"nose", {{0, -6, -36}, 26}},
+    {"mouth", {{0, -4, -74}, 27}},
+    {"eye_l", {{31.5, 14, -3}, 19}},
+    {"eye_r", {{-31.5, 14, -3}, 19}},
+};
+
+// The vertices of levels >= 1 whose own (u,v) lies on the surface inside the region.
+std::vector<VertexId> VerticesInside(const HSplineSurface& surface, const Sphere& region) {
+  const HSplineShape& shape = surface.shape();
+  std::vector<VertexId> inside;
+  for (int level = 1; level <= shape.max_level; ++level) {
+    for (int i = 0; i < shape.Columns(level); ++i) {
+      for (int j = 0; j < shape.Rows(level); ++j) {
+        const VertexId id{level, i, j};
+        if (region.Contains(surface.Point(ParameterOf(shape, id)))) {
+          inside.push_back(id);
+        }
+      }
+    }
+  }
+  return inside;
+}
+
+void CheckOptions(const TemplateOptions& o) {
+  const auto check = [](const char* name, double value, double least, double most) {
+    if (!(value >= least && value <= most)) {
+      throw InputError(
+          fmt::format("template: {} is {}; it must lie in [{}, {}]", name, value, least, most));
+    }
+  };
+  check("patches_u", o.patches_u, 4, 16);
+  check("patches_v", o.patches_v, 4, 16);
+  check("max_level", o.max_level, 0, 4);
+  check("detail_tolerance_mm", o.detail_tolerance_mm, 0, 10);
+  check("site_error", o.site_error, 0, 0.2);
+}
+
+void Disturb(double error, std::uint64_t random_seed, std::map<std::string, Vec2>& site_uv) {
+  SeededNumbers random(random_seed);
+  for (auto& [site, uv] : site_uv) {
+    for (int axis = 0; axis < 2; ++axis) {
+      uv[axis] = std::clamp(uv[axis] + random.Between(-error, error), 0.0, 1.0);
+    }
+  }
+}
+
+}  // namespace
+
+TemplateFace MakeTemplateFace(const TemplateOptions& options) {
+  CheckOptions(options);
+  const HSplineShape shape{.patches_u = options.patches_u,
+                           .patches_v = options.patches_v,
+                           .max_level = options.max_level,
+                           .reference = options.reference};
+  ControlNet coarse = FitFormula(shape, 0);
+  MakeSymmetric(coarse);
+  HSplineSurface surface(shape, coarse);
+  for (int level = 1; level <= options.max_level; ++level) {
+    AddDetail(surface, level, options.detail_tolerance_mm);
+  }
+  TemplateFace face{.surface = std::move(surface), .site_uv = TemplateSites(), .features = {}};
+  for (const FeatureRegion& f : kRegions) {
+    face.features.push_back({f.name, VerticesInside(face.surface, f.region), f.region});
+  }
+  if (options.site_error > 0) {
+    Disturb(options.site_error, options.site_random_seed, face.site_uv);
+  }
+  return face;
+}
+
+std::vector<VertexId> FeatureVertices(const TemplateFace& face) {
+  std::set<VertexId> vertices;
+  for (const TemplateFeature& feature : face.features) {
+    vertices.insert(feature.vertices.begin(), feature.vertices.end());
+  }
+  return {vertices.begin(), vertices.end()};
+}
+
+std::vector<Sphere> TemplateMasks(const TemplateFace& face) {
+  std::vector<Sphere> masks;
+  for (const TemplateFeature& feature : face.features) {
+    if (feature.region) {
+      masks.push_back(*feature.region);
+    }
+  }
+  return masks;
+}
+
+Sphere Transformed(const Sphere& sphere, const Similarity& to_from) {
+  return {to_from * sphere.center, to_from.scale * sphere.radius_mm};
+}
+
+TemplateResidual ResidualToFormula(const HSplineSurface& surface, int samples_u, int samples_v) {
+  TemplateResidual residual{.rms_mm = 0, .max_mm = -1};
+  for (int j = 0; j < samples_v; ++j) {
+    for (int i = 0; i < samples_u; ++i) {
+      const Vec2 uv(i / (samples_u - 1.0), j / (samples_v - 1.0));
+      const double d = (surface.Point(uv) - HeadPoint(uv.x(), uv.y())).norm();
+      residual.rms_mm += d * d;
+      if (d > residual.max_mm) {
+        residual.max_mm = d;
+        residual.worst_uv = uv;
+      }
+    }
+  }
+  residual.rms_mm = std::sqrt(residual.rms_mm / (static_cast<double>(samples_u) * samples_v));
+  return residual;
+}
+
+}  // namespace semblance

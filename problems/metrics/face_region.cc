@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/metrics/face_region.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+// A site without its side: "go_l" -> "go".
+std::string WithoutSide(const std::string& site) {
+  return site.ends_with("_l") || site.ends_with("_r") ? site.substr(0, site.size() - 2) : site;
+}
+
+TriMesh NetworkMesh(std::span<const Dowel> dowels, const DowelNetwork& network) {
+  TriMesh mesh;
+  for (const Dowel& dowel : dowels) {
+    mesh.points.push_back(dowel.base);
+  }
+  for (const std::array<int, 3>& area : network.areas) {
+    mesh.triangles.push_back({area[0], area[1], area[2]});
+  }
+  return mesh;
+}
+
+double DistanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 ab = b - a;
+  const double s = std::clamp((p - a).dot(ab) / ab.squaredNorm(), 0.0, 1.0);
+  return (p - (a + s * ab)).norm();
+}
+
+// How far p lies outside across a border edge of the triangle it is nearest to: its distance in
+// that triangle's plane from the nearest point, 0 if the nearest point is not on the border.
+class BorderRule {
+ public:
+  explicit BorderRule(const TriMesh& network) : network_(network), border_(BorderEdges(network)) {}
+
+  double Overhang(const Vec3& p, const MeshPoint& nearest) const {
+    const Triangle& t = network_.triangles[nearest.triangle];
+    if (!OnBorder(t, nearest.position)) {
+      return 0;
+    }
+    const Vec3 normal = TriangleAreaVector(network_, t).normalized();
+    const Vec3 offset = p - nearest.position;
+    return (offset - offset.dot(normal) * normal).norm();
+  }
+
+ private:
+  bool OnBorder(const Triangle& t, const Vec3& q) const {
+    constexpr double kOnEdge_mm = 1e-6;
+    for (const auto& [a, b] : border_) {
+      const bool touches =
+          std::count(t.begin(), t.end(), a) + std::count(t.begin(), t.end(), b) > 0;
+      if (touches && DistanceToSegment(q, network_.points[a], network_.points[b]) < kOnEdge_mm) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const TriMesh& network_;
+  std::vector<MeshEdge> border_;
+};
+
+std::vector<Sphere> ExcludedSpheres(std::span<const Dowel> dowels,
+                                    const std::vector<ExcludedZone>& zones) {
+  std::vector<Sphere> spheres;
+  for (const ExcludedZone& zone : zones) {
+    const auto dowel = std::find_if(dowels.begin(), dowels.end(),
+                                    [&](const Dowel& d) { return d.site == zone.site; });
+    if (dowel == dowels.end()) {
+      throw InputError(
+          fmt::format("face region: excluded site '{}' has no dowel on this skull; name a site "
+                      "that has one, or remove the zone",
+                      zone.site));
+    }
+    spheres.push_back({dowel->base, zone.radius_mm});
+  }
+  return spheres;
+}
+
+int NearestPart(const Vec3& p, std::span<const Dowel> dowels) {
+  const auto nearest =
+      std::min_element(dowels.begin(), dowels.end(), [&](const Dowel& a, const Dowel& b) {
+        return (a.base - p).squaredNorm() < (b.base - p).squaredNorm();
+      });
+  return FacePartOfSite(nearest->site);
+}
+
+}  // namespace
+
+int FacePartOfSite(const std::string& site) {
+  static const std::map<std::string, int> kPartOf = {
+      {"sg", 0}, {"g", 0},  {"fe", 0}, {"mso", 1}, {"mio", 1}, {"n", 2},   {"rhi", 2},
+      {"im", 3}, {"lo", 3}, {"zy", 3}, {"sM2", 3}, {"mp", 4},  {"pr", 4},  {"id", 4},
+      {"sm", 5}, {"pg", 5}, {"me", 5}, {"go", 6},  {"mr", 6},  {"iM2", 6}, {"sgl", 7}};
+  const auto found = kPartOf.find(WithoutSide(site));
+  if (found == kPartOf.end()) {
+    throw InputError(fmt::format(
+        "face region: site '{}' belongs to no part of the face; known are the 21 standard sites",
+        site));
+  }
+  return found->second;
+}
+
+FaceRegion FindFaceRegion(const TriMesh& skin, std::span<const Dowel> dowels,
+                          const DowelNetwork& network, const FaceRegionOptions& options) {
+  if (network.areas.empty()) {
+    throw InputError(
+        "face region: the dowel network has no area; at least three dowels that share an area are "
+        "needed");
+  }
+  const TriMesh network_mesh = NetworkMesh(dowels, network);
+  const MeshQuery query(network_mesh);
+  const BorderRule border(network_mesh);
+  const std::vector<Sphere> excluded = ExcludedSpheres(dowels, options.exclude);
+  FaceRegion region{std::vector<bool>(skin.points.size(), false),
+                    std::vector<int>(skin.points.size(), -1)};
+  for (std::size_t v = 0; v < skin.points.size(); ++v) {
+    const Vec3& p = skin.points[v];
+    const MeshPoint nearest = query.Closest(p);
+    const bool inside = nearest.distance_mm <= options.reach_mm &&
+                        border.Overhang(p, nearest) <= options.margin_mm + 1e-9;
+    const bool barred = std::any_of(excluded.begin(), excluded.end(),
+                                    [&](const Sphere& s) { return s.Contains(p); });
+    if (inside && !barred) {
+      region.scored[v] = true;
+      region.part[v] = NearestPart(p, dowels);
+    }
+  }
+  return region;
+}
+
+}  // namespace semblance

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/output/files.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Reason(int error_number) { return std::generic_category().message(error_number); }
+
+void CreateFolders(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) {
+    throw IoError(fmt::format("{}: the folder cannot be created: {}; choose another one",
+                              folder.string(),
+                              error ? error.message() : std::string("a file of this name exists")));
+  }
+}
+
+void RefuseIfNotEmpty(const fs::path& folder) {
+  std::error_code error;
+  const bool is_empty = fs::is_empty(folder, error);
+  if (error) {
+    throw IoError(fmt::format("{}: the folder cannot be read: {}; choose another one",
+                              folder.string(), error.message()));
+  }
+  if (!is_empty) {
+    throw IoError(fmt::format(
+        "{}: the output folder exists and is not empty, and nothing is overwritten unless asked; "
+        "choose another folder, or say --force to replace files in it",
+        folder.string()));
+  }
+}
+
+void TryToWrite(const fs::path& folder) {
+  const fs::path probe = folder / fmt::format(".semblance-probe-{}.tmp", ::getpid());
+  const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    throw IoError(fmt::format(
+        "{}: the output folder cannot be written to: {}; change its permissions or choose another "
+        "folder",
+        folder.string(), Reason(errno)));
+  }
+  ::close(descriptor);
+  ::unlink(probe.c_str());
+}
+
+bool StaysInside(const fs::path& name) {
+  const fs::path normal = name.lexically_normal();
+  return !normal.empty() && normal.is_relative() && *normal.begin() != ".." &&
+         normal.has_filename() && normal != ".";
+}
+
+}  // namespace
+
+OutputFolder::OutputFolder(fs::path root, WhenNotEmpty when_not_empty) : root_(std::move(root)) {
+  CreateFolders(root_);
+  if (when_not_empty == WhenNotEmpty::kRefuse) {
+    RefuseIfNotEmpty(root_);
+  }
+  TryToWrite(root_);
+}
+
+fs::path OutputFolder::PathOf(std::string_view name) const {
+  if (!StaysInside(name)) {
+    throw InputError(fmt::format(
+        "'{}': not a file name inside the output folder {}; give a relative path without '..'",
+        name, root_.string()));
+  }
+  const fs::path path = root_ / name;
+  CreateFolders(path.parent_path());
+  return path;
+}
+
+void OutputFolder::Write(std::string_view name, std::string_view bytes, Outlasts outlasts) {
+  WriteFileAtomically(PathOf(name), bytes, outlasts);
+  written_.emplace_back(name);
+}
+
+}  // namespace semblance

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pictures/image.h"
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/output/files.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+std::uint8_t Byte(double value) {
+  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
+}
+
+std::size_t Offset(const Image& image, int x, int y) {
+  return 3 * (static_cast<std::size_t>(y) * image.width + x);
+}
+
+bool IsInside(const Image& image, int x, int y) {
+  return x >= 0 && y >= 0 && x < image.width && y < image.height;
+}
+
+}  // namespace
+
+Colour HexColour(std::uint32_t rrggbb) {
+  return {((rrggbb >> 16) & 255) / 255.0, ((rrggbb >> 8) & 255) / 255.0, (rrggbb & 255) / 255.0};
+}
+
+Image MakeImage(int width, int height, const Colour& colour) {
+  if (width < 1 || height < 1) {
+    throw InputError(
+        fmt::format("picture of {} x {} pixels: both sides must be at least 1", width, height));
+  }
+  Image image{.width = width, .height = height, .rgb = {}};
+  image.rgb.resize(Offset(image, 0, height));
+  FillRectangle(image, 0, 0, width, height, colour);
+  return image;
+}
+
+Colour PixelAt(const Image& image, int x, int y) {
+  const std::uint8_t* pixel = &image.rgb.at(Offset(image, x, y));
+  return {pixel[0] / 255.0, pixel[1] / 255.0, pixel[2] / 255.0};
+}
+
+void BlendPixel(Image& image, int x, int y, const Colour& colour, double coverage) {
+  if (!IsInside(image, x, y) || !(coverage > 0)) {
+    return;
+  }
+  std::uint8_t* pixel = &image.rgb[Offset(image, x, y)];
+  const double c = std::min(coverage, 1.0);
+  pixel[0] = Byte((1 - c) * pixel[0] / 255 + c * colour.r);
+  pixel[1] = Byte((1 - c) * pixel[1] / 255 + c * colour.g);
+  pixel[2] = Byte((1 - c) * pixel[2] / 255 + c * colour.b);
+}
+
+void FillRectangle(Image& image, int x, int y, int width, int height, const Colour& colour) {
+  const std::uint8_t bytes[3] = {Byte(colour.r), Byte(colour.g), Byte(colour.b)};
+  for (int row = std::max(y, 0); row < std::min(y + height, image.height); ++row) {
+    for (int column = std::max(x, 0); column < std::min(x + width, image.width); ++column) {
+      std::copy_n(bytes, 3, &image.rgb[Offset(image, column, row)]);
+    }
+  }
+}
+
+void Paste(Image& onto, const Image& picture, int x, int y) {
+  for (int row = 0; row < picture.height; ++row) {
+    for (int column = 0; column < picture.width; ++column) {
+      if (IsInside(onto, x + column, y + row)) {
+        std::copy_n(&picture.rgb[Offset(picture, column, row)], 3,
+                    &onto.rgb[Offset(onto, x + column, y + row)]);
+      }
+    }
+  }
+}
+
+std::string EncodePng(const Image& image) {
+  if (image.width < 1 || image.height < 1 || image.rgb.size() != Offset(image, 0, image.height)) {
+    throw InputError(fmt::format("picture of {} x {} pixels with {} bytes: it has no valid pixels",
+                                 image.width, image.height, image.rgb.size()));
+  }
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  png.width = static_cast<png_uint_32>(image.width);
+  png.height = static_cast<png_uint_32>(image.height);
+  png.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
+  std::string bytes(size, '\0');
+  // Convert to 8 bit: no, the bytes are 8 bit already; row stride and colour map: the defaults.
+  if (png_image_write_to_memory(&png, bytes.data(), &size, 0, image.rgb.data(), 0, nullptr) == 0) {
+    throw InputError(fmt::format("picture of {} x {} pixels: libpng: {}", image.width, image.height,
+                                 png.message));
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
+}  // namespace semblance

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// An 8-bit picture and its PNG file.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "surfaces/base/fields.h"
+
+namespace semblance {
+
+// sRGB-encoded, each 0..1.
+struct Colour {
+  double r = 0;
+  double g = 0;
+  double b = 0;
+};
+
+template <class Visitor>
+void Fields(Visitor& visit, Colour& o) {
+  visit(FieldInfo{.name = "r", .min = 0, .max = 1, .doc = "red"}, o.r);
+  visit(FieldInfo{.name = "g", .min = 0, .max = 1, .doc = "green"}, o.g);
+  visit(FieldInfo{.name = "b", .min = 0, .max = 1, .doc = "blue"}, o.b);
+}
+
+// 0xrrggbb.
+Colour HexColour(std::uint32_t rrggbb);
+
+struct Image {
+  int width = 0;                  // pixels
+  int height = 0;                 // pixels
+  std::vector<std::uint8_t> rgb;  // sRGB, 3 bytes a pixel, row by row from the top left
+};
+
+// A picture of one colour; width, height >= 1, else InputError.
+Image MakeImage(int width, int height, const Colour& colour);
+
+// The pixel at column x, row y, which must be inside.
+Colour PixelAt(const Image& image, int x, int y);
+
+// Moves a pixel towards `colour` by `coverage` (0..1); a pixel outside the picture is left out.
+void BlendPixel(Image& image, int x, int y, const Colour& colour, double coverage);
+
+// Columns [x, x + width), rows [y, y + height), clipped to the picture.
+void FillRectangle(Image& image, int x, int y, int width, int height, const Colour& colour);
+
+// Copies `picture` with its top left corner at column x, row y, clipped.
+void Paste(Image& onto, const Image& picture, int x, int y);
+
+// The bytes of a PNG file: the same picture gives the same bytes (no time, no comment). Throws
+// InputError for a picture without pixels.
+std::string EncodePng(const Image& image);
+
+}  // namespace semblance

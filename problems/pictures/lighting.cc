@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pictures/lighting.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "problems/pictures/raster.h"
+#include "surfaces/base/parallel.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kMapSize = 512;  // texels along a side of a depth map
+constexpr SampleWindow kWholeMap = {0, kMapSize, 0, kMapSize};
+
+// Directions spread evenly over the sphere (Fibonacci lattice); z is up.
+Vec3 SphereDirection(int i, int count) {
+  const double z = 1 - (2 * i + 1.0) / count;
+  const double phi = i * std::numbers::pi * (3 - std::sqrt(5.0));
+  const double r = std::sqrt(1 - z * z);
+  return {r * std::cos(phi), r * std::sin(phi), z};
+}
+
+struct SoftBox {
+  Vec3 towards;  // in the view: right, up, towards the viewer
+  double radius = 0;
+  int lights = 1;
+  double strength = 0;
+  Rgb colour = Rgb::Ones();
+  bool is_key = false;
+};
+
+// Lights on a disc of the given radius (of the unit distance) around the direction, on a spiral.
+void AddSoftBox(const SoftBox& box, std::vector<Light>& lights) {
+  const Vec3 towards = box.towards.normalized();
+  const Vec3 u = towards.unitOrthogonal(), v = towards.cross(u);
+  for (int i = 0; i < box.lights; ++i) {
+    const double r = box.radius * std::sqrt((i + 0.5) / box.lights);
+    const double phi = i * std::numbers::pi * (3 - std::sqrt(5.0));
+    const Vec3 direction = towards + r * (std::cos(phi) * u + std::sin(phi) * v);
+    lights.push_back({.to_light = direction.normalized(),
+                      .irradiance = static_cast<float>(box.strength / box.lights) * box.colour,
+                      .is_key = box.is_key});
+  }
+}
+
+// A sky all round, in the view; top and bottom: radiance, relative.
+void AddDome(int count, double strength, double top, double bottom, std::vector<Light>& lights) {
+  for (int i = 0; i < count; ++i) {
+    const Vec3 d = SphereDirection(i, count);
+    const Vec3 in_view(d.x(), d.z(), d.y());
+    const double radiance = bottom + (top - bottom) * 0.5 * (1 + in_view.y());
+    lights.push_back({.to_light = in_view,
+                      .irradiance = Rgb::Constant(static_cast<float>(strength * radiance / count)),
+                      .is_key = false});
+  }
+}
+
+std::vector<Light> LightsInView(Lighting lighting) {
+  std::vector<Light> lights;
+  if (lighting == Lighting::kEven) {
+    AddSoftBox({.towards = {0, 0, 1}, .strength = 0.55}, lights);
+    AddDome(24, 2.0, 1, 1, lights);
+    return lights;
+  }
+  AddSoftBox({.towards = {-0.62, 0.62, 0.62},
+              .radius = 0.28,
+              .lights = 9,
+              .strength = 1.0,
+              .colour = {1.0F, 0.965F, 0.91F},
+              .is_key = true},
+             lights);
+  AddSoftBox({.towards = {0.8, 0.05, 0.6},
+              .radius = 0.2,
+              .lights = 3,
+              .strength = 0.22,
+              .colour = {0.90F, 0.95F, 1.0F}},
+             lights);
+  AddSoftBox({.towards = {0.75, 0.45, -0.55},
+              .radius = 0.1,
+              .lights = 2,
+              .strength = 0.55,
+              .colour = {0.95F, 0.97F, 1.0F}},
+             lights);
+  AddDome(26, 1.3, 1.0, 0.4, lights);
+  return lights;
+}
+
+// What is nearest to a light, seen from it.
+struct DepthMap {
+  Projection projection;
+  std::vector<float> depth;  // kMapSize^2, row by row; infinite where nothing is
+};
+
+Mat3 ViewTowards(const Vec3& to_viewer) {
+  Mat3 view;
+  view.row(2) = to_viewer.transpose();
+  view.row(0) = to_viewer.unitOrthogonal().transpose();
+  view.row(1) = view.row(2).cross(view.row(0));
+  return view;
+}
+
+DepthMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const Box3& box,
+               const Vec3& to_light) {
+  const double diameter = std::max(box.diagonal().norm(), 1e-9);
+  DepthMap map{
+      .projection = {.view_from_world = ViewTowards(to_light),
+                     .centre = box.center(),
+                     .samples_per_mm = (kMapSize - 4) / diameter,
+                     .width = kMapSize,
+                     .height = kMapSize},
+      .depth = std::vector<float>(kMapSize * kMapSize, std::numeric_limits<float>::infinity())};
+  std::vector<RasterPoint> points(flat.vertices.size());
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    if (casts[flat.object_of_vertex[v]]) {
+      points[v] = map.projection * flat.vertices[v].position;
+    }
+  }
+  for (const SceneTriangle& t : flat.triangles) {
+    if (casts[t.object]) {
+      VisitSamples(points[t.corners[0]], points[t.corners[1]], points[t.corners[2]], kWholeMap,
+                   [&](const Coverage& s) {
+                     float& depth = map.depth[s.y * kMapSize + s.x];
+                     depth = std::min(depth, s.depth);
+                   });
+    }
+  }
+  return map;
+}
+
+// How much of each colour passes `thickness_mm` of matter; half at scatter_mm, little far beyond.
+Rgb Passed(float thickness_mm, const Rgb& scatter_mm) {
+  const Rgb ratio = thickness_mm / scatter_mm;
+  return 1 / (1 + ratio * ratio);
+}
+
+// Between the four texels around the point: 1 in the open, towards 0 behind matter.
+Rgb LightThrough(const DepthMap& map, const Vec3& p, const Rgb& scatter_mm) {
+  const RasterPoint at = map.projection * p;
+  const float texel_mm = static_cast<float>(1 / map.projection.samples_per_mm);
+  const std::int32_t half = kSubsamples / 2;
+  const int x = (at.x - half) >> 8, y = (at.y - half) >> 8;
+  if (x < 0 || y < 0 || x + 1 >= kMapSize || y + 1 >= kMapSize) {
+    return Rgb::Ones();
+  }
+  const float fx = static_cast<float>((at.x - half) & 255) / kSubsamples;
+  const float fy = static_cast<float>((at.y - half) & 255) / kSubsamples;
+  Rgb sum = Rgb::Zero();
+  for (int k = 0; k < 4; ++k) {
+    const int dx = k & 1, dy = k >> 1;
+    const float weight = (dx != 0 ? fx : 1 - fx) * (dy != 0 ? fy : 1 - fy);
+    const float thickness = at.depth - map.depth[(y + dy) * kMapSize + x + dx] - texel_mm;
+    sum += thickness > 0 ? Rgb(weight * Passed(thickness, scatter_mm)) : Rgb::Constant(weight);
+  }
+  return sum;
+}
+
+void LightVertex(const Material& material, const std::vector<Light>& lights,
+                 const std::vector<DepthMap>& maps, SceneVertex& vertex) {
+  const Rgb scatter = material.scatter_mm.cast<float>().array();
+  const auto wrap = static_cast<float>(material.wrap);
+  float key_all = 0, key_seen = 0;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const auto cosine = static_cast<float>(vertex.normal.dot(lights[i].to_light));
+    const float wrapped = (cosine + wrap) / (1 + wrap);
+    if (wrapped <= 0) {
+      continue;
+    }
+    // From a little above the surface, so that it does not shade itself.
+    const Vec3 above = vertex.position + 1.5 / maps[i].projection.samples_per_mm * vertex.normal;
+    const Rgb through = LightThrough(maps[i], above, scatter);
+    vertex.light += wrapped * through * lights[i].irradiance;
+    key_all += lights[i].is_key ? 1.0F : 0.0F;
+    key_seen += lights[i].is_key ? through[1] : 0.0F;
+  }
+  vertex.key = key_all > 0 ? key_seen / key_all : 0;
+}
+
+}  // namespace
+
+std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world) {
+  std::vector<Light> lights = LightsInView(lighting);
+  Rgb facing = Rgb::Zero();
+  for (const Light& light : lights) {
+    facing += static_cast<float>(std::max(0.0, light.to_light.z())) * light.irradiance;
+  }
+  const float exposure = lighting == Lighting::kEven ? 1.0F : 0.86F;
+  for (Light& light : lights) {
+    light.irradiance *= exposure / facing;
+    light.to_light = view_from_world.transpose() * light.to_light;
+  }
+  return lights;
+}
+
+void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
+                   FlatScene& flat) {
+  std::vector<bool> casts;
+  for (const SceneObject& object : scene.objects) {
+    casts.push_back(object.opacity >= 1);
+  }
+  Box3 box;
+  for (std::size_t v = 0; v < flat.vertices.size(); ++v) {
+    if (casts[flat.object_of_vertex[v]]) {
+      box.extend(flat.vertices[v].position);
+    }
+  }
+  if (box.isEmpty()) {
+    box = Box3(Vec3::Zero(), Vec3::Zero());  // nothing casts shadows
+  }
+  std::vector<DepthMap> maps(lights.size());
+  ParallelFor(lights.size(), threads, 1,
+              [&](std::size_t i) { maps[i] = MapOf(flat, casts, box, lights[i].to_light); });
+  ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
+    LightVertex(scene.objects[flat.object_of_vertex[v]].material, lights, maps, flat.vertices[v]);
+  });
+}
+
+}  // namespace semblance

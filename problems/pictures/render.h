@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pictures of triangle meshes by a z-buffer in software: no window system, the same bytes for any
+// number of threads.
+#pragma once
+
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "problems/pictures/image.h"
+#include "surfaces/base/fields.h"
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+struct Material {
+  Colour colour = {0.8, 0.8, 0.8};    // of the vertices, unless they have their own
+  double wrap = 0;                    // 0..1: how far light creeps round the terminator
+  Vec3 scatter_mm = {0.6, 0.6, 0.6};  // red, green, blue: thickness that light half passes; > 0
+  double gloss = 0;                   // 0..1: strength of the highlight
+  int gloss_log2 = 5;                 // its sharpness: the cosine to the power 2^gloss_log2
+};
+
+Material SkinMaterial();
+Material BoneMaterial();
+Material PlasticMaterial(const Colour& colour);  // dowels, tools
+Material MatteMaterial();                        // for colours that stand for numbers
+
+struct SceneObject {
+  TriMesh mesh;
+  Material material;
+  std::vector<Colour> vertex_colours = {};  // one a vertex, or none: material.colour
+  // Seen face on; at a slant more, as through a thin sheet: 1 - (1 - opacity)^(1 / cos). Behind the
+  // nearest surface with opacity < 1 only opaque ones are seen.
+  double opacity = 1;
+};
+
+struct Scene {
+  std::vector<SceneObject> objects;
+};
+
+// Orthographic.
+struct Camera {
+  Mat3 view_from_world = Mat3::Identity();  // rows: right, up, towards the viewer
+  Vec3 centre = Vec3::Zero();               // at the middle of the picture, mm
+  double height_mm = kNaN;                  // from the picture's lower to its upper edge, > 0
+};
+
+enum class View { kFront, kThreeQuarter, kSide };
+constexpr auto EnumNames(View) {
+  return std::to_array<std::string_view>({"front", "three_quarter", "side"});
+}
+
+// The camera that frames `region` with a small margin in a picture of width / height `aspect`: the
+// box itself from front and side, and the ellipsoid in it, which is nearer to a head, from between.
+// front: from -y, the subject's left on the right of the picture; three_quarter: 40 degrees round
+// to the subject's left; side: from +x, the face looks to the left. +z is up in all. Throws
+// InputError for an empty region.
+Camera CameraFor(View view, const Box3& region, double aspect);
+
+// studio: key, fill and rim light with soft shadows. even: no highlights and little shadow; a
+// surface that faces the viewer has exactly its own colour.
+enum class Lighting { kStudio, kEven };
+constexpr auto EnumNames(Lighting) { return std::to_array<std::string_view>({"studio", "even"}); }
+
+struct RenderOptions {
+  int width = 800;        // pixels
+  int height = 800;       // pixels
+  int supersampling = 2;  // samples along each side of a pixel
+  Lighting lighting = Lighting::kStudio;
+  Colour background_top = {0.98, 0.985, 0.99};
+  Colour background_bottom = {0.89, 0.90, 0.915};
+};
+
+template <class Visitor>
+void Fields(Visitor& visit, RenderOptions& o) {
+  visit(FieldInfo{.name = "width", .min = 16, .max = 8192, .doc = "pixels"}, o.width);
+  visit(FieldInfo{.name = "height", .min = 16, .max = 8192, .doc = "pixels"}, o.height);
+  visit(FieldInfo{.name = "supersampling",
+                  .min = 1,
+                  .max = 8,
+                  .doc = "samples along each side of a pixel; more is smoother and slower"},
+        o.supersampling);
+  visit(FieldInfo{.name = "lighting", .doc = "studio, or even for colours that stand for numbers"},
+        o.lighting);
+  visit(FieldInfo{.name = "background_top", .doc = "sRGB; blends into background_bottom"},
+        o.background_top);
+  visit(FieldInfo{.name = "background_bottom", .doc = "sRGB"}, o.background_bottom);
+}
+
+// Throws InputError for options out of range, a camera without height, a point that is not finite,
+// a triangle that names a point which is not there, an opacity outside 0..1 or colours that are not
+// one a vertex. An empty scene shows the background. threads >= 1; the picture does not depend on
+// it.
+Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads);
+
+}  // namespace semblance

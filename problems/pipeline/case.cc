@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pipeline/case.h"
+
+#include <fmt/format.h>
+
+#include "problems/subject/network_file.h"
+#include "surfaces/mesh/mesh_check.h"
+#include "surfaces/mesh/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+void Append(std::vector<std::string>& notes, const std::vector<std::string>& more) {
+  notes.insert(notes.end(), more.begin(), more.end());
+}
+
+TriMesh ReadHeadMesh(const std::filesystem::path& path, const char* option, SubjectData& subject) {
+  if (path.empty()) {
+    throw InputError(fmt::format(
+        "subject.{}: no file is named; give the path of a mesh (PLY, OBJ, STL or OFF)", option));
+  }
+  TriMesh mesh = ReadMesh(path);
+  Append(subject.notes, CheckHeadMesh(mesh, path.filename().string()));
+  subject.inputs.push_back(path);
+  return mesh;
+}
+
+LandmarkFile ReadLandmarks(const std::filesystem::path& path, SubjectData& subject) {
+  if (path.empty()) {
+    throw InputError(
+        "subject.landmarks: no file is named; a skull needs landmarks (configs/landmarks/ shows "
+        "the form)");
+  }
+  subject.inputs.push_back(path);
+  return ReadLandmarkFile(path);
+}
+
+// Each Load fills subject.skull, skin, inputs and notes, and returns the landmarks.
+LandmarkFile Load(const PhantomOptions& options, SubjectData& subject, const RunContext&) {
+  Phantom phantom = MakePhantom(options);
+  subject.skull = std::move(phantom.skull);
+  subject.skin = std::move(phantom.face);
+  LandmarkFile file;
+  file.subject = fmt::format("phantom {}", options.random_seed);
+  for (const PhantomSite& site : phantom.sites) {
+    Landmark landmark;
+    landmark.site = site.site;
+    landmark.point = {site.base.x(), site.base.y(), site.base.z()};
+    landmark.normal = {site.normal.x(), site.normal.y(), site.normal.z()};
+    landmark.depth_along_normal_mm = site.depth_mm;
+    file.landmarks.push_back(landmark);
+  }
+  return file;
+}
+
+LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunContext&) {
+  LandmarkFile landmarks = ReadLandmarks(options.landmarks, subject);
+  subject.skull = ReadHeadMesh(options.skull, "skull", subject);
+  if (!options.skin.empty()) {
+    subject.skin = ReadHeadMesh(options.skin, "skin", subject);
+  }
+  return landmarks;
+}
+
+LandmarkFile Load(const CtSubject& options, SubjectData& subject, const RunContext& context) {
+  if (options.volume.empty()) {
+    throw InputError("subject.volume: no file is named; give the path of an InVesalius project");
+  }
+  LandmarkFile landmarks = ReadLandmarks(options.landmarks, subject);
+  subject.inputs.push_back(options.volume);
+  CtImport import = ImportCt(ReadInvesalius(options.volume), options.import, context);
+  subject.skull = std::move(import.skull);
+  subject.skin = std::move(import.skin);
+  Append(subject.notes, import.notes);
+  return landmarks;
+}
+
+// One line for all areas, by the sites that they lack.
+void NoteDroppedAreas(Case& subject) {
+  const DowelNetwork& network = subject.network;
+  if (!network.dropped.empty()) {
+    subject.notes.push_back(fmt::format(
+        "dowel network: {} of {} areas dropped, as there is no dowel at {}", network.dropped.size(),
+        network.dropped.size() + network.areas.size(), fmt::join(network.missing_sites, ", ")));
+  }
+}
+
+void CheckFilesNamed(const Experiment& experiment) {
+  if (experiment.network.empty()) {
+    throw InputError(
+        "network: no file is named; give the path of a dowel network (configs/networks/ has the "
+        "standard one)");
+  }
+}
+
+}  // namespace
+
+SubjectData LoadSubject(const Subject& subject, const RunContext& context) {
+  SubjectData data;
+  data.landmarks =
+      std::visit([&](const auto& options) { return Load(options, data, context); }, subject);
+  return data;
+}
+
+Case MakeCase(const SubjectData& data, const Experiment& experiment) {
+  CheckFilesNamed(experiment);
+  Case subject{.name = data.landmarks.subject,
+               .skull = data.skull,
+               .skin = data.skin,
+               .dowels = PlaceDowels(data.landmarks, data.skull, experiment.landmarks),
+               .network = {},
+               .notes = data.notes,
+               .inputs = data.inputs};
+  Append(subject.notes, FillDepths(experiment.tissue, data.landmarks, subject.dowels));
+  subject.network = BuildNetwork(ReadNetworkPlan(experiment.network), subject.dowels);
+  if (subject.network.areas.empty()) {
+    throw InputError(fmt::format(
+        "{}: no area of the dowel network has all its three dowels; more landmarks are needed",
+        subject.name));
+  }
+  NoteDroppedAreas(subject);
+  subject.inputs.push_back(experiment.network);
+  if (experiment.tissue.depths == DepthSource::kTable) {
+    subject.inputs.push_back(experiment.tissue.table);
+  }
+  if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
+    subject.inputs.push_back(map->file);
+    subject.inputs.push_back(map->mesh);
+    std::erase(subject.inputs, std::filesystem::path());
+  }
+  return subject;
+}
+
+}  // namespace semblance

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A subject made ready for reconstruction: DESIGN's Case{skull, dowels, network, truth?}.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "interp/dowels/dowel_network.h"
+#include "problems/pipeline/experiment.h"
+
+namespace semblance {
+
+// What was read or made of a subject, before any choice of depth or network.
+struct SubjectData {
+  TriMesh skull;                // mm, outward
+  std::optional<TriMesh> skin;  // the true skin, in the skull's frame, where it is known
+  LandmarkFile landmarks;
+  std::vector<std::string> notes;
+  std::vector<std::filesystem::path> inputs;  // files that were read
+};
+
+struct Case {
+  std::string name;
+  TriMesh skull;
+  std::optional<TriMesh> skin;
+  std::vector<Dowel> dowels;       // with depths
+  DowelNetwork network;            // of those dowels
+  std::vector<std::string> notes;  // what a reader of the result should know, a line each
+  std::vector<std::filesystem::path> inputs;  // for the manifest
+};
+
+// Reads or makes the subject and checks its meshes. Throws InputError, IoError or ConfigError with
+// one clear line for what cannot be used.
+SubjectData LoadSubject(const Subject& subject, const RunContext& context);
+
+// Places the dowels on the bone and gives them their depths and network. Throws as LoadSubject.
+Case MakeCase(const SubjectData& subject, const Experiment& experiment);
+
+}  // namespace semblance

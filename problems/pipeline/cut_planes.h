@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where a scan ends: beyond these planes nothing is known of a skull.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// The plane p[axis] = at_mm; the skull lies on the side where sign * (p[axis] - at_mm) < 0.
+struct CutPlane {
+  int axis = -1;
+  int sign = 0;  // 1 or -1
+  double at_mm = kNaN;
+
+  double Beyond_mm(const Vec3& p) const { return sign * (p[axis] - at_mm); }
+};
+
+// A side of the skull's bounding box is a cut plane if the open border of the mesh runs along it,
+// within 1 mm, for 100 mm or more in all.
+std::vector<CutPlane> FindCutPlanes(const TriMesh& skull);
+
+// In words, e.g. "z = 0.0 mm (lower end)".
+std::string InWords(const CutPlane& plane);
+
+// The triangles of a face that lie on the skull's side of all planes, at least margin_mm from each:
+// what a scan has to say about it.
+TriMesh WithinScan(const TriMesh& face, std::span<const CutPlane> planes, double margin_mm);
+
+}  // namespace semblance

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pipeline/depth_comparison.h"
+
+#include <cmath>
+
+#include "interp/evaluation/calibration.h"
+#include "surfaces/base/parallel.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+DepthErrors ErrorsAgainst(const TruthMap& truth, const FaceRegion& region, const DepthField& depth,
+                          const std::vector<double>& areas_mm2) {
+  DepthErrors errors;
+  errors.error_mm.assign(areas_mm2.size(), kNaN);
+  for (std::size_t v = 0; v < areas_mm2.size(); ++v) {
+    if (region.scored[v]) {
+      ++errors.vertices[truth.status[v]];
+      errors.error_mm[v] = depth.depth_mm[v] - truth.depth_mm[v];
+    }
+  }
+  errors.all = SummarizeDistances(errors.error_mm, areas_mm2, [](std::size_t) { return true; });
+  errors.regions = SummarizeParts(errors.error_mm, areas_mm2, region);
+  errors.coverage = Coverage(errors.error_mm, depth.sd_mm, areas_mm2);
+  errors.coverage_90 = CoverageAt90(errors.coverage);
+  return errors;
+}
+
+// From the depth's end to the closest skin, where the true depth along the direction is known.
+std::vector<double> TipErrors(const DepthStage& stage, const DepthComparison& comparison,
+                              const RunContext& context) {
+  const TriMesh& skin = *stage.subject.skin;
+  const MeshQuery query(skin);
+  std::vector<double> error(stage.shell.points.size(), kNaN);
+  ParallelFor(error.size(), context.threads, 256, [&](std::size_t v) {
+    const double signed_mm = comparison.along_direction.error_mm[v];
+    if (std::isfinite(signed_mm)) {
+      const Vec3 tip = stage.shell.points[v] + stage.depth.depth_mm[v] * comparison.directions[v];
+      error[v] = std::copysign(query.Closest(tip).distance_mm, signed_mm);
+    }
+  });
+  return error;
+}
+
+}  // namespace
+
+DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
+                              const RunContext& context) {
+  DepthComparison comparison;
+  comparison.region =
+      FindFaceRegion(stage.shell, stage.standing, stage.subject.network, experiment.region);
+  comparison.directions = DepthDirections(experiment.direction, stage.Input(), context);
+  comparison.truth = MeasureDepthTruth(stage.shell, comparison.directions, *stage.subject.skin,
+                                       experiment.depth_truth, context);
+  const std::vector<double> areas = VertexAreas(stage.shell);
+  comparison.along_direction =
+      ErrorsAgainst(comparison.truth.along_direction, comparison.region, stage.depth, areas);
+  comparison.closest =
+      ErrorsAgainst(comparison.truth.closest, comparison.region, stage.depth, areas);
+  comparison.tips = SummarizeDistances(TipErrors(stage, comparison, context), areas,
+                                       [](std::size_t) { return true; });
+  return comparison;
+}
+
+}  // namespace semblance

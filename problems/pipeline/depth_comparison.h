@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How far an interpolated depth is from the true one, where the true skin is known.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "interp/evaluation/depth_truth.h"
+#include "problems/metrics/face_metrics.h"
+#include "problems/pipeline/skull_stage.h"
+
+namespace semblance {
+
+// Against one convention's truth. Positive: the interpolated depth is too great.
+struct DepthErrors {
+  DistanceSummary all;
+  std::map<std::string, DistanceSummary> regions;  // by part of the face
+  std::vector<double> error_mm;         // one a vertex of the shell; NaN where not scored
+  std::map<TruthStatus, int> vertices;  // of the scored region, by what the truth says
+  std::vector<double> coverage;         // of the area with a stated sd_mm (interp/calibration.h)
+  double coverage_90 = kNaN;            // its share at 90 %
+};
+
+struct DepthComparison {
+  FaceRegion region;             // of the shell's vertices: those in front of the dowel network
+  std::vector<Vec3> directions;  // of the depths (Experiment::direction)
+  DepthTruth truth;
+  DepthErrors along_direction, closest;
+  DistanceSummary tips;  // from p + depth * direction to the closest skin, signed as the above
+};
+
+// Over the vertices of the region where the depth is finite, also where the outside rule gave it,
+// and the truth is valid. The subject must have a skin. Throws InputError as FindFaceRegion and
+// DepthDirections; Cancelled if stopped.
+DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
+                              const RunContext& context);
+
+}  // namespace semblance

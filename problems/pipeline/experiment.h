@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One experiment: every choice that leads from a skull to a face, as one struct. What its YAML file
+// says, and nothing else, decides the result.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "fitting/fit.h"
+#include "fitting/problem/placement.h"
+#include "fitting/problem/seeding.h"
+#include "interp/depth_scheme.h"
+#include "interp/evaluation/depth_direction.h"
+#include "interp/evaluation/depth_truth.h"
+#include "interp/schemes/outside_rule.h"
+#include "problems/config/config_errors.h"
+#include "problems/ct/import_ct.h"
+#include "problems/face_template/template_face.h"
+#include "problems/metrics/face_region.h"
+#include "problems/pipeline/uncertainty_options.h"
+#include "problems/subject/dowel_depths.h"
+#include "problems/subject/landmarks.h"
+#include "problems/subject/phantom.h"
+#include "surfaces/implicit_face.h"
+#include "surfaces/mesh/skull_fill.h"
+
+namespace semblance {
+
+// A subject in files of meshes.
+struct FileSubject {
+  static constexpr std::string_view kName = "files";
+  std::filesystem::path skull;
+  std::filesystem::path skin;
+  std::filesystem::path landmarks;
+};
+template <class Visitor>
+void Fields(Visitor& visit, FileSubject& o) {
+  visit(FieldInfo{.name = "skull", .doc = "mesh of the skull: PLY, OBJ, STL or OFF; mm, LPS"},
+        o.skull);
+  visit(FieldInfo{.name = "skin",
+                  .doc = "mesh of the true skin in the skull's frame; empty where it is not known"},
+        o.skin);
+  visit(FieldInfo{.name = "landmarks", .doc = "YAML file of the landmarks on the skull"},
+        o.landmarks);
+}
+
+// A subject in a CT volume: skull and true skin are taken from it.
+struct CtSubject {
+  static constexpr std::string_view kName = "ct";
+  std::filesystem::path volume;
+  std::filesystem::path landmarks;
+  CtImportOptions import;
+};
+template <class Visitor>
+void Fields(Visitor& visit, CtSubject& o) {
+  visit(FieldInfo{.name = "volume", .doc = "InVesalius project (.inv3) of a head CT"}, o.volume);
+  visit(FieldInfo{.name = "landmarks", .doc = "YAML file of the landmarks on the skull"},
+        o.landmarks);
+  visit(FieldInfo{.name = "import", .doc = "how skull and skin are taken from the volume"},
+        o.import);
+}
+
+// How dowels are left out to see how well the others foretell them (`semblance depth`, and studies
+// with `job: depth`): a landmark of both sides, a side, and one of `folds` random parts at a time.
+struct CrossValidationOptions {
+  int folds = 5;
+  std::uint64_t random_seed = 1;
+};
+template <class Visitor>
+void Fields(Visitor& visit, CrossValidationOptions& o) {
+  visit(FieldInfo{.name = "folds",
+                  .min = 2,
+                  .max = 1000,
+                  .doc = "random parts of the dowels, each left out in turn; at most one a dowel"},
+        o.folds);
+  visit(FieldInfo{.name = "random_seed", .doc = "which dowels are left out together"},
+        o.random_seed);
+}
+
+using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
+
+struct Experiment {
+  std::string title = "untitled";
+  Subject subject;
+  PlaceOptions landmarks;
+  TissueOptions tissue;
+  std::filesystem::path network;
+  DepthScheme interp;
+  OutsideRule outside;
+  SkullFill fill;
+  ImplicitFaceOptions implicit;
+  TemplateOptions face_template;
+  PlacementOptions placement;
+  std::vector<LevelFit> first_fit = {{.level = 0, .fraction = 1}};
+  SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
+  double cut_margin_mm = 5;
+  int rounds = 1;
+  FitOptions fit = {.relaxation = {.mode = RelaxationMode::kFootpoint}};
+  UncertaintyOptions uncertainty;
+  FaceRegionOptions region;
+  DepthDirection direction;
+  DepthTruthOptions depth_truth;
+  CrossValidationOptions cross_validation;
+};
+template <class Visitor>
+void Fields(Visitor& visit, Experiment& o) {
+  visit(FieldInfo{.name = "title", .doc = "what the report is headed with"}, o.title);
+  visit(FieldInfo{.name = "subject", .doc = "whose skull, and the true face where it is known"},
+        o.subject);
+  visit(FieldInfo{.name = "landmarks", .doc = "how landmarks are laid onto bone"}, o.landmarks);
+  visit(FieldInfo{.name = "tissue", .doc = "where the dowels' depths come from"}, o.tissue);
+  visit(FieldInfo{.name = "network", .doc = "YAML file of the dowel network"}, o.network);
+  visit(FieldInfo{.name = "interp", .doc = "how depth is interpolated between the dowels"},
+        o.interp);
+  visit(FieldInfo{.name = "outside",
+                  .doc = "what bone outside the network, or turned away from it, gets"},
+        o.outside);
+  visit(FieldInfo{.name = "fill", .doc = "how temples, orbits and gaps are bridged"}, o.fill);
+  visit(FieldInfo{.name = "implicit", .doc = "the implicit surface and its polygons"}, o.implicit);
+  visit(FieldInfo{.name = "template", .doc = "the generic face"}, o.face_template);
+  visit(FieldInfo{.name = "placement", .doc = "how the generic face is brought to the dowels"},
+        o.placement);
+  visit(FieldInfo{.name = "first_fit",
+                  .doc = "levels fitted to the dowels alone before seeds are taken; may be empty"},
+        o.first_fit);
+  visit(FieldInfo{.name = "seeds", .doc = "extra dowels on the implicit face"}, o.seeds);
+  visit(FieldInfo{.name = "cut_margin_mm",
+                  .unit = "mm",
+                  .min = -50,
+                  .max = 100,
+                  .doc = "no seeds nearer than this to a plane where the scan ends; beyond it the "
+                         "face follows the template"},
+        o.cut_margin_mm);
+  visit(FieldInfo{.name = "rounds",
+                  .min = 1,
+                  .max = 20,
+                  .doc = "how often seeds are taken anew and the schedule is run"},
+        o.rounds);
+  visit(FieldInfo{.name = "fit", .doc = "the level-by-level fit"}, o.fit);
+  visit(FieldInfo{.name = "uncertainty", .doc = "how far the face may be off, and by what"},
+        o.uncertainty);
+  visit(FieldInfo{.name = "region", .doc = "which part of the true skin is scored"}, o.region);
+  visit(FieldInfo{.name = "direction",
+                  .doc = "along which a depth is taken where it is compared with the true one, and "
+                         "where its end is: p + depth * direction"},
+        o.direction);
+  visit(FieldInfo{.name = "depth_truth", .doc = "what counts as a true depth"}, o.depth_truth);
+  visit(FieldInfo{.name = "cross_validation",
+                  .doc = "how dowels are left out, in `semblance depth` and studies of depth"},
+        o.cross_validation);
+}
+
+// Options that are right each by itself but not together, e.g. a step of the schedule at a level
+// that the generic face does not have. Told with the other faults when a configuration is read.
+std::vector<OptionFault> FaultsBetween(const Experiment& experiment);
+
+}  // namespace semblance

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pipeline/skull_stage.h"
+
+#include "problems/pipeline/cut_planes.h"
+#include "problems/pipeline/implicit_cache.h"
+#include "problems/pipeline/shell_dowels.h"
+#include "problems/pipeline/stage_key.h"
+
+namespace semblance {
+namespace {
+
+DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
+                const RunContext& context) {
+  constexpr double kLeastDepth_mm = 1;
+  const auto data = step("load subject", [&] {
+    return cache.Get<SubjectData>(StageKey("subject", e.subject),
+                                  [&] { return LoadSubject(e.subject, context); });
+  });
+  Case subject = MakeCase(*data, e);
+  const auto shell = step("fill skull", [&] {
+    return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
+                              [&] { return FillSkull(data->skull, e.fill, context); });
+  });
+  const auto* const wrap = std::get_if<WrapFill>(&e.fill);
+  TriMesh pressed = wrap ? PressedIn(*shell, subject.dowels, data->skull, wrap->press_mm) : *shell;
+  ShellDowels standing = StandOnShell(subject.dowels, pressed, kLeastDepth_mm);
+  subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
+  std::vector<Vec3> normals = VertexNormals(pressed);
+  DepthStage stage{
+      std::move(subject), std::move(pressed), std::move(normals), std::move(standing.dowels), {}};
+  stage.depth = step("interpolate depth", [&] {
+    return ApplyOutsideRule(e.outside, stage.Input(),
+                            InterpolateDepth(e.interp, stage.Input(), context), context);
+  });
+  return stage;
+}
+
+}  // namespace
+
+std::shared_ptr<const DepthStage> MakeDepthStage(const Experiment& e, StageCache& cache,
+                                                 StepClock& step, const RunContext& context) {
+  return cache.Get<DepthStage>(StageKey("depth stage", e.subject, e.landmarks, e.tissue, e.network,
+                                        e.interp, e.outside, e.fill),
+                               [&] { return Make(e, cache, step, context); });
+}
+
+namespace {
+
+// The shell's depths, none on the lid that closes it where the scan was cut off: for a face that is
+// to end there.
+std::vector<double> DepthsToTheEnds(const DepthStage& stage) {
+  constexpr double kLid_mm = 1;
+  std::vector<double> depth_mm = stage.depth.depth_mm;
+  for (const CutPlane& plane : FindCutPlanes(stage.subject.skull)) {
+    for (std::size_t v = 0; v < depth_mm.size(); ++v) {
+      depth_mm[v] = plane.Beyond_mm(stage.shell.points[v]) > -kLid_mm ? kNaN : depth_mm[v];
+    }
+  }
+  return depth_mm;
+}
+
+}  // namespace
+
+std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache& cache,
+                                                 StepClock& step, const RunContext& context) {
+  return cache.Get<SkullStage>(StageKey("skull stage", e.subject, e.landmarks, e.tissue, e.network,
+                                        e.interp, e.outside, e.fill, e.implicit),
+                               [&] {
+                                 auto depth = MakeDepthStage(e, cache, step, context);
+                                 ImplicitFace implicit = step("implicit face", [&] {
+                                   return CachedImplicitFace(depth->shell,
+                                                             e.implicit.ends == FaceEnds::kOpen
+                                                                 ? DepthsToTheEnds(*depth)
+                                                                 : depth->depth.depth_mm,
+                                                             e.implicit, cache.disk(), context);
+                                 });
+                                 return SkullStage{std::move(depth), std::move(implicit)};
+                               });
+}
+
+}  // namespace semblance

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The first half of the main job: from a subject to its depth, and on to its implicit face. It
+// knows nothing of the generic face, so experiments that differ in the fit alone share it.
+#pragma once
+
+#include <memory>
+
+#include "problems/pipeline/case.h"
+#include "problems/pipeline/stage_cache.h"
+#include "problems/pipeline/step_clock.h"
+
+namespace semblance {
+
+struct DepthStage {
+  Case subject;
+  TriMesh shell;              // the outer shell of the skull, temples and gaps bridged: what emits
+  std::vector<Vec3> normals;  // of the shell's vertices
+  std::vector<Dowel> standing;  // the subject's dowels as they stand on the shell
+  DepthField depth;             // of the shell's vertices, after the outside rule
+
+  DepthInput Input() const { return {shell, normals, standing, subject.network}; }
+};
+
+// Loads the case, fills the skull, interpolates depth: each taken from `cache` if it was made from
+// the same options before. Throws as LoadSubject, and Cancelled.
+std::shared_ptr<const DepthStage> MakeDepthStage(const Experiment& experiment, StageCache& cache,
+                                                 StepClock& step, const RunContext& context);
+
+struct SkullStage {
+  std::shared_ptr<const DepthStage> depth_stage;
+  ImplicitFace implicit;
+};
+
+// The same with the implicit face.
+std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& experiment, StageCache& cache,
+                                                 StepClock& step, const RunContext& context);
+
+}  // namespace semblance

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pipeline/uncertainty.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/problem/seeding.h"
+#include "fitting/uncertainty/error_spread.h"
+#include "interp/evaluation/calibration.h"
+#include "interp/schemes/kriging_process.h"
+#include "surfaces/base/parallel.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+// Where on the skull a point of the fit has its depth from, and how uncertain the dowels make it.
+struct DepthPlace {
+  Vec3 base = Vec3::Constant(kNaN);
+  double dowels_sd_mm = 0;
+  double depth_mm = kNaN;
+};
+
+std::vector<Dowel> WithSd(std::vector<Dowel> dowels, double sd_mm) {
+  for (Dowel& dowel : dowels) {
+    dowel.sd_mm = std::isfinite(dowel.sd_mm) ? dowel.sd_mm : sd_mm;
+  }
+  return dowels;
+}
+
+// The dowels' own, by inverse squared distance.
+double SdNear(std::span<const Dowel> dowels, const Vec3& p) {
+  double sum = 0, weights = 0;
+  for (const Dowel& dowel : dowels) {
+    const double weight = 1 / std::max((dowel.base - p).squaredNorm(), 1e-6);
+    sum += weight * dowel.sd_mm;
+    weights += weight;
+  }
+  return sum / weights;
+}
+
+// The corner of the shell that is nearest to a point on it.
+std::int32_t NearestCorner(const TriMesh& shell, const MeshPoint& at) {
+  const Triangle& t = shell.triangles[at.triangle];
+  return *std::min_element(t.begin(), t.end(), [&](std::int32_t a, std::int32_t b) {
+    return (shell.points[a] - at.position).squaredNorm() <
+           (shell.points[b] - at.position).squaredNorm();
+  });
+}
+
+std::vector<DepthPlace> PlacesOf(const FitTarget& target, const DepthStage& stage,
+                                 std::span<const Dowel> dowels, const RunContext& context) {
+  const MeshQuery shell(stage.shell);
+  std::vector<DepthPlace> places(target.points.size());
+  ParallelFor(places.size(), context.threads, 64, [&](std::size_t k) {
+    const FitPoint& point = target.points[k];
+    const auto dowel = std::find_if(dowels.begin(), dowels.end(),
+                                    [&](const Dowel& d) { return d.site == point.label; });
+    if (dowel != dowels.end()) {
+      places[k] = {dowel->base, dowel->sd_mm, dowel->depth_mm};
+      return;
+    }
+    const MeshPoint at = shell.Closest(point.position);
+    const std::int32_t corner = NearestCorner(stage.shell, at);
+    const double stated = stage.depth.sd_mm[corner];
+    places[k] = {at.position, std::isfinite(stated) ? stated : SdNear(dowels, at.position),
+                 stage.depth.depth_mm[corner]};
+  });
+  return places;
+}
+
+// Adds sd_i sd_j times the correlation of the places, Matern 3/2 as kriging's default.
+void AddSmoothErrors(std::span<const DepthPlace> places, const std::vector<double>& sd_mm,
+                     double length_mm, Eigen::MatrixXd& covariance) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t j = 0; j < places.size(); ++j) {
+      const double between_mm = (places[i].base - places[j].base).norm();
+      covariance(i, j) +=
+          sd_mm[i] * sd_mm[j] * CorrelationAt(Covariance::kMatern32, between_mm, length_mm).value;
+    }
+  }
+}
+
+// What the scheme's depths are off from the likeliest ones: known, but taken as one deviation.
+void AddKnownError(std::span<const DepthPlace> places, const Eigen::VectorXd& likeliest_mm,
+                   Eigen::MatrixXd& covariance) {
+  Eigen::VectorXd off(likeliest_mm.size());
+  for (Eigen::Index k = 0; k < off.size(); ++k) {
+    const double depth_mm = places[k].depth_mm;
+    off[k] = std::isfinite(depth_mm) ? depth_mm - likeliest_mm[k] : 0;
+  }
+  covariance += off * off.transpose();
+}
+
+// Of the points' depths, mm^2; what kriging found goes into the result.
+Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& input,
+                            std::span<const DepthPlace> places, FaceUncertainty& result,
+                            const RunContext& context) {
+  const auto* const own = std::get_if<Kriging>(&experiment.interp);
+  Kriging kriging = own == nullptr ? Kriging{.nugget_share = 0} : *own;
+  const KrigingModel model = FitKriging(kriging, input, context);
+  kriging.length_mm = result.depth_length_mm = model.length_mm;
+  kriging.signal_mm = result.depth_signal_mm = model.signal_mm;
+  std::vector<Vec3> bases;
+  std::vector<double> sd_mm;
+  for (const DepthPlace& place : places) {
+    bases.push_back(place.base);
+    sd_mm.push_back(own == nullptr ? place.dowels_sd_mm : 0);
+  }
+  DepthPosterior posterior = KrigingPosterior(kriging, input, bases, context);
+  AddSmoothErrors(places, sd_mm, model.length_mm, posterior.covariance);
+  if (own == nullptr) {
+    AddKnownError(places, posterior.mean_mm, posterior.covariance);
+  }
+  return std::move(posterior.covariance);
+}
+
+PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
+                     const HSplineSurface& surface, const FitTarget& target,
+                     FaceUncertainty& result, const RunContext& context) {
+  const std::vector<Dowel> dowels = WithSd(stage.standing, experiment.uncertainty.dowel_sd_mm);
+  const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network};
+  const std::vector<DepthPlace> places = PlacesOf(target, stage, dowels, context);
+  Eigen::MatrixXd covariance = DepthErrors(experiment, input, places, result, context);
+  PointErrors errors;
+  std::vector<double> laid_mm;  // seeds alone
+  for (const FitPoint& point : target.points) {
+    const auto dowel = std::find_if(dowels.begin(), dowels.end(),
+                                    [&](const Dowel& d) { return d.site == point.label; });
+    errors.directions.push_back(dowel != dowels.end() ? dowel->direction
+                                                      : surface.Normal(point.uv));
+    laid_mm.push_back(IsSeeded(point) ? experiment.uncertainty.implicit_sd_mm : 0);
+  }
+  AddSmoothErrors(places, laid_mm, result.depth_length_mm, covariance);
+  errors.root = PivotedRoot(std::move(covariance));
+  return errors;
+}
+
+int FinestLevel(const FitResult& fit) {
+  int finest = 0;
+  for (const LevelSummary& level : fit.levels) {
+    finest = std::max(finest, level.level);
+  }
+  return finest;
+}
+
+FitTarget AsLeft(FitTarget target, const FitResult& fit) {
+  for (std::size_t k = 0; k < target.points.size(); ++k) {
+    target.points[k].uv = fit.uv[k];
+  }
+  return target;
+}
+
+double AreaQuantile(const std::vector<double>& values, const std::vector<double>& areas,
+                    double share) {
+  std::vector<std::pair<double, double>> sorted;
+  double all = 0, below = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (std::isfinite(values[k])) {
+      sorted.emplace_back(values[k], areas[k]);
+      all += areas[k];
+    }
+  }
+  std::sort(sorted.begin(), sorted.end());
+  for (const auto& [value, area] : sorted) {
+    below += area;
+    if (below >= share * all) {
+      return value;
+    }
+  }
+  return kNaN;
+}
+
+// Sigma where a point of the fit lies in the same patch of its finest level, else NaN.
+std::vector<double> WhereHeld(const std::vector<double>& sigma_mm, const std::vector<Vec2>& uv,
+                              const FitTarget& target, const HSplineShape& shape, int level) {
+  const int across = shape.PatchesU(level), up = shape.PatchesV(level);
+  const auto patch = [&](const Vec2& at) {
+    const auto cell = [](double x, int n) { return std::clamp(static_cast<int>(x * n), 0, n - 1); };
+    return cell(at.x(), across) + across * cell(at.y(), up);
+  };
+  std::vector<char> held(static_cast<std::size_t>(across) * up, 0);
+  for (const FitPoint& point : target.points) {
+    held[patch(point.uv)] = 1;
+  }
+  std::vector<double> values;
+  for (std::size_t v = 0; v < uv.size(); ++v) {
+    values.push_back(held[patch(uv[v])] != 0 ? sigma_mm[v] : kNaN);
+  }
+  return values;
+}
+
+}  // namespace
+
+FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& stage,
+                                const FittedFace& fitted, const RunContext& context) {
+  const UncertaintyOptions& options = experiment.uncertainty;
+  const HSplineSurface& surface = fitted.fit.surface;
+  const FitTarget target = AsLeft(fitted.target, fitted.fit);
+  const int level = FinestLevel(fitted.fit);
+  FaceUncertainty result;
+  const ErrorSpread spread(surface, fitted.rest, target, level, experiment.fit.terms,
+                           ErrorsOf(experiment, stage, surface, target, result, context));
+  for (const std::string_view name : spread.left_out()) {
+    result.left_out.emplace_back(name);
+  }
+  result.prior_sd = spread.prior_sd();
+  context.ThrowIfStopped();
+  if (options.sigma) {
+    result.sigma_mm = spread.Sigma(fitted.face.uv, fitted.face.normals);
+    const std::vector<double> held =
+        WhereHeld(result.sigma_mm, fitted.face.uv, target, surface.shape(), level);
+    const std::vector<double> areas = VertexAreas(fitted.face.mesh);
+    result.median_mm = AreaQuantile(held, areas, 0.5);
+    result.p95_mm = AreaQuantile(held, areas, 0.95);
+  }
+  result.samples = spread.Samples(options.samples, options.random_seed);
+  return result;
+}
+
+SigmaCoverage MeasureCoverage(const TriMesh& skin, std::span<const double> signed_mm,
+                              const TriMesh& face, std::span<const double> sigma_mm,
+                              std::span<const Sphere> masks, const RunContext& context) {
+  const MeshQuery query(face);
+  std::vector<double> sigma(skin.points.size(), kNaN);
+  ParallelFor(sigma.size(), context.threads, 256, [&](std::size_t v) {
+    if (!std::isfinite(signed_mm[v])) {
+      return;
+    }
+    const MeshPoint at = query.Closest(skin.points[v]);
+    const auto masked = [&](const Sphere& mask) { return mask.Contains(at.position); };
+    if (std::none_of(masks.begin(), masks.end(), masked)) {
+      sigma[v] = sigma_mm[NearestCorner(face, at)];
+    }
+  });
+  const std::vector<double> areas = VertexAreas(skin);
+  SigmaCoverage coverage{.curve = Coverage(signed_mm, sigma, areas), .area_cm2 = 0};
+  coverage.at_90 = CoverageAt90(coverage.curve);
+  for (std::size_t v = 0; v < sigma.size(); ++v) {
+    coverage.area_cm2 += std::isfinite(sigma[v]) ? areas[v] / 100 : 0;
+  }
+  return coverage;
+}
+
+}  // namespace semblance

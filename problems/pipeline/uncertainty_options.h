@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a run says of how far its face may be off.
+#pragma once
+
+#include <cstdint>
+
+#include "surfaces/base/fields.h"
+
+namespace semblance {
+
+struct UncertaintyOptions {
+  bool sigma = true;
+  int samples = 0;
+  std::uint64_t random_seed = 1;
+  double dowel_sd_mm = 0;
+  double implicit_sd_mm = 0.5;
+};
+template <class Visitor>
+void Fields(Visitor& visit, UncertaintyOptions& o) {
+  visit(FieldInfo{.name = "sigma",
+                  .doc = "give each vertex of face.ply the standard deviation of its place along "
+                         "the normal, sigma_mm"},
+        o.sigma);
+  visit(FieldInfo{.name = "samples",
+                  .min = 0,
+                  .max = 1000,
+                  .doc = "faces drawn from the same distribution, sample_0.ply and on"},
+        o.samples);
+  visit(FieldInfo{.name = "random_seed", .doc = "which faces are drawn"}, o.random_seed);
+  visit(FieldInfo{.name = "dowel_sd_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 50,
+                  .doc = "standard deviation of the depth of dowels whose source states none, such "
+                         "as measured ones; 0: they are exact"},
+        o.dowel_sd_mm);
+  visit(FieldInfo{.name = "implicit_sd_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 50,
+                  .doc = "how far the implicit face, and so a seed, is off even where all depths "
+                         "are right"},
+        o.implicit_sd_mm);
+}
+
+}  // namespace semblance

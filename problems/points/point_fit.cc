@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/points/point_fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "problems/config/config.h"
+#include "problems/output/manifest.h"
+#include "problems/report/fit_json.h"
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/mesh/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+int FinestLevel(const FitOptions& fit) {
+  if (const auto* const plan = std::get_if<AdaptivePlan>(&fit.plan)) {
+    return plan->finest;
+  }
+  if (const auto* const plan = std::get_if<CoarseToFinePlan>(&fit.plan)) {
+    return plan->finest;
+  }
+  int finest = 0;
+  for (const LevelFit& step : fit.schedule) {
+    finest = std::max(finest, step.level);
+  }
+  return finest;
+}
+
+HSplineShape ShapeOf(const PointFitOptions& options) {
+  return {.patches_u = options.patches_u,
+          .patches_v = options.patches_v,
+          .max_level = FinestLevel(options.fit),
+          .closure = options.closure};
+}
+
+void CheckClosure(const std::string& kind, Closure closure) {
+  if (kind == "cylinder" && closure == Closure::kOpen) {
+    throw InputError("closure: parameters on a cylinder go round; write closure: periodic_u");
+  }
+  if (kind == "plane" && closure == Closure::kPeriodicU) {
+    throw InputError("closure: parameters on a plane do not go round; write closure: open");
+  }
+}
+
+FitTarget TargetOf(const PointTable& table, const std::vector<Vec2>& uv) {
+  FitTarget target;
+  target.points.reserve(uv.size());
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    target.points.push_back({.label = {},
+                             .position = table.positions[k],
+                             .uv = uv[k],
+                             .weight = table.weights.empty() ? 1 : table.weights[k]});
+  }
+  return target;
+}
+
+double Quantile(std::vector<double> values, double part) {
+  const auto at = static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+Json VerticesJson(const HSplineSurface& surface) {
+  const int coarsest = surface.Columns(0) * surface.Rows(0);
+  Json json = {{"total", coarsest + surface.Offsets().size()},
+               {"by_level", Json::array({coarsest})}};
+  for (int level = 1; level <= surface.shape().max_level; ++level) {
+    json["by_level"].push_back(surface.Offsets(level).size());
+  }
+  return json;
+}
+
+Json ResultJsonOf(const PointFitOptions& options, const std::filesystem::path& points,
+                  const PointFit& result) {
+  const std::vector<double>& residual = result.fit.residual_mm;
+  Json json = {{"title", options.title},
+               {"version", SEMBLANCE_VERSION},
+               {"points_file", points.filename().string()},
+               {"points_sha256", Sha256OfFile(points)},
+               {"points", residual.size()},
+               {"parameters", result.parameters},
+               {"rms_mm", result.fit.point_rms_mm},
+               {"median_mm", Quantile(residual, 0.5)},
+               {"p95_mm", Quantile(residual, 0.95)},
+               {"max_mm", Quantile(residual, 1)},
+               {"control_vertices", VerticesJson(result.fit.surface)},
+               {"usable", result.fit.usable}};
+  json.update(StepsToJson(result.fit));
+  return json;
+}
+
+std::string ResidualsCsv(const FitResult& fit) {
+  fmt::memory_buffer csv;
+  fmt::format_to(std::back_inserter(csv), "point,u,v,residual_mm\n");
+  for (std::size_t k = 0; k < fit.uv.size(); ++k) {
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{}\n", k, fit.uv[k].x(), fit.uv[k].y(),
+                   fit.residual_mm[k]);
+  }
+  return fmt::to_string(csv);
+}
+
+std::string SurfacePly(const HSplineSurface& surface, double chord_mm, int threads) {
+  Tessellation tessellation = TessellateToChord(surface, chord_mm, threads);
+  return EncodeMesh(tessellation.mesh, ".ply", {std::move(tessellation.normals), {}, {}});
+}
+
+}  // namespace
+
+PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
+                   const RunContext& context) {
+  const HSplineShape shape = ShapeOf(options);
+  StepClock step(context);
+  const Parametrisation parameters =
+      step("parameters", [&] { return Parametrise(table, options.parameters); });
+  CheckClosure(parameters.kind, options.closure);
+  const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
+  PointFit result{.parameters = parameters.kind,
+                  .fit = step("fit",
+                              [&] {
+                                const FitTarget target = TargetOf(table, parameters.uv);
+                                return Fit(start, target, {}, options.fit, context);
+                              }),
+                  .times = {}};
+  result.times = step.Take();
+  return result;
+}
+
+void WritePointFit(const PointFitOptions& options, const std::filesystem::path& points,
+                   const PointFit& result, OutputFolder& folder, const RunContext& context) {
+  context.Report("write", folder.Root().string());
+  folder.Write("resolved.yaml", WriteConfig(options));
+  folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
+  folder.Write("surface.ply", SurfacePly(result.fit.surface, options.chord_mm, context.threads));
+  folder.Write("residuals.csv", ResidualsCsv(result.fit));
+  Json timing = {{"steps", Json::array()}};
+  for (const StepTime& time : result.times) {
+    timing["steps"].push_back({{"step", time.step}, {"wall_s", time.wall_s}});
+  }
+  folder.Write("timing.json", timing.dump(2) + "\n");
+  folder.Write("result.json", ResultJsonOf(options, points, result).dump(2) + "\n");
+}
+
+}  // namespace semblance

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Scattered points in a CSV file.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "surfaces/base/geometry.h"
+
+namespace semblance {
+
+struct PointTable {
+  std::vector<Vec3> positions;  // mm
+  std::vector<Vec2> uv;         // one a point, or none
+  std::vector<double> weights;  // > 0; one a point, or none
+};
+
+// The first line names the columns, in any order: x, y and z, and, if wanted, u and v together and
+// weight. Each further line has one decimal number a column, separated by commas. Nothing else is
+// let pass: `name:line: what` as IoError for another column or one twice, a line with more or fewer
+// entries, an empty line before the end, what is not a finite number, a weight that is not
+// positive, or no point at all.
+PointTable ParsePointTable(std::string_view text, std::string_view name);
+PointTable ReadPointTable(const std::filesystem::path& file);
+
+}  // namespace semblance

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/program/face_commands.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/config/config.h"
+#include "problems/program/edit_script.h"
+#include "problems/program/exit_code.h"
+#include "problems/program/face_export.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/whole_file.h"
+#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline_files/hspline_io.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the user typed; each command reads its part.
+struct FaceArguments {
+  std::string face, script, inverse, out, name, library;
+  std::vector<std::string> features;
+  std::vector<double> weights;
+  std::optional<double> chord_mm;
+  std::array<double, 2> u = {0, 1}, v = {0, 1};
+  std::array<int, 2> levels = {1, 8};
+  int threads = 1;
+  bool force = false;
+};
+
+void RefuseToReplace(const fs::path& path, const FaceArguments& a) {
+  if (!a.force && fs::exists(path)) {
+    throw IoError(fmt::format("{}: it exists; name another file, or add --force to replace it",
+                              path.string()));
+  }
+}
+
+int Edit(const FaceArguments& a) {
+  RefuseToReplace(a.out, a);
+  HSplineSurface face = ReadHSpline(a.face);
+  const EditScript inverse = ApplyEdits(ReadEditScript(a.script), face);
+  if (!a.inverse.empty()) {
+    RefuseToReplace(a.inverse, a);
+    WriteFileAtomically(a.inverse, WriteConfig(inverse));
+  }
+  WriteHSpline(a.out, face);
+  fmt::print("{}: {} vertices changed\n", a.out, inverse.edits.size());
+  return kDone;
+}
+
+int Export(const FaceArguments& a) {
+  RefuseToReplace(a.out, a);
+  const std::string bytes =
+      EncodeFace(ReadHSpline(a.face), fs::path(a.out).extension().string(), a.chord_mm, a.threads);
+  WriteFileAtomically(a.out, bytes);
+  fmt::print("{}: {} bytes\n", a.out, bytes.size());
+  return kDone;
+}
+
+int Store(const Feature& feature, const FaceArguments& a) {
+  RefuseToReplace(fs::path(a.library) / fmt::format("{}.json", feature.name), a);
+  const fs::path path = StoreFeature(a.library, feature);
+  fmt::print("{}: {} vertices\n", path.string(), feature.offsets.size());
+  return kDone;
+}
+
+int ExtractCommand(const FaceArguments& a) {
+  const FeatureRegion region{a.u[0], a.u[1], a.v[0], a.v[1], a.levels[0], a.levels[1]};
+  const Feature feature = ExtractFeature(ReadHSpline(a.face), a.name, region);
+  if (feature.offsets.empty()) {
+    throw InputError(fmt::format(
+        "{}: no vertex of levels {} to {} with u in {}..{} and v in {}..{} has detail; widen them",
+        a.face, a.levels[0], a.levels[1], a.u[0], a.u[1], a.v[0], a.v[1]));
+  }
+  return Store(feature, a);
+}
+
+int ApplyCommand(const FaceArguments& a) {
+  RefuseToReplace(a.out, a);
+  HSplineSurface face = ReadHSpline(a.face);
+  std::size_t vertices = 0;
+  for (const std::string& path : a.features) {
+    const Feature feature = ReadFeature(path);
+    ApplyFeature(feature, face);
+    vertices += feature.offsets.size();
+  }
+  WriteHSpline(a.out, face);
+  fmt::print("{}: {} vertices given\n", a.out, vertices);
+  return kDone;
+}
+
+int BlendCommand(const FaceArguments& a) {
+  std::vector<Feature> features;
+  for (const std::string& path : a.features) {
+    features.push_back(ReadFeature(path));
+  }
+  const FeatureBlend blend = BlendFeatures(a.name, features, a.weights);
+  for (const std::string& warning : blend.warnings) {
+    fmt::print(stderr, "warning: {}\n", warning);
+  }
+  return Store(blend.feature, a);
+}
+
+int MirrorCommand(const FaceArguments& a) {
+  Feature feature = MirrorFeature(ReadFeature(a.features.at(0)));
+  feature.name = a.name;
+  return Store(feature, a);
+}
+
+int ListCommand(const FaceArguments& a) {
+  for (const auto& [name, feature] : ReadFeatureLibrary(a.library)) {
+    fmt::print("{}: {} vertices, {} x {} patches\n", name, feature.offsets.size(),
+               feature.shape.patches_u, feature.shape.patches_v);
+  }
+  return kDone;
+}
+
+using FaceCommand = int (*)(const FaceArguments&);
+
+// Declares commands that share one set of arguments.
+class Declarer {
+ public:
+  explicit Declarer(std::function<int()>& chosen) : chosen_(chosen) {}
+
+  CLI::App* Add(CLI::App& app, const char* name, const char* help, FaceCommand command) {
+    CLI::App* sub = app.add_subcommand(name, help);
+    sub->callback(
+        [chosen = &chosen_, a = a_, command] { *chosen = [a, command] { return command(*a); }; });
+    return sub;
+  }
+  void AddForce(CLI::App* sub) {
+    sub->add_flag("--force", a_->force, "replace a file of the same name");
+  }
+  void AddFace(CLI::App* sub) { sub->add_option("FACE", a_->face, "H-spline (.json)")->required(); }
+  void AddStore(CLI::App* sub) {
+    sub->add_option("--name", a_->name, "of the new feature: letters, digits, '-' and '_'")
+        ->required();
+    sub->add_option("--library", a_->library, "folder to store it in")->required();
+    AddForce(sub);
+  }
+  FaceArguments& arguments() { return *a_; }
+
+ private:
+  std::function<int()>& chosen_;
+  std::shared_ptr<FaceArguments> a_ = std::make_shared<FaceArguments>();
+};
+
+void DeclareEdit(CLI::App& app, Declarer& declarer) {
+  FaceArguments& a = declarer.arguments();
+  CLI::App* edit =
+      declarer.Add(app, "edit", "move vertices of an H-spline face, as a script says", &Edit);
+  declarer.AddFace(edit);
+  edit->add_option("SCRIPT", a.script, "what to reset and to move (.yaml)")->required();
+  edit->add_option("--out", a.out, "file for the edited face")->required();
+  edit->add_option("--inverse", a.inverse, "file for the script that takes the edits back");
+  declarer.AddForce(edit);
+}
+
+void DeclareExport(CLI::App& app, Declarer& declarer) {
+  FaceArguments& a = declarer.arguments();
+  CLI::App* to = declarer.Add(app, "export", "an H-spline face for other programs", &Export);
+  declarer.AddFace(to);
+  to->add_option("--to", a.out,
+                 "file; exact: .vtu .step .iges, triangles: .glb .ply .obj .off .stl")
+      ->required();
+  to->add_option("--chord_mm", a.chord_mm, "how far a triangle may be from the surface [0.1]");
+  to->add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  declarer.AddForce(to);
+}
+
+void DeclareFeature(CLI::App& app, Declarer& declarer) {
+  FaceArguments& a = declarer.arguments();
+  CLI::App* feature = app.add_subcommand("feature", "detail of one face for another (thesis 4.3)");
+  feature->require_subcommand(1);
+  CLI::App* extract = declarer.Add(*feature, "extract", "take detail from a face", &ExtractCommand);
+  declarer.AddFace(extract);
+  extract->add_option("--u", a.u, "lowest and highest u; lowest > highest runs across the seam")
+      ->check(CLI::Range(0.0, 1.0));
+  extract->add_option("--v", a.v, "lowest and highest v")->check(CLI::Range(0.0, 1.0));
+  extract->add_option("--levels", a.levels, "first and last level")->check(CLI::Range(1, 8));
+  declarer.AddStore(extract);
+  CLI::App* apply = declarer.Add(*feature, "apply", "give a face features", &ApplyCommand);
+  declarer.AddFace(apply);
+  apply->add_option("FEATURE", a.features, "files of a library; later ones win")->required();
+  apply->add_option("--out", a.out, "file for the new face")->required();
+  declarer.AddForce(apply);
+  CLI::App* blend = declarer.Add(*feature, "blend", "a weighted sum of features", &BlendCommand);
+  blend->add_option("FEATURE", a.features, "files of a library")->required();
+  blend->add_option("--weights", a.weights, "one a feature; outside 0..1 it extrapolates")
+      ->required();
+  declarer.AddStore(blend);
+  CLI::App* mirror =
+      declarer.Add(*feature, "mirror", "a feature for the other side", &MirrorCommand);
+  mirror->add_option("FEATURE", a.features, "file of a library")->required()->expected(1);
+  declarer.AddStore(mirror);
+  CLI::App* list = declarer.Add(*feature, "list", "what a library holds", &ListCommand);
+  list->add_option("LIBRARY", a.library, "folder")->required();
+}
+
+}  // namespace
+
+void DeclareFaceCommands(CLI::App& app, std::function<int()>& chosen) {
+  Declarer declarer(chosen);
+  DeclareEdit(app, declarer);
+  DeclareExport(app, declarer);
+  DeclareFeature(app, declarer);
+}
+
+}  // namespace semblance

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/program/study_commands.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "problems/program/exit_code.h"
+#include "problems/study/study_report.h"
+#include "problems/study/study_run.h"
+#include "problems/study/study_submit.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the user typed; each command reads its part.
+struct StudyArguments {
+  std::vector<std::string> files;
+  std::string out, shard;
+  bool quiet = false, list = false, slurm = false;
+  StudyRunOptions run;
+  SubmitOptions submit;
+  std::stop_token stop;
+};
+
+// "I/N", or what Slurm says of an array of jobs.
+void SetShard(const std::string& text, StudyRunOptions& options) {
+  const char *index = std::getenv("SLURM_ARRAY_TASK_ID"),
+             *count = std::getenv("SLURM_ARRAY_TASK_COUNT");
+  const std::string given =
+      text.empty() && index && count ? fmt::format("{}/{}", index, count) : text;
+  char rest = 0;
+  const bool read = given.empty() || std::sscanf(given.c_str(), "%d/%d%c", &options.shard,
+                                                 &options.shards, &rest) == 2;
+  if (!read || options.shards < 1 || options.shard < 0 || options.shard >= options.shards) {
+    throw InputError(fmt::format("--shard {}: write I/N with 0 <= I < N, e.g. 0/4", given));
+  }
+}
+
+int PrintPlan(const StudyPlan& plan) {
+  for (const StudyTrial& trial : plan.trials) {
+    fmt::print("{} {} | {}\n", trial.id, trial.subject, fmt::join(trial.values, " | "));
+  }
+  fmt::print("plan {}: {} trials over {}\n", plan.hash, plan.trials.size(),
+             fmt::join(plan.axes, ", "));
+  return kDone;
+}
+
+// What a study's folder holds, and how to go on.
+int PrintStudyState(const StudyResults& results, const fs::path& root) {
+  for (const TrialRow& row : results.trials) {
+    if (row.status == "failed" || row.status == "missing") {
+      fmt::print("{}: {} {} | {}{}{}\n", row.status, row.id, row.subject,
+                 fmt::join(row.values, " | "), row.reason.empty() ? "" : ": ", row.reason);
+    }
+  }
+  fmt::print("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
+             results.trials.size(), results.Count("unusable"), results.Count("failed"),
+             results.Count("missing"));
+  if (fs::exists(root / "report.html")) {
+    fmt::print("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
+  } else {
+    fmt::print("no report yet; semblance merge {} makes one of what is there\n", root.string());
+  }
+  return results.Count("done") == static_cast<int>(results.trials.size()) ? kDone : kNotUsable;
+}
+
+int StudyCommand(const StudyArguments& a) {
+  const bool plan_only = a.list || (a.files.size() == 2 && a.files[0] == "plan");
+  if (a.files.size() == 2 && !plan_only) {
+    throw InputError(
+        fmt::format("study {} {}: one study at a time; the word before the file can be "
+                    "'plan' alone",
+                    a.files[0], a.files[1]));
+  }
+  const fs::path file = a.files.back();
+  StudyRunOptions options = a.run;
+  SetShard(a.shard, options);
+  const StudyPlan plan = ReadStudy(file);
+  for (const std::string& note : plan.notes) {
+    fmt::print("note: {}\n", note);
+  }
+  if (plan_only) {
+    return PrintPlan(plan);
+  }
+  const fs::path root = a.out.empty() ? "out/" + file.stem().string() : a.out;
+  if (!a.quiet) {
+    options.on_pace = StudyProgress(stderr);
+  }
+  RunContext context;
+  context.stop_token = a.stop;
+  const StudySummary summary = RunStudy(plan, root, options, context);
+  if (options.shards > 1) {
+    fmt::print(
+        "shard {} of {}: {} trials, {} were there, {} done, {} failed; gather with "
+        "semblance merge\n",
+        options.shard, options.shards, summary.trials, summary.skipped, summary.done,
+        summary.failed);
+    return kDone;
+  }
+  OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
+  return PrintStudyState(WriteStudyTables(folder), root);
+}
+
+int MergeCommand(const StudyArguments& a) {
+  const fs::path root = a.files.at(0);
+  GatherTrials(root, {a.files.begin() + 1, a.files.end()});
+  if (!fs::exists(root / "plan.json")) {
+    throw IoError(fmt::format("{}: no folder of a study; it has no plan.json", root.string()));
+  }
+  OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
+  return PrintStudyState(WriteStudyTables(folder), root);
+}
+
+int StatusCommand(const StudyArguments& a) {
+  const fs::path root = a.files.at(0);
+  return PrintStudyState(ReadStudyResults(root), root);
+}
+
+int SubmitCommand(const StudyArguments& a) {
+  SubmitOptions options = a.submit;
+  options.program = fs::read_symlink("/proc/self/exe");
+  options.study = a.files.at(0);
+  options.folder = a.out.empty() ? "out/" + options.study.stem().string() : a.out;
+  ReadStudy(options.study);  // its faults are said here, not by every node
+  fmt::print("{}", SubmitScript(options));
+  std::fflush(stdout);
+  SubmitStudy(options);
+  return kDone;
+}
+
+using StudyCommandFunction = int (*)(const StudyArguments&);
+
+void AddStudyOptions(CLI::App* study, StudyArguments& a) {
+  study->add_option("CONFIG", a.files, "YAML file of the study; `plan` before it is --list")
+      ->required()
+      ->expected(1, 2);
+  study->add_option("--out", a.out, "folder for the trials; a study there goes on");
+  study->add_option("--jobs", a.run.jobs, "trials at a time")->check(CLI::Range(1, 1024));
+  study->add_option("--shard", a.shard, "I/N: every N-th trial from the I-th (from 0) alone");
+  study->add_option("--cache", a.run.cache, "folder for implicit faces that other calls can take");
+  study->add_option("--cache-limit-mb", a.run.cache_limit_mb, "above it the oldest go")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  study->add_flag("--list", a.list, "print the plan and run nothing");
+  study->add_flag("--retry-failed", a.run.retry_failed, "run again what failed before");
+  study->add_flag("--quiet", a.quiet, "no progress");
+}
+
+void AddSubmitOptions(CLI::App* submit, StudyArguments& a) {
+  submit->add_option("CONFIG", a.files, "YAML file of the study")->required()->expected(1);
+  submit->add_flag("--slurm", a.slurm, "the engine; the only one so far")->required();
+  submit->add_option("--out", a.out, "folder for the trials, which every node must see");
+  submit
+      ->add_option("--shards", a.submit.shards,
+                   "elements of the array; each should have work for 30 s or more")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  submit->add_option("--jobs", a.submit.jobs, "trials at a time in each")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  submit
+      ->add_option("--sbatch", a.submit.sbatch,
+                   "an option for sbatch, e.g. --sbatch=--partition=long; may be repeated")
+      ->allow_extra_args(false);
+}
+
+}  // namespace
+
+void DeclareStudyCommands(CLI::App& app, std::stop_token stop, std::function<int()>& chosen) {
+  const auto arguments = std::make_shared<StudyArguments>();
+  arguments->stop = std::move(stop);
+  const auto add = [&](const char* name, const char* help, StudyCommandFunction command) {
+    CLI::App* sub = app.add_subcommand(name, help);
+    sub->callback([&chosen, command, arguments] {
+      chosen = [command, arguments] { return command(*arguments); };
+    });
+    return sub;
+  };
+  StudyArguments& a = *arguments;
+  AddStudyOptions(add("study", "run every trial of a study that is not done yet", &StudyCommand),
+                  a);
+  AddSubmitOptions(
+      add("submit", "run a study on a cluster: an array of shards, then the merge", &SubmitCommand),
+      a);
+  CLI::App* merge = add("merge", "the tables and report of a study from its shards", &MergeCommand);
+  merge->add_option("DIR", a.files, "folder of the study, then folders to take trials from")
+      ->required();
+  CLI::App* status = add("status", "how far a study has come", &StatusCommand);
+  status->add_option("DIR", a.files, "folder of the study")->required()->expected(1);
+}
+
+}  // namespace semblance

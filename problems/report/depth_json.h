@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is known of an interpolated depth as JSON, for result.json; null for NaN.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "interp/evaluation/cross_validation.h"
+#include "problems/pipeline/depth_comparison.h"
+
+namespace semblance {
+
+// Counts of vertices by status, range and mean of the assigned depths, dowels and areas.
+nlohmann::ordered_json DepthToJson(const DepthField& depth, const Case& subject);
+
+// along_direction{...}, closest{...}: each a distance summary with regions{}, coverage_90 and the
+// counts of scored vertices by what the truth says there; tips{...}.
+nlohmann::ordered_json ComparisonToJson(const DepthComparison& comparison);
+
+// The summary, coverage_90, regions{} and sites{}: the error of each left-out dowel.
+nlohmann::ordered_json CrossValidationToJson(const CrossValidation& result);
+
+}  // namespace semblance

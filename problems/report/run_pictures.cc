@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/report/run_pictures.h"
+
+#include "problems/pictures/pictures.h"
+#include "problems/pictures/render.h"
+#include "surfaces/base/parallel.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
+constexpr int kWidth = 560, kHeight = 640;
+
+// What all pictures are framed to: skull, face and dowels.
+Box3 Region(const RunResult& result) {
+  Box3 box = Bounds(result.face.mesh);
+  box.extend(Bounds(result.shell));
+  for (const Dowel& dowel : result.subject.dowels) {
+    box.extend(dowel.Tip());
+  }
+  return box;
+}
+
+RenderOptions Options(Lighting lighting) {
+  return {.width = kWidth, .height = kHeight, .lighting = lighting};
+}
+
+void WriteViews(const Scene& scene, const RunResult& result, const Sheet& sheet, Lighting lighting,
+                OutputFolder& folder, const char* name, int threads) {
+  folder.Write(name, EncodePng(RenderViews(scene, Region(result), kViews, sheet, Options(lighting),
+                                           threads)));
+}
+
+Image Front(const Scene& scene, const RunResult& result, int threads) {
+  const double aspect = static_cast<double>(kWidth) / kHeight;
+  return Render(scene, CameraFor(View::kFront, Region(result), aspect), Options(Lighting::kStudio),
+                threads);
+}
+
+Scene SkullScene(const RunResult& result) {
+  return {{SkullObject(result.subject.skull), DowelObject(result.subject.dowels)}};
+}
+
+// The story in one row: skull and dowels, implicit face, H-spline face and, where it is known, the
+// true skin.
+void WriteOverview(const RunResult& result, OutputFolder& folder, int threads) {
+  std::vector<Image> pictures = {Front(SkullScene(result), result, threads),
+                                 Front({{SkinObject(result.implicit.dense)}}, result, threads),
+                                 Front({{SkinObject(result.face.mesh)}}, result, threads)};
+  Sheet sheet{.title = "",
+              .captions = {"skull and dowels", "implicit face", "H-spline face"},
+              .legend = std::nullopt};
+  if (result.subject.skin) {
+    pictures.push_back(Front({{SkinObject(*result.subject.skin)}}, result, threads));
+    sheet.captions.push_back("true skin");
+  }
+  folder.Write("pictures/overview.png", EncodePng(ContactSheet(pictures, sheet)));
+}
+
+void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
+  const TriMesh& skin = *result.subject.skin;
+  WriteViews({{SkinObject(skin)}}, result, {"True skin", {}, std::nullopt}, Lighting::kStudio,
+             folder, "pictures/truth.png", threads);
+  const Legend legend{ErrorColours(), "H-spline face outside (+) or inside (-) the true skin"};
+  WriteViews({{MappedObject(skin, result.truth->face.signed_mm, legend.map)}}, result,
+             {"Signed error on the true skin", {}, legend}, Lighting::kEven, folder,
+             "pictures/error.png", threads);
+  const Legend implicit_legend{ErrorColours(),
+                               "implicit face outside (+) or inside (-) the true skin"};
+  WriteViews({{MappedObject(skin, result.truth->implicit.signed_mm, implicit_legend.map)}}, result,
+             {"Signed error of the implicit face", {}, implicit_legend}, Lighting::kEven, folder,
+             "pictures/error_implicit.png", threads);
+}
+
+}  // namespace
+
+ColourMap DepthColours() { return SequentialMap(0, 25); }
+ColourMap ErrorColours() { return DivergingMap(8); }
+ColourMap SigmaColours() { return SequentialMap(0, 6); }
+
+std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
+                                  const RunContext& context) {
+  const TriMesh& skin = *result.subject.skin;
+  const std::vector<bool> comparable = ComparableTriangles(skin, result.truth->region);
+  const MeshQuery query(skin);
+  const std::vector<Vec3> normals = VertexNormals(skin);
+  std::vector<double> error(mesh.points.size(), kNaN);
+  ParallelFor(error.size(), context.threads, 256, [&](std::size_t v) {
+    const MeshPoint nearest = query.Closest(mesh.points[v]);
+    const Triangle& t = skin.triangles[nearest.triangle];
+    if (comparable[nearest.triangle]) {
+      const double side =
+          (mesh.points[v] - nearest.position).dot(normals[t[0]] + normals[t[1]] + normals[t[2]]);
+      error[v] = side < 0 ? -nearest.distance_mm : nearest.distance_mm;
+    }
+  });
+  return error;
+}
+
+void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context) {
+  context.Report("pictures");
+  const int threads = context.threads;
+  WriteOverview(result, folder, threads);
+  WriteViews(SkullScene(result), result, {"Skull and dowels", {}, std::nullopt}, Lighting::kStudio,
+             folder, "pictures/skull_dowels.png", threads);
+  const Legend depth{DepthColours(), "tissue depth on the skull's shell"};
+  WriteViews({{MappedObject(result.shell, result.depth.depth_mm, depth.map)}}, result,
+             {"Interpolated tissue depth", {}, depth}, Lighting::kEven, folder,
+             "pictures/depth.png", threads);
+  WriteViews({{SkinObject(result.implicit.dense)}}, result, {"Implicit face", {}, std::nullopt},
+             Lighting::kStudio, folder, "pictures/implicit.png", threads);
+  WriteViews({{SkinObject(result.face.mesh)}}, result, {"H-spline face", {}, std::nullopt},
+             Lighting::kStudio, folder, "pictures/face.png", threads);
+  Scene over = SkullScene(result);
+  over.objects.push_back(SkinObject(result.face.mesh, 0.55));
+  WriteViews(over, result, {"H-spline face over skull and dowels", {}, std::nullopt},
+             Lighting::kStudio, folder, "pictures/face_over_skull.png", threads);
+  if (result.uncertainty && !result.uncertainty->sigma_mm.empty()) {
+    const Legend sigma{SigmaColours(), "standard deviation along the normal"};
+    WriteViews({{MappedObject(result.face.mesh, result.uncertainty->sigma_mm, sigma.map)}}, result,
+               {"How far the face may be off", {}, sigma}, Lighting::kEven, folder,
+               "pictures/sigma.png", threads);
+  }
+  if (result.truth) {
+    WriteTruth(result, folder, threads);
+  }
+}
+
+}  // namespace semblance

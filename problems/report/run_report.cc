@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// report.html of a run, from the files of its folder alone.
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "problems/report/report.h"
+#include "problems/report/run_folder.h"
+#include "problems/report/scene_json.h"
+#include "problems/report/svg_plot.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Number(const Json& value, int digits = 2) {
+  if (value.is_number_float()) {
+    return fmt::format("{:.{}f}", value.get<double>(), digits);
+  }
+  return value.is_null() ? "" : value.is_string() ? value.get<std::string>() : value.dump();
+}
+
+std::string Percent(const Json& share) {
+  return share.is_null() ? "" : fmt::format("{:.1f}", 100 * share.get<double>());
+}
+
+// Runs of older versions say nothing of it.
+bool HasSigma(const Json& result) {
+  return result.contains("uncertainty") && !result.at("uncertainty").is_null() &&
+         !result.at("uncertainty").at("sigma_median_mm").is_null();
+}
+
+std::vector<ReportTile> Tiles(const Json& result) {
+  const Json& face = result.at("face");
+  const Json& fit = result.at("fit");
+  std::vector<ReportTile> tiles;
+  if (!face.is_null()) {
+    tiles = {
+        {"mean error", Number(face.at("mean_abs_mm")), "mm", "H-spline face against the true skin"},
+        {"RMS error", Number(face.at("rms_mm")), "mm", ""},
+        {"median", Number(face.at("median_mm")), "mm", ""},
+        {"95th percentile", Number(face.at("p95_mm")), "mm", ""},
+        {"within 2.5 mm", Percent(face.at("within_2_5mm")), "%", "of the scored area"}};
+  }
+  tiles.push_back(
+      {"dowel RMS", Number(fit.at("dowel_rms_mm")), "mm", "dowel tips to the fitted face"});
+  if (HasSigma(result)) {
+    tiles.push_back({"may be off", Number(result.at("uncertainty").at("sigma_median_mm")), "mm",
+                     "median standard deviation of the face along its normal"});
+  }
+  return tiles;
+}
+
+std::vector<std::string> MetricsRow(const std::string& name, const Json& s) {
+  return {name,
+          Number(s.at("area_cm2"), 1),
+          Number(s.at("mean_abs_mm")),
+          Number(s.at("rms_mm")),
+          Number(s.at("median_mm")),
+          Number(s.at("p95_mm")),
+          Number(s.at("max_mm")),
+          Number(s.at("mean_signed_mm")),
+          Percent(s.at("within_2_5mm")),
+          Percent(s.at("within_5mm"))};
+}
+
+ReportTable MetricsTable(const std::string& caption, const Json& metrics) {
+  ReportTable table{caption,
+                    {"part", "area (cm²)", "mean (mm)", "RMS (mm)", "median (mm)", "p95 (mm)",
+                     "max (mm)", "signed mean (mm)", "≤ 2.5 mm (%)", "≤ 5 mm (%)"},
+                    {}};
+  table.rows.push_back(MetricsRow("all, skin to face", metrics));
+  table.rows.push_back(MetricsRow("all, face to skin", metrics.at("reverse")));
+  for (const auto& [name, summary] : metrics.at("regions").items()) {
+    table.rows.push_back(MetricsRow(name, summary));
+  }
+  return table;
+}
+
+std::vector<double> Numbers(const Json& list) {
+  std::vector<double> numbers;
+  for (const Json& value : list) {
+    numbers.push_back(value.is_number() ? value.get<double>() : kNaN);
+  }
+  return numbers;
+}
+
+ReportImage ConvergencePlot(const Json& fit) {
+  BoxRow row{"last round", {}};
+  for (const Json& level : fit.at("levels")) {
+    if (row.values.empty() && level.at("rms_before_mm").is_number()) {
+      row.values.push_back(level.at("rms_before_mm").get<double>());
+    }
+    row.values.push_back(
+        level.at("rms_after_mm").is_number() ? level.at("rms_after_mm").get<double>() : kNaN);
+  }
+  return {ConvergencePlotSvg({row}, "RMS distance of the fitted points (mm)"),
+          "How far the fitted points are from the surface, step by step.",
+          "root mean square distance by step of the schedule"};
+}
+
+std::string OutOf(const Json& level, const char* part, const char* all) {
+  return level.contains(part) && level.at(part).is_number()
+             ? fmt::format("{} of {}", level.at(part).dump(), level.at(all).dump())
+             : "";
+}
+
+// How the points' (u,v) moved; empty without relaxation, or for runs of older versions.
+ReportTable RelaxationTable(const Json& fit) {
+  ReportTable table{"How dowels and seeds moved over the face: mean penalties after each step",
+                    {"step", "distance before (mm²)", "distance (mm²)", "bunching (mm²)",
+                     "distortion (mm²)", "crease (mm²)", "largest move (mm)", "folds prevented"},
+                    {}};
+  int step = 0;
+  for (const Json& moves : fit.value("relaxations", Json::array())) {
+    const Json& after = moves.at("after");
+    table.rows.push_back({std::to_string(++step), Number(moves.at("before").at("distance"), 3),
+                          Number(after.at("distance"), 3), Number(after.at("bunching"), 3),
+                          Number(after.at("distortion"), 3), Number(after.at("crease"), 3),
+                          Number(moves.at("max_move_mm")), Number(moves.at("flips_prevented"))});
+  }
+  return table;
+}
+
+ReportTable FeaturesTable(const Json& fit) {
+  ReportTable table{
+      "What the fit did to the generic face's features: strain against the template",
+      {"part", "area (cm²)", "RMS strain (%)", "largest strain (%)", "RMS change of area (%)"},
+      {}};
+  const Json parts = fit.value("feature_distortion", Json::object());
+  for (const auto& [part, d] : parts.items()) {
+    table.rows.push_back({part, Number(d.at("area_cm2"), 1), Percent(d.at("rms_strain")),
+                          Percent(d.at("max_strain")), Percent(d.at("rms_area"))});
+  }
+  return table;
+}
+
+// Those with rows.
+std::vector<ReportTable> Filled(std::vector<ReportTable> tables) {
+  std::erase_if(tables, [](const ReportTable& table) { return table.rows.empty(); });
+  return tables;
+}
+
+ReportTable LevelsTable(const Json& fit) {
+  ReportTable table{
+      "Steps of the schedule",
+      {"step", "level", "fraction", "RMS before (mm)", "RMS after (mm)", "largest move (mm)",
+       "rank of the data", "vertices free", "vertices without data", "patches without data"},
+      {}};
+  int step = 0;
+  for (const Json& level : fit.at("levels")) {
+    table.rows.push_back({std::to_string(++step), Number(level.at("level")),
+                          Number(level.at("fraction")), Number(level.at("rms_before_mm")),
+                          Number(level.at("rms_after_mm")), Number(level.at("max_move_mm")),
+                          Number(level.at("rank")), Number(level.at("free_vertices")),
+                          Number(level.at("uncovered_vertices")),
+                          OutOf(level, "empty_patches", "patches")});
+  }
+  return table;
+}
+
+// Some columns of dowels.csv, rounded for reading.
+ReportTable DowelsTable(const std::string& csv) {
+  ReportTable table{"Dowels", {"site", "depth (mm)", "SD (mm)", "u", "v", "fit residual (mm)"}, {}};
+  std::istringstream lines(csv);
+  std::string line;
+  std::getline(lines, line);  // the header
+  while (std::getline(lines, line)) {
+    std::vector<std::string> cells;
+    std::istringstream parts(line + ",");
+    for (std::string cell; std::getline(parts, cell, ',');) {
+      cells.push_back(cell);
+    }
+    const auto rounded = [&](std::size_t c) {
+      return c >= cells.size() || cells[c].empty() ? ""
+                                                   : fmt::format("{:.2f}", std::stod(cells[c]));
+    };
+    table.rows.push_back(
+        {cells.at(0), rounded(7), rounded(8), rounded(12), rounded(13), rounded(14)});
+  }
+  return table;
+}
+
+ReportTable CountsTable(const std::string& caption, const Json& values) {
+  ReportTable table{caption, {"what", "value"}, {}};
+  for (const auto& [name, value] : values.items()) {
+    if (!value.is_structured()) {
+      table.rows.push_back({name, Number(value, 3)});
+    }
+  }
+  return table;
+}
+
+ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
+  ReportSection section{.heading = "Against the true skin"};
+  section.paragraphs = {
+      "Scored is the skin in front of the dowel network, without the zones that the configuration "
+      "excludes; see resolved.yaml, region. Distances are to the "
+      "closest point, weighted by area; nothing was aligned to the true skin."};
+  section.images = {
+      ReportImageFromFile(folder.Root() / "pictures/error.png", "",
+                          "signed error of the H-spline face on the true skin from three sides"),
+      ReportImageFromFile(folder.Root() / "pictures/error_implicit.png", "",
+                          "signed error of the implicit face on the true skin"),
+      ReportImageFromFile(folder.Root() / "pictures/truth.png", "",
+                          "the true skin from three sides")};
+  section.images.push_back(
+      {QuantilePlotSvg({{"H-spline face", Numbers(result.at("face").at("quantiles_mm"))},
+                        {"implicit face", Numbers(result.at("implicit_face").at("quantiles_mm"))}},
+                       "distance from the true skin (mm)"),
+       "Share of the scored skin within each distance, up to 95 %.",
+       "cumulative distribution of the errors of both faces"});
+  section.tables = {MetricsTable("H-spline face", result.at("face")),
+                    MetricsTable("Implicit face", result.at("implicit_face"))};
+  return section;
+}
+
+ReportSection PictureSection(const OutputFolder& folder) {
+  ReportSection section{.heading = "From skull to face"};
+  for (const auto& [file, alt] :
+       {std::pair("skull_dowels", "skull with dowels"),
+        std::pair("depth", "interpolated tissue depth on the skull's shell"),
+        std::pair("implicit", "implicit face"), std::pair("face", "H-spline face"),
+        std::pair("face_over_skull", "H-spline face, translucent, over skull and dowels")}) {
+    section.images.push_back(
+        ReportImageFromFile(folder.Root() / "pictures" / (std::string(file) + ".png"), "",
+                            fmt::format("{} from three sides", alt)));
+  }
+  return section;
+}
+
+ReportSection UncertaintySection(const Json& result, const OutputFolder& folder) {
+  const Json& uncertainty = result.at("uncertainty");
+  ReportSection section{.heading = "How far the face may be off"};
+  section.paragraphs = {fmt::format(
+      "Standard deviation of the face along its normal, from that of the dowels' depths, of the "
+      "depths between them, and of what the fit's smoothness holds back: {} mm in the median and "
+      "{} mm at the 95th percentile of the area that dowels and seeds hold. It knows nothing of a "
+      "wrong skull, wrong landmarks or a table of other people.",
+      Number(uncertainty.at("sigma_median_mm")), Number(uncertainty.at("sigma_p95_mm")))};
+  if (!uncertainty.at("coverage_90").is_null()) {
+    section.paragraphs.push_back(
+        fmt::format("Of the true skin in front of the network, the features' regions apart, {} % "
+                    "lie within the interval that should hold 90 %.",
+                    Percent(uncertainty.at("coverage_90"))));
+  }
+  section.images = {
+      ReportImageFromFile(folder.Root() / "pictures/sigma.png", "",
+                          "standard deviation of the H-spline face from three sides")};
+  return section;
+}
+
+ReportSection NotesSection(const Json& result) {
+  ReportSection section{.heading = "Notes"};
+  for (const Json& note : result.at("notes")) {
+    section.paragraphs.push_back(note.get<std::string>());
+  }
+  if (section.paragraphs.empty()) {
+    section.paragraphs = {"Nothing to note."};
+  }
+  return section;
+}
+
+Report BuildReport(const Json& result, const OutputFolder& folder) {
+  Report report;
+  report.title = result.at("title").get<std::string>();
+  report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
+                    ". An approximation, not an identification.";
+  report.tiles = Tiles(result);
+  report.main_images = {ReportImageFromFile(
+      folder.Root() / "pictures/overview.png", "",
+      fmt::format("skull and dowels, implicit face, H-spline face{}, from the front",
+                  result.at("face").is_null() ? "" : " and true skin"))};
+  if (!result.at("face").is_null()) {
+    report.sections.push_back(ErrorSection(result, folder));
+  }
+  const std::filesystem::path scene = folder.Root() / "scene.json";
+  if (std::filesystem::exists(scene)) {  // runs of older versions have none
+    report.scenes = CollectScenes({{result.at("subject"), ReadFileBytes(scene)}}, 0).json;
+  }
+  report.sections.push_back(PictureSection(folder));
+  report.sections.push_back(
+      {.heading = "The fit",
+       .images = {ConvergencePlot(result.at("fit"))},
+       .tables = Filled({LevelsTable(result.at("fit")), RelaxationTable(result.at("fit")),
+                         FeaturesTable(result.at("fit")),
+                         CountsTable("Counts of the fit", result.at("fit")),
+                         DowelsTable(ReadFileBytes(folder.Root() / "dowels.csv"))})});
+  if (HasSigma(result)) {
+    report.sections.push_back(UncertaintySection(result, folder));
+  }
+  report.sections.push_back({.heading = "Depth and implicit surface",
+                             .tables = {CountsTable("Depth field", result.at("depth")),
+                                        CountsTable("Implicit surface", result.at("implicit"))}});
+  report.sections.push_back(NotesSection(result));
+  report.sections.push_back(
+      {.heading = "Configuration", .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml")});
+  const std::filesystem::path provenance = folder.Root() / "provenance.json";
+  if (std::filesystem::exists(provenance)) {
+    report.sections.push_back(
+        {.heading = "Provenance",
+         .paragraphs = {"What went in, by content, and what it was made with. manifest.json beside "
+                        "this page has the hash of every output too."},
+         .preformatted = ReadFileBytes(provenance)});
+  }
+  report.footer = "semblance " SEMBLANCE_VERSION;
+  return report;
+}
+
+}  // namespace
+
+void WriteReport(OutputFolder& folder) {
+  const std::filesystem::path file = folder.Root() / "result.json";
+  try {
+    folder.Write("report.html", ReportHtml(BuildReport(Json::parse(ReadFileBytes(file)), folder)));
+  } catch (const nlohmann::json::exception& e) {
+    throw IoError(fmt::format("{}: not the result of a run: {}", file.string(), e.what()));
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/report/scene_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "problems/report/run_pictures.h"
+#include "problems/report/scene_blobs.h"
+#include "surfaces/base/parallel.h"
+#include "surfaces/decimate/decimate.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kTriangles = 24000;  // of a decimated mesh
+
+// One vertex a cell of a grid, for meshes that are no manifolds.
+TriMesh Clustered(const TriMesh& mesh, double cell_mm) {
+  std::map<std::array<long, 3>, std::int32_t> of_cell;
+  std::vector<std::int32_t> to(mesh.points.size());
+  TriMesh out;
+  for (std::size_t v = 0; v < to.size(); ++v) {
+    const Vec3 at = mesh.points[v] / cell_mm;
+    const auto [it, is_new] =
+        of_cell.try_emplace({std::lround(at.x()), std::lround(at.y()), std::lround(at.z())},
+                            static_cast<std::int32_t>(out.points.size()));
+    if (is_new) {
+      out.points.push_back(mesh.points[v]);
+    }
+    to[v] = it->second;
+  }
+  for (const Triangle& t : mesh.triangles) {
+    const Triangle s = {to[t[0]], to[t[1]], to[t[2]]};
+    if (s[0] != s[1] && s[1] != s[2] && s[2] != s[0]) {
+      out.triangles.push_back(s);
+    }
+  }
+  return out;
+}
+
+TriMesh ForView(const TriMesh& mesh) {
+  if (mesh.triangles.size() <= kTriangles) {
+    return mesh;
+  }
+  try {
+    return Decimate(mesh, {.target_triangles = kTriangles}).mesh;
+  } catch (const InputError&) {  // a scan may hold edges that no decimation takes
+    return Clustered(mesh, std::sqrt(2.3 * Area(mesh) / kTriangles));
+  }
+}
+
+std::string Hex(const Colour& c) {
+  const auto byte = [](double x) { return std::lround(255 * std::clamp(x, 0.0, 1.0)); };
+  return fmt::format("#{:02x}{:02x}{:02x}", byte(c.r), byte(c.g), byte(c.b));
+}
+
+Json MapJson(const ColourMap& map, const char* title) {
+  constexpr int kSteps = 32;  // close enough for straight lines between them
+  Json json = {{"title", title},
+               {"low_mm", map.low_mm},
+               {"high_mm", map.high_mm},
+               {"no_data", Hex(kNoDataColour)},
+               {"colours", Json::array()}};
+  for (int k = 0; k <= kSteps; ++k) {
+    json["colours"].push_back(
+        Hex(ColourAt(map, map.low_mm + (map.high_mm - map.low_mm) * k / kSteps)));
+  }
+  return json;
+}
+
+Json Numbers(const Vec3& p) {
+  const auto rounded = [](double x) { return std::round(1000 * x) / 1000; };
+  return {rounded(p.x()), rounded(p.y()), rounded(p.z())};
+}
+
+// The meshes of a run, thinned out.
+struct ViewMeshes {
+  TriMesh skull, shell, implicit, face, skin;
+};
+
+ViewMeshes MakeViewMeshes(const RunResult& result, int threads) {
+  ViewMeshes view;
+  const std::array<std::pair<const TriMesh*, TriMesh*>, 5> jobs = {
+      {{&result.subject.skull, &view.skull},
+       {result.subject.skin ? &*result.subject.skin : nullptr, &view.skin},
+       {&result.shell, &view.shell},
+       {&result.implicit.mesh, &view.implicit},
+       {&result.face.mesh, &view.face}}};
+  ParallelFor(jobs.size(), threads, 1, [&jobs](std::size_t k) {
+    if (jobs[k].first != nullptr) {
+      *jobs[k].second = ForView(*jobs[k].first);
+    }
+  });
+  return view;
+}
+
+class SceneWriter {
+ public:
+  SceneWriter(const RunResult& result, const RunContext& context)
+      : result_(result), context_(context), view_(MakeViewMeshes(result, context.threads)) {}
+
+  std::string Write() {
+    Mesh("skull", "Skull", view_.skull, "#e8dcc4");
+    Dowels();
+    Depth();
+    Face("implicit", "Implicit face", view_.implicit, "#d9b38c");
+    Face("face", "H-spline face", view_.face, "#d8a58a");
+    if (result_.uncertainty && !result_.uncertainty->sigma_mm.empty()) {
+      Mesh("sigma", "Uncertainty of face", view_.face, "#8f8f8f");
+      Map("sigma", NearestValues(view_.face, result_.face.mesh, result_.uncertainty->sigma_mm));
+    }
+    if (result_.subject.skin) {
+      Mesh("skin", "True skin", view_.skin, "#b9c7d6");
+    }
+    for (int level = 0; level <= result_.fit.surface.shape().max_level; ++level) {
+      Net(level);
+    }
+    const Json scene = {{"label", result_.subject.name},
+                        {"facts", Facts()},
+                        {"maps", Maps()},
+                        {"layers", layers_},
+                        {"blobs", blobs_.All()}};
+    return scene.dump() + "\n";
+  }
+
+ private:
+  void Mesh(const char* id, const char* label, const TriMesh& mesh, const char* colour) {
+    layers_.push_back(
+        {{"id", id}, {"label", label}, {"colour", colour}, {"mesh", blobs_.AddMesh(mesh)}});
+  }
+
+  void Face(const char* id, const char* label, const TriMesh& mesh, const char* colour) {
+    Mesh(id, label, mesh, colour);
+    if (result_.truth) {
+      layers_.back()["map"] = "error";
+      layers_.back()["values"] = blobs_.AddValues(SignedErrorOf(mesh, result_, context_));
+    }
+  }
+
+  // The value of the nearest vertex of the mesh before it was thinned out.
+  std::vector<double> NearestValues(const TriMesh& thin, const TriMesh& full,
+                                    const std::vector<double>& full_values) const {
+    const MeshQuery query(full);
+    std::vector<double> values(thin.points.size());
+    ParallelFor(values.size(), context_.threads, 256, [&](std::size_t v) {
+      const MeshPoint at = query.Closest(thin.points[v]);
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const std::int32_t corner : full.triangles[at.triangle]) {
+        const double distance = (full.points[corner] - thin.points[v]).norm();
+        if (distance < nearest) {
+          nearest = distance;
+          values[v] = full_values[corner];
+        }
+      }
+    });
+    return values;
+  }
+
+  // Colours the last layer.
+  void Map(const char* map, const std::vector<double>& values) {
+    layers_.back()["map"] = map;
+    layers_.back()["always_mapped"] = true;
+    layers_.back()["values"] = blobs_.AddValues(values);
+  }
+
+  void Depth() {
+    Mesh("depth", "Tissue depth on skull", view_.shell, "#8f8f8f");
+    Map("depth", NearestValues(view_.shell, result_.shell, result_.depth.depth_mm));
+  }
+
+  void Dowels() {
+    Json dowels = Json::array();
+    for (const Dowel& dowel : result_.subject.dowels) {
+      if (!dowel.Tip().allFinite()) {
+        continue;
+      }
+      Json json = {{"site", dowel.site},
+                   {"base", Numbers(dowel.base)},
+                   {"tip", Numbers(dowel.Tip())},
+                   {"depth_mm", dowel.depth_mm}};
+      for (std::size_t k = 0; k < result_.target.points.size(); ++k) {
+        if (result_.target.points[k].label == dowel.site) {
+          json["on_face"] = Numbers(result_.fit.surface.Point(result_.fit.uv[k]));
+          json["residual_mm"] = result_.fit.residual_mm[k];
+        }
+      }
+      dowels.push_back(json);
+    }
+    layers_.push_back(
+        {{"id", "dowels"}, {"label", "Dowels"}, {"colour", "#b3261e"}, {"dowels", dowels}});
+  }
+
+  void Net(int level) {
+    const HSplineSurface& surface = result_.fit.surface;
+    const ControlNet& net = surface.Net(level);
+    std::vector<SceneBlobs::Segment> segments;
+    const bool periodic = surface.shape().closure == Closure::kPeriodicU;
+    for (int j = 0; j < net.rows; ++j) {
+      for (int i = 0; i < net.columns; ++i) {
+        if (i + 1 < net.columns || periodic) {
+          segments.push_back({net.Index(i, j), net.Index((i + 1) % net.columns, j)});
+        }
+        if (j + 1 < net.rows) {
+          segments.push_back({net.Index(i, j), net.Index(i, j + 1)});
+        }
+      }
+    }
+    static constexpr std::array kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
+    layers_.push_back({{"id", fmt::format("net{}", level)},
+                       {"label", fmt::format("Control net, level {}", level)},
+                       {"colour", kColours[level % kColours.size()]},
+                       {"lines", blobs_.AddLines(net.vertices, segments)}});
+  }
+
+  Json Maps() const {
+    return {{"error", MapJson(ErrorColours(), "outside (+) or inside (\u2212) the true skin")},
+            {"depth", MapJson(DepthColours(), "tissue depth")},
+            {"sigma", MapJson(SigmaColours(), "standard deviation of the face")}};
+  }
+
+  Json Facts() const {
+    Json facts = Json::array();
+    if (result_.truth) {
+      const DistanceSummary& s = result_.truth->face.truth_to_face;
+      facts.push_back(fmt::format("mean error {:.2f} mm", s.mean_abs_mm));
+      facts.push_back(fmt::format("RMS {:.2f} mm", s.rms_mm));
+      facts.push_back(fmt::format("within 2.5 mm {:.0f} %", 100 * s.within_2_5mm));
+    }
+    facts.push_back(fmt::format("dowel RMS {:.2f} mm", result_.fit.dowel_rms_mm));
+    return facts;
+  }
+
+  const RunResult& result_;
+  const RunContext& context_;
+  const ViewMeshes view_;
+  SceneBlobs blobs_;
+  Json layers_ = Json::array();
+};
+
+}  // namespace
+
+std::string SceneJson(const RunResult& result, const RunContext& context) {
+  return SceneWriter(result, context).Write();
+}
+
+SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t limit_bytes) {
+  Json all = {{"scenes", Json::array()}, {"blobs", Json::object()}};
+  std::size_t size = 0;
+  for (const SceneText& text : scenes) {
+    Json scene = Json::parse(text.json, nullptr, false);
+    if (!scene.is_object() || !scene.contains("blobs") || !scene.contains("layers")) {
+      throw IoError(fmt::format("scene '{}': no scene of a run; run it again", text.label));
+    }
+    std::size_t more = 0;
+    for (const auto& [name, blob] : scene["blobs"].items()) {
+      more += all["blobs"].contains(name) ? 0 : blob.dump().size();
+    }
+    if (!all["scenes"].empty() && size + more > limit_bytes) {
+      break;
+    }
+    size += more;
+    for (const auto& [name, blob] : scene["blobs"].items()) {
+      all["blobs"][name] = blob;
+    }
+    scene.erase("blobs");
+    scene["label"] = text.label;
+    all["scenes"].push_back(std::move(scene));
+  }
+  return {all.dump(), static_cast<int>(all["scenes"].size())};
+}
+
+}  // namespace semblance

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study/depth_study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "problems/report/depth_json.h"
+#include "problems/subject/sites.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::vector<std::pair<std::string, Folds>> KindsOfFolds(const CrossValidationOptions& options,
+                                                        std::span<const Dowel> dowels) {
+  std::vector<std::pair<std::string, Folds>> kinds = {
+      {"landmark", EachLandmark(dowels)},
+      {"side", EachSide(dowels)},
+      {"k_fold", RandomFolds(dowels, options.folds, options.random_seed)}};
+  std::erase_if(kinds, [&](const auto& kind) {
+    return std::ranges::any_of(kind.second,
+                               [&](const auto& fold) { return fold.size() >= dowels.size(); });
+  });
+  return kinds;
+}
+
+std::vector<std::pair<std::string, CrossValidation>> LeaveOut(const Experiment& experiment,
+                                                              const DepthStage& stage,
+                                                              const RunContext& context) {
+  std::vector<std::pair<std::string, CrossValidation>> left_out;
+  for (const auto& [kind, folds] : KindsOfFolds(experiment.cross_validation, stage.standing)) {
+    left_out.emplace_back(
+        kind, CrossValidate(experiment.interp, experiment.outside, stage.Input(), folds, context));
+  }
+  return left_out;
+}
+
+std::string Cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+
+const char* InWords(DepthStatus status) {
+  return status == DepthStatus::kAssigned  ? "assigned"
+         : status == DepthStatus::kOutside ? "outside"
+                                           : "not_facing";
+}
+
+std::string SummaryLine(const char* what, const DistanceSummary& s) {
+  return fmt::format("{:<26} {:6.2f} {:6.2f} {:6.2f} {:7.2f} {:9.0f}\n", what, s.rms_mm,
+                     s.mean_abs_mm, s.p95_mm, s.mean_signed_mm, s.area_cm2);
+}
+
+std::string TruthText(const DepthComparison& truth) {
+  std::string text = "depth against the true skin      RMS   mean    p95  signed  cm² scored\n" +
+                     SummaryLine("  along the direction", truth.along_direction.all);
+  for (const auto& [name, summary] : truth.along_direction.regions) {
+    text += SummaryLine(fmt::format("    {}", name).c_str(), summary);
+  }
+  text += SummaryLine("  to the closest skin", truth.closest.all);
+  return text + SummaryLine("  the depth's end", truth.tips);
+}
+
+}  // namespace
+
+bool DepthResult::usable() const {
+  return std::ranges::any_of(stage->depth.depth_mm, [](double d) { return std::isfinite(d); });
+}
+
+DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context,
+                         StageCache* cache) {
+  StepClock step(context);
+  StageCache own_cache(4);
+  DepthResult result;
+  result.stage = MakeDepthStage(experiment, cache ? *cache : own_cache, step, context);
+  const DepthStage& stage = *result.stage;
+  if (stage.subject.skin) {
+    result.truth =
+        step("compare with the truth", [&] { return CompareDepths(experiment, stage, context); });
+  }
+  result.directions = result.truth ? result.truth->directions
+                                   : DepthDirections(experiment.direction, stage.Input(), context);
+  if (!std::holds_alternative<DepthMap>(experiment.interp)) {  // no dowel has a part in a map
+    result.left_out =
+        step("leave dowels out", [&] { return LeaveOut(experiment, stage, context); });
+  }
+  result.times = step.Take();
+  return result;
+}
+
+std::string DepthResultJson(const Experiment& experiment, const DepthResult& result) {
+  Json json = {{"title", experiment.title},
+               {"subject", result.stage->subject.name},
+               {"usable", result.usable()},
+               {"depth", DepthToJson(result.stage->depth, result.stage->subject)},
+               {"depth_truth", nullptr},
+               {"cross_validation", Json::object()}};
+  if (result.truth) {
+    json["depth_truth"] = ComparisonToJson(*result.truth);
+  }
+  for (const auto& [kind, left_out] : result.left_out) {
+    json["cross_validation"][kind] = CrossValidationToJson(left_out);
+  }
+  json["notes"] = result.stage->subject.notes;
+  return json.dump(2) + "\n";
+}
+
+std::string LeftOutCsv(const DepthResult& result) {
+  std::string csv =
+      "kind,site,landmark,region,depth_mm,predicted_mm,error_mm,sd_mm,within_90,status\n";
+  for (const auto& [kind, left_out] : result.left_out) {
+    for (const LeftOut& out : left_out.left_out) {
+      csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", kind, out.site, WithoutSide(out.site),
+                         kFaceParts[FacePartOfSite(out.site)], out.depth_mm, Cell(out.predicted_mm),
+                         Cell(out.error_mm), Cell(out.sd_mm),
+                         out.within_90 ? (*out.within_90 ? "1" : "0") : "", InWords(out.status));
+    }
+  }
+  return csv;
+}
+
+std::string DepthText(const DepthResult& result) {
+  std::string text;
+  if (result.truth) {
+    text += TruthText(*result.truth);
+  }
+  if (!result.left_out.empty()) {
+    text += "dowels left out                  RMS   mean    max  signed  predicted  within 90 %\n";
+  }
+  for (const auto& [kind, left_out] : result.left_out) {
+    text += fmt::format("  {:<24} {:6.2f} {:6.2f} {:6.2f} {:7.2f} {:4} of {:3}  {}\n", kind,
+                        left_out.rms_mm, left_out.mean_absolute_mm, left_out.most_mm,
+                        left_out.mean_mm, left_out.predicted, left_out.left_out.size(),
+                        std::isfinite(left_out.coverage_90)
+                            ? fmt::format("{:.0f} %", 100 * left_out.coverage_90)
+                            : "no sd stated");
+  }
+  return text;
+}
+
+}  // namespace semblance

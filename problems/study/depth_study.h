@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The bench of interpolation schemes: an experiment's depth alone, without an implicit face or a
+// fit, against the true depth and by cross-validation.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "interp/evaluation/cross_validation.h"
+#include "problems/output/files.h"
+#include "problems/pictures/image.h"
+#include "problems/pipeline/depth_comparison.h"
+
+namespace semblance {
+
+struct DepthResult {
+  std::shared_ptr<const DepthStage> stage;
+  std::vector<Vec3> directions;          // one a vertex of the shell
+  std::optional<DepthComparison> truth;  // where the true skin is known
+  // What was left out together: "landmark" (both its sides), "side", "k_fold" (random parts).
+  // A kind for which there are not enough dowels is missing; all are of a depth_map.
+  std::vector<std::pair<std::string, CrossValidation>> left_out;
+  std::vector<StepTime> times;  // not part of the result proper
+
+  bool usable() const;  // a vertex has a depth
+};
+
+// Loads the case, fills the skull, interpolates, compares, leaves dowels out. Throws as
+// LoadSubject, and Cancelled. cache: as Run's.
+DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context,
+                         StageCache* cache = nullptr);
+
+// Metrics and counts: title, subject, usable, depth{}, depth_truth{}, cross_validation{}, notes[];
+// null where there is no number.
+std::string DepthResultJson(const Experiment& experiment, const DepthResult& result);
+
+// One line a left-out dowel: kind, site, landmark, region, depth_mm, predicted_mm, error_mm, sd_mm,
+// within_90, status; an empty cell where there is none.
+std::string LeftOutCsv(const DepthResult& result);
+
+// The depth on the skull's shell from two sides and, where the truth is known, the error against it
+// along the direction; as PNG.
+std::string DepthPicture(const DepthResult& result, const std::string& title, int threads);
+
+// resolved.yaml, result.json, left_out.csv, depth.ply (depth, sd, true depths and errors a vertex),
+// tips.ply (the shell moved by its depth), depth.png, timing.json.
+void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputFolder& folder,
+                const RunContext& context);
+
+// The numbers for people: a few lines of text.
+std::string DepthText(const DepthResult& result);
+
+}  // namespace semblance

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study/study_progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+
+namespace semblance {
+namespace {
+
+std::string Duration(double seconds) {
+  if (seconds < 90) {
+    return fmt::format("{:.0f} s", std::max(1.0, std::round(seconds)));
+  }
+  return seconds < 5400 ? fmt::format("{:.0f} min", seconds / 60)
+                        : fmt::format("{:.1f} h", seconds / 3600);
+}
+
+}  // namespace
+
+std::string PaceText(const StudyPace& pace) {
+  std::string text = fmt::format("{} of {} trials", pace.finished, pace.trials);
+  const int here = pace.finished - pace.finished_before;
+  if (here == 0 && pace.elapsed_s >= 1) {
+    text += fmt::format(", {} so far", Duration(pace.elapsed_s));
+  }
+  if (here > 0 && pace.elapsed_s > 0) {
+    const double each_s = pace.elapsed_s / here;
+    text += each_s >= 1 ? fmt::format(", {:.1f} s each", each_s)
+                        : fmt::format(", {:.1f} a second", 1 / each_s);
+    if (pace.finished < pace.trials) {
+      text += fmt::format(", about {} left", Duration(each_s * (pace.trials - pace.finished)));
+    }
+  }
+  return text + (pace.failed > 0 ? fmt::format("; {} failed", pace.failed) : "");
+}
+
+std::string BarText(const StudyPace& pace, int width) {
+  const int full = pace.trials > 0 ? width * pace.finished / pace.trials : width;
+  return fmt::format("[{:#<{}}{:.<{}}]", "", full, "", width - full);
+}
+
+StudyProgress::StudyProgress(std::FILE* stream, std::chrono::milliseconds interval)
+    : stream_(stream), is_terminal_(isatty(fileno(stream)) == 1), interval_(interval) {}
+
+void StudyProgress::operator()(const StudyPace& pace, const std::string& trial) {
+  constexpr const char* kClearLine = "\r\033[K";
+  const bool is_last = pace.finished == pace.trials;
+  if (is_over_) {
+    return;
+  }
+  is_over_ = is_last;
+  if (pace.failed > failed_) {
+    failed_ = pace.failed;
+    fmt::print(stream_, "{}{}\n", is_terminal_ ? kClearLine : "", trial);
+  }
+  if (is_terminal_) {
+    fmt::print(stream_, "{}{} {}{}", kClearLine, BarText(pace, 30), PaceText(pace),
+               is_last ? "\n" : "");
+  } else if (is_last || Clock::now() - last_ >= interval_) {
+    last_ = Clock::now();
+    fmt::print(stream_, "{}\n", PaceText(pace));
+  }
+  std::fflush(stream_);
+}
+
+}  // namespace semblance

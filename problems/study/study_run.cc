@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study/study_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <ctime>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include "problems/output/manifest.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/report/run_folder.h"
+#include "problems/report/scene_json.h"
+#include "problems/study/depth_study.h"
+#include "problems/study/study_tables.h"
+#include "surfaces/base/whole_file.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+fs::path TrialFolder(const fs::path& folder, const std::string& id) {
+  return folder / "trials" / id;
+}
+
+// The status of a finished trial; nothing if it is not there or not whole.
+std::optional<std::string> StatusOf(const fs::path& folder, const std::string& id) {
+  const fs::path file = TrialFolder(folder, id) / "trial.json";
+  if (!fs::exists(file)) {
+    return std::nullopt;
+  }
+  const Json json = Json::parse(ReadFileBytes(file), nullptr, false);
+  const bool whole = json.is_object() && json.value("id", "") == id;
+  return whole ? std::optional(json.value("status", "failed")) : std::nullopt;
+}
+
+Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
+  Json json = {{"id", trial.id}, {"subject", trial.subject}, {"axes", Json::object()}};
+  for (std::size_t k = 0; k < plan.axes.size(); ++k) {
+    json["axes"][plan.axes[k]] = trial.values[k];
+  }
+  return json;
+}
+
+// What identifies how a trial came about. Inputs by name and content: folders differ by machine.
+void AppendProvenance(const StudyTrial& trial, Json& json) {
+  std::string config = WriteConfig(trial.experiment);
+  json["inputs"] = Json::array();
+  for (const fs::path& file : InputFilesOf(trial.experiment)) {
+    json["inputs"].push_back({{"file", file.filename().string()}, {"sha256", Sha256OfFile(file)}});
+    for (std::size_t at = config.find(file.string()); at != config.npos;
+         at = config.find(file.string(), at)) {
+      config.replace(at, file.string().size(), file.filename().string());
+    }
+  }
+  json["config"] = config;
+  json["version"] = SEMBLANCE_VERSION;
+  json["libraries"] = Json::object();
+  for (const auto& [name, version] : LibraryVersions()) {
+    json["libraries"][name] = version;
+  }
+}
+
+double ThreadCpu_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// Wall time of each step and, of the whole, the processor's; what others made for it is not in it.
+std::string TimingJson(const std::vector<StepTime>& times, double cpu_s) {
+  Json json = {{"cpu_s", cpu_s}};
+  for (const StepTime& time : times) {
+    json[time.step] = time.wall_s;
+  }
+  return json.dump(2) + "\n";
+}
+
+std::shared_ptr<const DiskCache> CacheOnDisk(const StudyRunOptions& options) {
+  constexpr std::uintmax_t kMegabyte = 1'000'000;
+  return options.cache.empty()
+             ? nullptr
+             : std::make_shared<const DiskCache>(options.cache, kMegabyte * options.cache_limit_mb);
+}
+
+class StudyRunner {
+ public:
+  StudyRunner(const StudyPlan& plan, fs::path folder, const StudyRunOptions& options,
+              const RunContext& context)
+      : plan_(plan),
+        folder_(std::move(folder)),
+        options_(options),
+        context_(context),
+        cache_(4 * options.jobs + 6, CacheOnDisk(options)) {}
+
+  StudySummary Run() {
+    for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
+      if (static_cast<int>(n % options_.shards) == options_.shard) {
+        Queue(plan_.trials[n]);
+      }
+    }
+    std::vector<std::jthread> threads;
+    for (int job = 0; job < std::min<int>(options_.jobs, static_cast<int>(queue_.size())); ++job) {
+      threads.emplace_back([this] {
+        Work();
+        const std::lock_guard lock(mutex_);
+        ++ended_;
+        thread_ended_.notify_one();
+      });
+    }
+    WatchUntilEnded(threads.size());
+    threads.clear();  // joins
+    if (broken_) {
+      std::rethrow_exception(broken_);
+    }
+    context_.ThrowIfStopped();
+    summary_.shared_made = cache_.made();
+    return summary_;
+  }
+
+ private:
+  void Queue(const StudyTrial& trial) {
+    ++summary_.trials;
+    const auto status = StatusOf(folder_, trial.id);
+    if (status && (*status != "failed" || !options_.retry_failed)) {
+      ++summary_.skipped;
+    } else {
+      queue_.push_back(&trial);
+    }
+  }
+
+  void WatchUntilEnded(std::size_t threads) {
+    std::unique_lock lock(mutex_);
+    while (ended_ < threads) {
+      TellPace("");
+      thread_ended_.wait_for(lock, std::chrono::seconds(1), [&] { return ended_ == threads; });
+    }
+  }
+
+  void Work() {
+    while (!context_.stop_token.stop_requested() && !broken_flag_) {
+      const std::size_t n = next_++;
+      if (n >= queue_.size()) {
+        return;
+      }
+      try {
+        RunTrial(*queue_[n]);
+      } catch (const Cancelled&) {
+        return;
+      } catch (...) {  // the folder cannot be written: no trial can
+        const std::lock_guard lock(mutex_);
+        broken_ = std::current_exception();
+        broken_flag_ = true;
+      }
+    }
+  }
+
+  // What a trial leaves beside trial.json.
+  using Files = std::function<void(OutputFolder&)>;
+
+  void RunTrial(const StudyTrial& trial) {
+    Json json = TrialHead(plan_, trial);
+    Files write = [](OutputFolder&) {};
+    const double cpu_before_s = ThreadCpu_s();
+    try {
+      write = plan_.job == StudyJob::kFace ? Face(trial, cpu_before_s, json)
+                                           : Depth(trial, cpu_before_s, json);
+    } catch (const Error& error) {
+      json["status"] = "failed";
+      json["reason"] = error.what();
+    }
+    AppendProvenance(trial, json);
+    OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
+    write(output);
+    // Last: it says that the trial is whole. A broken one counts as none; with other files beside
+    // it, it must not outlast them.
+    output.Write("trial.json", json.dump(1) + "\n",
+                 plan_.keep == StudyKeep::kSummary ? Outlasts::kProcess : Outlasts::kPowerFailure);
+    Tell(trial, json);
+  }
+
+  RunContext Quiet() const {
+    RunContext quiet;
+    quiet.stop_token = context_.stop_token;
+    return quiet;
+  }
+
+  Files Face(const StudyTrial& trial, double cpu_before_s, Json& json) {
+    auto result =
+        std::make_shared<const RunResult>(semblance::Run(trial.experiment, Quiet(), &cache_));
+    json["status"] = result->usable() ? "done" : "unusable";
+    json["result"] = Json::parse(ResultJson(trial.experiment, *result));
+    const double cpu_s = ThreadCpu_s() - cpu_before_s;
+    return [this, &trial, result, cpu_s](OutputFolder& output) {
+      const RunContext quiet;
+      if (plan_.keep == StudyKeep::kRun) {
+        WriteRun(trial.experiment, *result, output, quiet);
+        return;
+      }
+      output.Write("timing.json", TimingJson(result->times, cpu_s), Outlasts::kProcess);
+      if (plan_.keep == StudyKeep::kView) {
+        output.Write("scene.json", SceneJson(*result, quiet));
+      }
+    };
+  }
+
+  Files Depth(const StudyTrial& trial, double cpu_before_s, Json& json) {
+    auto result =
+        std::make_shared<const DepthResult>(MeasureDepth(trial.experiment, Quiet(), &cache_));
+    json["status"] = result->usable() ? "done" : "unusable";
+    json["result"] = Json::parse(DepthResultJson(trial.experiment, *result));
+    const double cpu_s = ThreadCpu_s() - cpu_before_s;
+    return [this, &trial, result, cpu_s](OutputFolder& output) {
+      if (plan_.keep == StudyKeep::kRun) {
+        WriteDepth(trial.experiment, *result, output, {});
+      }
+      output.Write("timing.json", TimingJson(result->times, cpu_s), Outlasts::kProcess);
+      if (plan_.keep == StudyKeep::kView && trial.subject == plan_.trials.front().subject) {
+        const std::string title =
+            fmt::format("{}: {}", trial.subject, TreatmentLabel(plan_.axes, trial.values));
+        output.Write("depth.png", DepthPicture(*result, title, 1));
+      }
+    };
+  }
+
+  void Tell(const StudyTrial& trial, const Json& json) {
+    const std::lock_guard lock(mutex_);
+    ++(json["status"] == "failed" ? summary_.failed : summary_.done);
+    const std::string reason =
+        json.contains("reason") ? ": " + json["reason"].get<std::string>() : "";
+    TellPace(fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
+                         fmt::join(trial.values, " "), reason));
+  }
+
+  // With mutex_ held.
+  void TellPace(const std::string& trial) {
+    if (options_.on_pace) {
+      const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
+      options_.on_pace({.trials = summary_.trials,
+                        .finished = summary_.done + summary_.failed + summary_.skipped,
+                        .finished_before = summary_.skipped,
+                        .failed = summary_.failed,
+                        .elapsed_s = elapsed_s},
+                       trial);
+    }
+  }
+
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start_ = Clock::now();
+  const StudyPlan& plan_;
+  fs::path folder_;
+  const StudyRunOptions& options_;
+  const RunContext& context_;
+  StageCache cache_;
+  std::vector<const StudyTrial*> queue_;
+  std::atomic<std::size_t> next_ = 0;
+  std::atomic<bool> broken_flag_ = false;
+  std::mutex mutex_;
+  std::condition_variable thread_ended_;
+  std::size_t ended_ = 0;  // of the threads
+  std::exception_ptr broken_;
+  StudySummary summary_;
+};
+
+// The hash in a folder's plan.json; empty where there is none.
+std::string PlanHashOf(const fs::path& folder) {
+  const fs::path file = folder / "plan.json";
+  if (!fs::exists(file)) {
+    return "";
+  }
+  return Json::parse(ReadFileBytes(file), nullptr, false).value("hash", "");
+}
+
+}  // namespace
+
+std::string PlanJson(const StudyPlan& plan) {
+  Json json = {{"title", plan.title}, {"hash", plan.hash},       {"metric", plan.metric},
+               {"axes", plan.axes},   {"trials", Json::array()}, {"notes", plan.notes}};
+  for (const StudyTrial& trial : plan.trials) {
+    json["trials"].push_back(
+        {{"id", trial.id}, {"subject", trial.subject}, {"values", trial.values}});
+  }
+  return json.dump(1) + "\n";
+}
+
+StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
+                      const RunContext& context) {
+  OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
+  const std::string there = PlanHashOf(folder);
+  if (!there.empty() && there != plan.hash) {
+    throw IoError(fmt::format(
+        "{}: the folder holds another study (plan {}, this is {}); choose another --out",
+        folder.string(), there, plan.hash));
+  }
+  output.Write("plan.json", PlanJson(plan));
+  return StudyRunner(plan, folder, options, context).Run();
+}
+
+void GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
+  for (const fs::path& other : others) {
+    const std::string hash = PlanHashOf(other);
+    if (hash.empty() || (!PlanHashOf(folder).empty() && PlanHashOf(folder) != hash)) {
+      throw IoError(fmt::format("{}: no folder of this study (its plan.json is missing or another)",
+                                other.string()));
+    }
+    OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
+    output.Write("plan.json", ReadFileBytes(other / "plan.json"));
+    if (!fs::exists(other / "trials")) {
+      continue;
+    }
+    for (const auto& entry : fs::directory_iterator(other / "trials")) {
+      const std::string id = entry.path().filename().string();
+      if (StatusOf(other, id) && !StatusOf(folder, id)) {
+        fs::create_directories(folder / "trials");
+        fs::copy(entry.path(), TrialFolder(folder, id),
+                 fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+      }
+    }
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Runs the trials of a study. Each is one folder, written whole or not at all, so that a study that
+// was killed goes on where it was, and shards of it can run anywhere.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "problems/study/study_plan.h"
+#include "problems/study/study_progress.h"
+#include "surfaces/base/run_context.h"
+
+namespace semblance {
+
+struct StudyRunOptions {
+  int jobs = 1;   // trials at a time, each on one thread
+  int shard = 0;  // of shards: trials n with n % shards == shard
+  int shards = 1;
+  bool retry_failed = false;         // run again what failed before
+  std::filesystem::path cache = {};  // folder for implicit faces, shared by processes; empty: none
+  int cache_limit_mb = 2000;
+  // May be empty. Called from one thread at a time: each second, and after each trial with its
+  // subject, values and status.
+  std::function<void(const StudyPace&, const std::string& trial)> on_pace = {};
+};
+
+struct StudySummary {
+  int trials = 0;   // of this shard
+  int skipped = 0;  // were there already
+  int done = 0, failed = 0;
+  int shared_made = 0;  // subjects, shells, skulls with their implicit face, and generic faces that
+                        // were made; each serves all trials that have it in common
+};
+
+// In `folder`: plan.json (all trials), trials/<id>/trial.json (status, axes, metrics, resolved
+// experiment, versions; the same bytes whenever and wherever it ran) and timing.json; with
+// `keep: view` scene.json (of a study of depth: the first subject's depth.png), with `keep: run`
+// all files of a run beside them. A trial that cannot be done is a trial.json with the reason. What
+// trials have in common is made once. Throws IoError if the folder cannot be written or holds
+// another plan, Cancelled on request (after the trials at hand).
+StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
+                      const StudyRunOptions& options, const RunContext& context);
+
+// Copies finished trials from other folders of the same plan; those that are there already stay.
+// Throws IoError if a folder is of another plan.
+void GatherTrials(const std::filesystem::path& folder,
+                  const std::vector<std::filesystem::path>& others);
+
+// plan.json as text.
+std::string PlanJson(const StudyPlan& plan);
+
+}  // namespace semblance

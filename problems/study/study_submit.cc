@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study/study_submit.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "problems/output/files.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// For a POSIX shell, whatever is in it.
+std::string Quoted(const std::string& text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  }
+  return quoted + "'";
+}
+
+std::string QuotedPath(const fs::path& path) { return Quoted(fs::absolute(path).string()); }
+
+}  // namespace
+
+std::string SubmitScript(const SubmitOptions& o) {
+  const std::string name = Quoted("semblance-" + o.study.stem().string());
+  std::string extra;
+  for (const std::string& option : o.sbatch) {
+    extra += fmt::format(" {}", Quoted(option));
+  }
+  // The number of shards is fixed here: Slurm's own count is smaller when only some elements of the
+  // array are run again.
+  const std::string shard = fmt::format(
+      "{} study {} --out {} --jobs {} --quiet --shard \"$SLURM_ARRAY_TASK_ID/{}\"",
+      QuotedPath(o.program), QuotedPath(o.study), QuotedPath(o.folder), o.jobs, o.shards);
+  const std::string merge = fmt::format("{} merge {}", QuotedPath(o.program), QuotedPath(o.folder));
+  const std::string log = fs::absolute(o.folder).string();
+  return fmt::format(
+      "#!/bin/sh\n"
+      "# Submits the study and its merge to Slurm. Run again, it submits again: what is done is "
+      "skipped.\n"
+      "set -eu\n"
+      "array=$(sbatch --parsable --requeue --job-name={} --array=0-{} --cpus-per-task={} "
+      "--output={}{} \\\n  --wrap={})\n"
+      "merge=$(sbatch --parsable --requeue --job-name={} --dependency=afterany:\"${{array%%;*}}\" "
+      "--output={}{} \\\n  --wrap={})\n"
+      "echo \"shards: job $array; merge: job $merge\"\n",
+      name, o.shards - 1, o.jobs, Quoted(log + "/slurm-shard-%a.log"), extra, Quoted(shard), name,
+      Quoted(log + "/slurm-merge.log"), extra, Quoted(merge));
+}
+
+fs::path SubmitStudy(const SubmitOptions& options) {
+  OutputFolder folder(options.folder, WhenNotEmpty::kReplaceFiles);
+  folder.Write("submit.sh", SubmitScript(options));
+  const fs::path script = folder.Root() / "submit.sh";
+  if (std::system("command -v sbatch > /dev/null 2>&1") != 0) {
+    throw InputError(
+        fmt::format("{}: written, but there is no sbatch here; run it with sh where Slurm is",
+                    script.string()));
+  }
+  if (std::system(("sh " + QuotedPath(script)).c_str()) != 0) {
+    throw InputError(fmt::format(
+        "{}: sbatch refused, see above; mend the options after --sbatch and submit again",
+        script.string()));
+  }
+  return script;
+}
+
+}  // namespace semblance

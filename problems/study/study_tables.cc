@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study/study_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "surfaces/base/error.h"
+#include "surfaces/base/whole_file.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// All numbers of an object by dotted path; lists are left out.
+void Flatten(const Json& json, const std::string& path, std::map<std::string, double>& out) {
+  if (json.is_number()) {
+    out[path] = json.get<double>();
+  } else if (json.is_object()) {
+    for (const auto& [key, value] : json.items()) {
+      Flatten(value, path.empty() ? key : fmt::format("{}.{}", path, key), out);
+    }
+  }
+}
+
+// A list of numbers; none where there is no list.
+std::vector<double> NumbersAt(const Json& result, const char* pointer) {
+  const Json list = result.value(Json::json_pointer(pointer), Json());
+  std::vector<double> numbers;
+  for (const Json& value : list.is_array() ? list : Json::array()) {
+    numbers.push_back(value.is_number() ? value.get<double>() : kNaN);
+  }
+  return numbers;
+}
+
+// What is drawn as a curve, where it is there.
+void ReadCurves(const Json& result, TrialRow& row) {
+  row.quantiles_mm = NumbersAt(result, "/face/quantiles_mm");
+  row.depth_coverage = NumbersAt(result, "/depth_truth/along_direction/coverage");
+  row.left_out_coverage = NumbersAt(result, "/cross_validation/landmark/coverage");
+  const Json levels = result.value(Json::json_pointer("/fit/levels"), Json());
+  for (const Json& level : levels.is_array() ? levels : Json::array()) {
+    const auto number = [&](const char* name) {
+      return level.contains(name) && level[name].is_number() ? level[name].get<double>() : kNaN;
+    };
+    if (row.step_rms_mm.empty()) {
+      row.step_rms_mm.push_back(number("rms_before_mm"));
+    }
+    row.step_rms_mm.push_back(number("rms_after_mm"));
+  }
+}
+
+void ReadTrial(const fs::path& folder, TrialRow& row) {
+  const fs::path file = folder / "trials" / row.id / "trial.json";
+  row.status = "missing";
+  if (!fs::exists(file)) {
+    return;
+  }
+  const Json json = Json::parse(ReadFileBytes(file), nullptr, false);
+  if (!json.is_object() || json.value("id", "") != row.id) {
+    return;
+  }
+  row.status = json.value("status", "failed");
+  row.reason = json.value("reason", "");
+  if (json.contains("result")) {
+    Flatten(json["result"], "", row.metrics);
+    ReadCurves(json["result"], row);
+  }
+}
+
+// A cell as RFC 4180 wants it.
+std::string Cell(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) {
+    return text;
+  }
+  std::string quoted = "\"";
+  for (const char c : text) {
+    quoted += c == '"' ? "\"\"" : std::string(1, c);
+  }
+  return quoted + "\"";
+}
+
+std::string Cells(const std::vector<std::string>& texts) {
+  std::string line;
+  for (const std::string& text : texts) {
+    line += Cell(text) + ",";
+  }
+  return line;
+}
+
+std::string CsvNumber(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+
+std::map<std::string, double> BySubject(const StudyResults& results, const Treatment& treatment,
+                                        const std::string& metric) {
+  std::map<std::string, double> values;
+  for (const std::size_t n : treatment.trials) {
+    const TrialRow& row = results.trials[n];
+    if (const auto value = row.metrics.find(metric); value != row.metrics.end()) {
+      values[row.subject] = value->second;
+    }
+  }
+  return values;
+}
+
+}  // namespace
+
+int StudyResults::Count(const std::string& status) const {
+  return static_cast<int>(std::count_if(trials.begin(), trials.end(),
+                                        [&](const TrialRow& row) { return row.status == status; }));
+}
+
+StudyResults ReadStudyResults(const fs::path& folder) {
+  const fs::path file = folder / "plan.json";
+  StudyResults results;
+  try {
+    const Json plan = Json::parse(ReadFileBytes(file));
+    results.title = plan.at("title");
+    results.hash = plan.at("hash");
+    results.metric = plan.at("metric");
+    results.axes = plan.at("axes").get<std::vector<std::string>>();
+    results.notes = plan.at("notes").get<std::vector<std::string>>();
+    for (const Json& trial : plan.at("trials")) {
+      TrialRow row;
+      row.id = trial.at("id");
+      row.subject = trial.at("subject");
+      row.values = trial.at("values").get<std::vector<std::string>>();
+      ReadTrial(folder, row);
+      results.trials.push_back(std::move(row));
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw IoError(fmt::format("{}: not the plan of a study: {}", file.string(), error.what()));
+  }
+  return results;
+}
+
+std::string TreatmentLabel(const std::vector<std::string>& axes,
+                           const std::vector<std::string>& values) {
+  std::string label;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (axes[k] == "title" && !values[k].empty()) {
+      return values[k];
+    }
+    label += label.empty() || values[k].empty() ? values[k] : ", " + values[k];
+  }
+  return label.empty() ? "base" : label;
+}
+
+std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric) {
+  std::vector<Treatment> treatments;
+  std::map<std::vector<std::string>, std::size_t> index;
+  for (std::size_t n = 0; n < results.trials.size(); ++n) {
+    const TrialRow& row = results.trials[n];
+    const auto [it, is_new] = index.try_emplace(row.values, treatments.size());
+    if (is_new) {
+      treatments.push_back({row.values, TreatmentLabel(results.axes, row.values), {}, {}});
+    }
+    if (row.status == "done") {
+      treatments[it->second].trials.push_back(n);
+    }
+  }
+  for (Treatment& treatment : treatments) {
+    treatment.by_subject = BySubject(results, treatment, metric);
+  }
+  return treatments;
+}
+
+std::string TrialsCsv(const StudyResults& results) {
+  std::string csv = "trial,subject," + Cells(results.axes) + "status,reason,metric,value\n";
+  for (const TrialRow& row : results.trials) {
+    const std::string head = fmt::format("{},{},{}{},{},", row.id, Cell(row.subject),
+                                         Cells(row.values), row.status, Cell(row.reason));
+    if (row.metrics.empty()) {
+      csv += head + ",\n";
+    }
+    for (const auto& [metric, value] : row.metrics) {
+      csv += fmt::format("{}{},{}\n", head, metric, value);
+    }
+  }
+  return csv;
+}
+
+std::string SummaryCsv(const StudyResults& results) {
+  std::set<std::string> metrics;
+  for (const TrialRow& row : results.trials) {
+    for (const auto& [metric, value] : row.metrics) {
+      metrics.insert(metric);
+    }
+  }
+  std::string csv =
+      Cells(results.axes) + "metric,n,mean,sd,median,min,max,mean_low_95,mean_high_95\n";
+  const std::vector<Treatment> treatments = Treatments(results, results.metric);
+  for (const std::string& metric : metrics) {
+    for (const Treatment& treatment : treatments) {
+      std::vector<double> values;
+      for (const auto& [subject, value] : BySubject(results, treatment, metric)) {
+        values.push_back(value);
+      }
+      const SampleSummary s = Summarize(values);
+      csv += fmt::format("{}{},{},{},{},{},{},{},{},{}\n", Cells(treatment.values), metric, s.n,
+                         CsvNumber(s.mean), CsvNumber(s.sd), CsvNumber(s.median), CsvNumber(s.min),
+                         CsvNumber(s.max), CsvNumber(s.mean_95.low), CsvNumber(s.mean_95.high));
+    }
+  }
+  return csv;
+}
+
+}  // namespace semblance

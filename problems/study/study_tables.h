@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The numbers of a study's folder: read from its trials, written as tables.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "problems/metrics/statistics.h"
+
+namespace semblance {
+
+struct TrialRow {
+  std::string id, subject;
+  std::vector<std::string> values;        // one an axis
+  std::string status;                     // done, unusable, failed, missing
+  std::string reason;                     // of a failure
+  std::map<std::string, double> metrics;  // by dotted path in result.json; finite ones only
+  std::vector<double> quantiles_mm = {};  // of the face's error (FaceMetrics); empty: none
+  std::vector<double> step_rms_mm = {};   // before the first step of the fit, after each
+  // Of stated standard deviations (interp/calibration.h): against the true depth, against dowels
+  // that were left out.
+  std::vector<double> depth_coverage = {}, left_out_coverage = {};
+};
+
+struct StudyResults {
+  std::string title, hash, metric;
+  std::vector<std::string> axes;
+  std::vector<TrialRow> trials;  // in the order of the plan
+  std::vector<std::string> notes;
+
+  int Count(const std::string& status) const;
+};
+
+// Throws IoError if plan.json is missing or not that of a study.
+StudyResults ReadStudyResults(const std::filesystem::path& folder);
+
+// One treatment: the trials that differ in the subject only.
+struct Treatment {
+  std::vector<std::string> values;           // one an axis
+  std::string label;                         // TreatmentLabel of them
+  std::vector<std::size_t> trials;           // those that are done, in the order of the plan
+  std::map<std::string, double> by_subject;  // the metric, of these
+};
+// The title, where the study sets one, else all values that are not empty.
+std::string TreatmentLabel(const std::vector<std::string>& axes,
+                           const std::vector<std::string>& values);
+std::vector<Treatment> Treatments(const StudyResults& results, const std::string& metric);
+
+// trials.csv: trial, subject, the axes, status, reason, metric, value; one line a number, in the
+// order of the plan. summary.csv: the axes, metric, n, mean, sd, median, min, max and the
+// bootstrap's 95 % interval of the mean over subjects.
+std::string TrialsCsv(const StudyResults& results);
+std::string SummaryCsv(const StudyResults& results);
+
+}  // namespace semblance

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/dowel_depths.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/config/nearest_word.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using Notes = std::vector<std::string>;
+
+void CheckSetSites(const std::map<std::string, double>& set_mm) {
+  std::vector<std::string> known = StandardSiteCodes();
+  for (const StandardSite& site : StandardSites()) {
+    if (site.paired) {
+      known.emplace_back(site.code);
+    }
+  }
+  for (const auto& [site, depth_mm] : set_mm) {
+    if (std::find(known.begin(), known.end(), site) == known.end()) {
+      throw InputError(fmt::format("set_mm: unknown site '{}'{}", site, Suggestion(site, known)));
+    }
+    if (!(depth_mm > 0 && std::isfinite(depth_mm))) {
+      throw InputError(fmt::format("set_mm: the depth of site {} is {} mm; it must be above 0",
+                                   SiteInWords(site), depth_mm));
+    }
+  }
+}
+
+// The entry of set_mm that holds for the site: its own, else that of the pair.
+std::map<std::string, double>::const_iterator FindSet(const TissueOptions& options,
+                                                      const std::string& site) {
+  const auto own = options.set_mm.find(site);
+  return own != options.set_mm.end() ? own : options.set_mm.find(WithoutSide(site));
+}
+
+void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowels, Notes& notes) {
+  for (const auto& entry : options.set_mm) {
+    const bool used = std::any_of(dowels.begin(), dowels.end(), [&](const Dowel& dowel) {
+      const auto it = FindSet(options, dowel.site);
+      return it != options.set_mm.end() && it->first == entry.first;
+    });
+    if (!used) {
+      notes.push_back(
+          fmt::format("set_mm: no dowel takes the depth of site {}", SiteInWords(entry.first)));
+    }
+  }
+}
+
+// Sets the depths of set_mm and returns the dowels that still need one.
+std::vector<Dowel*> ApplySets(const TissueOptions& options, std::vector<Dowel>& dowels,
+                              Notes& notes) {
+  std::vector<Dowel*> open;
+  for (Dowel& dowel : dowels) {
+    dowel.depth_mm = dowel.sd_mm = kNaN;
+    const auto it = FindSet(options, dowel.site);
+    if (it == options.set_mm.end()) {
+      open.push_back(&dowel);
+      continue;
+    }
+    dowel.depth_mm = it->second;
+    notes.push_back(
+        fmt::format("site {}: depth set to {} mm by hand", SiteInWords(dowel.site), it->second));
+  }
+  return open;
+}
+
+void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open, Notes& notes) {
+  if (open.empty()) {
+    return;
+  }
+  if (options.table.empty()) {
+    throw InputError(
+        "tissue depths come from a table, but none is given; set `table` to a file such as "
+        "configs/tables/rhine_caucasoid.yaml, or `depths: measured`");
+  }
+  const TissueTable table = ReadTissueTable(options.table);
+  std::vector<std::string> sites;
+  for (const Dowel* dowel : open) {
+    sites.push_back(dowel->site);
+  }
+  RequireDepths(table, options.sex, options.build, sites);
+  for (Dowel* dowel : open) {
+    const TissueDepth depth = LookUpDepth(table, options.sex, options.build, dowel->site);
+    dowel->depth_mm = depth.mean_mm;
+    dowel->sd_mm = depth.sd_mm.value_or(kNaN);
+    if (depth.flag == CellFlag::kSuspect) {
+      notes.push_back(fmt::format("site {}: the depth of {:.2f} mm in table '{}' is suspect: {}",
+                                  SiteInWords(dowel->site), depth.mean_mm, table.id, depth.note));
+    }
+  }
+}
+
+const Landmark& LandmarkAt(const LandmarkFile& file, const std::string& site) {
+  for (const Landmark& landmark : file.landmarks) {
+    if (landmark.site == site) {
+      return landmark;
+    }
+  }
+  throw InputError(
+      fmt::format("site {}: no landmark has it, so it has no measured depth", SiteInWords(site)));
+}
+
+void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open, Notes& notes) {
+  for (Dowel* dowel : open) {
+    const Landmark& landmark = LandmarkAt(file, dowel->site);
+    if (landmark.depth_along_normal_mm) {
+      dowel->depth_mm = *landmark.depth_along_normal_mm;
+    } else if (landmark.depth_closest_mm) {
+      dowel->depth_mm = *landmark.depth_closest_mm;
+      notes.push_back(fmt::format(
+          "site {}: no depth along the normal; {:.2f} mm to the closest skin taken instead",
+          SiteInWords(dowel->site), dowel->depth_mm));
+    } else {
+      notes.push_back(
+          fmt::format("site {}: no measured depth; dowel dropped", SiteInWords(dowel->site)));
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
+                                    std::vector<Dowel>& dowels) {
+  CheckSetSites(options.set_mm);
+  Notes notes;
+  const std::vector<Dowel*> open = ApplySets(options, dowels, notes);
+  NoteUnusedSets(options, dowels, notes);
+  if (options.depths == DepthSource::kTable) {
+    FillFromTable(options, open, notes);
+  } else {
+    FillFromMeasured(landmarks, open, notes);
+  }
+  std::erase_if(dowels, [](const Dowel& dowel) { return std::isnan(dowel.depth_mm); });
+  if (dowels.empty()) {
+    throw InputError(
+        "no dowel has a tissue depth; measure at least one in the landmark file, or set `depths: "
+        "table`");
+  }
+  return notes;
+}
+
+}  // namespace semblance

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Gives dowels their tissue depth: from a table (thesis app. A) or from what was measured on the
+// subject.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "interp/dowels/dowel.h"
+#include "problems/subject/landmarks.h"
+#include "problems/subject/tissue_table.h"
+#include "surfaces/base/fields.h"
+
+namespace semblance {
+
+enum class DepthSource { kTable, kMeasured };
+
+constexpr auto EnumNames(DepthSource) {
+  return std::to_array<std::string_view>({"table", "measured"});
+}
+
+struct TissueOptions {
+  DepthSource depths = DepthSource::kTable;
+  std::filesystem::path table;
+  Sex sex = Sex::kMale;
+  Build build = Build::kNormal;
+  std::map<std::string, double> set_mm;
+};
+
+template <class Visitor>
+void Fields(Visitor& visit, TissueOptions& o) {
+  visit(FieldInfo{.name = "depths",
+                  .doc = "table: those of a population; measured: those in the landmark file"},
+        o.depths);
+  visit(FieldInfo{.name = "table", .doc = "file of the tissue table; for depths: table"}, o.table);
+  visit(
+      FieldInfo{.name = "sex", .doc = "of the subject; a table of pooled adults has no use for it"},
+      o.sex);
+  visit(FieldInfo{.name = "build",
+                  .doc = "of the subject: emaciated, normal or obese; not for pooled adults"},
+        o.build);
+  visit(FieldInfo{.name = "set_mm",
+                  .unit = "mm",
+                  .min = 0.01,
+                  .max = 100,
+                  .doc = "depths by site, e.g. {me: 7, go_l: 12}, in place of the table's or the "
+                         "measured ones; a pair's code without side means both sides"},
+        o.set_mm);
+}
+
+// Sets depth_mm and sd_mm of each dowel; a depth under set_mm comes first (that of "go_l" before
+// that of "go"). Measured depths are those along the normal, else to the closest skin. Dowels of
+// landmarks without any measured depth are removed.
+//
+// Returns what people should know: suspect cells used, entries of set_mm used and unused, depths to
+// the closest skin, dowels removed. Throws InputError if a table is needed and not given or lacks a
+// depth (all such sites are named), if set_mm names an unknown site, or if no dowel is left;
+// IoError and ConfigError as ReadTissueTable.
+std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
+                                    std::vector<Dowel>& dowels);
+
+}  // namespace semblance

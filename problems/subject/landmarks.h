@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The landmarks placed on a skull, as a file, and the dowels that stand on them (thesis def. 2.1).
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "interp/dowels/dowel.h"
+#include "surfaces/base/fields.h"
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// How sure the observer was of a landmark's place.
+enum class Certainty { kHigh, kMedium, kLow };
+
+constexpr auto EnumNames(Certainty) {
+  return std::to_array<std::string_view>({"high", "medium", "low"});
+}
+
+struct Landmark {
+  std::string site;                                  // e.g. "g", "go_l"
+  std::array<double, 3> point = {kNaN, kNaN, kNaN};  // on the bone, mm
+  std::optional<std::array<double, 3>> normal;       // unit, out of the bone
+  std::optional<double> depth_along_normal_mm;       // measured on the subject, > 0
+  std::optional<double> depth_closest_mm;            // from bone to the closest skin, > 0
+  Certainty certainty = Certainty::kMedium;
+  std::string note;
+};
+
+// A site that was looked for and cannot be placed, e.g. because the bone is gone.
+struct AbsentLandmark {
+  std::string site;
+  std::string reason;
+};
+
+struct LandmarkFile {
+  std::string subject;
+  std::string units = "mm";
+  std::string axes = "LPS";
+  std::vector<Landmark> landmarks;
+  std::vector<AbsentLandmark> absent;
+};
+
+struct PlaceOptions {
+  double max_distance_mm = 3;
+  double normal_radius_mm = 3;
+};
+
+template <class Visitor>
+void Fields(Visitor& visit, Landmark& o) {
+  visit(
+      FieldInfo{.name = "site", .doc = "code of the site, with _l or _r where it is one of a pair"},
+      o.site);
+  visit(FieldInfo{.name = "point", .unit = "mm", .doc = "on the bone"}, o.point);
+  visit(FieldInfo{.name = "normal", .doc = "unit, out of the bone; else taken from the skull"},
+        o.normal);
+  visit(FieldInfo{.name = "depth_along_normal_mm",
+                  .unit = "mm",
+                  .min = 0.01,
+                  .max = 100,
+                  .doc = "measured tissue depth along the normal"},
+        o.depth_along_normal_mm);
+  visit(FieldInfo{.name = "depth_closest_mm",
+                  .unit = "mm",
+                  .min = 0.01,
+                  .max = 100,
+                  .doc = "measured distance to the closest skin"},
+        o.depth_closest_mm);
+  visit(FieldInfo{.name = "certainty", .doc = "of the place"}, o.certainty);
+  visit(FieldInfo{.name = "note", .doc = "what the observer had to say"}, o.note);
+}
+
+template <class Visitor>
+void Fields(Visitor& visit, AbsentLandmark& o) {
+  visit(FieldInfo{.name = "site", .doc = "code of the site"}, o.site);
+  visit(FieldInfo{.name = "reason", .doc = "why it cannot be placed"}, o.reason);
+}
+
+template <class Visitor>
+void Fields(Visitor& visit, LandmarkFile& o) {
+  visit(FieldInfo{.name = "subject", .doc = "whose skull it is; for messages"}, o.subject);
+  visit(FieldInfo{.name = "units", .doc = "mm"}, o.units);
+  visit(FieldInfo{.name = "axes", .doc = "LPS: +x subject left, +y posterior, +z up"}, o.axes);
+  visit(FieldInfo{.name = "landmarks", .doc = "those that were placed"}, o.landmarks);
+  visit(FieldInfo{.name = "absent", .doc = "those that cannot be placed, with the reason"},
+        o.absent);
+}
+
+template <class Visitor>
+void Fields(Visitor& visit, PlaceOptions& o) {
+  visit(FieldInfo{.name = "max_distance_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 50,
+                  .doc = "a landmark further from the skull than this is an error; more forgives "
+                         "coarse skulls, and wrong frames"},
+        o.max_distance_mm);
+  visit(FieldInfo{.name = "normal_radius_mm",
+                  .unit = "mm",
+                  .min = 0.1,
+                  .max = 30,
+                  .doc = "where a landmark has no normal, the skull's mean normal within this "
+                         "radius; more smooths rough bone, and rounds rims"},
+        o.normal_radius_mm);
+}
+
+// The one way to read such a file, as the checks are made here. Throws IoError if the file cannot
+// be read; ConfigError, with a line for each fault, if its units or axes are others, it has no
+// landmark, a site is not one of StandardSiteCodes() or stands twice (also once as absent), a point
+// lacks, or a normal is not of length 1 within 1 %.
+LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
+
+// One dowel a landmark, in the file's order, its depth still NaN. The base is the skull's point
+// nearest to the landmark; the direction the landmark's normal, else the area-weighted normal of
+// the skull within the radius: of the bone that hangs together with the base there and faces within
+// 80 degrees of it, so that the inner side of a thin wall has no say. Throws InputError if a
+// landmark is too far from the skull, or the skull has no area there.
+std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
+                               const PlaceOptions& options);
+
+}  // namespace semblance

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/phantom.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "problems/subject/phantom_shape.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+struct SitePlace {
+  const char* code;  // without side
+  Vec3 place;        // near an average skull, mm; of the left one of a pair
+  double depth_mm;   // of an average adult
+};
+
+const SitePlace kMidline[] = {
+    {"sg", {0, 2, 32}, 4.3},   {"g", {0, -3, 11}, 5.3},  {"n", {0, 0, 0}, 6.5},
+    {"rhi", {0, -10, -21}, 4}, {"mp", {0, -5, -58}, 10}, {"pr", {0, -8, -69}, 10},
+    {"id", {0, -5, -86}, 11},  {"sm", {0, -1, -96}, 11}, {"pg", {0, -4, -107}, 11},
+    {"me", {0, 8, -118}, 7.5},
+};
+const SitePlace kLateral[] = {
+    {"fe", {30, 10, 44}, 4.5},   {"mso", {27, 3, 13}, 7},     {"mio", {32, 8, -28}, 7},
+    {"im", {40, 17, -46}, 12},   {"lo", {50, 22, -28}, 10},   {"zy", {66, 58, -26}, 8},
+    {"sgl", {66, 82, -20}, 8.5}, {"go", {50, 70, -85}, 11.5}, {"sM2", {37, 28, -62}, 15},
+    {"mr", {50, 56, -60}, 14},   {"iM2", {36, 32, -88}, 14},
+};
+constexpr double kVaultDepth = 5;     // mm
+constexpr double kBlendWidth = 0.27;  // sigma of a site's influence, radians
+
+struct DirectionAnchor {
+  Vec3 direction;
+  double depth_mm;
+};
+
+class DepthFormula {
+ public:
+  explicit DepthFormula(SeededNumbers& random);
+  double At(const Vec3& direction) const;  // mm, > 0
+
+ private:
+  std::vector<DirectionAnchor> anchors_;
+  double subject_;
+  WaveSum waves_;
+};
+
+Vec3 OnSide(const Vec3& place, double side) { return {side * place.x(), place.y(), place.z()}; }
+
+std::vector<DirectionAnchor> SiteAnchors() {
+  std::vector<DirectionAnchor> anchors;
+  for (const SitePlace& s : kMidline) {
+    anchors.push_back({PhantomDirection(s.place), s.depth_mm});
+  }
+  for (const SitePlace& s : kLateral) {
+    anchors.push_back({PhantomDirection(s.place), s.depth_mm});
+    anchors.push_back({PhantomDirection(OnSide(s.place, -1)), s.depth_mm});
+  }
+  return anchors;
+}
+
+// The vault is held at its depth by even points of the sphere that are far from every site.
+std::vector<DirectionAnchor> VaultAnchors(const std::vector<DirectionAnchor>& sites) {
+  constexpr int kPoints = 200;
+  const double far = std::cos(35 * std::numbers::pi / 180);
+  std::vector<DirectionAnchor> anchors;
+  for (int i = 0; i < kPoints; ++i) {
+    const double z = 1 - (2 * i + 1.0) / kPoints;
+    const double azimuth = i * std::numbers::pi * (3 - std::sqrt(5.0));
+    const double s = std::sqrt(1 - z * z);
+    const Vec3 d(s * std::cos(azimuth), s * std::sin(azimuth), z);
+    if (std::ranges::all_of(sites,
+                            [&](const DirectionAnchor& a) { return a.direction.dot(d) < far; })) {
+      anchors.push_back({d, kVaultDepth});
+    }
+  }
+  return anchors;
+}
+
+DepthFormula::DepthFormula(SeededNumbers& random)
+    : anchors_(SiteAnchors()),
+      subject_(std::clamp(1 + 0.08 * random.Normal(), 0.84, 1.16)),
+      waves_(DrawWaves(random)) {
+  const std::vector<DirectionAnchor> vault = VaultAnchors(anchors_);
+  anchors_.insert(anchors_.end(), vault.begin(), vault.end());
+}
+
+double DepthFormula::At(const Vec3& direction) const {
+  constexpr double kWaveShare = 0.05;
+  double sum = 0, weights = 0;
+  for (const DirectionAnchor& a : anchors_) {
+    const double weight = std::exp((a.direction.dot(direction) - 1) / (kBlendWidth * kBlendWidth));
+    sum += weight * a.depth_mm;
+    weights += weight;
+  }
+  return subject_ * (1 + kWaveShare * waves_.Value(direction)) * sum / weights;
+}
+
+// Even directions: ring k of n has 6 min(k, n - k) of them, so triangles are alike everywhere.
+int RingSize(int ring, int rings) { return std::max(1, 6 * std::min(ring, rings - ring)); }
+
+// Runs 0..pi; rings lie closest at the height of the chin, where the bone curves most.
+double PolarAngle(double share) {
+  constexpr double kCrowding = 0.25, kClosest = 0.74, kTurn = 2 * std::numbers::pi;
+  const double wave = std::sin(kTurn * (share - kClosest)) + std::sin(kTurn * kClosest);
+  return std::numbers::pi * (share - kCrowding / kTurn * wave);
+}
+
+std::vector<Vec3> RingDirections(int rings) {
+  std::vector<Vec3> directions;
+  for (int k = 0; k <= rings; ++k) {
+    const double theta = PolarAngle(static_cast<double>(k) / rings);
+    const int size = RingSize(k, rings);
+    for (int i = 0; i < size; ++i) {
+      const double phi = 2 * std::numbers::pi * i / size;
+      directions.emplace_back(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                              std::cos(theta));
+    }
+  }
+  return directions;
+}
+
+// Zips two rings: always the side whose next point comes first round the axis.
+void JoinRings(int upper_first, int upper_size, int lower_first, int lower_size,
+               std::vector<Triangle>& triangles) {
+  const int upper_steps = upper_size > 1 ? upper_size : 0;
+  const int lower_steps = lower_size > 1 ? lower_size : 0;
+  int u = 0, l = 0;
+  while (u < upper_steps || l < lower_steps) {
+    const std::int32_t a = upper_first + u % upper_size, b = lower_first + l % lower_size;
+    const bool lower_next = u == upper_steps || (l < lower_steps && (2 * l + 1) * upper_size <=
+                                                                        (2 * u + 1) * lower_size);
+    if (lower_next) {
+      triangles.push_back({a, b, lower_first + ++l % lower_size});
+    } else {
+      triangles.push_back({a, b, upper_first + ++u % upper_size});
+    }
+  }
+}
+
+std::vector<Triangle> RingTriangles(int rings) {
+  std::vector<Triangle> triangles;
+  int first = 0;
+  for (int k = 0; k < rings; ++k) {
+    const int size = RingSize(k, rings);
+    JoinRings(first, size, first + size, RingSize(k + 1, rings), triangles);
+    first += size;
+  }
+  return triangles;
+}
+
+class Head {
+ public:
+  explicit Head(std::uint64_t random_seed)
+      : random_(random_seed), shape_(random_), depth_(random_) {
+    const Vec3 nasion = PhantomDirection(Vec3::Zero());
+    centre_ = -shape_.Radius(nasion) * nasion;
+  }
+  PhantomSite At(std::string site, const Vec3& direction) const {
+    return {std::move(site), centre_ + shape_.Radius(direction) * direction,
+            shape_.Normal(direction), depth_.At(direction)};
+  }
+  const Vec3& Centre() const { return centre_; }
+
+ private:
+  SeededNumbers random_;
+  PhantomShape shape_;
+  DepthFormula depth_;
+  Vec3 centre_;
+};
+
+std::vector<PhantomSite> AllSites(const Head& head) {
+  std::vector<PhantomSite> sites;
+  for (const SitePlace& s : kMidline) {
+    sites.push_back(head.At(s.code, PhantomDirection(s.place)));
+  }
+  for (const SitePlace& s : kLateral) {
+    sites.push_back(head.At(fmt::format("{}_l", s.code), PhantomDirection(s.place)));
+    sites.push_back(head.At(fmt::format("{}_r", s.code), PhantomDirection(OnSide(s.place, -1))));
+  }
+  return sites;
+}
+
+}  // namespace
+
+Phantom MakePhantom(const PhantomOptions& options) {
+  if (options.rings < 8 || options.rings > 1000) {
+    throw InputError(
+        fmt::format("phantom: rings is {}, allowed is 8 to 1000; choose a number in that range",
+                    options.rings));
+  }
+  const Head head(options.random_seed);
+  Phantom phantom;
+  phantom.centre = head.Centre();
+  phantom.skull.triangles = RingTriangles(options.rings);
+  phantom.face.triangles = phantom.skull.triangles;
+  for (const Vec3& direction : RingDirections(options.rings)) {
+    const PhantomSite p = head.At({}, direction);
+    phantom.skull.points.push_back(p.base);
+    phantom.depth_mm.push_back(p.depth_mm);
+    phantom.face.points.push_back(p.base + p.depth_mm * p.normal);
+  }
+  phantom.sites = AllSites(head);
+  return phantom;
+}
+
+}  // namespace semblance

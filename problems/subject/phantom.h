@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A made-up head whose skull, skin and tissue depths are all known exactly, to measure how well a
+// face is recovered where nothing is left to doubt but the method.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "surfaces/base/fields.h"
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+struct PhantomOptions {
+  static constexpr std::string_view kName = "phantom";
+  std::uint64_t random_seed = 1;
+  int rings = 100;
+};
+template <class Visitor>
+void Fields(Visitor& visit, PhantomOptions& o) {
+  visit(FieldInfo{.name = "random_seed",
+                  .doc = "which head: sizes, features, asymmetry and tissue depths follow from it"},
+        o.random_seed);
+  visit(
+      FieldInfo{
+          .name = "rings",
+          .min = 8,
+          .max = 1000,
+          .doc = "bands of triangles from crown to throat; the mesh has about 3 rings^2 triangles"},
+      o.rings);
+}
+
+struct PhantomSite {
+  std::string site;                    // landmark code with side, e.g. "g", "go_l", "go_r"
+  Vec3 base = Vec3::Constant(kNaN);    // on the exact skull, mm
+  Vec3 normal = Vec3::Constant(kNaN);  // of the exact skull there, unit, outward
+  double depth_mm = kNaN;              // of the tissue along the normal, > 0
+};
+
+struct Phantom {
+  TriMesh skull;                       // closed, outward; LPS, nasion at the origin
+  std::vector<double> depth_mm;        // tissue along the exact normal, one a skull vertex, > 0
+  TriMesh face;                        // skull vertex + depth * exact normal; the skull's triangles
+  std::vector<PhantomSite> sites;      // all 32: midline from the forehead down, then pairs
+  Vec3 centre = Vec3::Constant(kNaN);  // every ray from here meets the skull once
+};
+
+// The same options give the same bytes. Throws InputError for rings out of range.
+Phantom MakePhantom(const PhantomOptions& options);
+
+}  // namespace semblance

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/tissue_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "problems/config/config.h"
+#include "problems/subject/sites.h"
+
+namespace semblance {
+namespace {
+
+constexpr char kPooled[] = "adult";
+
+std::vector<std::string> SixStrata() {
+  std::vector<std::string> strata;
+  for (const Build build : {Build::kEmaciated, Build::kNormal, Build::kObese}) {
+    for (const Sex sex : {Sex::kMale, Sex::kFemale}) {
+      strata.push_back(StratumName(sex, build));
+    }
+  }
+  return strata;
+}
+
+std::vector<std::string> StrataOf(const TissueRow& row) {
+  std::vector<std::string> strata;
+  for (const auto& [stratum, cell] : row.values) {
+    strata.push_back(stratum);
+  }
+  return strata;
+}
+
+bool IsPooled(const TissueTable& table) {
+  return !table.rows.empty() && table.rows.front().values.contains(kPooled);
+}
+
+std::string StratumOf(const TissueTable& table, Sex sex, Build build) {
+  return IsPooled(table) ? kPooled : StratumName(sex, build);
+}
+
+const TissueCell* FindCell(const TissueTable& table, const std::string& stratum,
+                           const std::string& site) {
+  const std::string code = WithoutSide(site);
+  for (const TissueRow& row : table.rows) {
+    const auto it = row.values.find(stratum);
+    if (row.site == code && it != row.values.end()) {
+      return &it->second;
+    }
+  }
+  return nullptr;
+}
+
+bool HasDepth(const TissueCell* cell) { return cell && cell->mean; }
+
+std::string WhyNoDepth(const TissueCell* cell) {
+  if (!cell) {
+    return "not in the table";
+  }
+  return cell->note.empty() ? "missing" : fmt::format("missing: {}", cell->note);
+}
+
+// "" if the row's depths grow with the build in both sexes, as far as they are known.
+std::string BrokenOrder(const TissueRow& row) {
+  std::string broken;
+  for (const Sex sex : {Sex::kMale, Sex::kFemale}) {
+    std::vector<double> means;
+    for (const Build build : {Build::kEmaciated, Build::kNormal, Build::kObese}) {
+      const auto it = row.values.find(StratumName(sex, build));
+      if (it != row.values.end() && it->second.mean) {
+        means.push_back(*it->second.mean);
+      }
+    }
+    if (!std::is_sorted(means.begin(), means.end())) {
+      broken += fmt::format("{} {} {:.2f} mm", broken.empty() ? "" : ",",
+                            sex == Sex::kMale ? "male" : "female", fmt::join(means, " "));
+    }
+  }
+  return broken;
+}
+
+}  // namespace
+
+template <class Report>
+void CheckValue(Report& report, const TissueCell& cell) {
+  if ((cell.flag == CellFlag::kMissing) == cell.mean.has_value()) {
+    report("mean", cell.mean ? "a missing cell has no mean; write null, or another flag"
+                             : "a cell without mean needs `flag: missing`");
+  }
+  if (cell.sd && !cell.mean) {
+    report("sd", "a cell without mean has no sd; leave it out");
+  }
+}
+
+template <class Report>
+void CheckValue(Report& report, const TissueRow& row) {
+  std::vector<std::string> six = SixStrata();
+  std::sort(six.begin(), six.end());
+  const std::vector<std::string> strata = StrataOf(row);
+  if (strata != six && strata != std::vector<std::string>{kPooled}) {
+    report("values", fmt::format("the strata must be all of {}, or only {}",
+                                 fmt::join(SixStrata(), ", "), kPooled));
+  }
+  if (row.site.empty() || WithoutSide(row.site) != row.site) {
+    report("site", fmt::format("'{}' is not a code without side; a pair stands once", row.site));
+  }
+}
+
+template <class Report>
+void CheckValue(Report& report, const TissueTable& table) {
+  if (table.units != "mm") {
+    report("units",
+           fmt::format("must be mm, not '{}'; convert the depths to millimetres", table.units));
+  }
+  if (table.id.empty()) {
+    report("id", "give the table a short name; messages use it");
+  }
+  if (table.rows.empty()) {
+    report("rows", "the table has none; list at least one site");
+  }
+  std::set<std::string> sites;
+  for (const TissueRow& row : table.rows) {
+    if (!sites.insert(row.site).second) {
+      report("rows", fmt::format("site '{}' stands twice; keep one", row.site));
+    }
+    if (StrataOf(row) != StrataOf(table.rows.front())) {
+      report("rows", fmt::format("site '{}' has other strata than the first row; a table is either "
+                                 "pooled or not",
+                                 row.site));
+    }
+  }
+}
+
+std::string StratumName(Sex sex, Build build) {
+  return fmt::format("{}_{}", EnumNames(build)[static_cast<std::size_t>(build)],
+                     EnumNames(sex)[static_cast<std::size_t>(sex)]);
+}
+
+TissueTable ReadTissueTable(const std::filesystem::path& path) {
+  return ReadConfig<TissueTable>(path);
+}
+
+TissueDepth LookUpDepth(const TissueTable& table, Sex sex, Build build, const std::string& site) {
+  RequireDepths(table, sex, build, {&site, 1});
+  const TissueCell& cell = *FindCell(table, StratumOf(table, sex, build), site);
+  return {*cell.mean, cell.sd, cell.flag, cell.note};
+}
+
+void RequireDepths(const TissueTable& table, Sex sex, Build build,
+                   std::span<const std::string> sites) {
+  const std::string stratum = StratumOf(table, sex, build);
+  std::vector<std::string> lacking;
+  for (const std::string& site : sites) {
+    if (const TissueCell* cell = FindCell(table, stratum, site); !HasDepth(cell)) {
+      lacking.push_back(fmt::format("{}: {}", SiteInWords(site), WhyNoDepth(cell)));
+    }
+  }
+  if (!lacking.empty()) {
+    throw InputError(fmt::format(
+        "tissue table '{}', stratum {}: no depth for {}. Set a depth in mm for the site under "
+        "set_mm, take another table or stratum, or list the site under `absent` in the landmark "
+        "file",
+        table.id, stratum, fmt::join(lacking, "; ")));
+  }
+}
+
+std::vector<std::string> TableWarnings(const TissueTable& table) {
+  std::vector<std::string> warnings;
+  for (const TissueRow& row : table.rows) {
+    if (const std::string broken = BrokenOrder(row); !broken.empty()) {
+      warnings.push_back(
+          fmt::format("tissue table '{}', {}: depth does not grow from emaciated to obese:{}",
+                      table.id, SiteInWords(row.site), broken));
+    }
+    for (const auto& [stratum, cell] : row.values) {
+      if (cell.flag == CellFlag::kSuspect) {
+        warnings.push_back(fmt::format("tissue table '{}', {}, {}: {:.2f} mm is suspect: {}",
+                                       table.id, SiteInWords(row.site), stratum,
+                                       cell.mean.value_or(0), cell.note));
+      }
+    }
+  }
+  return warnings;
+}
+
+}  // namespace semblance

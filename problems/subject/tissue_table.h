@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tables of tissue depth (thesis app. A; configs/tables): a row a site, a cell a stratum.
+//
+// A table has either the six strata of build and sex, "emaciated_male" ... "obese_female", or the
+// one stratum "adult": then it is pooled, and holds for every sex and build alike.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "surfaces/base/fields.h"
+
+namespace semblance {
+
+enum class Sex { kMale, kFemale };
+enum class Build { kEmaciated, kNormal, kObese };
+// Of one cell: kSuspect is used but reported, kMissing has no mean.
+enum class CellFlag { kOk, kSuspect, kMissing };
+enum class DepthMethod { kUnspecified, kNeedle, kUltrasound, kCt, kMri, kMixed };
+enum class DepthConvention { kUnspecified, kAlongBoneNormal, kClosestPoint };
+enum class DepthPosture { kUnspecified, kSupine, kUpright, kMixed };
+
+constexpr auto EnumNames(Sex) { return std::to_array<std::string_view>({"male", "female"}); }
+constexpr auto EnumNames(Build) {
+  return std::to_array<std::string_view>({"emaciated", "normal", "obese"});
+}
+constexpr auto EnumNames(CellFlag) {
+  return std::to_array<std::string_view>({"ok", "suspect", "missing"});
+}
+constexpr auto EnumNames(DepthMethod) {
+  return std::to_array<std::string_view>(
+      {"unspecified", "needle", "ultrasound", "ct", "mri", "mixed"});
+}
+constexpr auto EnumNames(DepthConvention) {
+  return std::to_array<std::string_view>({"unspecified", "along_bone_normal", "closest_point"});
+}
+constexpr auto EnumNames(DepthPosture) {
+  return std::to_array<std::string_view>({"unspecified", "supine", "upright", "mixed"});
+}
+
+struct TissueCell {
+  std::optional<double> mean;  // mm; none if and only if missing
+  std::optional<double> sd;    // mm
+  CellFlag flag = CellFlag::kOk;
+  std::string note;
+};
+
+struct TissueRow {
+  std::string site;                          // code without side; need not be a standard one
+  std::optional<int> number;                 // in the printed table
+  std::string name;                          // as printed
+  std::map<std::string, TissueCell> values;  // by stratum
+};
+
+struct TissueMeasurement {
+  DepthMethod method = DepthMethod::kUnspecified;
+  DepthConvention convention = DepthConvention::kUnspecified;
+  DepthPosture posture = DepthPosture::kUnspecified;
+};
+
+struct TissueTable {
+  std::string id;
+  std::string title;
+  std::string citation;
+  std::string population_label;  // as printed
+  std::string units = "mm";
+  TissueMeasurement measurement;
+  std::vector<TissueRow> rows;
+};
+
+struct TissueDepth {
+  double mean_mm = 0;  // > 0
+  std::optional<double> sd_mm;
+  CellFlag flag = CellFlag::kOk;  // never kMissing
+  std::string note;
+};
+
+template <class Visitor>
+void Fields(Visitor& visit, TissueCell& o) {
+  visit(FieldInfo{.name = "mean", .unit = "mm", .min = 0.01, .max = 100, .doc = "null if missing"},
+        o.mean);
+  visit(FieldInfo{.name = "sd", .unit = "mm", .min = 0, .max = 100, .doc = "standard deviation"},
+        o.sd);
+  visit(FieldInfo{.name = "flag", .doc = "suspect: used, but reported; missing: no mean"}, o.flag);
+  visit(FieldInfo{.name = "note", .doc = "why the cell is flagged"}, o.note);
+}
+
+template <class Visitor>
+void Fields(Visitor& visit, TissueRow& o) {
+  visit(FieldInfo{.name = "site", .doc = "code without side"}, o.site);
+  visit(FieldInfo{.name = "number", .min = 1, .doc = "in the printed table"}, o.number);
+  visit(FieldInfo{.name = "name", .doc = "as printed"}, o.name);
+  visit(FieldInfo{.name = "values", .doc = "a cell for each stratum"}, o.values);
+}
+
+template <class Visitor>
+void Fields(Visitor& visit, TissueMeasurement& o) {
+  visit(FieldInfo{.name = "method", .doc = "how depths were measured"}, o.method);
+  visit(FieldInfo{.name = "convention", .doc = "in which direction"}, o.convention);
+  visit(FieldInfo{.name = "posture", .doc = "how the subjects lay or sat"}, o.posture);
+}
+
+template <class Visitor>
+void Fields(Visitor& visit, TissueTable& o) {
+  visit(FieldInfo{.name = "id", .doc = "short name for messages"}, o.id);
+  visit(FieldInfo{.name = "title", .doc = "for people"}, o.title);
+  visit(FieldInfo{.name = "citation", .doc = "where the numbers were published"}, o.citation);
+  visit(FieldInfo{.name = "population_label", .doc = "who was measured, as printed"},
+        o.population_label);
+  visit(FieldInfo{.name = "units", .doc = "mm"}, o.units);
+  visit(FieldInfo{.name = "measurement", .doc = "method, convention and posture"}, o.measurement);
+  visit(FieldInfo{.name = "rows", .min = 1, .doc = "one a site"}, o.rows);
+}
+
+// "emaciated_male" ... "obese_female".
+std::string StratumName(Sex sex, Build build);
+
+// The one way to read a table, as the checks are made here. Throws IoError if the file cannot be
+// read; ConfigError if it is not such a table: units other than mm, strata that are neither the six
+// nor "adult", a site that stands twice or with a side, a mean in a missing cell or none in
+// another.
+TissueTable ReadTissueTable(const std::filesystem::path& path);
+
+// The depth at a site, with or without _l / _r; a pooled table ignores `sex` and `build`. Throws
+// InputError if the table has no such site or its cell is missing.
+TissueDepth LookUpDepth(const TissueTable& table, Sex sex, Build build, const std::string& site);
+
+// Throws one InputError that names all those of `sites` for which LookUpDepth would throw.
+void RequireDepths(const TissueTable& table, Sex sex, Build build,
+                   std::span<const std::string> sites);
+
+// One line for each row in which depth does not grow from emaciated over normal to obese in one of
+// the sexes, and one for each suspect cell. To be told, not to be refused: the published tables
+// have them.
+std::vector<std::string> TableWarnings(const TissueTable& table);
+
+}  // namespace semblance

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/emitters/emitter_cluster.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "surfaces/emitters/wide.h"
+
+namespace semblance {
+namespace {
+
+// Calls visit(x, mass) for points of triangle a, b, c whose moments up to the second are those of
+// the triangle with that mass.
+template <class Visit>
+void ForEachPoint(const Vec3& a, const Vec3& b, const Vec3& c, double mass, const Visit& visit) {
+  visit(Vec3((a + b + c) / 3), 0.75 * mass);
+  for (const Vec3& corner : {a, b, c}) {
+    visit(corner, mass / 12);
+  }
+}
+
+// The same for an emitter, its gain and depth^decay the mass; by parts where the depth is linear.
+template <class Visit>
+void ForEachPoint(const EmitterTriangle& t, int decay, const Visit& visit) {
+  if (!t.IsSloped()) {
+    ForEachPoint(t.a, t.b, t.c, t.gain, visit);
+    return;
+  }
+  const auto weighted = [&](const Vec3& x, double mass) {
+    const double share = 1 + (x - t.centroid).dot(t.slope);
+    visit(x, mass * std::pow(std::clamp(share, t.least_share, t.most_share), decay));
+  };
+  const Vec3 ab = 0.5 * (t.a + t.b), bc = 0.5 * (t.b + t.c), ca = 0.5 * (t.c + t.a);
+  ForEachPoint(t.a, ab, ca, t.gain / 4, weighted);
+  ForEachPoint(ab, t.b, bc, t.gain / 4, weighted);
+  ForEachPoint(ca, bc, t.c, t.gain / 4, weighted);
+  ForEachPoint(ab, bc, ca, t.gain / 4, weighted);
+}
+
+// visit(t, x, mass) for all points of all emitters.
+template <class Visit>
+void ForEachPoint(std::span<const EmitterTriangle> emitters, int decay, const Visit& visit) {
+  for (const EmitterTriangle& t : emitters) {
+    ForEachPoint(t, decay, [&](const Vec3& x, double mass) { visit(t, x, mass); });
+  }
+}
+
+// The centroid, each emitter weighted by how much it faces the common normal, moved along that so
+// that the sum of gain n.(x - center) is 0.
+Vec3 CenterOf(std::span<const EmitterTriangle> emitters, int decay, const Vec3& gain_normal) {
+  const double gain = gain_normal.norm();
+  const Vec3 normal = gain_normal / gain;
+  Vec3 center = Vec3::Zero();
+  double along = 0;
+  ForEachPoint(emitters, decay, [&](const EmitterTriangle& t, const Vec3& x, double mass) {
+    center += mass * t.normal.dot(normal) / gain * x;
+    along += mass * t.normal.dot(x) / gain;
+  });
+  return center + (along - normal.dot(center)) * normal;
+}
+
+// Moments about the center: [i], of gain n_i.
+struct Moments {
+  Mat3 first = Mat3::Zero();
+  std::array<Mat3, 3> second = {Mat3::Zero(), Mat3::Zero(), Mat3::Zero()};
+};
+
+Moments MomentsOf(std::span<const EmitterTriangle> emitters, int decay, const Vec3& center) {
+  Moments moments;
+  ForEachPoint(emitters, decay, [&](const EmitterTriangle& t, const Vec3& x, double mass) {
+    const Vec3 y = x - center;
+    const Mat3 square = mass * y * y.transpose();
+    moments.first += mass * t.normal * y.transpose();
+    for (int i = 0; i < 3; ++i) {
+      moments.second[i] += t.normal[i] * square;
+    }
+  });
+  return moments;
+}
+
+// Of the second order, by how much the series is more than gain_normal and spread give.
+double SecondOrderLeft(const Moments& moments, const EmitterCluster& cluster, int power) {
+  double all2 = 0;
+  Vec3 traces, cross = Vec3::Zero();
+  for (int i = 0; i < 3; ++i) {
+    const Mat3 left = moments.second[i] - cluster.gain_normal[i] * cluster.spread_mm2;
+    all2 += left.squaredNorm();
+    traces[i] = left.trace();
+    cross += moments.second[i].row(i).transpose();
+  }
+  return 0.5 * power * (traces.norm() + (power + 2) * std::sqrt(all2)) + power * cross.norm();
+}
+
+// Sets what is bounded by each emitter's furthest corner.
+void SetBounds(std::span<const EmitterTriangle> emitters, int decay, EmitterCluster& cluster) {
+  cluster.radius_mm = 0;
+  for (const EmitterTriangle& t : emitters) {
+    const double plane_mm = std::abs(t.normal.dot(t.a - cluster.center));
+    double furthest_mm = 0;
+    for (const Vec3& corner : {t.a, t.b, t.c}) {
+      furthest_mm = std::max(furthest_mm, (corner - cluster.center).norm());
+    }
+    double square = 0;
+    ForEachPoint(t, decay, [&](const Vec3& x, double mass) {
+      square += mass * (x - cluster.center).squaredNorm();
+    });
+    cluster.radius_mm = std::max(cluster.radius_mm, furthest_mm);
+    cluster.plane_mm = std::max(cluster.plane_mm, plane_mm);
+    cluster.tilt = std::max(cluster.tilt, (t.normal - cluster.gain_normal.normalized()).norm());
+    cluster.third += furthest_mm * square;
+    cluster.third_by_plane += plane_mm * square;
+  }
+}
+
+}  // namespace
+
+EmitterCluster ClusterOf(std::span<const EmitterTriangle> emitters, int decay) {
+  EmitterCluster cluster;
+  ForEachPoint(emitters, decay, [&](const EmitterTriangle& t, const Vec3&, double mass) {
+    cluster.gain_normal += mass * t.normal;
+    cluster.gain += mass;
+  });
+  const double facing = cluster.gain_normal.norm();
+  if (!(facing > 0)) {
+    return cluster;
+  }
+  cluster.center = CenterOf(emitters, decay, cluster.gain_normal);
+  const Moments moments = MomentsOf(emitters, decay, cluster.center);
+  for (int i = 0; i < 3; ++i) {
+    cluster.spread_mm2 += cluster.gain_normal[i] / (facing * facing) * moments.second[i];
+  }
+  const int power = decay + 3;
+  cluster.first = power * (0.5 * (moments.first + moments.first.transpose())).norm();
+  cluster.second = SecondOrderLeft(moments, cluster, power);
+  SetBounds(emitters, decay, cluster);
+  return cluster;
+}
+
+ClusterBatch::ClusterBatch() {
+  for (Lanes& lanes : at) {
+    lanes.fill(1e100);
+  }
+}
+
+void ClusterBatch::Set(int lane, const EmitterCluster& cluster, int power) {
+  const double half = 0.5 * power * (power + 2);
+  const bool usable = std::isfinite(cluster.radius_mm);
+  const Vec3 facing = cluster.gain_normal.normalized();
+  for (int k = 0; k < 3; ++k) {
+    at[k][lane] = usable ? cluster.center[k] : 0;
+    gain_normal[k][lane] = cluster.gain_normal[k];
+    normal[k][lane] = facing[k];
+    bend[k][lane] = half * cluster.spread_mm2(k, k);
+    bend[3 + k][lane] = 2 * half * cluster.spread_mm2(k == 2 ? 1 : 0, k == 0 ? 1 : 2);
+  }
+  fade[lane] = 0.5 * power * cluster.spread_mm2.trace();
+  radius_mm[lane] = cluster.radius_mm;
+  plane_mm[lane] = cluster.plane_mm;
+  tilt[lane] = cluster.tilt;
+  gain[lane] = cluster.gain;
+  first[lane] = cluster.first;
+  second[lane] = cluster.second;
+  third[lane] = cluster.third;
+  third_by_plane[lane] = cluster.third_by_plane;
+}
+
+// The coefficients of |p - x|^-power in powers of |x - center| / |p - center| are Gegenbauer
+// polynomials of the cosine, at most (power + j - 1 over j); each bound is at most `next` times the
+// one before. Heights over the planes differ by at most `apart` from that over the center: where p
+// may be in front of some planes alone, they are at most twice that.
+SEMBLANCE_WIDE double ClusterBatch::ErrorInBox(const Vec3& box_center, const Vec3& half,
+                                               int power) const {
+  const auto load = [](const Lanes& lanes) { return Load<Wide>(lanes, 0); };
+  Wide nearest2{}, furthest2{}, over{}, reach{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const Wide from = box_center[axis] - load(at[axis]), facing = load(normal[axis]);
+    const Wide least = Greater<Wide>(Magnitude(from) - half[axis], Wide{}),
+               most = Magnitude(from) + half[axis];
+    nearest2 += least * least;
+    furthest2 += most * most;
+    over += facing * from;
+    reach += Magnitude(facing) * half[axis];
+  }
+  const Wide nearest = SquareRoot(nearest2), inverse = 1 / nearest,
+             beyond = nearest - load(radius_mm);
+  const Wide apart = load(tilt) * nearest + load(plane_mm),
+             furthest_apart = load(tilt) * SquareRoot(furthest2) + load(plane_mm);
+  const Wide next = (power + 2) / 3.0 * load(radius_mm) * inverse;
+  const Wide second_up = power * (power + 1) / 2.0 / (1 - next),
+             third_up = (power + 2) / 3.0 * second_up;
+  const Wide height =
+      Smaller<Wide>((over + reach + furthest_apart + load(plane_mm)) * inverse, All<Wide>(1));
+  const Wide of_third = load(third) * height * third_up + load(third_by_plane) * second_up;
+  const Wide in_front = InversePowerOf(nearest2, power, power) *
+                        (load(first) + inverse * (load(second) + inverse * of_third));
+  const Wide of_some = 2 * apart * load(gain) * InversePowerOf<Wide>(beyond * beyond, power, power);
+  const Wide error = over - reach >= furthest_apart ? in_front : Greater(in_front, of_some);
+  const Wide usable = next < 1 ? error : All<Wide>(std::numeric_limits<double>::infinity());
+  Lanes errors;
+  Store(usable, errors, 0);
+  return (1 + kRounding) * ((errors[0] + errors[1]) + (errors[2] + errors[3]));
+}
+
+SEMBLANCE_WIDE double SumClusters(std::span<const ClusterBatch> batches,
+                                  std::span<const std::int32_t> which, const Vec3& p, int power) {
+  constexpr int kUsual = 9;  // of the default decay
+  Wide sum{};
+  for (const std::int32_t n : which) {
+    const ClusterBatch& b = batches[n];
+    const auto load = [](const ClusterBatch::Lanes& lanes) { return Load<Wide>(lanes, 0); };
+    const Wide x = p.x() - load(b.at[0]), y = p.y() - load(b.at[1]), z = p.z() - load(b.at[2]);
+    const Wide r2 = x * x + y * y + z * z, inverse2 = 1 / r2;
+    const Wide facing =
+        x * load(b.gain_normal[0]) + y * load(b.gain_normal[1]) + z * load(b.gain_normal[2]);
+    const Wide along2 = x * (x * load(b.bend[0]) + y * load(b.bend[3]) + z * load(b.bend[4])) +
+                        y * (y * load(b.bend[1]) + z * load(b.bend[5])) + z * z * load(b.bend[2]);
+    const Wide order2 = inverse2 * (along2 * inverse2 - load(b.fade));
+    const Wide fall =
+        power == kUsual ? InversePowerOf(r2, kUsual, kUsual) : InversePowerOf(r2, power, power);
+    sum += Greater(facing, Wide{}) * fall * (1 + order2);
+  }
+  ClusterBatch::Lanes lanes;
+  Store(sum, lanes, 0);
+  return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+}
+
+}  // namespace semblance

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What several flat emitters give together from afar: as one, by their moments up to the second,
+// with a bound on the error.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "surfaces/emitters/emitter_triangle.h"
+
+namespace semblance {
+
+// The emitters' sum at p is
+//   K = sum of gain * integral of max(n.(p - x), 0) / |p - x|^power dm(x),
+// m the share of the triangle's depth^decay. In front of all planes its Taylor series about x =
+// center is kept to the second order as far as
+//   (N.u) |u|^-power (1 + power / 2 |u|^-2 ((power + 2) u'Cu |u|^-2 - tr C))
+// gives it, u = p - center, N = sum of gain n, C the spread; 0 where N.u <= 0.
+struct EmitterCluster {
+  Vec3 gain_normal = Vec3::Zero();
+  Vec3 center = Vec3::Constant(kNaN);  // where the first order's trace is 0
+  Mat3 spread_mm2 = Mat3::Zero();      // second moment about the center, weighted by gain n.N
+
+  // What bounds the error: how far the emitters and their planes are from the center, their normals
+  // from N's, and what the form above lacks of the first and the second order.
+  double radius_mm = std::numeric_limits<double>::infinity(), plane_mm = 0, tilt = 0;
+  double gain = 0, first = 0, second = 0;
+  double third = 0, third_by_plane = 0;  // moments |x - center|^3, |n.(x - center)| |x - center|^2
+};
+
+// decay: of the flat emitter; power = decay + 3, whole. Where depths are linear, moments are taken
+// by quadrature.
+EmitterCluster ClusterOf(std::span<const EmitterTriangle> emitters, int decay);
+
+// Four clusters side by side, one a lane. A lane that was not set emits nothing.
+struct alignas(64) ClusterBatch {
+  static constexpr int kLanes = 4;
+  using Lanes = std::array<double, kLanes>;
+
+  ClusterBatch();
+  void Set(int lane, const EmitterCluster& cluster, int power);
+
+  // Not less than how much all four together err anywhere within `half`, each way, of the center;
+  // infinity where a series is of no use.
+  double ErrorInBox(const Vec3& box_center, const Vec3& half, int power) const;
+
+  std::array<Lanes, 3> at, gain_normal{};
+  std::array<Lanes, 6> bend{};  // power (power + 2) / 2 times xx, yy, zz, 2 xy, 2 xz, 2 yz
+  Lanes fade{};                 // power / 2 times the trace
+  // What bounds the error, as in EmitterCluster.
+  std::array<Lanes, 3> normal{};
+  Lanes radius_mm{}, plane_mm{}, tilt{}, gain{}, first{}, second{}, third{}, third_by_plane{};
+};
+
+// The sum at p of some of the batches, by their numbers. The same bits whatever the processor.
+double SumClusters(std::span<const ClusterBatch> batches, std::span<const std::int32_t> which,
+                   const Vec3& p, int power);
+
+}  // namespace semblance

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/emitters/flat_batch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "surfaces/emitters/wide.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kTiny = 1e-300;  // mm^2
+
+// A point of a triangle, its centroid + ab u + ac v, and its share of the mean.
+struct Sample {
+  double u, v, weight;
+};
+
+// Weights of the corners of three samples that are alike; the third is what is left of 1.
+constexpr void Append(double corner, double weight, Sample*& to) {
+  const double third = 1.0 / 3, other = 1 - 2 * corner;
+  *to++ = {corner - third, corner - third, weight};
+  *to++ = {other - third, corner - third, weight};
+  *to++ = {corner - third, other - third, weight};
+}
+
+// Dunavant 1985: exact to degree 4 and to degree 6.
+constexpr auto kSix = [] {
+  std::array<Sample, 6> samples{};
+  Sample* to = samples.data();
+  Append(0.445948490915965, 0.223381589678011, to);
+  Append(0.091576213509771, 0.109951743655322, to);
+  return samples;
+}();
+constexpr auto kTwelve = [] {
+  std::array<Sample, 12> samples{};
+  Sample* to = samples.data();
+  Append(0.249286745170910, 0.116786275726379, to);
+  Append(0.063089014491502, 0.050844906370207, to);
+  constexpr double third = 1.0 / 3;
+  constexpr std::array<double, 3> corners = {0.310352451033785, 0.053145049844816,
+                                             0.636502499121399};
+  for (int n = 0; n < 3; ++n) {
+    for (int m = 0; m < 3; ++m) {
+      if (n != m) {
+        *to++ = {corners[n] - third, corners[m] - third, 0.082851075618374};
+      }
+    }
+  }
+  return samples;
+}();
+
+// Squared longest edge over squared distance up to which the centroid and the second derivative
+// there, six and twelve samples keep within 1 %, for powers up to 9.
+constexpr std::array<double, 3> kMostShare = {0.04, 0.35, 0.9};
+
+// Some lanes, from `first` on.
+struct Four {
+  const FlatBatch& batch;
+  int first;
+  Wide dx, dy, dz, r2, inverse2;  // of the point from the centroid
+  Wide height, share;             // the squared longest edge over the squared distance
+
+  SEMBLANCE_INLINE Wide Of(const FlatBatch::Lanes& lanes) const { return Load<Wide>(lanes, first); }
+};
+
+SEMBLANCE_INLINE Four See(const FlatBatch& b, int first, const Vec3& p) {
+  Four seen{b, first, {}, {}, {}, {}, {}, {}, {}};
+  seen.dx = p.x() - seen.Of(b.at[0]);
+  seen.dy = p.y() - seen.Of(b.at[1]);
+  seen.dz = p.z() - seen.Of(b.at[2]);
+  seen.r2 =
+      Greater<Wide>(seen.dx * seen.dx + seen.dy * seen.dy + seen.dz * seen.dz, All<Wide>(kTiny));
+  seen.height = seen.dx * seen.Of(b.normal[0]) + seen.dy * seen.Of(b.normal[1]) +
+                seen.dz * seen.Of(b.normal[2]);
+  seen.inverse2 = 1 / seen.r2;
+  seen.share = seen.Of(b.longest_mm2) * seen.inverse2;
+  return seen;
+}
+
+// By the centroid, corrected by half the trace of the integrand's Hessian times the triangle's
+// covariance. The depth over its mean changes with the integrand (tilt) and on its own (bow).
+SEMBLANCE_INLINE Wide MeanFromAfar(const Four& seen, int power) {
+  const FlatBatch& b = seen.batch;
+  const Wide along_ab =
+      seen.dx * seen.Of(b.ab[0]) + seen.dy * seen.Of(b.ab[1]) + seen.dz * seen.Of(b.ab[2]);
+  const Wide along_ac =
+      seen.dx * seen.Of(b.ac[0]) + seen.dy * seen.Of(b.ac[1]) + seen.dz * seen.Of(b.ac[2]);
+  const Wide along_bc = along_ac - along_ab, inverse2 = seen.inverse2;
+  const Wide along2 =
+      (along_ab * along_ab + along_ac * along_ac + along_bc * along_bc) * (1.0 / 36);
+  Wide bend =
+      1 + (0.5 * power) * inverse2 * ((power + 2.0) * along2 * inverse2 - seen.Of(b.spread_mm2));
+  if (b.sloped) {
+    const Wide tilt = power * inverse2 *
+                      (seen.dx * seen.Of(b.tilt_mm[0]) + seen.dy * seen.Of(b.tilt_mm[1]) +
+                       seen.dz * seen.Of(b.tilt_mm[2]));
+    bend += (power - 3.0) * (tilt + 0.5 * (power - 4) * seen.Of(b.bow));
+  }
+  return bend * InversePowerOf(seen.r2, power, power);
+}
+
+SEMBLANCE_INLINE Wide MeanOfSamples(const Four& seen, std::span<const Sample> samples, int power) {
+  const FlatBatch& b = seen.batch;
+  Wide sum{};
+  for (const Sample& s : samples) {
+    const Wide dx = seen.dx - s.u * seen.Of(b.ab[0]) - s.v * seen.Of(b.ac[0]);
+    const Wide dy = seen.dy - s.u * seen.Of(b.ab[1]) - s.v * seen.Of(b.ac[1]);
+    const Wide dz = seen.dz - s.u * seen.Of(b.ab[2]) - s.v * seen.Of(b.ac[2]);
+    const Wide r2 = Greater<Wide>(dx * dx + dy * dy + dz * dz, All<Wide>(kTiny));
+    Wide value = s.weight * InversePowerOf(r2, power, power);
+    if (b.sloped) {
+      Wide depth = 1 + s.u * seen.Of(b.rise_ab) + s.v * seen.Of(b.rise_ac);
+      for (int rest = power - 3; rest > 0; rest >>= 1) {
+        value = (rest & 1) != 0 ? value * depth : value;
+        depth *= depth;
+      }
+    }
+    sum += value;
+  }
+  return sum;
+}
+
+// Adds what four lanes emit; returns those that are too near, as bits. fixed: the power, or 0 where
+// only the fall knows it.
+template <int fixed>
+SEMBLANCE_INLINE unsigned AddFour(const FlatBatch& batch, int first, const Vec3& p,
+                                  const FlatFall& fall, Wide& sum) {
+  const int power = fixed > 0 ? fixed : fall.power;
+  const Four seen = See(batch, first, p);
+  const Wide share = seen.height > 0 ? seen.share : Wide{};
+  std::array<double, kWidth<Wide>> shares;  // g++ 12 miscompiles share[l] where bounds are checked
+  Store(share, shares, 0);
+  unsigned near = 0, ways = 0;  // ways: of taking the mean that some lane needs, as bits
+  for (int l = 0; l < kWidth<Wide>; ++l) {
+    const unsigned way = static_cast<unsigned>(shares[l] > fall.most_share[0]) +
+                         static_cast<unsigned>(shares[l] > fall.most_share[1]) +
+                         static_cast<unsigned>(shares[l] > fall.most_share[2]);
+    near |= static_cast<unsigned>(way == 3) << l;
+    ways |= static_cast<unsigned>(shares[l] > 0) << way;
+  }
+  Wide mean{};
+  if ((ways & 1) != 0) {
+    mean = share <= All<Wide>(fall.most_share[0]) ? MeanFromAfar(seen, power) : mean;
+  }
+  if ((ways & 2) != 0) {
+    const Wide six = MeanOfSamples(seen, kSix, power);
+    mean = share > All<Wide>(fall.most_share[0]) ? six : mean;
+  }
+  if ((ways & 4) != 0) {
+    const Wide twelve = MeanOfSamples(seen, kTwelve, power);
+    mean = share > All<Wide>(fall.most_share[1]) ? twelve : mean;
+  }
+  const Wide emission = seen.Of(batch.gain) * seen.height * mean;
+  const Wide taken = share > All<Wide>(fall.most_share[2]) ? Wide{} : emission;
+  sum += share > 0 ? taken : Wide{};
+  return near;
+}
+
+}  // namespace
+
+void FlatBatch::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& unit_normal,
+                    double lane_gain) {
+  const Vec3 centroid = (a + b + c) / 3, to_b = b - a, to_c = c - a;
+  for (int k = 0; k < 3; ++k) {
+    at[k][lane] = centroid[k];
+    normal[k][lane] = unit_normal[k];
+    ab[k][lane] = to_b[k];
+    ac[k][lane] = to_c[k];
+  }
+  const double bc2 = (c - b).squaredNorm();
+  gain[lane] = lane_gain;
+  spread_mm2[lane] = (to_b.squaredNorm() + to_c.squaredNorm() + bc2) / 36;
+  longest_mm2[lane] = std::max({to_b.squaredNorm(), to_c.squaredNorm(), bc2});
+}
+
+void FlatBatch::SetSlope(int lane, const Vec3& slope) {
+  const Vec3 to_b(ab[0][lane], ab[1][lane], ab[2][lane]),
+      to_c(ac[0][lane], ac[1][lane], ac[2][lane]);
+  sloped = true;
+  rise_ab[lane] = to_b.dot(slope);
+  rise_ac[lane] = to_c.dot(slope);
+  const Vec3 tilt = (to_b * rise_ab[lane] + to_c * rise_ac[lane] +
+                     (to_c - to_b) * (rise_ac[lane] - rise_ab[lane])) /
+                    36;
+  for (int k = 0; k < 3; ++k) {
+    tilt_mm[k][lane] = tilt[k];
+  }
+  bow[lane] = tilt.dot(slope);
+}
+
+FlatFall::FlatFall(int of_power) : power(of_power) {
+  const double of_share = std::min(1.0, std::pow(9.0 / power, 1.6));  // by experiment
+  for (std::size_t n = 0; n < most_share.size(); ++n) {
+    most_share[n] = of_share * kMostShare[n];
+  }
+}
+
+SEMBLANCE_WIDE void AddFlat(std::span<const FlatBatch> batches, std::span<const std::int32_t> runs,
+                            const Vec3& p, const FlatFall& fall, FlatWalk& walk) {
+  constexpr int kUsual = 9;  // of the default decay
+  Wide sum = Load<Wide>(walk.sum, 0);
+  walk.near = 0;
+  while (walk.next < runs.size() && walk.near == 0) {
+    const std::int32_t run = runs[walk.next++];
+    const FlatBatch& batch = batches[run / 2];
+    const int first = run % 2 * kWidth<Wide>;
+    walk.near = fall.power == kUsual ? AddFour<kUsual>(batch, first, p, fall, sum)
+                                     : AddFour<0>(batch, first, p, fall, sum);
+  }
+  Store(sum, walk.sum, 0);
+}
+
+}  // namespace semblance

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The levels of an H-spline: their sizes, and each of them as a plain bicubic B-spline.
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "surfaces/hspline/control_net.h"
+
+namespace semblance {
+
+enum class Closure { kOpen, kPeriodicU };
+constexpr auto EnumNames(Closure) {
+  return std::to_array<std::string_view>({"open", "periodic_u"});
+}
+
+// In what axes an offset is kept: the frame of the next coarser surface, so that detail turns with
+// it, or the world's.
+enum class OffsetReference { kFrame, kWorld };
+constexpr auto EnumNames(OffsetReference) {
+  return std::to_array<std::string_view>({"frame", "world"});
+}
+
+// The domain is [0,1] x [0,1]; level L has patches_u 2^L x patches_v 2^L patches.
+struct HSplineShape {
+  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (periodic); at most 8192 on the finest level
+  int patches_v = 8;  // of level 0; >= 1; likewise
+  int max_level = 3;  // finest level that may hold detail; 0..8
+  Closure closure = Closure::kOpen;
+  OffsetReference reference = OffsetReference::kFrame;
+
+  int PatchesU(int level) const { return patches_u << level; }
+  int PatchesV(int level) const { return patches_v << level; }
+  int Columns(int level) const { return PatchesU(level) + (closure == Closure::kOpen ? 3 : 0); }
+  int Rows(int level) const { return PatchesV(level) + 3; }
+  // The column of a vertex that may lie across the seam of a periodic surface.
+  int Column(int level, int i) const {
+    return closure == Closure::kOpen ? i : (i + Columns(level)) % Columns(level);
+  }
+  bool operator==(const HSplineShape&) const = default;
+};
+
+// A control vertex of one level; (i, j) along u and v.
+struct VertexId {
+  int level = -1;
+  int i = -1;
+  int j = -1;
+  auto operator<=>(const VertexId&) const = default;
+};
+
+// A patch of one level: u in [i, i + 1] / PatchesU(level), v likewise. Its vertices are (i, j) to
+// (i + 3, j + 3) of the level.
+struct PatchId {
+  int level = -1;
+  int i = -1;
+  int j = -1;
+  auto operator<=>(const PatchId&) const = default;
+};
+
+// Orders of derivation along u and v.
+struct DerivativeOrder {
+  int u = 0;  // 0, 1 or 2
+  int v = 0;
+};
+
+// A place in a patch.
+struct PatchPlace {
+  PatchId patch;
+  double s = kNaN;  // along u, 0..1
+  double t = kNaN;  // along v, 0..1
+};
+
+// Throws InputError for sizes outside the bounds above.
+void CheckShape(const HSplineShape& shape);
+
+// Throws InputError for a level that is not there or a (u,v) that is not finite.
+void CheckPlace(const HSplineShape& shape, int level, const Vec2& uv);
+
+// The patch of `level` at uv: u is clamped (open) or wrapped (periodic), v is clamped to [0,1]. The
+// arguments are not checked.
+PatchPlace Locate(const HSplineShape& shape, int level, const Vec2& uv);
+
+// The weights of the patch's sixteen vertices, [a + 4 b] with a along u, in the point, or in its
+// derivative with respect to u, v in [0,1].
+std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPlace& place,
+                                    DerivativeOrder order = {});
+
+// The sixteen vertices of `level` that make the point of the plain B-spline at uv, or its
+// derivative with respect to u, v in [0,1]. uv: as in Locate. level: 0..shape.max_level. Throws as
+// CheckPlace.
+Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order = {});
+
+// Where a control vertex has the greatest influence, clamped (open) or wrapped (periodic) into the
+// domain.
+Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex);
+
+// The net of the same surface one level finer (knot insertion at every midpoint).
+ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level);
+
+// The sixteen vertices of the child of a patch, from those of the patch, both [a + 4 b]. right,
+// upper: 0 or 1, which of the four children. The same bytes as Refine.
+std::array<Vec3, 16> RefinePatch(const std::array<Vec3, 16>& vertices, int right, int upper);
+
+}  // namespace semblance

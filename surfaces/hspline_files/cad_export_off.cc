@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The build without OpenCASCADE.
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_files/cad_export.h"
+
+namespace semblance {
+namespace {
+
+std::string Refuse(const char* format) {
+  throw InputError(
+      std::string(format) +
+      ": this build cannot write it; install libocct-data-exchange-dev, then configure "
+      "with -DSEMBLANCE_WITH_CAD=ON and build again");
+}
+
+}  // namespace
+
+bool HasCad() { return false; }
+
+std::string SurfaceToStep(const HSplineSurface&) { return Refuse("STEP"); }
+
+std::string SurfaceToIges(const HSplineSurface&) { return Refuse("IGES"); }
+
+}  // namespace semblance

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/hspline_files/hspline_json.h"
+
+#include <fmt/format.h>
+
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_files/json_parts.h"
+
+namespace semblance {
+namespace {
+
+using namespace json_parts;
+
+constexpr std::string_view kHSplineFormat = "semblance-hspline";
+constexpr int kHSplineVersion = 1;
+
+HSplineSurface SurfaceFromJson(const Json& json) {
+  RequireKeys(json, {"format", "version", "patches", "max_level", "closure", "offset_reference",
+                     "units", "level0", "offsets"});
+  RequireFormat(json, kHSplineFormat, kHSplineVersion);
+  const HSplineShape shape = ShapeFromJson(json);
+  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
+  for (const Json& row : ListFromJson(json, "level0")) {
+    RequireSize(row, 3);
+    net.vertices.push_back(VecFromJson(row, 0));
+  }
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  for (const auto& [vertex, offset] : OffsetsFromJson(json)) {
+    offsets.emplace(vertex, offset);
+  }
+  HSplineSurface surface(shape, std::move(net));
+  surface.SetOffsets(offsets);
+  return surface;
+}
+
+}  // namespace
+
+std::string HSplineToJson(const HSplineSurface& surface) {
+  const HSplineShape& shape = surface.shape();
+  Json json;
+  json["format"] = kHSplineFormat;
+  json["version"] = kHSplineVersion;
+  json["units"] = "mm";
+  ShapeToJson(shape, json);
+  json["level0"] = Json::array();
+  const ControlNet level0 = surface.Net(0);
+  for (const Vec3& p : level0.vertices) {
+    json["level0"].push_back({p.x(), p.y(), p.z()});
+  }
+  json["offsets"] = OffsetsToJson(surface.Offsets());
+  return json.dump() + "\n";
+}
+
+HSplineSurface HSplineFromJson(std::string_view text, const std::string& name) {
+  try {
+    return SurfaceFromJson(ParseWithoutRepeats(text));
+  } catch (const nlohmann::json::exception& e) {
+    throw IoError(fmt::format("{}: not an H-spline that can be read: {}", name, e.what()));
+  } catch (const Error& e) {
+    throw IoError(fmt::format("{}: not an H-spline that can be read: {}", name, e.what()));
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/hspline_query/hspline_project.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "surfaces/base/error.h"
+#include "surfaces/hspline/patch_tree.h"
+
+namespace semblance {
+namespace {
+
+using Mat2 = Eigen::Matrix2d;
+
+void CheckOptions(const ProjectOptions& o) {
+  if (o.samples_per_patch < 1 || o.starts < 1 || o.max_iterations < 1 || !(o.tolerance_mm > 0)) {
+    throw InputError(fmt::format(
+        "projection: samples_per_patch {}, starts {}, max_iterations {} and tolerance_mm {} must "
+        "all be positive",
+        o.samples_per_patch, o.starts, o.max_iterations, o.tolerance_mm));
+  }
+}
+
+void CheckPoint(const Vec3& point) {
+  if (!point.allFinite()) {
+    throw InputError(fmt::format("projection: the point ({}, {}, {}) is not finite", point.x(),
+                                 point.y(), point.z()));
+  }
+}
+
+Vec2 IntoDomain(const HSplineShape& shape, Vec2 uv) {
+  const double u = uv.x() - std::floor(uv.x());
+  uv.x() = shape.closure == Closure::kPeriodicU ? (u < 1 ? u : 0) : std::clamp(uv.x(), 0.0, 1.0);
+  uv.y() = std::clamp(uv.y(), 0.0, 1.0);
+  return uv;
+}
+
+// Half the squared distance at one (u,v), with what a step needs to know.
+struct Slope {
+  Vec3 residual;
+  Mat2 squares;   // J^T J
+  Mat2 hessian;   // with the surface's curvature
+  Vec2 gradient;  // per unit of u and v
+  double Value() const { return residual.squaredNorm() / 2; }
+};
+
+Slope SlopeAt(const HSplineSurface& surface, const Vec3& point, const Vec2& uv) {
+  const SurfaceFrame frame = surface.Frame(uv);
+  const SecondDerivatives second = surface.Second(uv);
+  Slope s;
+  s.residual = frame.point - point;
+  Eigen::Matrix<double, 3, 2> jacobian;
+  jacobian << frame.du, frame.dv;
+  s.squares = jacobian.transpose() * jacobian;
+  s.gradient = jacobian.transpose() * s.residual;
+  const double uu = second.duu.dot(s.residual), uv_ = second.duv.dot(s.residual),
+               vv = second.dvv.dot(s.residual);
+  s.hessian = s.squares;
+  s.hessian += (Mat2() << uu, uv_, uv_, vv).finished();
+  return s;
+}
+
+// Borders that the gradient presses against: these coordinates stay.
+void HoldBorders(const HSplineShape& shape, const Vec2& uv, Slope& s) {
+  for (int k = 0; k < 2; ++k) {
+    const bool has_border = k == 1 || shape.closure == Closure::kOpen;
+    const bool presses = (uv[k] <= 0 && s.gradient[k] > 0) || (uv[k] >= 1 && s.gradient[k] < 0);
+    if (has_border && presses) {
+      s.gradient[k] = 0;
+      for (Mat2* m : {&s.squares, &s.hessian}) {
+        const double diagonal = s.squares(k, k) > 0 ? s.squares(k, k) : 1;
+        m->row(k).setZero();
+        m->col(k).setZero();
+        (*m)(k, k) = diagonal;
+      }
+    }
+  }
+}
+
+// Newton's step, or Gauss and Newton's, slightly damped, where the distance is not convex.
+Vec2 StepOf(const Slope& s) {
+  const Eigen::LLT<Mat2> newton(s.hessian);
+  const double trace = s.squares.trace();
+  const bool convex =
+      newton.info() == Eigen::Success && s.hessian.determinant() > 1e-12 * s.squares.determinant();
+  if (convex) {
+    return -newton.solve(s.gradient);
+  }
+  const Mat2 damped = s.squares + 1e-9 * (trace > 0 ? trace : 1) * Mat2::Identity();
+  return -damped.llt().solve(s.gradient);
+}
+
+Vec2 DiagonalStep(const Slope& s) {
+  const Vec2 diagonal = s.squares.diagonal();
+  return (diagonal.array() > 0).select(-s.gradient.cwiseQuotient(diagonal), Vec2::Zero());
+}
+
+// The first of the halved steps that shortens the distance enough (Armijo), or `uv` if none does.
+Vec2 Backtrack(const HSplineSurface& surface, const Vec3& point, const Vec2& uv, const Slope& s,
+               const Vec2& step) {
+  // What rounding of the surface's point may add to the value.
+  const double slack = 16 * std::numeric_limits<double>::epsilon() * s.residual.norm() *
+                       (s.residual.norm() + point.norm());
+  for (double a = 1; a > 1e-9; a /= 2) {
+    Vec2 moved = a * step;
+    const Vec2 next = IntoDomain(surface.shape(), uv + moved);
+    moved.y() = next.y() - uv.y();
+    if (surface.shape().closure == Closure::kOpen) {
+      moved.x() = next.x() - uv.x();
+    }
+    const double value = (surface.Point(next) - point).squaredNorm() / 2;
+    if (value <= s.Value() + slack + 1e-4 * s.gradient.dot(moved)) {
+      return next;
+    }
+  }
+  return uv;
+}
+
+double LengthOf(const Vec2& step, const Mat2& squares) {
+  return std::sqrt(std::max(0.0, step.dot(squares * step)));
+}
+
+int GridLevel(const HSplineSurface& surface) {
+  constexpr int kMostPatches = 65536;
+  const HSplineShape& shape = surface.shape();
+  int level = surface.Offsets().empty() ? 0 : surface.Offsets().rbegin()->first.level;
+  while (level > 0 && shape.PatchesU(level) * shape.PatchesV(level) > kMostPatches) {
+    --level;
+  }
+  return level;
+}
+
+}  // namespace
+
+SurfaceProjection ProjectFrom(const HSplineSurface& surface, const Vec3& point, const Vec2& start,
+                              const ProjectOptions& options) {
+  CheckOptions(options);
+  CheckPoint(point);
+  SurfaceProjection result;
+  result.uv = IntoDomain(surface.shape(), start);
+  for (result.iterations = 0; result.iterations < options.max_iterations && !result.converged;
+       ++result.iterations) {
+    Slope s = SlopeAt(surface, point, result.uv);
+    HoldBorders(surface.shape(), result.uv, s);
+    const Vec2 step = StepOf(s);
+    Vec2 next = Backtrack(surface, point, result.uv, s, step);
+    if (next == result.uv) {  // a border has turned the step uphill; along the gradient it cannot
+      next = Backtrack(surface, point, result.uv, s, DiagonalStep(s));
+    }
+    result.converged = LengthOf(step, s.squares) <= options.tolerance_mm;
+    if (next == result.uv) {
+      break;
+    }
+    result.uv = next;
+  }
+  result.point = surface.Point(result.uv);
+  result.distance_mm = (result.point - point).norm();
+  return result;
+}
+
+SurfaceProjector::SurfaceProjector(const HSplineSurface& surface, const ProjectOptions& options)
+    : surface_(surface), options_(options) {
+  CheckOptions(options);
+  const HSplineShape& shape = surface.shape();
+  const int level = GridLevel(surface), quads_u = options.samples_per_patch * shape.PatchesU(level);
+  columns_ = shape.closure == Closure::kOpen ? quads_u + 1 : quads_u;
+  rows_ = options.samples_per_patch * shape.PatchesV(level) + 1;
+  for (int j = 0; j < rows_; ++j) {
+    for (int i = 0; i < columns_; ++i) {
+      samples_.push_back(surface.Point({double(i) / quads_u, double(j) / (rows_ - 1)}));
+    }
+  }
+  const PatchTree tree(surface);
+  for (const PatchId& leaf : tree.leaves()) {
+    if (leaf.level > level) {
+      fine_uv_.emplace_back((leaf.i + 0.5) / shape.PatchesU(leaf.level),
+                            (leaf.j + 0.5) / shape.PatchesV(leaf.level));
+      fine_.push_back(surface.Point(fine_uv_.back()));
+    }
+  }
+}
+
+std::vector<Vec2> SurfaceProjector::Starts(const Vec3& point) const {
+  const bool periodic = surface_.shape().closure == Closure::kPeriodicU;
+  const int quads_u = periodic ? columns_ : columns_ - 1;
+  std::vector<double> squared(samples_.size());
+  std::transform(samples_.begin(), samples_.end(), squared.begin(),
+                 [&](const Vec3& s) { return (s - point).squaredNorm(); });
+  const auto at = [&](int i, int j) {
+    i = periodic ? (i + columns_) % columns_ : std::clamp(i, 0, columns_ - 1);
+    return squared[i + columns_ * std::clamp(j, 0, rows_ - 1)];
+  };
+  std::vector<std::pair<double, int>> valleys;
+  for (int j = 0; j < rows_; ++j) {
+    for (int i = 0; i < columns_; ++i) {
+      const double here = at(i, j);
+      if (here <= at(i - 1, j) && here <= at(i + 1, j) && here <= at(i, j - 1) &&
+          here <= at(i, j + 1)) {
+        valleys.emplace_back(here, i + columns_ * j);
+      }
+    }
+  }
+  const std::size_t count = std::min<std::size_t>(valleys.size(), options_.starts);
+  std::partial_sort(valleys.begin(), valleys.begin() + count, valleys.end());
+  std::vector<Vec2> starts;
+  for (std::size_t k = 0; k < count; ++k) {
+    const int i = valleys[k].second % columns_, j = valleys[k].second / columns_;
+    starts.emplace_back(double(i) / quads_u, double(j) / (rows_ - 1));
+  }
+  const auto nearest =
+      std::min_element(fine_.begin(), fine_.end(), [&](const Vec3& a, const Vec3& b) {
+        return (a - point).squaredNorm() < (b - point).squaredNorm();
+      });
+  if (nearest != fine_.end()) {
+    starts.push_back(fine_uv_[nearest - fine_.begin()]);
+  }
+  return starts;
+}
+
+SurfaceProjection SurfaceProjector::Project(const Vec3& point) const {
+  CheckPoint(point);
+  SurfaceProjection best;
+  for (const Vec2& start : Starts(point)) {
+    const SurfaceProjection found = ProjectFrom(surface_, point, start, options_);
+    if (!(found.distance_mm >= best.distance_mm)) {
+      best = found;
+    }
+  }
+  return best;
+}
+
+}  // namespace semblance

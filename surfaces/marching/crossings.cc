@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/marching/crossings.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace semblance {
+namespace {
+
+// A bracket on [0,1] along an edge: the field is positive at one end and not at the other.
+struct Bracket {
+  double a, fa, b, fb;
+
+  double SecantRoot(double weight_a = 1, double weight_b = 1) const {
+    return a + (b - a) * (weight_a * fa) / (weight_a * fa - weight_b * fb);
+  }
+  // Puts (x, f) in place of the end of its sign; true if that was the upper end.
+  bool Narrow(double x, double f) {
+    const bool lower = (f > 0) == (fa > 0);
+    (lower ? a : b) = x;
+    (lower ? fa : fb) = f;
+    return !lower;
+  }
+};
+
+using LineField = std::function<double(double)>;
+
+double Bisect(Bracket e, double tolerance, const LineField& field, std::int64_t& evaluations) {
+  while (e.b - e.a > tolerance) {
+    const double middle = 0.5 * (e.a + e.b);
+    e.Narrow(middle, field(middle));
+    ++evaluations;
+  }
+  return 0.5 * (e.a + e.b);
+}
+
+// What the ends and a point (x, f) between them say of the crossing: a function that bends one way
+// lies between its chords, so the crossing is between where those from both ends to the point have
+// the value 0.
+struct Estimate {
+  double at;            // where the parabola through the three, place over value, has value 0
+  double uncertain_by;  // NaN where the values neither rise nor fall throughout
+};
+
+Estimate Estimated(const Bracket& e, double x, double f) {
+  const double lower = (x - e.a) / (f - e.fa), upper = (e.b - x) / (e.fb - f);
+  if (!(lower * upper > 0)) {
+    return {x, f == 0 ? 0 : kNaN};
+  }
+  const double bend = (upper - lower) / (e.fb - e.fa);
+  const auto [least, most] = std::minmax({x - f * lower, x - f * upper});
+  return {std::clamp(e.a - e.fa * (lower - bend * f), least, most), most - least};
+}
+
+// Regula falsi as of Illinois: an end that stays twice counts half. Ends where the last three
+// values tell the crossing within the tolerance, if between them the field bends one way.
+double FalsePosition(Bracket e, double tolerance, const LineField& field,
+                     std::int64_t& evaluations) {
+  constexpr int kMostSteps = 60;
+  double weight_a = 1, weight_b = 1;
+  bool last_upper = false;
+  for (int step = 0; step < kMostSteps && e.b - e.a > tolerance; ++step) {
+    const double x = e.SecantRoot(weight_a, weight_b), f = field(x);
+    ++evaluations;
+    const Estimate crossing = Estimated(e, x, f);
+    if (crossing.uncertain_by <= tolerance) {
+      return std::clamp(crossing.at, e.a, e.b);
+    }
+    const bool upper = e.Narrow(x, f);
+    const bool again = step > 0 && upper == last_upper;
+    weight_a = upper && again ? 0.5 * weight_a : 1;
+    weight_b = !upper && again ? 0.5 * weight_b : 1;
+    last_upper = upper;
+  }
+  return e.SecantRoot();
+}
+
+Vec3 PointOn(const SampleGrid& grid, const CrossedEdge& edge) {
+  const std::array<int, 3> low = grid.At(edge.id / 3);
+  std::array<int, 3> high = low;
+  ++high[edge.id % 3];
+  const Vec3 a = grid.Corner(low[0], low[1], low[2]);
+  return a + edge.at * (grid.Corner(high[0], high[1], high[2]) - a);
+}
+
+// As cells ascend, so do the ids of the same edge of each: one place a cell edge, which only goes
+// forward, finds them all.
+std::vector<Triangle> Connect(const SampleGrid& grid, const Crossings& crossings) {
+  std::array<std::size_t, 12> place{};
+  std::vector<Triangle> triangles;
+  for (const CrossedCell& cell : crossings.cells) {
+    const std::array<int, 3> at = grid.At(cell.index);
+    for (std::size_t e = 0; e < kCellEdges.size(); ++e) {
+      const std::int64_t id = EdgeId(grid, at, kCellEdges[e]);
+      while (place[e] < crossings.edges.size() && crossings.edges[place[e]].id < id) {
+        ++place[e];
+      }
+    }
+    for (const auto& corners : MarchingCubesCases()[cell.mask]) {
+      if ((cell.edges >> corners[0] & 1) == 0) {
+        continue;  // of another sheet in the cell
+      }
+      triangles.push_back({static_cast<std::int32_t>(place[corners[0]]),
+                           static_cast<std::int32_t>(place[corners[1]]),
+                           static_cast<std::int32_t>(place[corners[2]])});
+    }
+  }
+  return triangles;
+}
+
+bool TouchesBorder(const SampleGrid& grid, const std::vector<CrossedCell>& cells) {
+  return std::any_of(cells.begin(), cells.end(), [&](const CrossedCell& cell) {
+    const std::array<int, 3> at = grid.At(cell.index);
+    return at[0] == 0 || at[1] == 0 || at[2] == 0 || at[0] + 2 == grid.counts[0] ||
+           at[1] + 2 == grid.counts[1] || at[2] + 2 == grid.counts[2];
+  });
+}
+
+}  // namespace
+
+std::int64_t EdgeId(const SampleGrid& grid, const std::array<int, 3>& cell, const CellEdge& edge) {
+  const int c = edge.from;
+  return 3 * grid.Index(cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2 & 1)) +
+         edge.axis;
+}
+
+double SearchCrossing(double from, double to, const EdgeSearchOptions& options,
+                      const LineField& field, std::int64_t& evaluations) {
+  return (options.method == EdgeSearch::kBisection ? Bisect : FalsePosition)(
+      {0, from, 1, to}, options.tolerance, field, evaluations);
+}
+
+PolygonizeResult MeshOf(const SampleGrid& grid, Crossings crossings) {
+  std::vector<CrossedEdge>& edges = crossings.edges;
+  std::sort(edges.begin(), edges.end(),
+            [](const CrossedEdge& a, const CrossedEdge& b) { return a.id < b.id; });
+  PolygonizeResult result;
+  result.mesh.points.reserve(edges.size());
+  for (const CrossedEdge& edge : edges) {
+    result.mesh.points.push_back(PointOn(grid, edge));
+  }
+  result.mesh.triangles = Connect(grid, crossings);
+  result.touches_border = TouchesBorder(grid, crossings.cells);
+  result.summary = crossings.summary;
+  result.summary.active_cells = static_cast<std::int64_t>(crossings.cells.size());
+  return result;
+}
+
+}  // namespace semblance

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/mesh/mesh_check.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+// A head, or the scanned part of one, is of this size.
+constexpr double kSmallest_mm = 60, kLargest_mm = 500;
+
+void CheckUnit(double size, const std::string& name) {
+  if (size >= kSmallest_mm && size <= kLargest_mm) {
+    return;
+  }
+  std::string guess = "check its unit";
+  for (const auto& [unit, factor] : {std::pair("metres", 1000.0), std::pair("centimetres", 10.0),
+                                     std::pair("inches", 25.4), std::pair("micrometres", 0.001)}) {
+    if (size * factor >= 1.5 * kSmallest_mm && size * factor <= 0.8 * kLargest_mm) {
+      guess = fmt::format("it looks like {}; multiply by {}", unit, factor);
+      break;
+    }
+  }
+  throw InputError(
+      fmt::format("{}: its longest side is {:.4g} mm, which is no head's ({} to {} mm); {}", name,
+                  size, kSmallest_mm, kLargest_mm, guess));
+}
+
+// The share of rays from all sides towards the mesh that meet a front first.
+double ShareOfFronts(const TriMesh& mesh) {
+  const MeshQuery query(mesh);
+  const Box3 box = Bounds(mesh);
+  const double radius = box.diagonal().norm();
+  int fronts = 0, hits = 0;
+  constexpr int kRays = 256;
+  for (int n = 0; n < kRays; ++n) {  // directions of a Fibonacci sphere
+    const double z = 1 - (2 * n + 1.0) / kRays, angle = n * std::numbers::pi * (3 - std::sqrt(5.0));
+    const Vec3 outward(std::sqrt(1 - z * z) * std::cos(angle),
+                       std::sqrt(1 - z * z) * std::sin(angle), z);
+    if (const auto hit = query.FirstHit(box.center() + radius * outward, -outward, 2 * radius)) {
+      ++hits;
+      fronts += TriangleAreaVector(mesh, mesh.triangles[hit->triangle]).dot(outward) > 0;
+    }
+  }
+  return hits > 0 ? static_cast<double>(fronts) / hits : kNaN;
+}
+
+}  // namespace
+
+std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& name) {
+  if (mesh.triangles.empty()) {
+    throw InputError(fmt::format("{}: the mesh has no triangles", name));
+  }
+  CheckUnit(Bounds(mesh).sizes().maxCoeff(), name);
+  const double fronts = ShareOfFronts(mesh);
+  if (fronts < 0.5) {
+    throw InputError(
+        fmt::format("{}: {:.0f} % of its outside shows triangles' backs: the mesh is inside out; "
+                    "flip its normals",
+                    name, 100 * (1 - fronts)));
+  }
+  const EdgeReport edges = CheckEdges(mesh);
+  std::vector<std::string> notes;
+  const auto note = [&](std::int64_t count, const char* what) {
+    if (count > 0) {
+      notes.push_back(fmt::format("{}: {} of {} edges {}", name, count, edges.edges, what));
+    }
+  };
+  note(edges.boundary, "are open borders");
+  note(edges.non_manifold, "are non-manifold");
+  note(edges.inconsistent, "join triangles of opposite orientation");
+  return notes;
+}
+
+}  // namespace semblance

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Whether a mesh can be a head in millimetres, and what is wrong with it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// Throws InputError, naming the mesh, if it is empty or not finite, if its bounding box is no
+// head's in mm (saying which unit it looks like), or if it is turned inside out: of rays sent from
+// far outside, most meet a triangle's back first. It is never turned silently. Returns a line for
+// each lesser defect that real scans have: non-manifold, inconsistent or open edges, triangles
+// without area.
+std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& name);
+
+}  // namespace semblance

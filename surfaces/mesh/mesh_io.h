@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Meshes in files: PLY, OBJ, STL and OFF, in mm.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// Reads a mesh, all its faces kept as they stand (also where edges are non-manifold), polygons
+// fanned into triangles, equal corners of an STL merged. The format follows the extension (.ply
+// .obj .stl .off). Throws IoError (no such file, unknown extension, truncated, not of that format)
+// or InputError (no triangles, a coordinate that is not finite), naming the file.
+TriMesh ReadMesh(const std::filesystem::path& path);
+
+// What a PLY may carry beside the shape; each vector is empty or has one entry a vertex.
+struct VertexScalar {
+  std::string name;            // MeshLab shows "quality"; CloudCompare any "scalar_..."
+  std::vector<double> values;  // NaN where there is no data
+};
+struct MeshAttributes {
+  std::vector<Vec3> normals;
+  std::vector<std::array<std::uint8_t, 3>> colors;
+  std::vector<VertexScalar> scalars;
+};
+
+// The bytes of a mesh file. extension: ".ply" (binary little-endian, float coordinates, all
+// attributes), or ".obj", ".stl", ".off" through OpenMesh (shape only). Throws InputError for
+// another extension, for attributes of the wrong size, and for a non-manifold mesh in a format that
+// would lose faces of it.
+std::string EncodeMesh(const TriMesh& mesh, const std::string& extension,
+                       const MeshAttributes& attributes = {});
+
+}  // namespace semblance

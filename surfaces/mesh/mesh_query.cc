@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/mesh/mesh_query.h"
+
+#include <CGAL/AABB_traits.h>
+#include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
+#include <CGAL/Simple_cartesian.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using QueryKernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<QueryKernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<QueryKernel, Triangles::const_iterator>;
+using AabbTree = CGAL::AABB_tree<CGAL::AABB_traits<QueryKernel, Primitive>>;
+
+QueryKernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+Vec3 ToVec(const QueryKernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
+
+Triangles CopyTriangles(const TriMesh& mesh) {
+  if (mesh.triangles.empty()) {
+    throw InputError("mesh query: the mesh has no triangles; give one with at least one");
+  }
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    if (!mesh.points[i].allFinite()) {
+      throw InputError(fmt::format("mesh query: point {} is not finite; repair the mesh first", i));
+    }
+  }
+  Triangles triangles;
+  triangles.reserve(mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles) {
+    triangles.emplace_back(ToCgal(mesh.points[t[0]]), ToCgal(mesh.points[t[1]]),
+                           ToCgal(mesh.points[t[2]]));
+  }
+  return triangles;
+}
+
+}  // namespace
+
+struct MeshQuery::Tree {
+  explicit Tree(const TriMesh& mesh)
+      : triangles(CopyTriangles(mesh)), tree(triangles.cbegin(), triangles.cend()) {
+    tree.build();
+    tree.accelerate_distance_queries();  // here, so that const queries from several threads never
+                                         // build it
+  }
+  int IndexOf(const Triangles::const_iterator& it) const {
+    return static_cast<int>(it - triangles.cbegin());
+  }
+
+  Triangles triangles;
+  AabbTree tree;
+};
+
+MeshQuery::MeshQuery(const TriMesh& mesh) : tree_(std::make_unique<Tree>(mesh)) {}
+MeshQuery::~MeshQuery() = default;
+MeshQuery::MeshQuery(MeshQuery&&) noexcept = default;
+MeshQuery& MeshQuery::operator=(MeshQuery&&) noexcept = default;
+
+MeshPoint MeshQuery::Closest(const Vec3& p) const {
+  const auto found = tree_->tree.closest_point_and_primitive(ToCgal(p));
+  MeshPoint result;
+  result.position = ToVec(found.first);
+  result.triangle = tree_->IndexOf(found.second);
+  result.distance_mm = (result.position - p).norm();
+  return result;
+}
+
+std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direction,
+                                          double max_distance_mm) const {
+  const Vec3 end = origin + max_distance_mm * direction.normalized();
+  const QueryKernel::Segment_3 segment(ToCgal(origin), ToCgal(end));
+  std::vector<AabbTree::Intersection_and_primitive_id<QueryKernel::Segment_3>::Type> found;
+  tree_->tree.all_intersections(segment, std::back_inserter(found));
+  std::vector<MeshPoint> hits;
+  for (const auto& hit : found) {
+    // A ray that runs inside a triangle's plane meets it in a segment: its neighbours, met in
+    // points, stand for it.
+    if (const QueryKernel::Point_3* point = boost::get<QueryKernel::Point_3>(&hit.first)) {
+      const Vec3 position = ToVec(*point);
+      hits.push_back({position, tree_->IndexOf(hit.second), (position - origin).norm()});
+    }
+  }
+  std::sort(hits.begin(), hits.end(), [](const MeshPoint& a, const MeshPoint& b) {
+    return std::pair(a.distance_mm, a.triangle) < std::pair(b.distance_mm, b.triangle);
+  });
+  return hits;
+}
+
+std::optional<MeshPoint> MeshQuery::FirstHit(const Vec3& origin, const Vec3& direction,
+                                             double max_distance_mm) const {
+  const std::vector<MeshPoint> hits = AllHits(origin, direction, max_distance_mm);
+  return hits.empty() ? std::nullopt : std::optional(hits.front());
+}
+
+}  // namespace semblance

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/least_squares/patch_energy.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+
+#include "tests/testing/plain_bspline.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using testing::PlainStencil;
+using testing::Random;
+
+// Gauss-Legendre nodes and weights on [0,1] from the Golub-Welsch eigenproblem.
+struct Quadrature {
+  Eigen::VectorXd nodes, weights;
+};
+Quadrature GaussLegendre(int n) {
+  Eigen::MatrixXd jacobi = Eigen::MatrixXd::Zero(n, n);
+  for (int k = 1; k < n; ++k) {
+    jacobi(k, k - 1) = jacobi(k - 1, k) = k / std::sqrt(4.0 * k * k - 1);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(jacobi);
+  return {(eigen.eigenvalues().array() + 1) / 2,
+          eigen.eigenvectors().row(0).transpose().cwiseAbs2()};
+}
+
+ControlNet RandomNet(int m, int n, std::uint64_t random_seed) {
+  Random random(random_seed);
+  ControlNet net{.columns = m + 3, .rows = n + 3, .vertices = {}};
+  for (int k = 0; k < net.columns * net.rows; ++k) {
+    net.vertices.push_back(random.InBox(-10, 10));
+  }
+  return net;
+}
+
+// Integral over [0,1]^2 of |d^(k+l) S / du^k dv^l|^2.
+double Integral(const ControlNet& net, int m, int n, int k, int l) {
+  const Quadrature q = GaussLegendre(8);
+  double sum = 0;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < m; ++i) {
+      for (int b = 0; b < 8; ++b) {
+        for (int a = 0; a < 8; ++a) {
+          const Vec2 uv((i + q.nodes[a]) / m, (j + q.nodes[b]) / n);
+          sum += q.weights[a] * q.weights[b] / (m * n) *
+                 PlainStencil(m, n, uv, k, l).Apply(net).squaredNorm();
+        }
+      }
+    }
+  }
+  return sum;
+}
+
+TEST(PatchEnergy, FormsEqualQuadratureOfTheDerivatives) {
+  const int m = 3, n = 5;
+  const double lu = 70, lv = 30;
+  const ControlNet net = RandomNet(m, n, 1);
+  const PatchGrid grid{.patches_u = m, .patches_v = n};
+  const double thin = lu * lv *
+                      (Integral(net, m, n, 2, 0) / std::pow(lu, 4) +
+                       2 * Integral(net, m, n, 1, 1) / (lu * lu * lv * lv) +
+                       Integral(net, m, n, 0, 2) / std::pow(lv, 4));
+  const double membrane =
+      lu * lv * (Integral(net, m, n, 1, 0) / (lu * lu) + Integral(net, m, n, 0, 1) / (lv * lv));
+  EXPECT_NEAR(FormEnergy(ThinPlateForm(lu / m, lv / n), grid, net), thin, 1e-11 * thin);
+  EXPECT_NEAR(FormEnergy(MembraneForm(lu / m, lv / n), grid, net), membrane, 1e-11 * membrane);
+  const Vec2 lengths = MeanLengths(grid, net);
+  EXPECT_NEAR(lengths.x(), std::sqrt(Integral(net, m, n, 1, 0)), 1e-11 * lengths.x());
+  EXPECT_NEAR(lengths.y(), std::sqrt(Integral(net, m, n, 0, 1)), 1e-11 * lengths.y());
+}
+
+TEST(PatchEnergy, RootsReproduceTheFormsAndShowTheirNullSpaces) {
+  const PatchForm thin = ThinPlateForm(2, 3), membrane = MembraneForm(2, 3);
+  const Eigen::MatrixXd a = FormRoot(thin), b = FormRoot(membrane);
+  EXPECT_EQ(a.rows(), 13);  // 1, s and t are free
+  EXPECT_EQ(b.rows(), 15);  // 1 is free
+  EXPECT_LT((a.transpose() * a - thin).cwiseAbs().maxCoeff(), 1e-13 * thin.maxCoeff());
+  EXPECT_LT((b.transpose() * b - membrane).cwiseAbs().maxCoeff(), 1e-13 * membrane.maxCoeff());
+}
+
+// Vertices of a translation-invariant periodic net: shifting them by one column changes nothing.
+TEST(PatchEnergy, PeriodicEnergyKnowsNoSeam) {
+  const PatchGrid grid{.patches_u = 6, .patches_v = 3, .periodic_u = true};
+  Random random(2);
+  ControlNet net{.columns = 6, .rows = 6, .vertices = {}};
+  for (int k = 0; k < 36; ++k) {
+    net.vertices.push_back(random.InBox(-1, 1));
+  }
+  ControlNet shifted = net;
+  for (int j = 0; j < 6; ++j) {
+    for (int i = 0; i < 6; ++i) {
+      shifted.At((i + 1) % 6, j) = net.At(i, j);
+    }
+  }
+  const PatchForm form = ThinPlateForm(1, 2);
+  const double energy = FormEnergy(form, grid, net);
+  EXPECT_GT(energy, 0);
+  EXPECT_NEAR(FormEnergy(form, grid, shifted), energy, 1e-12 * energy);
+}
+
+}  // namespace
+}  // namespace semblance

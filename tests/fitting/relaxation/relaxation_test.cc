@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/relaxation/relaxation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "fitting/fit.h"
+#include "fitting/problem/placement.h"
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_query/hspline_project.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+using testing::Random;
+using testing::SmoothSurface;
+
+HSplineShape Shape() { return {.patches_u = 4, .patches_v = 4, .max_level = 1}; }
+
+// The subject: the template with a wavy face of up to 6 mm.
+HSplineSurface Subject(const HSplineSurface& rest) {
+  HSplineSurface subject = rest;
+  ControlNet net = rest.Net(0);
+  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+    const Vec3 out = Vec3(net.vertices[k].x(), net.vertices[k].y(), 0).normalized();
+    net.vertices[k] += (3 + 3 * std::sin(1.3 * static_cast<double>(k))) * out;
+  }
+  subject.SetNet(0, net);
+  return subject;
+}
+
+// A lattice of 8 x 8 dowels on the subject, within noise_mm along each axis; their (u,v) are off by
+// up to `error` of the domain.
+FitTarget Dowels(const HSplineSurface& subject, double error, std::uint64_t random_seed = 3,
+                 double noise_mm = 0) {
+  Random random(random_seed);
+  FitTarget target;
+  for (int k = 0; k < 64; ++k) {
+    const Vec2 uv((k % 8 + 0.5) / 8, (k / 8 + 0.5) / 8);
+    const Vec2 off(random.Uniform(-error, error), random.Uniform(-error, error));
+    target.points.push_back({.label = "site",
+                             .position = subject.Point(uv) + random.InBox(-noise_mm, noise_mm),
+                             .uv = (uv + off).cwiseMax(0).cwiseMin(1)});
+  }
+  return target;
+}
+
+// Root mean square distance to the surface of points of the subject between the dowels.
+double HeldOutRms(const HSplineSurface& subject, const HSplineSurface& fitted) {
+  const SurfaceProjector projector(fitted);
+  double sum = 0;
+  int count = 0;
+  for (int j = 2; j < 15; ++j) {
+    for (int i = 2; i < 15; ++i, ++count) {
+      sum += std::pow(projector.Project(subject.Point(Vec2(i, j) / 16.0)).distance_mm, 2);
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+// All that moves points.
+constexpr std::array kModes = {RelaxationMode::kFootpoint, RelaxationMode::kAlternating,
+                               RelaxationMode::kTangentDistance, RelaxationMode::kJoint};
+
+FitOptions Options(RelaxationMode mode) {
+  FitOptions options;
+  options.schedule = {{0, 0.5}, {0, 0.5}, {0, 0.5}, {0, 1}};
+  options.terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-3}, MembraneTerm{.weight = 1e-2}};
+  options.relaxation.mode = mode;
+  options.relaxation.rounds = 5;
+  return options;
+}
+
+// The same in a tenth of the time.
+FitOptions ShortOptions(RelaxationMode mode) {
+  FitOptions options = Options(mode);
+  options.schedule = {{0, 0.5}, {0, 1}};
+  options.relaxation.rounds = options.relaxation.tangent_rounds = 1;
+  return options;
+}
+
+std::vector<Vec2> Places(const FitTarget& target) {
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    uv.push_back(p.uv);
+  }
+  return uv;
+}
+
+// Mean over three sets of dowels, known to 0.3 mm.
+double MeanHeldOutRms(double error, RelaxationMode mode, int steps) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  FitOptions options = Options(mode);
+  options.schedule.assign(steps - 1, {0, 0.5});
+  options.schedule.push_back({0, 1});
+  double sum = 0;
+  for (const std::uint64_t seed : {3, 4, 5}) {
+    const FitTarget target = Dowels(subject, error, seed, 0.3);
+    sum += HeldOutRms(subject, Fit(rest, target, {}, options, {}).surface);
+  }
+  return sum / 3;
+}
+
+TEST(Relaxation, UndoesAnErrorOfFivePercentOfTheDomain) {
+  const double unperturbed = MeanHeldOutRms(0, RelaxationMode::kNone, 4);
+  EXPECT_GT(MeanHeldOutRms(0.05, RelaxationMode::kNone, 4), 2.5 * unperturbed);
+  EXPECT_GT(MeanHeldOutRms(0.05, RelaxationMode::kNone, 10), 2.5 * unperturbed);
+  for (const RelaxationMode mode : kModes) {
+    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
+    const int steps = mode == RelaxationMode::kFootpoint ? 10 : 4;
+    EXPECT_LT(MeanHeldOutRms(0.05, mode, steps), 1.1 * unperturbed);
+  }
+}
+
+TEST(Relaxation, LeavesNoCrease) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  const FitTarget exact = Dowels(subject, 0);
+  const DowelMesh mesh(rest, Places(exact));
+  const FitTarget target = Dowels(subject, 0.05);
+  const auto crease_deg = [&](const FitTarget& t, RelaxationMode mode) {
+    FitOptions options = Options(mode);
+    options.schedule = {{0, 0.5}, {0, 1}};
+    const FitResult result = Fit(rest, t, {}, options, {});
+    return SharpestCrease_deg(result.surface, mesh, result.uv);
+  };
+  const double clean = crease_deg(exact, RelaxationMode::kNone);
+  EXPECT_GT(crease_deg(target, RelaxationMode::kNone), clean + 10);
+  for (const RelaxationMode mode : kModes) {
+    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
+    EXPECT_LT(crease_deg(target, mode), clean + 10);
+  }
+}
+
+// Points that lie in another order than their (u,v): some can only arrive by passing each other.
+TEST(Relaxation, NeverTurnsATriangleOver) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  int prevented = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    for (const RelaxationMode mode : kModes) {
+      FitTarget target = Dowels(subject, 0.15, seed);
+      const DowelMesh mesh(rest, Places(target));
+      ASSERT_EQ(mesh.Flips(Places(target)), 0);
+      const RelaxationSummary summary =
+          Relax(rest, rest, mesh, Options(mode).relaxation, 10, target);
+      EXPECT_EQ(mesh.Flips(Places(target)), 0);
+      prevented += summary.flips_prevented;
+      const FitResult result = Fit(rest, Dowels(subject, 0.15, seed), {}, ShortOptions(mode), {});
+      EXPECT_EQ(mesh.Flips(result.uv), 0);
+    }
+  }
+  EXPECT_GT(prevented, 0);
+}
+
+TEST(Relaxation, PenaltiesFall) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  FitTarget target = Dowels(subject, 0.05);
+  const DowelMesh mesh(rest, Places(target));
+  RelaxationOptions options{.mode = RelaxationMode::kAlternating, .crease = 0.1, .standard = 0.1};
+  const RelaxationSummary some = Relax(subject, rest, mesh, options, 5, target);
+  EXPECT_LT(some.after.distance, 0.5 * some.before.distance);
+  EXPECT_GT(some.after.standard, 0);
+  FitTarget held = Dowels(subject, 0.05);
+  options.standard = 1e6;
+  const RelaxationSummary none = Relax(subject, rest, mesh, options, 5, held);
+  EXPECT_LT(none.max_move_mm, 1e-2);
+  EXPECT_GT(some.max_move_mm, 1);
+}
+
+TEST(Relaxation, APointOnTheSurfaceArrivesAtIt) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2);
+  const Vec2 truth(0.4, 0.6);
+  FitTarget target{{{.label = "a", .position = rest.Point(truth), .uv = Vec2(0.45, 0.52)}}};
+  const DowelMesh mesh(rest, Places(target));
+  const RelaxationOptions options{.mode = RelaxationMode::kFootpoint, .damping = 0};
+  const RelaxationSummary summary = Relax(rest, rest, mesh, options, 20, target);
+  EXPECT_LT((target.points[0].uv - truth).norm(), 1e-8);
+  EXPECT_LT(summary.after.distance, 1e-12);
+}
+
+TEST(Relaxation, IsEquivariantUnderRigidMotion) {
+  const Similarity pose = {.scale = 1,
+                           .rotation = Eigen::AngleAxisd(1.1, Vec3(1, 2, -1).normalized()).matrix(),
+                           .translation = Vec3(30, -60, 9)};
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  const FitTarget target = Dowels(subject, 0.05);
+  FitTarget moved = target;
+  for (FitPoint& p : moved.points) {
+    p.position = pose * p.position;
+  }
+  for (const RelaxationMode mode : kModes) {
+    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
+    const FitOptions options = ShortOptions(mode);
+    const FitResult a = Fit(rest, target, {}, options, {});
+    const FitResult b = Fit(Transformed(rest, pose), moved, {}, options, {});
+    for (std::size_t k = 0; k < a.uv.size(); ++k) {
+      EXPECT_LT((a.uv[k] - b.uv[k]).norm(), 1e-6);
+    }
+    EXPECT_NEAR(a.point_rms_mm, b.point_rms_mm, 1e-6);
+  }
+}
+
+TEST(Relaxation, OrderOfPointsAndDuplicatesDoNotMatter) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  FitTarget target = Dowels(subject, 0.05);
+  target.points.push_back(target.points[5]);
+  RunContext two;
+  two.threads = 2;
+  FitTarget reversed = target;
+  std::reverse(reversed.points.begin(), reversed.points.end());
+  for (const RelaxationMode mode : kModes) {
+    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
+    const FitOptions options = ShortOptions(mode);
+    const FitResult a = Fit(rest, target, {}, options, {});
+    EXPECT_EQ(a.uv.back(), a.uv[5]);
+    EXPECT_EQ(a.uv, Fit(rest, target, {}, options, two).uv);
+    FitResult b = Fit(rest, reversed, {}, options, {});
+    std::reverse(b.uv.begin(), b.uv.end());
+    for (std::size_t k = 0; k < a.uv.size(); ++k) {
+      EXPECT_LT((a.uv[k] - b.uv[k]).norm(), 1e-9);
+    }
+  }
+}
+
+// Points and penalties together, at full steps, so that each round ends where it was solved.
+TEST(Relaxation, EveryModeBringsThePointsNearer) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  const FitTarget target = Dowels(subject, 0.05);
+  FitOptions options = Options(RelaxationMode::kNone);
+  options.schedule = {{0, 1}};
+  const double without = Fit(rest, target, {}, options, {}).point_rms_mm;
+  for (const RelaxationMode mode : kModes) {
+    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
+    options.relaxation.mode = mode;
+    double before = without;
+    for (const int rounds : {1, 2, 4}) {
+      options.relaxation.rounds = rounds;
+      const double rms = Fit(rest, target, {}, options, {}).point_rms_mm;
+      EXPECT_LT(rms, before);
+      before = rms;
+    }
+  }
+}
+
+// Without the network's barrier points whose order is wrong can pass each other.
+TEST(Relaxation, WithoutABarrierPointsPassEachOther) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2);
+  FitTarget target = Dowels(rest, 0);
+  std::swap(target.points[27].uv, target.points[28].uv);
+  const FitTarget given = target;
+  RelaxationOptions options{.mode = RelaxationMode::kFootpoint, .damping = 0, .max_move_mm = 50};
+  Relax(rest, rest, MeshOf(rest, target, options), options, 20, target);
+  EXPECT_GT((rest.Point(target.points[27].uv) - target.points[27].position).norm(), 1);
+  target = given;
+  options.barrier = false;
+  const DowelMesh loose = MeshOf(rest, target, options);
+  EXPECT_TRUE(loose.triangles().empty());
+  Relax(rest, rest, loose, options, 20, target);
+  EXPECT_LT((rest.Point(target.points[27].uv) - target.points[27].position).norm(), 1e-6);
+}
+
+TEST(Relaxation, AModeThatCannotSaysWhy) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2);
+  const FitTarget target = Dowels(rest, 0);
+  const auto message = [&](const FitOptions& options) -> std::string {
+    try {
+      Fit(rest, target, {}, options, {});
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  FitOptions options = Options(RelaxationMode::kTangentDistance);
+  options.terms = {PointTerm{.loss = RobustLoss::kTukey}};
+  EXPECT_THAT(message(options), ::testing::HasSubstr("loss: none"));
+  options.terms = {PriorTerm{}};
+  EXPECT_THAT(message(options), ::testing::HasSubstr("'points'"));
+  options = Options(RelaxationMode::kJoint);
+  options.plan = AdaptivePlan{.finest = 1};
+  EXPECT_THAT(message(options), ::testing::HasSubstr("joint goes level by level"));
+}
+
+TEST(Relaxation, IsReportedByStep) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  const FitTarget target = Dowels(subject, 0.05);
+  const FitResult none = Fit(rest, target, {}, Options(RelaxationMode::kNone), {});
+  EXPECT_TRUE(none.relaxations.empty());
+  EXPECT_EQ(none.uv, Places(target));
+  const FitResult result = Fit(rest, target, {}, Options(RelaxationMode::kFootpoint), {});
+  ASSERT_EQ(result.relaxations.size(), 4u);
+  EXPECT_GT(result.relaxations[0].max_move_mm, 0);
+  EXPECT_LT(result.relaxations[0].after.distance, result.relaxations[0].before.distance);
+}
+
+}  // namespace
+}  // namespace semblance

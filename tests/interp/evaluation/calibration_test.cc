@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/evaluation/calibration.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "surfaces/base/geometry.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::Each;
+using ::testing::IsEmpty;
+using testing::Random;
+
+// Sums of twelve uniform numbers: normal to a tenth of a per cent within two deviations.
+double Normal(Random& random) {
+  double sum = -6;
+  for (int k = 0; k < 12; ++k) {
+    sum += random.Uniform(0, 1);
+  }
+  return sum;
+}
+
+TEST(Coverage, OfTrueDeviationsIsWhatTheyState) {
+  Random random(1);
+  std::vector<double> errors, sds;
+  for (int n = 0; n < 20000; ++n) {
+    sds.push_back(random.Uniform(0.5, 3));
+    errors.push_back(sds.back() * Normal(random));
+  }
+  const std::vector<double> coverage = Coverage(errors, sds);
+  ASSERT_EQ(coverage.size(), 19u);
+  for (int k = 0; k < 19; ++k) {
+    EXPECT_NEAR(coverage[k], (k + 1) / 20.0, 0.015) << k;
+  }
+  EXPECT_EQ(CoverageAt90(coverage), coverage[17]);
+  for (double& sd : sds) {
+    sd /= 2;  // too bold: within 1.645 / 2 deviations lie 58.9 %
+  }
+  EXPECT_NEAR(CoverageAt90(Coverage(errors, sds)), 0.589, 0.015);
+}
+
+TEST(Coverage, CountsByWeightAndLeavesOutWhatIsNotStated) {
+  const std::vector<double> errors = {0, 10, kNaN, 5}, sds = {1, 1, 1, kNaN},
+                            weights = {3, 1, 100, 100};
+  EXPECT_THAT(Coverage(errors, sds, weights), Each(0.75));
+  EXPECT_THAT(Coverage(errors, sds), Each(0.5));
+}
+
+TEST(Coverage, ADeviationOfZeroHoldsNoError) {
+  EXPECT_THAT(Coverage(std::vector<double>{0, 1}, std::vector<double>{0, 0}), Each(0.5));
+}
+
+TEST(Coverage, OfNothingIsNothing) {
+  EXPECT_THAT(Coverage({}, {}), IsEmpty());
+  EXPECT_TRUE(std::isnan(CoverageAt90({})));
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/evaluation/cross_validation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "surfaces/base/error.h"
+#include "tests/testing/dowel_scenes.h"
+
+namespace semblance {
+namespace {
+
+using testing::DomeScene;
+using testing::DowelScene;
+using ::testing::ElementsAre;
+using testing::FlatScene;
+using testing::OnThreads;
+using testing::ScatteredScene;
+
+CrossValidation Validate(const DepthScheme& scheme, const DowelScene& scene,
+                         const OutsideRule& rule = LeaveUnassigned{}) {
+  return CrossValidate(scheme, rule, scene.Input(), EachDowel(scene.dowels), OnThreads(1));
+}
+
+std::string ErrorOf(const DowelScene& scene, const Folds& folds) {
+  try {
+    CrossValidate(Mean{}, LeaveUnassigned{}, scene.Input(), folds, OnThreads(1));
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST(Folds, AreDowelsOrLandmarksOfBothSides) {
+  const DowelScene scene = DomeScene();  // sg mso_l mso_r n me
+  EXPECT_THAT(EachDowel(scene.dowels), ElementsAre(ElementsAre(0), ElementsAre(1), ElementsAre(2),
+                                                   ElementsAre(3), ElementsAre(4)));
+  EXPECT_THAT(EachLandmark(scene.dowels),
+              ElementsAre(ElementsAre(0), ElementsAre(1, 2), ElementsAre(3), ElementsAre(4)));
+}
+
+TEST(Folds, OfASideAreItsDowels) {
+  EXPECT_THAT(EachSide(DomeScene().dowels), ElementsAre(ElementsAre(1), ElementsAre(2)));
+  EXPECT_TRUE(EachSide(FlatScene().dowels).empty());
+  std::vector<Dowel> left = {DomeScene().dowels[1]};
+  EXPECT_TRUE(EachSide(left).empty());  // nothing would be left to predict from
+}
+
+TEST(Folds, DrawnOnesHoldEachDowelOnceAndNoOrderMatters) {
+  const DowelScene scene = ScatteredScene(23);
+  const Folds folds = RandomFolds(scene.dowels, 5, 3);
+  ASSERT_EQ(folds.size(), 5u);
+  std::vector<std::size_t> all;
+  for (const auto& fold : folds) {
+    EXPECT_GE(fold.size(), 4u);
+    EXPECT_LE(fold.size(), 5u);
+    all.insert(all.end(), fold.begin(), fold.end());
+  }
+  std::ranges::sort(all);
+  for (std::size_t i = 0; i < 23; ++i) {
+    EXPECT_EQ(all[i], i);
+  }
+  EXPECT_NE(RandomFolds(scene.dowels, 5, 4), folds);
+  EXPECT_EQ(RandomFolds(scene.dowels, 5, 3), folds);
+  std::vector<Dowel> turned(scene.dowels.rbegin(), scene.dowels.rend());
+  Folds back = RandomFolds(turned, 5, 3);
+  for (auto& fold : back) {
+    for (std::size_t& i : fold) {
+      i = 22 - i;
+    }
+    std::ranges::sort(fold);
+  }
+  EXPECT_EQ(back, folds);
+  EXPECT_EQ(RandomFolds(FlatScene().dowels, 9, 1).size(), 4u);
+  EXPECT_THROW(RandomFolds(scene.dowels, 1, 1), InputError);
+}
+
+TEST(CrossValidation, OfTheMeanIsTheMeanOfTheOthers) {  // depths 4, 7, 9, 5
+  const CrossValidation result = Validate(Mean{}, FlatScene());
+  const std::vector<double> predicted = {7, 6, 16 / 3., 20 / 3.};
+  const std::vector<double> depth = {4, 7, 9, 5};
+  double squares = 0;
+  ASSERT_EQ(result.left_out.size(), 4u);
+  for (int k = 0; k < 4; ++k) {
+    const LeftOut& out = result.left_out[k];
+    EXPECT_EQ(out.site, FlatScene().dowels[k].site);
+    EXPECT_EQ(out.depth_mm, depth[k]);
+    EXPECT_NEAR(out.predicted_mm, predicted[k], 1e-12);
+    EXPECT_NEAR(out.error_mm, predicted[k] - depth[k], 1e-12);
+    EXPECT_FALSE(out.within_90.has_value());
+    squares += out.error_mm * out.error_mm;
+  }
+  EXPECT_EQ(result.predicted, 4);
+  EXPECT_NEAR(result.rms_mm, std::sqrt(squares / 4), 1e-12);
+  EXPECT_NEAR(result.mean_mm, 0, 1e-12);
+  EXPECT_NEAR(result.mean_absolute_mm, (3 + 1 + 11 / 3. + 5 / 3.) / 4, 1e-12);
+  EXPECT_NEAR(result.most_mm, 11 / 3., 1e-12);
+  EXPECT_TRUE(std::isnan(result.coverage_90));
+}
+
+TEST(CrossValidation, AsksWhetherTheErrorIsWithinTheStatedSd) {
+  // Nearest to sg are g and rhi alike, g first: 7 +- 2 for 4. For n: 7 +- 2 for 9. For g: n would
+  // be 9 +- 3 as near as sg, n first. For rhi: n 9 +- 3 for 5.
+  CrossValidation result = Validate(Nearest{}, FlatScene());
+  EXPECT_THAT(result.left_out[0].within_90, ::testing::Optional(true));  // 3 < 3.29
+  EXPECT_EQ(result.left_out[0].sd_mm, 2);
+  EXPECT_EQ(result.coverage_90, 1);
+  DowelScene scene = FlatScene();
+  scene.dowels[1].sd_mm = 1;
+  result = Validate(Nearest{}, scene);
+  EXPECT_THAT(result.left_out[0].within_90, ::testing::Optional(false));  // 3 > 1.645
+  EXPECT_EQ(result.coverage_90, 0.5);
+}
+
+TEST(CrossValidation, TakesTheAreasOfALeftOutDowelAway) {
+  // Without sg the area of the other three is left, in which sg is not; the rule then fills.
+  const CrossValidation none = CrossValidate(Barycentric{}, LeaveUnassigned{}, FlatScene().Input(),
+                                             {{1}, {3}}, OnThreads(1));
+  EXPECT_EQ(none.predicted, 0);
+  EXPECT_TRUE(std::isnan(none.rms_mm));
+  EXPECT_EQ(none.left_out[0].status, DepthStatus::kOutside);
+  const CrossValidation filled = CrossValidate(Barycentric{}, ConstantDepth{.depth_mm = 6},
+                                               FlatScene().Input(), {{1}, {3}}, OnThreads(1));
+  EXPECT_EQ(filled.predicted, 2);
+  EXPECT_EQ(filled.left_out[0].error_mm, -1);
+  EXPECT_EQ(filled.left_out[1].error_mm, 1);
+  EXPECT_EQ(filled.left_out[0].status, DepthStatus::kOutside);
+}
+
+TEST(CrossValidation, LeavesAFoldOutTogether) {
+  const DowelScene scene = FlatScene();
+  const CrossValidation result =
+      CrossValidate(Mean{}, LeaveUnassigned{}, scene.Input(), {{0, 1}, {2, 3}}, OnThreads(1));
+  EXPECT_EQ(result.left_out[0].predicted_mm, 7);
+  EXPECT_EQ(result.left_out[1].predicted_mm, 7);
+  EXPECT_EQ(result.left_out[2].predicted_mm, 5.5);
+}
+
+TEST(CrossValidation, AsksSchemesOnTheSurfaceThere) {
+  const DowelScene scene = ScatteredScene(8);
+  DowelScene without = scene;
+  without.dowels.erase(without.dowels.begin() + 6);
+  const DepthField field = InterpolateDepth(Biharmonic{}, without.Input(), RunContext{});
+  const auto at =
+      std::ranges::find(scene.skull.points, scene.dowels[6].base) - scene.skull.points.begin();
+  const CrossValidation result = Validate(Biharmonic{}, scene);
+  EXPECT_EQ(result.left_out[6].predicted_mm, field.depth_mm[at]);
+  EXPECT_EQ(result.left_out[6].status, DepthStatus::kAssigned);
+}
+
+TEST(CrossValidation, PrefersASmoothSchemeOnASmoothDepth) {
+  const DowelScene scene = ScatteredScene(40);
+  const double mean = Validate(Mean{}, scene).rms_mm;
+  const double nearest = Validate(Nearest{}, scene).rms_mm;
+  const double kriging = Validate(Kriging{}, scene).rms_mm;
+  EXPECT_LT(nearest, mean);
+  EXPECT_LT(kriging, nearest);
+  EXPECT_LT(Validate(RadialBasis{}, scene).rms_mm, nearest);
+}
+
+TEST(CrossValidation, DoesNotDependOnThreads) {
+  const DowelScene scene = ScatteredScene(8);
+  for (const DepthScheme& scheme : {DepthScheme{Kriging{}}, DepthScheme{Harmonic{}}}) {
+    const auto errors = [&](int threads) {
+      std::vector<double> all;
+      for (const LeftOut& out : CrossValidate(scheme, LeaveUnassigned{}, scene.Input(),
+                                              EachDowel(scene.dowels), OnThreads(threads))
+                                    .left_out) {
+        all.push_back(out.error_mm);
+      }
+      return all;
+    };
+    EXPECT_EQ(errors(1), errors(2));
+  }
+}
+
+TEST(CrossValidation, SaysWhatIsWrongWithAFold) {
+  const DowelScene scene = FlatScene();
+  EXPECT_EQ(ErrorOf(scene, {{0}, {4}}),
+            "cross-validation: fold 1 names dowel 4, but there are 4 (0..3); make the folds from "
+            "these dowels");
+  EXPECT_EQ(ErrorOf(scene, {{0, 1, 2, 3}}),
+            "cross-validation: fold 0 leaves out all of the 4 dowels; at least one must be left "
+            "to predict from");
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/kriging.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "interp/schemes/kriging_process.h"
+#include "tests/testing/dowel_scenes.h"
+
+namespace semblance {
+namespace {
+
+using testing::DowelScene;
+using testing::FlatScene;
+using testing::Random;
+using testing::ScatteredScene;
+
+DepthField FieldAt(const Kriging& options, const DowelScene& scene, std::vector<Vec3> points) {
+  DowelScene at = scene.At(std::move(points));
+  at.network.areas.clear();
+  return InterpolateDepth(options, at.Input(), RunContext{});
+}
+
+KrigingModel ModelOf(const Kriging& options, DowelScene scene) {
+  scene.network.areas.clear();
+  return FitKriging(options, scene.Input(), RunContext{});
+}
+
+// Depths along x, sums of noise in a moving window: their covariance falls linearly to 0 at
+// `length`.
+DowelScene RoughScene(int count, double spacing_mm, double length_mm, std::uint64_t random_seed) {
+  Random random(random_seed);
+  const int window = static_cast<int>(length_mm / spacing_mm);
+  std::vector<double> noise;
+  for (int k = 0; k < count + window; ++k) {
+    noise.push_back(random.Uniform(-1, 1) + random.Uniform(-1, 1) + random.Uniform(-1, 1));
+  }
+  DowelScene scene;
+  for (int k = 0; k < count; ++k) {
+    double depth = 20;
+    for (int w = 0; w < window; ++w) {
+      depth += 2 * noise[k + w] / std::sqrt(window);
+    }
+    scene.dowels.push_back(
+        {std::to_string(1000 + k), {k * spacing_mm, 0, 0}, {0, 0, 1}, depth, kNaN});
+  }
+  scene.skull.points = {{0, 0, 0}};
+  scene.normals = {{0, 0, 1}};
+  return scene;
+}
+
+TEST(Kriging, OfTwoDowelsIsTheClosedForm) {
+  DowelScene scene = FlatScene();
+  scene.dowels.resize(2);  // 4 at x = 5 and 7 at x = 35
+  const Kriging kriging{
+      .covariance = Covariance::kMatern12, .length_mm = 30, .signal_mm = 2, .nugget_share = 0};
+  const Vec3 p(15, 5, 0);
+  // Mean 5.5 by symmetry; weights of the residuals -1.5, 1.5 are -+1.5 / (1 - e^-1).
+  const double near = std::exp(-10 / 30.), far = std::exp(-20 / 30.), both = std::exp(-1.0);
+  const DepthField field = FieldAt(kriging, scene, {p});
+  EXPECT_NEAR(field.depth_mm[0], 5.5 + 1.5 * (far - near) / (1 - both), 1e-8);
+  const double explained = (near * near + far * far - 2 * both * near * far) / (1 - both * both);
+  const double of_mean = 1 - (near + far) / (1 + both);
+  const double variance = 4 * (1 - explained + of_mean * of_mean * (1 + both) / 2);
+  EXPECT_NEAR(field.sd_mm[0], std::sqrt(variance), 1e-8);
+}
+
+TEST(Kriging, CovariancesAreTheirFormulas) {
+  DowelScene scene = FlatScene();
+  scene.dowels.resize(2);
+  const std::vector<double> at_30mm = {
+      std::exp(-1.0), (1 + std::sqrt(3.0)) * std::exp(-std::sqrt(3.0)),
+      (1 + std::sqrt(5.0) + 5 / 3.) * std::exp(-std::sqrt(5.0)), std::exp(-0.5)};
+  for (int k = 0; k < 4; ++k) {
+    // With a large nugget on both, the residual's share is c(0)-c(30) over that plus the nugget.
+    const Kriging kriging{.covariance = static_cast<Covariance>(k),
+                          .length_mm = 30,
+                          .signal_mm = 1,
+                          .nugget_share = 1};
+    scene.dowels[0].sd_mm = scene.dowels[1].sd_mm = 3;
+    const double share = (1 - at_30mm[k]) / (1 - at_30mm[k] + 9);
+    EXPECT_NEAR(FieldAt(kriging, scene, {{5, 5, 0}}).depth_mm[0], 5.5 - 1.5 * share, 1e-8) << k;
+  }
+}
+
+TEST(Kriging, SdIsNoneAtACertainDowelAndGrowsAwayFromIt) {
+  DowelScene scene = FlatScene();
+  const Kriging certain{.length_mm = 30, .signal_mm = 2, .nugget_share = 0};
+  const DepthField field =
+      FieldAt(certain, scene, {{5, 5, 0}, {7, 5, 0}, {20, 20, 0}, {20, 20, 60}, {0, 0, 1e5}});
+  EXPECT_NEAR(field.sd_mm[0], 0, 1e-4);
+  for (int k = 1; k < 5; ++k) {
+    EXPECT_GT(field.sd_mm[k], field.sd_mm[k - 1] + 0.05);
+  }
+  EXPECT_GT(field.sd_mm[4], 2);  // the signal, and an uncertain mean
+  EXPECT_LT(field.sd_mm[4], 3);
+}
+
+TEST(Kriging, AnUncertainDowelIsSmoothedAndLeavesAnSd) {
+  const DowelScene scene = FlatScene();  // sg: 4 +- 1
+  const DepthField field = FieldAt({.length_mm = 30, .signal_mm = 2}, scene, {{5, 5, 0}});
+  EXPECT_GT(field.depth_mm[0], 4.05);
+  EXPECT_GT(field.sd_mm[0], 0.5);
+  EXPECT_LT(field.sd_mm[0], 1);
+}
+
+TEST(Kriging, WithoutStateSdGivesTheSameDepthsAndNone) {
+  const DowelScene scene = FlatScene();
+  const DepthField with = FieldAt({}, scene, {{20, 10, 0}});
+  const DepthField without = FieldAt({.state_sd = false}, scene, {{20, 10, 0}});
+  EXPECT_EQ(with.depth_mm, without.depth_mm);
+  EXPECT_TRUE(std::isfinite(with.sd_mm[0]));
+  EXPECT_TRUE(std::isnan(without.sd_mm[0]));
+}
+
+KrigingData DataOf(const DowelScene& scene) {
+  const auto n = static_cast<Eigen::Index>(scene.dowels.size());
+  KrigingData data{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd::Zero(n)};
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Dowel& dowel = scene.dowels[j];
+    data.depth_mm[j] = dowel.depth_mm;
+    data.nugget_mm2[j] = std::isfinite(dowel.sd_mm) ? dowel.sd_mm * dowel.sd_mm : 0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      data.distance_mm(j, k) = (dowel.base - scene.dowels[k].base).norm();
+    }
+  }
+  return data;
+}
+
+class EveryCovariance : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Kriging, EveryCovariance, ::testing::Range(0, 4));
+
+TEST_P(EveryCovariance, GradientOfTheDevianceEqualsItsNumericTwin) {
+  const auto covariance = static_cast<Covariance>(GetParam());
+  const DowelScene scene = ScatteredScene(20);
+  const KrigingData data = DataOf(scene);
+  const auto deviance = [&](const Vec2& logs) {
+    return KrigingProcess(covariance, data, {std::exp(logs[0]), std::exp(logs[1])}).Deviance();
+  };
+  const Vec2 logs(std::log(25.0), std::log(2.0));
+  const Vec2 exact =
+      KrigingProcess(covariance, data, {std::exp(logs[0]), std::exp(logs[1])}).DevianceGradient();
+  constexpr double kStep = 1e-4;
+  for (int k = 0; k < 2; ++k) {
+    const Vec2 step = kStep * Vec2::Unit(k);
+    const double numeric = (deviance(logs + step) - deviance(logs - step)) / (2 * kStep);
+    EXPECT_NEAR(exact[k], numeric, 1e-5 * (1 + std::abs(numeric)));
+  }
+}
+
+TEST_P(EveryCovariance, FitIsNoWorseThanAnyPointOfADenseGrid) {
+  const Kriging free{.covariance = static_cast<Covariance>(GetParam())};
+  DowelScene scene = ScatteredScene(25);
+  scene.network.areas.clear();
+  const KrigingModel best = ModelOf(free, scene);
+  const KrigingData data = DataOf(scene);
+  const auto cost = [&](double length_mm, double signal_mm) {
+    const double away = std::log(length_mm / free.length_prior_mm) / free.length_prior_spread;
+    return KrigingProcess(free.covariance, data, {length_mm, signal_mm}).Deviance() + away * away;
+  };
+  const double least = cost(best.length_mm, best.signal_mm);
+  for (double length_mm = 10; length_mm < 400; length_mm *= 1.1) {
+    for (double signal_mm = 0.2; signal_mm < 20; signal_mm *= 1.1) {
+      EXPECT_GE(cost(length_mm, signal_mm), least - 1e-6) << length_mm << " " << signal_mm;
+    }
+  }
+}
+
+TEST(KrigingFit, FindsTheLengthAndTheSignalOfManyDowels) {
+  const Kriging free{.covariance = Covariance::kMatern12, .length_prior_spread = 10};
+  std::vector<double> lengths;
+  for (const double length : {25.0, 100.0}) {
+    const KrigingModel model = ModelOf(free, RoughScene(180, 5, length, 3));
+    EXPECT_NEAR(model.signal_mm, 2, 0.7);
+    EXPECT_NEAR(model.mean_mm, 20, 2);
+    lengths.push_back(model.length_mm);
+  }
+  EXPECT_GT(lengths[1], 2 * lengths[0]);
+  EXPECT_GT(lengths[0], 5);
+  EXPECT_LT(lengths[1], 200);
+}
+
+TEST(KrigingFit, APriorHoldsTheLengthThatFewDowelsDoNotTell) {
+  const DowelScene scene = ScatteredScene(5);
+  const double held = ModelOf({.length_prior_spread = 0.05}, scene).length_mm;
+  EXPECT_NEAR(held, 60, 6);
+  EXPECT_NEAR(ModelOf({.length_prior_mm = 30, .length_prior_spread = 0.05}, scene).length_mm, 30,
+              3);
+}
+
+TEST(KrigingFit, KeepsWhatTheOptionsFix) {
+  const DowelScene scene = ScatteredScene(30);
+  const KrigingModel both = ModelOf({.length_mm = 33, .signal_mm = 1.5}, scene);
+  EXPECT_EQ(both.length_mm, 33);
+  EXPECT_EQ(both.signal_mm, 1.5);
+  EXPECT_NEAR(ModelOf({.length_mm = 33}, scene).length_mm, 33, 1e-12);
+  EXPECT_NEAR(ModelOf({.signal_mm = 1.5}, scene).signal_mm, 1.5, 1e-12);
+}
+
+TEST(KrigingFit, ScalesWithTheDepths) {
+  const DowelScene scene = RoughScene(60, 5, 50, 11);
+  const Kriging free{.covariance = Covariance::kMatern12};
+  const KrigingModel best = ModelOf(free, scene);
+  DowelScene scaled = scene;
+  for (Dowel& dowel : scaled.dowels) {
+    dowel.depth_mm *= 3;
+  }
+  const KrigingModel three = ModelOf(free, scaled);
+  EXPECT_NEAR(three.length_mm / best.length_mm, 1, 0.01);
+  EXPECT_NEAR(three.signal_mm / best.signal_mm, 3, 0.03);
+  EXPECT_NEAR(three.mean_mm / best.mean_mm, 3, 0.03);
+}
+
+TEST(KrigingFit, CoversTheDepthsOfItsOwnProcess) {
+  const DowelScene all = RoughScene(160, 5, 60, 5);
+  DowelScene half = all;
+  half.dowels.clear();
+  std::vector<Vec3> asked;
+  std::vector<double> truth;
+  for (std::size_t k = 0; k < all.dowels.size(); ++k) {
+    if (k % 2 == 0) {
+      half.dowels.push_back(all.dowels[k]);
+    } else {
+      asked.push_back(all.dowels[k].base);
+      truth.push_back(all.dowels[k].depth_mm);
+    }
+  }
+  const DepthField field =
+      FieldAt({.covariance = Covariance::kMatern12, .clamp = false}, half, asked);
+  int covered = 0;
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    covered += std::abs(field.depth_mm[k] - truth[k]) <= 1.645 * field.sd_mm[k];
+  }
+  EXPECT_NEAR(covered, 72, 7);  // 90 % of 80
+}
+
+// On the diagonal the stated deviations; off it what a further dowel would tell: it takes
+// cov(p, q)^2 / var(q) off the variance at p.
+TEST(Kriging, TheCovarianceIsWhatADowelThereWouldTell) {
+  DowelScene scene = ScatteredScene(12);
+  scene.network.areas.clear();
+  const Kriging kriging{.length_mm = 25, .signal_mm = 3, .clamp = false};
+  std::vector<Vec3> places;
+  for (std::size_t k = 0; k + 1 < scene.dowels.size() && k < 4; ++k) {
+    places.push_back((2 * scene.dowels[k].base + scene.dowels[k + 1].base) / 3);
+  }
+  const DepthPosterior posterior = KrigingPosterior(kriging, scene.Input(), places, RunContext{});
+  const Eigen::MatrixXd& covariance = posterior.covariance;
+  const DepthField field = FieldAt(kriging, scene, places);
+  DowelScene more = scene;
+  more.dowels.push_back({"zzz", places[0], scene.dowels[0].direction, 9, kNaN});
+  const Eigen::MatrixXd after =
+      KrigingPosterior(kriging, more.Input(), places, RunContext{}).covariance;
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    EXPECT_NEAR(covariance(p, p), std::pow(field.sd_mm[p], 2), 1e-8);
+    EXPECT_NEAR(posterior.mean_mm[p], field.depth_mm[p], 1e-9);
+    for (std::size_t q = 0; q < places.size(); ++q) {
+      const double told = covariance(p, 0) * covariance(q, 0) / covariance(0, 0);
+      EXPECT_NEAR(after(p, q), covariance(p, q) - told, 1e-6);
+      EXPECT_EQ(covariance(p, q), covariance(q, p));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/output/disk_cache.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "problems/output/manifest.h"
+#include "problems/pipeline/implicit_cache.h"
+#include "problems/subject/phantom.h"
+#include "surfaces/base/whole_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ScratchFolder;
+
+std::string Key(int n) { return Sha256OfText(std::to_string(n)); }
+
+void Age(const fs::path& folder, int n, int hours) {
+  const fs::path file = folder / (Key(n) + ".bin");
+  fs::last_write_time(file, fs::file_time_type::clock::now() - std::chrono::hours(hours));
+}
+
+TEST(DiskCache, GivesBackWhatWasPutAndNothingElse) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder / "cache", 1 << 20);
+  EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+  cache.Put(Key(1), std::string("a\0b", 3));
+  cache.Put(Key(2), "");
+  EXPECT_EQ(cache.Get(Key(1)), std::string("a\0b", 3));
+  EXPECT_EQ(cache.Get(Key(2)), "");
+  EXPECT_EQ(cache.Get(Key(3)), std::nullopt);
+}
+
+TEST(DiskCache, WhatIsDamagedIsMissing) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder.Path(), 1 << 20);
+  cache.Put(Key(1), "some bytes");
+  const fs::path file = folder / (Key(1) + ".bin");
+  std::string bytes = ReadFileBytes(file);
+  bytes.back() ^= 1;
+  WriteFileAtomically(file, bytes);
+  EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+  WriteFileAtomically(file, "x");
+  EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+}
+
+TEST(DiskCache, AboveItsLimitWhatWasUsedLongestAgoGoes) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder.Path(), 3 * 164 + 10);
+  for (int n = 1; n <= 3; ++n) {
+    cache.Put(Key(n), std::string(100, 'x'));
+    Age(folder.Path(), n, 10 - n);
+  }
+  EXPECT_TRUE(cache.Get(Key(1)));  // now used last
+  cache.Put(Key(4), std::string(100, 'x'));
+  EXPECT_TRUE(cache.Get(Key(1)));
+  EXPECT_FALSE(cache.Get(Key(2)));
+  EXPECT_TRUE(cache.Get(Key(3)));
+  EXPECT_TRUE(cache.Get(Key(4)));
+}
+
+TEST(DiskCache, ManyAtOnceReadWholeValuesOrNone) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder.Path(), 5000);
+  std::vector<std::jthread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&cache, t] {
+      for (int n = 0; n < 40; ++n) {
+        const int which = (n * 7 + t) % 5;
+        cache.Put(Key(which), std::string(500 + which, static_cast<char>('a' + which)));
+        const auto bytes = cache.Get(Key((which + 1) % 5));
+        if (bytes) {
+          EXPECT_EQ(*bytes,
+                    std::string(500 + (which + 1) % 5, static_cast<char>('a' + (which + 1) % 5)));
+        }
+      }
+    });
+  }
+}
+
+TEST(ImplicitCache, GivesTheSameFaceToTheBitWithoutMakingItAgain) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder.Path(), 1 << 28);
+  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 20});
+  ImplicitFaceOptions options;
+  options.resolution = 16;
+  const ImplicitFace made =
+      CachedImplicitFace(phantom.skull, phantom.depth_mm, options, &cache, {});
+  EXPECT_EQ(ToBytes(made),
+            ToBytes(BuildImplicitFace(phantom.skull, phantom.depth_mm, options, {})));
+  // A face that nobody could make proves that the second one was read.
+  ImplicitFace marked = made;
+  marked.notes.push_back("from the cache");
+  const fs::path file = *fs::directory_iterator(folder.Path());
+  cache.Put(file.stem().string(), ToBytes(marked));
+  EXPECT_EQ(ToBytes(CachedImplicitFace(phantom.skull, phantom.depth_mm, options, &cache, {})),
+            ToBytes(marked));
+  options.resolution = 17;
+  EXPECT_NE(ToBytes(CachedImplicitFace(phantom.skull, phantom.depth_mm, options, &cache, {})),
+            ToBytes(marked));
+}
+
+TEST(ImplicitCache, BytesOfAnotherKindAreNoFace) {
+  ImplicitFace face;
+  face.notes = {"a", "note"};
+  const std::string bytes = ToBytes(face);
+  EXPECT_EQ(ImplicitFaceFrom(bytes)->notes, face.notes);
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    EXPECT_FALSE(ImplicitFaceFrom(bytes.substr(0, size)));
+  }
+  EXPECT_FALSE(ImplicitFaceFrom(bytes + "x"));
+  EXPECT_FALSE(ImplicitFaceFrom(std::string(400, '\xff')));
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `semblance fit`: any scattered points, with and without (u,v).
+#include "problems/points/point_fit.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "problems/config/config.h"
+#include "surfaces/hspline_files/hspline_io.h"
+#include "surfaces/hspline_query/hspline_project.h"
+#include "surfaces/mesh/mesh_io.h"
+#include "tests/testing/program_call.h"
+#include "tests/testing/scattered_data.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ErrorAgainst;
+using testing::FrankePoint;
+using ::testing::HasSubstr;
+using testing::HeadPoint;
+using testing::Scattered;
+
+const std::string kProgram = SEMBLANCE_PROGRAM;
+const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs/fit";
+
+std::string Csv(const FitTarget& target, bool with_uv) {
+  std::string csv = with_uv ? "x,y,z,u,v\n" : "x,y,z\n";
+  for (const FitPoint& p : target.points) {
+    csv += fmt::format("{},{},{}", p.position.x(), p.position.y(), p.position.z());
+    csv += with_uv ? fmt::format(",{},{}\n", p.uv.x(), p.uv.y()) : "\n";
+  }
+  return csv;
+}
+
+PointTable TableOf(const FitTarget& target) {
+  return ParsePointTable(Csv(target, /*with_uv=*/false), "test");
+}
+
+class PointFitCommand : public ::testing::Test {
+ protected:
+  testing::Outcome Call(const std::string& arguments) {
+    return testing::CallProgram(folder_, arguments);
+  }
+  void Write(const std::string& name, const std::string& text) {
+    WriteFileAtomically(folder_ / name, text);
+  }
+  testing::ScratchFolder folder_;
+};
+
+TEST_F(PointFitCommand, FrankesFunctionAndTheHeadComeOut) {
+  Write("franke.csv", Csv(Scattered(FrankePoint, 10000, 1e-3, 1), true));
+  Write("head.csv", Csv(Scattered(HeadPoint, 30000, 1e-4, 1), true));
+  for (const char* name : {"franke", "head"}) {
+    const auto outcome =
+        Call(fmt::format("fit {0}.csv {1}/{0}.yaml --out {0} --quiet", name, kConfigs));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("(u,v): given"));
+    for (const char* file : {"surface.ply", "residuals.csv", "resolved.yaml", "timing.json"}) {
+      EXPECT_TRUE(fs::exists(folder_ / name / file)) << file;
+    }
+  }
+  EXPECT_LT(ErrorAgainst(FrankePoint, ReadHSpline(folder_ / "franke/surface.hspline.json"), 60).rms,
+            1e-3);
+  EXPECT_LT(ErrorAgainst(HeadPoint, ReadHSpline(folder_ / "head/surface.hspline.json"), 60).rms,
+            2e-4);
+  const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "franke/result.json"));
+  EXPECT_EQ(json["points"], 10000);
+  EXPECT_GT(json["levels"].back()["auto_weight"], 0.0);
+  EXPECT_GT(ReadMesh(folder_ / "head/surface.ply").triangles.size(), 1000u);
+}
+
+// With more vertices than the points determine, cross-validation leaves them their noise, 1e-3 each
+// way. A coarser level than the configuration's, which takes a minute.
+TEST_F(PointFitCommand, AHeightFieldKeepsItsNoise) {
+  Write("franke.csv", Csv(Scattered(FrankePoint, 5000, 1e-3, 1), /*with_uv=*/false));
+  const auto outcome = Call(fmt::format(
+      "fit franke.csv {}/height_field.yaml --set \"fit.schedule=[{{level: 3, fraction: 1}}]\" "
+      "--out out --quiet",
+      kConfigs));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "out/result.json"));
+  EXPECT_EQ(json["control_vertices"]["by_level"].size(), 4u);
+  const double noise = std::sqrt(3) * 1e-3;
+  EXPECT_GT(json["rms_mm"], 0.8 * noise);
+  EXPECT_LT(json["rms_mm"], 1.05 * noise);
+}
+
+// Steep heights, whose least spread is not upward, over the plane that is said.
+TEST(PointFit, APlaneAcrossANormalHasItsHeights) {
+  const PointTable table = TableOf(Scattered(FrankePoint, 2000, 0, 1));
+  const Parametrisation p = Parametrise(table, PlaneParameters{.normal = {0, 0, 2}});
+  EXPECT_EQ(p.kind, "plane");
+  for (std::size_t k = 0; k < p.uv.size(); ++k) {
+    EXPECT_NEAR(p.uv[k].x(), table.positions[k].x(), 2e-3);  // the points nearly fill the square
+    EXPECT_NEAR(p.uv[k].y(), table.positions[k].y(), 2e-3);
+  }
+}
+
+TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
+  Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
+  Write("bad.csv", "x,y,z\n0,0,zero\n");
+  Write("line.csv", "x,y,z\n0,0,0\n1,0,0\n2,0,0\n");
+  const auto refused = [&](const std::string& arguments, const std::string& words) {
+    const auto outcome = Call("fit " + arguments + " --out out --quiet");
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out" / "result.json"));
+  };
+  Write("plain.yaml", "parameters: auto\n");
+  Write("cylinder.yaml", "parameters: cylinder\n");
+  refused("bad.csv plain.yaml", "bad.csv:2: column 'z': 'zero'");
+  refused("none.csv plain.yaml", "none.csv");
+  refused("line.csv plain.yaml", "lie on a line");
+  refused("good.csv cylinder.yaml", "closure: periodic_u");
+  refused("good.csv plain.yaml --set parameters=given", "columns u and v");
+  refused("good.csv plain.yaml --set fit.terms[1].weight=some", "a number is due");
+}
+
+// A height field that is turned in space, without (u,v): the plane is found.
+TEST(PointFit, PlaneParametersFindTheHeightField) {
+  const Mat3 turn = Eigen::AngleAxisd(0.8, Vec3(1, -2, 0.5).normalized()).matrix();
+  const auto surface = [&](const Vec2& uv) -> Vec3 {
+    return turn * Vec3(150 * uv.x(), 100 * uv.y(), 8 * std::sin(5 * uv.x()) * std::cos(4 * uv.y()));
+  };
+  PointFitOptions options;
+  options.fit.terms = {PointTerm{}};
+  options.fit.plan = AdaptivePlan{.tolerance_mm = 0.01, .finest = 3};
+  const PointFit result = FitPoints(TableOf(Scattered(surface, 5000, 0, 3)), options, {});
+  EXPECT_EQ(result.parameters, "plane");
+  const SurfaceProjector projector(result.fit.surface);
+  for (const FitPoint& p : Scattered(surface, 100, 0, 4).points) {
+    if ((p.uv - Vec2(0.5, 0.5)).cwiseAbs().maxCoeff() < 0.45) {
+      EXPECT_LT(projector.Project(p.position).distance_mm, 0.02);
+    }
+  }
+}
+
+TEST(PointFit, CylinderParametersCloseTheHead) {
+  const PointFitOptions options{
+      .closure = Closure::kPeriodicU,
+      .parameters = CylinderParameters{.axis = {0, 0, 1}},
+      .fit = {.terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-9, .length_mm = 1}},
+              .plan = AdaptivePlan{.tolerance_mm = 4e-3, .finest = 3}}};
+  const PointFit result = FitPoints(TableOf(Scattered(HeadPoint, 30000, 1e-4, 3)), options, {});
+  EXPECT_EQ(result.parameters, "cylinder");
+  EXPECT_LT(result.fit.point_rms_mm, 4e-3);
+  for (const double v : {0.1, 0.5, 0.9}) {
+    const Vec2 left(1 - 1e-9, v), right(1e-9, v);
+    EXPECT_LT((result.fit.surface.Point(left) - result.fit.surface.Point(right)).norm(), 1e-6);
+  }
+}
+
+TEST(PointFit, TheRangeOfGivenParametersIsMapped) {
+  PointTable table{.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+                   .uv = {{0, 0}, {9, 0}, {4.5, 9}},
+                   .weights = {}};
+  const GivenParameters given{.u_range = {0, 9}, .v_range = {0, 9}};
+  EXPECT_EQ(Parametrise(table, given).uv[2], Vec2(0.5, 1));
+  EXPECT_THROW(Parametrise(table, GivenParameters{}), InputError);
+}
+
+TEST(PointFit, ConfigurationRoundTrips) {
+  const auto options = ReadConfig<PointFitOptions>(kConfigs + "/scan.yaml");
+  EXPECT_TRUE(std::get<SmoothnessTerm>(options.fit.terms[1]).weight.automatic);
+  const auto again = ReadConfigText<PointFitOptions>(WriteConfig(options), "x.yaml");
+  EXPECT_EQ(WriteConfig(again), WriteConfig(options));
+  EXPECT_THAT(OptionsReference<PointFitOptions>(), HasSubstr("number or auto"));
+  const auto schema = nlohmann::json::parse(OptionsSchema<PointFitOptions>());
+  EXPECT_TRUE(schema["properties"].contains("parameters"));
+}
+
+}  // namespace
+}  // namespace semblance

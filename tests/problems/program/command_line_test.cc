@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The program as users meet it: its words and exit codes, and what it leaves behind.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "surfaces/base/whole_file.h"
+#include "surfaces/mesh/mesh_io.h"
+#include "tests/testing/program_call.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::ScratchFolder;
+
+const std::string kProgram = SEMBLANCE_PROGRAM;
+const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs";
+const std::string kQuick =
+    " --quiet --set subject.rings=30 --set implicit.resolution=40 --set seeds.level=1";
+
+class CommandLine : public ::testing::Test {
+ protected:
+  using Outcome = testing::Outcome;
+
+  Outcome Call(const std::string& arguments) { return testing::CallProgram(folder_, arguments); }
+
+  // One line of error, exit code 2, and no folder `out`.
+  void ExpectRefused(const std::string& arguments, const std::string& words) {
+    const Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out" / "result.json"));
+  }
+
+  void Write(const std::string& name, const std::string& text) {
+    WriteFileAtomically(folder_ / name, text);
+  }
+
+  // A configuration of a ball for a skull, with one landmark.
+  void WriteBall(const Vec3& landmark) {
+    Write("skull.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 80, 40), ".ply"));
+    Write("marks.yaml", fmt::format("subject: ball\nunits: mm\naxes: LPS\nlandmarks:\n"
+                                    "  - {{site: g, point: [{}, {}, {}]}}\n",
+                                    landmark.x(), landmark.y(), landmark.z()));
+    Write("ball.yaml", fmt::format("subject: {{type: files, skull: skull.ply, landmarks: "
+                                   "marks.yaml}}\nnetwork: {0}/networks/standard32.yaml\n"
+                                   "tissue: {{table: {0}/tables/t_table_2023.yaml}}\n",
+                                   kConfigs));
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(CommandLine, AStudysPlanIsListedAndNothingRuns) {
+  Write("study.yaml", fmt::format("base: {}/phantom.yaml\ngrid: {{rounds: [1, 2]}}\n", kConfigs));
+  const Outcome plan = Call("study plan study.yaml --out out");
+  EXPECT_EQ(plan.code, 0) << plan.err;
+  EXPECT_EQ(std::count(plan.out.begin(), plan.out.end(), '\n'), 3) << plan.out;
+  EXPECT_THAT(plan.out, HasSubstr(": 2 trials over rounds"));
+  EXPECT_EQ(Call("study study.yaml --list --out out").out, plan.out);
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  ExpectRefused("study study.yaml study.yaml", "one study at a time");
+}
+
+TEST_F(CommandLine, HelpAndVersionAreNoErrors) {
+  EXPECT_EQ(Call("--help").code, 0);
+  EXPECT_THAT(Call("--version").out, HasSubstr("semblance "));
+  EXPECT_EQ(Call("").code, 2);
+  EXPECT_EQ(Call("walk").code, 2);
+}
+
+TEST_F(CommandLine, RunWritesAReportAndSaysWhere) {
+  const Outcome outcome = Call("run " + kConfigs + "/phantom.yaml --out out" + kQuick);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("H-spline face: mean "), HasSubstr("within 2.5 mm"),
+                                 HasSubstr("out/report.html")));
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "manifest.json"));
+}
+
+TEST_F(CommandLine, DepthSaysHowFarTheSchemeIsFromTheTruthAndFromLeftOutDowels) {
+  const Outcome outcome = Call("depth " + kConfigs +
+                               "/phantom.yaml --out depth --quiet --set subject.rings=30 "
+                               "--set interp=network_spline");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("along the direction"), HasSubstr("cheeks"),
+                                 HasSubstr("  k_fold"), HasSubstr("no sd stated")));
+  EXPECT_TRUE(fs::exists(folder_ / "depth" / "depth.ply"));
+  ExpectRefused("depth " + kConfigs +
+                    "/phantom.yaml --out map --quiet --set subject.rings=30 "
+                    "--set interp=depth_map",
+                "depth_map: no file is named");
+}
+
+TEST_F(CommandLine, AFolderThatExistsIsLeftAloneUnlessForced) {
+  const std::string run = "run " + kConfigs + "/phantom.yaml --out out" + kQuick;
+  fs::create_directories(folder_ / "out");
+  Write("out/mine.txt", "mine");
+  const Outcome refused = Call(run);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("exists and is not empty"));
+  EXPECT_EQ(Call(run + " --force").code, 0);
+  EXPECT_EQ(ReadFileBytes(folder_ / "out" / "mine.txt"), "mine");
+  EXPECT_THAT(ReadFileBytes(folder_ / "out" / "manifest.json"), Not(HasSubstr("mine.txt")));
+}
+
+TEST_F(CommandLine, AnUnwritableFolderIsRefusedBeforeAnyWork) {
+  ExpectRefused("run " + kConfigs + "/phantom.yaml --out /proc/semblance" + kQuick,
+                "/proc/semblance");
+}
+
+TEST_F(CommandLine, UnknownKeysAreNamedWithTheirPlace) {
+  Write("e.yaml", "title: x\nnetwrk: a.yaml\n");
+  ExpectRefused("run e.yaml --out out", "e.yaml:2:1: netwrk");
+  EXPECT_THAT(Call("check e.yaml").err, HasSubstr("did you mean 'network'?"));
+  EXPECT_EQ(Call("check e.yaml").code, 2);
+}
+
+TEST_F(CommandLine, ATruncatedMeshIsNamed) {
+  WriteBall({0, -80, 0});
+  const std::string ply = ReadFileBytes(folder_ / "skull.ply");
+  Write("skull.ply", ply.substr(0, ply.size() / 2));
+  ExpectRefused("run ball.yaml --quiet --out out", "skull.ply");
+}
+
+TEST_F(CommandLine, ALandmarkOffTheBoneIsNamedWithItsDistance) {
+  WriteBall({0, -100, 0});
+  ExpectRefused("run ball.yaml --quiet --out out", "site g (Glabella) is 20.0 mm from the skull");
+}
+
+TEST_F(CommandLine, AMissingTableCellThatIsNeededIsNamed) {
+  WriteBall({0, -80, 0});
+  Write("marks.yaml",
+        "subject: ball\nunits: mm\naxes: LPS\nlandmarks:\n  - {site: fe_l, point: [0, -80, 0]}\n");
+  ExpectRefused("run ball.yaml --quiet --out out", "fe_l");
+}
+
+TEST_F(CommandLine, ASkullWithTooFewLandmarksIsRefused) {
+  WriteBall({0, -80, 0});
+  ExpectRefused("run ball.yaml --quiet --out out",
+                "no area of the dowel network has all its three dowels");
+}
+
+TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
+  std::string files;
+  for (const std::string& folder : {kConfigs, kConfigs + "/fit"}) {
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      files += entry.path().extension() == ".yaml" ? fmt::format(" {}", entry.path().string()) : "";
+    }
+  }
+  EXPECT_THAT(files, HasSubstr("franke.yaml"));
+  const Outcome outcome = Call("check" + files);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+}
+
+TEST_F(CommandLine, CheckTellsAFitFromAnExperimentAndRefusesTheFaultsOfEither) {
+  Write("fit.yaml", "patches_u: 4\nclosure: periodic_u\nfit: {terms: [points]}\n");
+  EXPECT_EQ(Call("check fit.yaml").code, 0);
+  Write("fit.yaml", "patches_u: 4\nclosure: periodic\nfit: {terms: [points]}\n");
+  ExpectRefused("check fit.yaml", "fit.yaml:2:");
+  Write("both.yaml", "patches_u: 4\nsubject: phantom\nrounds: 2\n");
+  ExpectRefused("check both.yaml", "patches_u");
+}
+
+TEST_F(CommandLine, OptionsNameEveryKeyAndTheSchemaIsJson) {
+  const std::string options = Call("options").out;
+  for (const char* key : {"subject", "emitter", "fraction", "tail_error", "random_seed"}) {
+    EXPECT_THAT(options, HasSubstr(key));
+  }
+  EXPECT_TRUE(nlohmann::json::accept(Call("options --schema").out));
+}
+
+TEST_F(CommandLine, EvaluateMeasuresAnyTwoMeshes) {
+  Write("a.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 82, 60), ".ply"));
+  Write("b.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 80, 60), ".ply"));
+  const Outcome outcome = Call("evaluate a.ply b.ply --quiet");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const auto metrics = nlohmann::json::parse(outcome.out);
+  EXPECT_NEAR(metrics.at("mean_signed_mm").get<double>(), 2, 0.02);
+  EXPECT_EQ(Call("evaluate a.ply none.ply").code, 2);
+}
+
+TEST_F(CommandLine, ReportOfAFolderThatIsNoRunIsRefused) {
+  EXPECT_EQ(Call("report nowhere").code, 2);
+  fs::create_directories(folder_ / "empty");
+  EXPECT_THAT(Call("report empty").err, HasSubstr("result.json"));
+}
+
+// A killed run leaves whole files or none, and no manifest that would call it finished.
+TEST_F(CommandLine, AKilledRunLeavesNoBrokenFile) {
+  const std::string config = kConfigs + "/phantom.yaml", out = (folder_ / "out").string();
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::execl(kProgram.c_str(), "semblance", "run", config.c_str(), "--out", out.c_str(), "--quiet",
+            "--set", "subject.rings=30", "--set", "implicit.resolution=40", nullptr);
+    ::_exit(127);
+  }
+  while (!fs::exists(fs::path(out) / "face.ply") && ::waitpid(child, nullptr, WNOHANG) == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  EXPECT_NO_THROW(ReadMesh(fs::path(out) / "face.ply"));
+  EXPECT_FALSE(fs::exists(fs::path(out) / "manifest.json"));
+}
+
+}  // namespace
+}  // namespace semblance

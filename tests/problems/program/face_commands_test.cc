@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands edit, export and feature as users meet them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "surfaces/hspline_files/cad_export.h"
+#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline_files/hspline_io.h"
+#include "surfaces/hspline_files/surface_export.h"
+#include "surfaces/mesh/mesh_io.h"
+#include "tests/testing/program_call.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class FaceCommands : public ::testing::Test {
+ protected:
+  void SetUp() override { WriteHSpline(folder_ / "face.json", face_); }
+
+  testing::Outcome Call(const std::string& arguments) {
+    return testing::CallProgram(folder_, arguments);
+  }
+
+  void ExpectDone(const std::string& arguments) {
+    const testing::Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, 0) << arguments << "\n" << outcome.err;
+    EXPECT_EQ(outcome.err, "") << arguments;
+  }
+
+  // One line of error, and exit code 2.
+  void ExpectRefused(const std::string& arguments, const std::string& words) {
+    const testing::Outcome outcome = Call(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  }
+
+  std::string Bytes(const std::string& name) { return ReadFileBytes(folder_ / name); }
+
+  testing::ScratchFolder folder_;
+  const HSplineSurface face_ =
+      testing::RandomSurface({.patches_u = 4, .patches_v = 4, .max_level = 3}, 1);
+};
+
+TEST_F(FaceCommands, EditMovesVerticesAndItsInverseMovesThemBack) {
+  WriteFileAtomically(folder_ / "script.yaml",
+                      "edits:\n  - {level: 2, i: 5, j: 6, offset: [0.5, 0, -1]}\n");
+  ExpectDone("edit face.json script.yaml --out edited.json --inverse inverse.yaml");
+  EXPECT_EQ(ReadHSpline(folder_ / "edited.json").Offset({2, 5, 6}), Vec3(0.5, 0, -1));
+  ExpectDone("edit edited.json inverse.yaml --out back.json");
+  EXPECT_EQ(Bytes("back.json"), Bytes("face.json"));
+  ExpectRefused("edit face.json missing.yaml --out x.json", "missing.yaml");
+  ExpectRefused("edit face.json script.yaml --out back.json", "--force");
+  ExpectRefused("edit face.json script.yaml --out x.json --inverse inverse.yaml", "--force");
+  EXPECT_FALSE(fs::exists(folder_ / "x.json"));
+  ExpectDone("edit face.json script.yaml --out back.json --inverse inverse.yaml --force");
+}
+
+TEST_F(FaceCommands, EditResetsARegionAndItsInverseBringsItBack) {
+  WriteFileAtomically(folder_ / "reset.yaml", "resets:\n  - {u: [0, 0.5], v: [0, 1]}\n");
+  ExpectDone("edit face.json reset.yaml --out smooth.json --inverse inverse.yaml");
+  const HSplineSurface smooth = ReadHSpline(folder_ / "smooth.json");
+  for (const auto& [vertex, offset] : face_.Offsets()) {
+    EXPECT_EQ(smooth.Offset(vertex).has_value(), smooth.ParameterOf(vertex).x() > 0.5);
+  }
+  ExpectDone("edit smooth.json inverse.yaml --out back.json");
+  EXPECT_EQ(Bytes("back.json"), Bytes("face.json"));
+}
+
+TEST_F(FaceCommands, ExportsExactAndTriangulatedFaces) {
+  ExpectDone("export face.json --to face.vtu");
+  EXPECT_EQ(Bytes("face.vtu"), SurfaceToVtu(face_));
+  ExpectDone("export face.json --to face.glb --chord_mm 0.5");
+  EXPECT_THAT(Bytes("face.glb"), StartsWith("glTF"));
+  ExpectDone("export face.json --to coarse.ply --chord_mm 2");
+  ExpectDone("export face.json --to fine.PLY --chord_mm 0.2 --threads 2");
+  ExpectDone("export face.json --to face.obj");
+  EXPECT_LT(3 * ReadMesh(folder_ / "coarse.ply").triangles.size(),
+            ReadMesh(folder_ / "face.obj").triangles.size());
+}
+
+TEST_F(FaceCommands, ExportsToCadOrSaysWhatIsMissing) {
+  if (HasCad()) {
+    ExpectDone("export face.json --to face.step");
+    EXPECT_THAT(Bytes("face.step"), StartsWith("ISO-10303-21;"));
+    ExpectDone("export face.json --to face.igs");
+  } else {
+    ExpectRefused("export face.json --to face.step", "libocct-data-exchange-dev");
+    ExpectRefused("export face.json --to face.igs", "libocct-data-exchange-dev");
+  }
+}
+
+TEST_F(FaceCommands, ExportRefusesWhatItCannotDo) {
+  ExpectRefused("export face.json --to face.docx", "'.docx' is no format");
+  ExpectRefused("export missing.json --to face.glb", "missing.json");
+  ExpectRefused("export face.json --to face.vtu --chord_mm 1", "exact surface");
+  ExpectRefused("export face.json --to face.glb --chord_mm 0", "above 0");
+  ExpectDone("export face.json --to face.glb");
+  ExpectRefused("export face.json --to face.glb", "--force");
+  ExpectDone("export face.json --to face.glb --force");
+}
+
+TEST_F(FaceCommands, AFeatureGoesFromFaceToFace) {
+  ExpectDone("feature extract face.json --u 0.2 0.8 --levels 2 3 --name nose --library lib");
+  const Feature nose = ReadFeature(folder_ / "lib/nose.json");
+  const FeatureRegion region{.lowest_u = 0.2, .highest_u = 0.8, .first_level = 2, .last_level = 3};
+  EXPECT_EQ(nose, ExtractFeature(face_, "nose", region));
+  HSplineSurface smooth = testing::SmoothSurface(face_.shape(), 1);
+  WriteHSpline(folder_ / "smooth.json", smooth);
+  ExpectDone("feature apply smooth.json lib/nose.json --out with.json");
+  ApplyFeature(nose, smooth);
+  EXPECT_EQ(ReadHSpline(folder_ / "with.json").Offsets(), smooth.Offsets());
+  EXPECT_THAT(Call("feature list lib").out, HasSubstr("nose: "));
+}
+
+TEST_F(FaceCommands, FeaturesBlendAndMirror) {
+  ExpectDone("feature extract face.json --levels 1 1 --name a --library lib");
+  ExpectDone("feature extract face.json --levels 2 3 --name b --library lib");
+  ExpectDone("feature blend lib/a.json lib/b.json --weights 1 0 --name first --library lib");
+  EXPECT_EQ(ReadFeature(folder_ / "lib/first.json").offsets,
+            ReadFeature(folder_ / "lib/a.json").offsets);
+  const testing::Outcome beyond =
+      Call("feature blend lib/a.json lib/b.json --weights 1.5 0.5 --name more --library lib");
+  EXPECT_EQ(beyond.code, 0);
+  EXPECT_THAT(beyond.err, HasSubstr("warning: feature a: the weight 1.5 is outside 0..1"));
+  ExpectDone("feature mirror lib/a.json --name other --library lib");
+  ExpectDone("feature mirror lib/other.json --name a --library twice");
+  EXPECT_EQ(Bytes("twice/a.json"), Bytes("lib/a.json"));
+}
+
+TEST_F(FaceCommands, FeatureRefusesWhatItCannotDo) {
+  ExpectDone("feature extract face.json --name a --library lib");
+  ExpectRefused("feature extract face.json --name a --library lib", "--force");
+  ExpectRefused("feature extract face.json --name 'a b' --library lib", "'a b' is not a name");
+  ExpectRefused("feature extract face.json --u 0.501 0.502 --name e --library lib", "has detail");
+  ExpectRefused("feature apply face.json lib/c.json --out x.json", "c.json");
+  ExpectRefused("feature blend lib/a.json --weights 1 2 --name c --library lib", "2 weights");
+  WriteHSpline(folder_ / "other.json",
+               testing::SmoothSurface({.patches_u = 5, .patches_v = 4, .max_level = 3}, 1));
+  ExpectRefused("feature apply other.json lib/a.json --out x.json", "same template");
+  EXPECT_FALSE(fs::exists(folder_ / "x.json"));
+  EXPECT_EQ(Call("feature").code, 2);
+}
+
+}  // namespace
+}  // namespace semblance

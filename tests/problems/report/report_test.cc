@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/report/report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <pugixml.hpp>
+#include <regex>
+
+#include "problems/pictures/image.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+ReportImage Picture(std::string alt) {
+  return {.bytes = EncodePng(MakeImage(8, 6, {0.2, 0.4, 0.6})), .caption = "A <b>", .alt = alt};
+}
+
+Report Full() {
+  Report report{.title = "Face of \"A & B\" <1>",
+                .subtitle = "it's one line",
+                .tiles = {{"mean error", "1.84", "mm", "within 2.5 mm: 74 %"}},
+                .main_images = {Picture("the recovered face")},
+                .sections = {},
+                .footer = "Semblance"};
+  report.sections.push_back(
+      {.heading = "Depths & dowels",
+       .paragraphs = {"a < b", "http is a word"},
+       .images = {Picture("a \"quoted\" view")},
+       .tables = {{.caption = "Depths",
+                   .header = {"site", "depth (mm)", "note"},
+                   .rows = {{"g", "5.25", "1st"}, {"n", "-6.5", "x"}, {"go_l", "", "2 > 1"}}}},
+       .preformatted = "a: 1\n  b: <2>\n"});
+  report.sections.push_back({.heading = "Inputs"});
+  return report;
+}
+
+int Count(const std::string& text, const std::string& regex) {
+  const std::regex pattern(regex);
+  return static_cast<int>(std::distance(std::sregex_iterator(text.begin(), text.end(), pattern),
+                                        std::sregex_iterator()));
+}
+
+TEST(Base64, Rfc4648Examples) {
+  EXPECT_EQ(Base64(""), "");
+  EXPECT_EQ(Base64("f"), "Zg==");
+  EXPECT_EQ(Base64("fo"), "Zm8=");
+  EXPECT_EQ(Base64("foo"), "Zm9v");
+  EXPECT_EQ(Base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(Base64("\xff\xfe\xfd"), "//79");
+}
+
+TEST(Html, SpecialCharactersAreEscaped) {
+  EXPECT_EQ(EscapeHtml("<a href=\"x\">&'"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;");
+  EXPECT_EQ(EscapeHtml(std::string_view("a\0b\tc\r\n", 7)), "a\uFFFDb\tc\n");
+}
+
+TEST(Html, TextOfTheReportIsEscapedEverywhere) {
+  const std::string html = ReportHtml(Full());
+  EXPECT_THAT(html, AllOf(HasSubstr("<h1>Face of &quot;A &amp; B&quot; &lt;1&gt;</h1>"),
+                          HasSubstr("<title>Face of &quot;A &amp; B&quot; &lt;1&gt;</title>"),
+                          HasSubstr("it&#39;s one line"), HasSubstr("<p>a &lt; b</p>"),
+                          HasSubstr("Depths &amp; dowels</h2>"), HasSubstr("b: &lt;2&gt;\n</pre>"),
+                          HasSubstr("<td>2 &gt; 1</td>"), Not(HasSubstr("<b>"))));
+}
+
+TEST(Html, EveryImageIsInsideTheFileAndHasAltText) {
+  const std::string html = ReportHtml(Full());
+  EXPECT_EQ(Count(html, "<img"), 2);
+  EXPECT_EQ(Count(html,
+                  "<img alt=\"[^\"]+\" width=\"8\" height=\"6\" "
+                  "src=\"data:image/png;base64,[A-Za-z0-9+/=]+\">"),
+            2);
+  EXPECT_THAT(html, HasSubstr("alt=\"a &quot;quoted&quot; view\""));
+}
+
+TEST(Html, NeedsNothingElse) {
+  const std::string html = ReportHtml(Full());
+  EXPECT_EQ(Count(html, "://|url\\(|@import|<script[^>]*src|<link|<iframe"), 0);
+  EXPECT_EQ(Count(html, "src=\"(?!data:)"), 0);
+  EXPECT_EQ(Count(html, "href=\"(?!#s)"), 0);
+}
+
+TEST(Html, TagsAreBalanced) {
+  // With its void elements closed, the page is XML, which a strict parser can check.
+  std::string html = ReportHtml(Full());
+  html.erase(html.find("<script>"), html.find("</script>") + 9 - html.find("<script>"));
+  const std::string xml = std::regex_replace(html.substr(html.find("<html")),
+                                             std::regex("<((meta|img)[^>]*)>"), "<$1/>");
+  pugi::xml_document document;
+  const pugi::xml_parse_result parsed = document.load_string(xml.c_str());
+  EXPECT_TRUE(parsed) << parsed.description() << ": " << xml.substr(parsed.offset, 80);
+  EXPECT_STREQ(document.select_node("//section[1]/h2").node().attribute("id").value(), "s1");
+  EXPECT_EQ(document.select_nodes("//tbody/tr").size(), 3u);
+}
+
+TEST(Html, ColumnsOfNumbersAreAlignedRight) {
+  const std::string html = ReportHtml(Full());
+  EXPECT_THAT(html, AllOf(HasSubstr("<td class=\"n\">5.25</td>"),
+                          HasSubstr("<th scope=\"col\" class=\"n\">depth (mm)</th>"),
+                          HasSubstr("<td class=\"n\">\u2013</td>"), HasSubstr("<td>1st</td>")));
+}
+
+TEST(Html, SameReportSameBytes) { EXPECT_EQ(ReportHtml(Full()), ReportHtml(Full())); }
+
+TEST(Html, WrongPartsAreErrors) {
+  Report report = Full();
+  report.sections[0].tables[0].rows[1].pop_back();
+  EXPECT_THROW(ReportHtml(report), InputError);
+  report = Full();
+  report.main_images[0].alt.clear();
+  EXPECT_THROW(ReportHtml(report), InputError);
+  report = Full();
+  report.main_images[0].bytes = "GIF89a";
+  EXPECT_THROW(ReportHtml(report), InputError);
+  EXPECT_THROW(ReportImageFromFile("/nowhere/x.png", "", "x"), IoError);
+}
+
+TEST(Html, SvgIsTakenAsSvg) {
+  Report report = Full();
+  report.main_images = {
+      {.bytes = "<?xml version=\"1.0\"?>\n<svg></svg>", .caption = "", .alt = "plot"}};
+  EXPECT_THAT(ReportHtml(report), HasSubstr("data:image/svg+xml;base64,"));
+}
+
+}  // namespace
+}  // namespace semblance

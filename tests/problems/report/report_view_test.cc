@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The 3-D view of a report as a browser shows it: a script laid over the page presses its buttons
+// and counts pixels. The page itself may reach no network; what it tries is a fault here.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "problems/pipeline/experiment_config.h"
+#include "problems/report/report.h"
+#include "problems/report/report_assets.h"
+#include "problems/report/scene_json.h"
+#include "surfaces/base/whole_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+using testing::ScratchFolder;
+
+constexpr const char* kListen = R"js(<script>
+window.faults = [];
+addEventListener('error', (e) => faults.push(e.message));
+addEventListener('securitypolicyviolation', (e) => faults.push('policy: ' + e.blockedURI));
+console.error = console.warn = (...words) => faults.push(words.join(' '));
+</script>)js";
+
+constexpr const char* kPress = R"js(<script>
+addEventListener('load', () => setTimeout(() => {
+  const canvases = [...document.querySelectorAll('.view3d-stage canvas')];
+  const picture = (canvas) => {
+    const copy = Object.assign(document.createElement('canvas'), {width: canvas.width, height: canvas.height});
+    const pen = copy.getContext('2d');
+    pen.drawImage(canvas, 0, 0);
+    return pen.getImageData(0, 0, copy.width, copy.height).data;
+  };
+  const inked = (data) => { let n = 0; for (let k = 0; k < data.length; k += 4) { n += data[k] < 250; } return n; };
+  const changed = (a, b) => { let n = 0; for (let k = 0; k < a.length; ++k) { n += a[k] !== b[k]; } return n; };
+  const out = {canvases: canvases.length, inked: canvases.map((c) => inked(picture(c))), toggles: {}};
+  for (const box of document.querySelectorAll('input[data-layer]')) {
+    const before = picture(canvases[0]);
+    box.click();
+    out.toggles[box.dataset.layer] = changed(before, picture(canvases[0]));
+    box.click();
+    out.toggles[box.dataset.layer] *= changed(before, picture(canvases[0])) === 0;
+  }
+  const choose = (select, value) => { select.value = value; select.dispatchEvent(new Event('change')); };
+  const byText = (tag, text) => [...document.querySelectorAll(tag)].find((e) => e.textContent.includes(text));
+  let before = picture(canvases[0]);
+  choose(byText('.view3d-choice', 'faces by').querySelector('select'), 'error');
+  out.coloured = changed(before, picture(canvases[0]));
+  out.legend = byText('.view3d-legend', 'true skin').textContent;
+  const choices = document.querySelectorAll('.view3d-head select');
+  out.different = changed(picture(canvases[0]), picture(canvases[1]));
+  choose(choices[1], '0');
+  before = picture(canvases[0]);
+  byText('.view3d-panel button', 'Left').click();
+  setTimeout(() => {  // cameras draw with the next frame
+    out.turned = changed(before, picture(canvases[0]));
+    out.apart = changed(picture(canvases[0]), picture(canvases[1]));
+    const table = document.querySelector('table'), cells = () => [...table.tBodies[0].rows].map((r) => r.cells[1].textContent);
+    table.querySelectorAll('th button')[1].click();
+    out.up = cells();
+    table.querySelectorAll('th button')[1].click();
+    out.down = cells();
+    out.faults = faults;
+    document.body.insertAdjacentHTML('beforeend', '<pre id="outcome">' + JSON.stringify(out) + '</pre>');
+  }, 500);
+}, 0));
+</script>)js";
+
+RunResult SmallRun(int random_seed) {
+  const std::vector<std::string> overrides = {fmt::format("subject.random_seed={}", random_seed),
+                                              "subject.rings=40",
+                                              "implicit.resolution=30",
+                                              "seeds.level=0",
+                                              "template.max_level=1",
+                                              "fit.schedule=[{level: 0, fraction: 1}]"};
+  const auto experiment =
+      ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides);
+  return Run(experiment, {});
+}
+
+std::string Page() {
+  const SceneCollection scenes = CollectScenes(
+      {{"first </script>", SceneJson(SmallRun(1), {})}, {"second", SceneJson(SmallRun(2), {})}},
+      1 << 30);
+  Report report;
+  report.title = "t";
+  report.scenes = scenes.json;
+  report.sections.push_back(
+      {.heading = "s", .tables = {{"", {"a", "b"}, {{"x", "10"}, {"y", "9.5"}, {"z", ""}}}}});
+  std::string html = ReportHtml(report);
+  html.insert(html.find("<head>") + 6, kListen);
+  return html + kPress;
+}
+
+class ReportViewTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (ThreeScript().empty()) {
+      GTEST_SKIP() << "built without three.js (Debian: libjs-three)";
+    }
+    if (std::system("command -v chromium > /dev/null") != 0) {
+      GTEST_SKIP() << "there is no chromium here";
+    }
+  }
+  ScratchFolder folder_;
+};
+
+TEST_F(ReportViewTest, RendersTogglesLinksAndSortsWithoutAFault) {
+  WriteFileAtomically(folder_ / "page.html", Page());
+  const std::string command = fmt::format(
+      "HOME={0} timeout 120 chromium --headless --no-sandbox --use-gl=angle "
+      "--use-angle=swiftshader "
+      "--enable-unsafe-swiftshader --user-data-dir={0}/profile --window-size=1400,1800 "
+      "--virtual-time-budget=20000 "
+      "--dump-dom file://{0}/page.html > {0}/dom.html 2> {0}/log",
+      folder_.Path().string());
+  ASSERT_EQ(std::system(command.c_str()), 0) << ReadFileBytes(folder_ / "log");
+  const std::string dom = ReadFileBytes(folder_ / "dom.html");
+  const std::size_t at = dom.rfind("<pre id=\"outcome\">");
+  ASSERT_NE(at, dom.npos) << ReadFileBytes(folder_ / "log");
+  const std::string text = dom.substr(at + 18, dom.find("</pre>", at) - at - 18);
+  const auto out = nlohmann::json::parse(text);
+  EXPECT_EQ(out["faults"], nlohmann::json::array());
+  EXPECT_EQ(out["canvases"], 2);
+  EXPECT_GT(out["inked"][0], 5000);
+  EXPECT_GT(out["inked"][1], 5000);
+  EXPECT_GE(out["toggles"].size(), 7u);
+  for (const auto& [layer, pixels] : out["toggles"].items()) {
+    EXPECT_GT(pixels, 50) << layer;  // hidden or shown, and back again
+  }
+  EXPECT_GT(out["coloured"], 5000);
+  EXPECT_GT(out["different"], 1000);
+  EXPECT_GT(out["turned"], 5000);
+  EXPECT_EQ(out["apart"], 0);  // the same scene twice, one camera
+  EXPECT_EQ(out["up"], nlohmann::json({"9.5", "10", "–"}));
+  EXPECT_EQ(out["down"], nlohmann::json({"10", "9.5", "–"}));
+}
+
+}  // namespace
+}  // namespace semblance

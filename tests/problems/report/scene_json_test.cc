@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/report/scene_json.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "problems/report/scene_blobs.h"
+#include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using testing::WordsOf;
+
+// RFC 4648, written anew.
+std::string FromBase64(const std::string& text) {
+  std::string bytes;
+  std::uint32_t bits = 0;
+  int count = 0;
+  for (const char c : text) {
+    if (c == '=') {
+      break;
+    }
+    const int digit = c >= 'a'   ? c - 'a' + 26
+                      : c >= 'A' ? c - 'A'
+                      : c == '+' ? 62
+                      : c == '/' ? 63
+                                 : c - '0' + 52;
+    bits = bits << 6 | static_cast<std::uint32_t>(digit);
+    count += 6;
+    if (count >= 8) {
+      count -= 8;
+      bytes += static_cast<char>(bits >> count & 0xFF);
+    }
+  }
+  return bytes;
+}
+
+int Word(const std::string& bytes, std::size_t n) {
+  return static_cast<unsigned char>(bytes[2 * n]) | static_cast<unsigned char>(bytes[2 * n + 1])
+                                                        << 8;
+}
+
+TEST(SceneBlobs, PointsAreWithinHalfAStepAndTrianglesAreKept) {
+  const TriMesh mesh = {{{0, 0, 0}, {100, 1, 2}, {3, 50.4321, 5}, {-7, -8, 9.87}},
+                        {{0, 1, 2}, {2, 3, 0}}};
+  SceneBlobs blobs;
+  const Json blob = blobs.All().empty() ? Json(blobs.AddMesh(mesh)) : Json();
+  const Json& made = blobs.All().at(blob.get<std::string>());
+  const std::string points = FromBase64(made["points"]), triangles = FromBase64(made["triangles"]);
+  ASSERT_EQ(points.size(), 2 * 3 * mesh.points.size());
+  const double step = made["step"];
+  EXPECT_LE(step, 107.0 / 65535 + 1e-12);
+  for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double low = made["low"][axis];
+      EXPECT_NEAR(low + step * Word(points, 3 * v + axis), mesh.points[v][axis], 0.5 * step + 1e-9);
+    }
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    EXPECT_EQ(Word(triangles, k), mesh.triangles[k / 3][k % 3]);
+  }
+}
+
+TEST(SceneBlobs, ValuesAreHundredthsAndNoValueIsKeptApart) {
+  SceneBlobs blobs;
+  const std::string name = blobs.AddValues(std::vector<double>{1.234, -0.5, kNaN, 1e9});
+  const std::string bytes = FromBase64(blobs.All().at(name)["values"]);
+  const auto at = [&](std::size_t n) { return static_cast<std::int16_t>(Word(bytes, n)); };
+  EXPECT_EQ(at(0), 123);
+  EXPECT_EQ(at(1), -50);
+  EXPECT_EQ(at(2), -32768);
+  EXPECT_EQ(at(3), 32000);
+}
+
+TEST(SceneBlobs, TheSameGeometryIsThereOnce) {
+  SceneBlobs blobs;
+  const TriMesh mesh = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+  EXPECT_EQ(blobs.AddMesh(mesh), blobs.AddMesh(mesh));
+  EXPECT_EQ(blobs.All().size(), 1u);
+}
+
+std::string Scene(const std::string& blob, std::size_t size) {
+  return Json({{"label", "x"},
+               {"layers", Json::array()},
+               {"blobs", {{blob, {{"points", std::string(size, 'A')}}}}}})
+      .dump();
+}
+
+TEST(CollectScenes, SharesBlobsAndStopsAtTheLimit) {
+  const SceneCollection all = CollectScenes(
+      {{"a", Scene("k", 1000)}, {"b", Scene("k", 1000)}, {"c", Scene("l", 1000)}}, 1500);
+  EXPECT_EQ(all.count, 2);  // the third would bring a second blob
+  const Json json = Json::parse(all.json);
+  EXPECT_EQ(json["blobs"].size(), 1u);
+  EXPECT_EQ(json["scenes"][1]["label"], "b");
+  EXPECT_FALSE(json["scenes"][0].contains("blobs"));
+  EXPECT_EQ(CollectScenes({{"a", Scene("k", 1000)}}, 0).count, 1);
+}
+
+TEST(CollectScenes, RefusesWhatIsNoScene) {
+  EXPECT_THAT(WordsOf<IoError>([] {
+                CollectScenes({{"a", "{}"}}, 1);
+              }),
+              ::testing::HasSubstr("no scene"));
+  EXPECT_THAT(WordsOf<IoError>([] {
+                CollectScenes({{"a", "nonsense"}}, 1);
+              }),
+              ::testing::HasSubstr("no scene"));
+}
+
+}  // namespace
+}  // namespace semblance

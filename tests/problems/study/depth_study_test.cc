@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Depth without a fit: against the phantom's known depth, with dowels left out, and as a study.
+#include "problems/study/depth_study.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "problems/pipeline/experiment_config.h"
+#include "problems/study/study_breakdown.h"
+#include "problems/study/study_report.h"
+#include "problems/study/study_run.h"
+#include "surfaces/mesh/mesh_io.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+using Json = nlohmann::ordered_json;
+
+Experiment SmallPhantom(std::vector<std::string> overrides = {}) {
+  overrides.insert(overrides.begin(), "subject.rings=50");
+  return ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides);
+}
+
+DepthResult Measured(std::vector<std::string> overrides = {}) {
+  return MeasureDepth(SmallPhantom(std::move(overrides)), {});
+}
+
+TEST(DepthStudy, TheTruthIsThePhantomsOwnDepth) {
+  const DepthResult result = Measured();
+  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 50});
+  ASSERT_TRUE(result.truth);
+  const TruthMap& along = result.truth->truth.along_direction;
+  double squares = 0;
+  int count = 0;
+  for (std::size_t v = 0; v < phantom.depth_mm.size(); ++v) {
+    if (result.truth->region.scored[v] && along.status[v] == TruthStatus::kValid) {
+      squares += std::pow(along.depth_mm[v] - phantom.depth_mm[v], 2);
+      ++count;
+      EXPECT_LE(result.truth->truth.closest.depth_mm[v], along.depth_mm[v] + 1e-9);
+    }
+  }
+  EXPECT_GT(count, 500);
+  EXPECT_LT(std::sqrt(squares / count), 0.25);  // the mesh's normals are not the exact ones
+}
+
+TEST(DepthStudy, AMapOfTheTrueDepthHasNoErrorButThoseOfNormals) {
+  const ScratchFolder folder;
+  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 50});
+  WriteFileAtomically(
+      folder / "true.ply",
+      EncodeMesh(
+          phantom.skull, ".ply",
+          {.normals = {}, .colors = {}, .scalars = {{"scalar_depth_mm", phantom.depth_mm}}}));
+  const DepthResult map = Measured(
+      {fmt::format("interp={{type: depth_map, file: {}}}", (folder / "true.ply").string())});
+  EXPECT_TRUE(map.left_out.empty());
+  const double best = map.truth->along_direction.all.rms_mm;
+  EXPECT_LT(best, 0.25);
+  for (const char* scheme : {"barycentric", "network_spline", "mean"}) {
+    EXPECT_GT(Measured({fmt::format("interp={}", scheme)}).truth->along_direction.all.rms_mm, best);
+  }
+}
+
+TEST(DepthStudy, ErrorsAreInterpolatedLessTrueAndTheMeansDepthIsEverywhereTheSame) {
+  const DepthResult result = Measured({"interp=mean"});
+  const DepthComparison& truth = *result.truth;
+  const double mean = result.stage->depth.depth_mm[0];
+  for (std::size_t v = 0; v < truth.truth.closest.depth_mm.size(); ++v) {
+    if (std::isfinite(truth.closest.error_mm[v])) {
+      ASSERT_NEAR(truth.closest.error_mm[v], mean - truth.truth.closest.depth_mm[v], 1e-12);
+    }
+  }
+  EXPECT_LT(truth.tips.rms_mm, truth.along_direction.all.rms_mm);  // tips go to the closest skin
+  EXPECT_TRUE(std::isnan(truth.along_direction.coverage_90));
+  double area = 0;
+  for (const auto& [name, part] : truth.along_direction.regions) {
+    area += part.area_cm2;
+  }
+  EXPECT_NEAR(area, truth.along_direction.all.area_cm2, 1e-9);
+}
+
+TEST(DepthStudy, KrigingStatesAnSdThatMostErrorsKeepTo) {
+  const DepthResult result = Measured({"interp=kriging"});
+  EXPECT_GT(result.truth->along_direction.coverage_90, 0.6);
+  EXPECT_LE(result.truth->along_direction.coverage_90, 1);
+}
+
+TEST(DepthStudy, TheDirectionTurnsTheEndsAndTheTruthAlongIt) {
+  const DepthResult normal = Measured(), dowels = Measured({"direction=dowel_direction"}),
+                    smooth = Measured({"direction={type: smoothed_normal, radius_mm: 15}"});
+  EXPECT_NE(normal.truth->tips.rms_mm, dowels.truth->tips.rms_mm);
+  EXPECT_NE(normal.truth->tips.rms_mm, smooth.truth->tips.rms_mm);
+  EXPECT_NE(normal.truth->along_direction.all.rms_mm, dowels.truth->along_direction.all.rms_mm);
+}
+
+TEST(DepthStudy, LeavesOutLandmarksSidesAndParts) {
+  const DepthResult result = Measured();
+  ASSERT_EQ(result.left_out.size(), 3u);
+  EXPECT_EQ(result.left_out[0].first, "landmark");
+  EXPECT_EQ(result.left_out[1].first, "side");
+  EXPECT_EQ(result.left_out[2].first, "k_fold");
+  EXPECT_EQ(result.left_out[0].second.left_out.size(), 32u);
+  EXPECT_EQ(result.left_out[1].second.left_out.size(), 22u);
+  EXPECT_EQ(result.left_out[2].second.left_out.size(), 32u);
+  const std::string csv = LeftOutCsv(result);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 32 + 22 + 32);
+  EXPECT_THAT(csv, HasSubstr("\nlandmark,go_l,go,jaw,"));
+}
+
+TEST(DepthStudy, JsonHasEveryNumberByItsPath) {
+  const Experiment experiment = SmallPhantom({"interp=kriging"});
+  const DepthResult result = MeasureDepth(experiment, {});
+  const Json json = Json::parse(DepthResultJson(experiment, result));
+  EXPECT_EQ(json.at("usable"), true);
+  for (const char* path :
+       {"/depth/assigned", "/depth_truth/along_direction/rms_mm", "/depth_truth/closest/p95_mm",
+        "/depth_truth/along_direction/regions/cheeks/rms_mm",
+        "/depth_truth/along_direction/vertices/valid", "/depth_truth/along_direction/coverage_90",
+        "/depth_truth/tips/mean_abs_mm", "/cross_validation/landmark/sites/go_l",
+        "/cross_validation/side/rms_mm", "/cross_validation/k_fold/regions/nose/rms_mm",
+        "/cross_validation/landmark/coverage_90"}) {
+    EXPECT_TRUE(json.at(Json::json_pointer(path)).is_number()) << path;
+  }
+}
+
+TEST(DepthStudy, TheFolderHoldsMeshesWithTheirNumbers) {
+  const ScratchFolder folder;
+  const Experiment experiment = SmallPhantom();
+  const DepthResult result = MeasureDepth(experiment, {});
+  OutputFolder output(folder / "out", WhenNotEmpty::kRefuse);
+  WriteDepth(experiment, result, output, {});
+  EXPECT_THAT(output.Written(), ElementsAre("resolved.yaml", "result.json", "left_out.csv",
+                                            "depth.ply", "tips.ply", "depth.png", "timing.json"));
+  // depth.ply is itself a map that can be read back.
+  const DepthResult again = Measured({fmt::format("interp={{type: depth_map, file: {}}}",
+                                                  (folder / "out" / "depth.ply").string())});
+  for (std::size_t v = 0; v < result.stage->depth.depth_mm.size(); ++v) {
+    if (std::isfinite(result.stage->depth.depth_mm[v])) {
+      ASSERT_NEAR(again.stage->depth.depth_mm[v], result.stage->depth.depth_mm[v], 1e-5);
+    }
+  }
+  EXPECT_EQ(ReadMesh(folder / "out" / "tips.ply").points.size(),
+            ReadMesh(folder / "out" / "depth.ply").points.size());
+}
+
+TEST(DepthStudy, AsAStudyItRanksBreaksDownAndShowsTheFirstSubjectsMaps) {
+  const ScratchFolder folder;
+  WriteFileAtomically(folder / "study.yaml",
+                      fmt::format("base: {}/configs/phantom.yaml\nset: {{subject.rings: 40}}\n"
+                                  "job: depth\nkeep: view\nsubjects:\n"
+                                  "  - {{name: a, set: {{subject.random_seed: 1}}}}\n"
+                                  "  - {{name: b, set: {{subject.random_seed: 2}}}}\n"
+                                  "grid: {{interp: [mean, network_spline]}}\n"
+                                  "metric: depth_truth.along_direction.rms_mm\n",
+                                  SEMBLANCE_SOURCE_DIR));
+  const StudyPlan plan = ReadStudy(folder / "study.yaml");
+  RunStudy(plan, folder / "out", {.jobs = 2}, {});
+  OutputFolder output(folder / "out", WhenNotEmpty::kReplaceFiles);
+  const StudyResults results = WriteStudyTables(output);
+  ASSERT_EQ(results.Count("done"), 4);
+  const auto treatments = Treatments(results, results.metric);
+  ASSERT_EQ(treatments.size(), 2u);
+  const auto tables = BreakdownTables(results, treatments);
+  ASSERT_EQ(tables.size(), 4u);
+  EXPECT_THAT(tables[0].header, Contains("p95 (mm)"));
+  EXPECT_THAT(tables[1].header, Contains("cheeks"));
+  EXPECT_THAT(tables[2].header, Contains("a side: RMS (mm)"));
+  EXPECT_EQ(tables[3].rows.size(), 32u);
+  EXPECT_EQ(tables[3].header.size(), 3u);
+  // The mean of the two subjects' own numbers.
+  const auto& rms = treatments[1].by_subject;
+  EXPECT_EQ(tables[0].rows[1][1], fmt::format("{:.3f}", (rms.at("a") + rms.at("b")) / 2));
+  int maps = 0;
+  for (const StudyTrial& trial : plan.trials) {
+    const bool is_there = fs::exists(folder / "out" / "trials" / trial.id / "depth.png");
+    EXPECT_EQ(is_there, trial.subject == "a");
+    maps += is_there;
+  }
+  EXPECT_EQ(maps, 2);
+  EXPECT_THAT(ReadFileBytes(folder / "out" / "report.html"), HasSubstr("Depth maps"));
+}
+
+TEST(DepthStudy, SaysWhatIsWrongWithAJob) {
+  const ScratchFolder folder;
+  WriteFileAtomically(folder / "study.yaml",
+                      fmt::format("base: {}/configs/phantom.yaml\njob: depths\n"
+                                  "grid: {{interp: [mean]}}\n",
+                                  SEMBLANCE_SOURCE_DIR));
+  EXPECT_THAT(testing::WordsOf<ConfigError>([&] { ReadStudy(folder / "study.yaml"); }),
+              HasSubstr("depths"));
+}
+
+}  // namespace
+}  // namespace semblance

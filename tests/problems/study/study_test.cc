@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Studies from file to tables, on phantoms coarse enough to be quick.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "problems/config/config.h"
+#include "problems/run.h"
+#include "problems/study/study_report.h"
+#include "problems/study/study_rows.h"
+#include "problems/study/study_run.h"
+#include "surfaces/base/whole_file.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::ScratchFolder;
+using testing::WordsOf;
+
+const std::string kBase = fmt::format(
+    "base: {}/configs/phantom.yaml\n"
+    "set: {{subject.rings: 40, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
+    "      fit.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
+    SEMBLANCE_SOURCE_DIR);
+
+class StudyTest : public ::testing::Test {
+ protected:
+  fs::path Write(const std::string& text) {
+    const fs::path file = folder_ / "study.yaml";
+    WriteFileAtomically(file, text);
+    return file;
+  }
+  StudyPlan Plan(const std::string& text) { return ReadStudy(Write(kBase + text)); }
+  std::string Faults(const std::string& text) {
+    return WordsOf<ConfigError>([&] { Plan(text); });
+  }
+  // The tables of a finished folder; the trials' timing apart.
+  std::map<std::string, std::string> Tables(const fs::path& root) {
+    OutputFolder output(root, WhenNotEmpty::kReplaceFiles);
+    WriteStudyTables(output);
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(root)) {
+      if (entry.is_regular_file() && entry.path().filename() != "timing.json") {
+        files[fs::relative(entry.path(), root).generic_string()] = ReadFileBytes(entry.path());
+      }
+    }
+    return files;
+  }
+
+  ScratchFolder folder_;
+};
+
+const char* const kSmall =
+    "subjects:\n  - {name: a, set: {subject.random_seed: 1}}\n"
+    "  - {name: b, set: {subject.random_seed: 2}}\n"
+    "grid: {interp: [nearest, {type: mean}], fit.features: [restore]}\nmetric: "
+    "implicit_face.rms_mm\n";
+
+TEST_F(StudyTest, EveryCombinationIsOneTrial) {
+  const StudyPlan plan = Plan(
+      "subjects: [{name: a}, {name: b, set: {subject.random_seed: 7}}]\n"
+      "grid: {interp: [nearest, mean], rounds: [1, 2, 3]}\n"
+      "zip: {seeds.weight: [0.5, 1.5], title: [x, y]}\n"
+      "list: [{seeds.level: 0}, {fit.features: free}]\n");
+  EXPECT_EQ(plan.trials.size(), 2u * 6 * 2 * 2);
+  EXPECT_THAT(plan.axes, ElementsAre("interp", "rounds", "seeds.weight", "title", "seeds.level",
+                                     "fit.features"));
+  std::set<std::string> ids;
+  for (const StudyTrial& trial : plan.trials) {
+    ids.insert(trial.id);
+    EXPECT_EQ(trial.experiment.seeds.weight == 0.5, trial.experiment.title == "x");
+  }
+  EXPECT_EQ(ids.size(), plan.trials.size());
+  EXPECT_THAT(plan.trials[0].values, ElementsAre("nearest", "1", "0.5", "x", "0", ""));
+  EXPECT_EQ(plan.hash, Plan("subjects: [{name: a}, {name: b, set: {subject.random_seed: 7}}]\n"
+                            "grid: {interp: [nearest, mean], rounds: [1, 2, 3]}\n"
+                            "zip: {seeds.weight: [0.5, 1.5], title: [x, y]}\n"
+                            "list: [{seeds.level: 0}, {fit.features: free}]\n")
+                           .hash);
+}
+
+TEST_F(StudyTest, SamplesStayInTheirRangesAndFillThem) {
+  const StudyPlan plan = Plan(
+      "sample: {method: lhs, n: 10, random_seed: 3, ranges: {seeds.weight: [1.0, 2.0], rounds: [1, "
+      "5]}}\n");
+  ASSERT_EQ(plan.trials.size(), 10u);
+  std::set<int> slices;
+  for (const StudyTrial& trial : plan.trials) {
+    slices.insert(static_cast<int>(10 * (trial.experiment.seeds.weight - 1)));
+    EXPECT_GE(trial.experiment.rounds, 1);
+    EXPECT_LE(trial.experiment.rounds, 5);
+  }
+  EXPECT_EQ(slices.size(), 10u);  // one in each tenth
+}
+
+TEST(StudySamples, SobolPointsAreEvenInEachHalf) {
+  const auto points = UnitSamples(SampleMethod::kSobol, 15, 2, 0);
+  int low = 0;
+  for (const auto& p : points) {
+    low += p[0] < 0.5 ? 1 : 0;
+  }
+  EXPECT_EQ(low, 7);
+  EXPECT_NEAR(points[0][0], 0.5, 1e-12);
+  EXPECT_NEAR(points[0][1], 0.5, 1e-12);
+}
+
+TEST_F(StudyTest, EveryFaultIsSaidOnceAtItsLine) {
+  EXPECT_THAT(Faults("subjects: [{name: a}, {name: b}]\ngrid:\n  interp: [nearest, krigging]\n"),
+              AllOf(HasSubstr("study.yaml:6:21: interp"), HasSubstr("krigging")));
+  const std::string twice = Faults(
+      "subjects: [{name: a}, {name: b, set: {subject.random_seed: 2}}]\n"
+      "grid: {rounds: [1, 2000]}\n");
+  EXPECT_EQ(std::count(twice.begin(), twice.end(), '\n'), 0) << twice;
+  EXPECT_THAT(Faults("grids: {}\n"), HasSubstr("did you mean 'grid'?"));
+  EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("a list of one or more values"));
+  EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("go side by side"));
+  EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"), HasSubstr("must be the lower"));
+  EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"), HasSubstr("a name of its own"));
+  EXPECT_THAT(Faults("grid: {rounds: [2, 2]}\n"), HasSubstr("are the same experiment"));
+  EXPECT_THAT(Faults("grid: {no.such: [2]}\n"), HasSubstr("no"));
+  EXPECT_THAT(WordsOf<ConfigError>([&] { ReadStudy(Write("grid: {rounds: [1]}\n")); }),
+              HasSubstr("base: the file of an experiment is due"));
+}
+
+TEST_F(StudyTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorIfNot) {
+  const std::string missing =
+      "subjects: [{name: a}, {name: b, set: {subject: {type: files, skull: none.ply, landmarks: "
+      "none.yaml}}";
+  const StudyPlan plan = Plan(missing + ", optional: true}]\n");
+  EXPECT_EQ(plan.trials.size(), 1u);
+  EXPECT_THAT(plan.notes, ElementsAre(HasSubstr("subject b: skipped")));
+  EXPECT_THAT(Faults(missing + "}]\n"), HasSubstr("subject b: no such file"));
+}
+
+TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
+  const StudyPlan plan = Plan(kSmall);
+  RunStudy(plan, folder_ / "one", {}, {});
+  const auto one = Tables(folder_ / "one");
+  EXPECT_THAT(one.at("trials.csv"), HasSubstr(",implicit_face.rms_mm,"));
+
+  RunStudy(plan, folder_ / "two", {.jobs = 2}, {});
+  EXPECT_EQ(Tables(folder_ / "two"), one);
+
+  for (int shard = 0; shard < 3; ++shard) {
+    RunStudy(plan, folder_ / fmt::format("shard{}", shard), {.shard = shard, .shards = 3}, {});
+  }
+  GatherTrials(folder_ / "merged", {folder_ / "shard2", folder_ / "shard0", folder_ / "shard1"});
+  EXPECT_EQ(Tables(folder_ / "merged"), one);
+
+  // As if killed: one trial is gone, one is cut short.
+  fs::remove_all(folder_ / "one" / "trials" / plan.trials[0].id);
+  WriteFileAtomically(folder_ / "one" / "trials" / plan.trials[2].id / "trial.json", "{\"id\": ");
+  const StudySummary again = RunStudy(plan, folder_ / "one", {}, {});
+  EXPECT_EQ(again.skipped, 2);
+  EXPECT_EQ(again.done, 2);
+  EXPECT_EQ(Tables(folder_ / "one"), one);
+}
+
+TEST_F(StudyTest, AFailedTrialIsARowWithItsReason) {
+  // With this radius no landmark is close enough to a skull of so few triangles.
+  const StudyPlan plan = Plan("grid: {landmarks.max_distance_mm: [0, 50]}\n");
+  const StudySummary summary = RunStudy(plan, folder_ / "run", {}, {});
+  EXPECT_EQ(summary.failed, 1);
+  EXPECT_EQ(summary.done, 1);
+  const auto files = Tables(folder_ / "run");
+  EXPECT_THAT(files.at("trials.csv"), HasSubstr("failed,\"landmarks of phantom 1"));
+  EXPECT_THAT(files.at("report.html"), HasSubstr("max_distance_mm"));
+  EXPECT_EQ(RunStudy(plan, folder_ / "run", {}, {}).skipped, 2);
+  EXPECT_EQ(RunStudy(plan, folder_ / "run", {.retry_failed = true}, {}).failed, 1);
+}
+
+TEST_F(StudyTest, WhatIsMissingIsCountedAndSaid) {
+  const StudyPlan plan = Plan(kSmall);
+  RunStudy(plan, folder_ / "run", {.shard = 1, .shards = 2}, {});
+  OutputFolder output(folder_ / "run", WhenNotEmpty::kReplaceFiles);
+  const StudyResults results = WriteStudyTables(output);
+  EXPECT_EQ(results.Count("missing"), 2);
+  EXPECT_EQ(results.Count("done"), 2);
+  EXPECT_THAT(ReadFileBytes(folder_ / "run" / "report.html"), HasSubstr("too few for a test"));
+}
+
+TEST_F(StudyTest, OfOneTreatmentNoDifferenceIsAsked) {
+  RunStudy(Plan("grid: {landmarks.max_distance_mm: [50]}\n"), folder_ / "run", {}, {});
+  const std::string report = Tables(folder_ / "run").at("report.html");
+  EXPECT_THAT(report, HasSubstr("Behind the metric"));
+  EXPECT_THAT(report, Not(HasSubstr("Do the treatments differ?")));
+}
+
+TEST_F(StudyTest, AFolderOfAnotherPlanIsLeftAlone) {
+  RunStudy(Plan(kSmall), folder_ / "run", {.shard = 1, .shards = 4}, {});
+  EXPECT_THAT(WordsOf<IoError>(
+                  [&] { RunStudy(Plan("grid: {rounds: [1, 2]}\n"), folder_ / "run", {}, {}); }),
+              HasSubstr("holds another study"));
+}
+
+TEST_F(StudyTest, ResultsAreThoseOfSingleRuns) {
+  const StudyPlan plan = Plan(kSmall);
+  RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
+  const StudyResults results = ReadStudyResults(folder_ / "run");
+  for (std::size_t n = 0; n < plan.trials.size(); ++n) {
+    const RunResult alone = semblance::Run(plan.trials[n].experiment, {});
+    EXPECT_EQ(results.trials[n].metrics.at("face.rms_mm"), alone.truth->face.truth_to_face.rms_mm);
+  }
+}
+
+TEST_F(StudyTest, TwelveFitsOnOneImplicitFaceMakeItOnce) {
+  const StudyPlan one = Plan("list: [{fit.schedule: [{level: 0, fraction: 0.05}]}]\n");
+  const StudyPlan twelve = Plan(
+      "zip: {fit.schedule: [[{level: 0, fraction: 0.1}], [{level: 0, fraction: 0.2}],\n"
+      "  [{level: 0, fraction: 0.3}], [{level: 0, fraction: 0.4}], [{level: 0, fraction: 0.5}],\n"
+      "  [{level: 0, fraction: 0.6}], [{level: 0, fraction: 0.7}], [{level: 0, fraction: 0.8}],\n"
+      "  [{level: 0, fraction: 0.9}], [{level: 0, fraction: 1}], [{level: 1, fraction: 0.5}],\n"
+      "  [{level: 1, fraction: 1}]]}\n");
+  const StudySummary alone = RunStudy(one, folder_ / "one", {}, {});
+  const StudySummary all = RunStudy(twelve, folder_ / "twelve", {.jobs = 2}, {});
+  EXPECT_EQ(all.done, 12);
+  EXPECT_EQ(all.shared_made, alone.shared_made);
+  const StudyPlan other = Plan("grid: {implicit.resolution: [20, 21]}\n");
+  EXPECT_GT(RunStudy(other, folder_ / "other", {}, {}).shared_made, alone.shared_made);
+}
+
+TEST(StageCache, MakesEachValueOnceAndForgetsWhatWasAskedForLongestAgo) {
+  StageCache cache(2);
+  int calls = 0;
+  const auto get = [&](const std::string& key) {
+    return *cache.Get<int>(key, [&] { return ++calls; });
+  };
+  EXPECT_EQ(get("a"), 1);
+  EXPECT_EQ(get("a"), 1);
+  EXPECT_EQ(get("b"), 2);
+  EXPECT_EQ(get("a"), 1);
+  EXPECT_EQ(get("c"), 3);
+  EXPECT_EQ(get("a"), 1);
+  EXPECT_EQ(get("b"), 4);
+  EXPECT_EQ(cache.made(), 4);
+  EXPECT_THROW(cache.Get<int>("bad", []() -> int { throw InputError("no"); }), InputError);
+  EXPECT_EQ(*cache.Get<int>("bad", [] { return 9; }), 9);
+}
+
+}  // namespace
+}  // namespace semblance

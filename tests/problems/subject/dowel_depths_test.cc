@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/dowel_depths.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "problems/config/config.h"
+#include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::WordsOf;
+
+constexpr char kTables[] = SEMBLANCE_SOURCE_DIR "/configs/tables/";
+
+TissueOptions FromTable(const std::string& id, Sex sex, Build build) {
+  TissueOptions options;
+  options.table = kTables + id + ".yaml";
+  options.sex = sex;
+  options.build = build;
+  return options;
+}
+
+TissueOptions Measured() {
+  TissueOptions options;
+  options.depths = DepthSource::kMeasured;
+  return options;
+}
+
+// Landmarks with measured depths along the normal 1, 2, ... mm, and their dowels.
+struct Subject {
+  LandmarkFile file;
+  std::vector<Dowel> dowels;
+  explicit Subject(const std::vector<std::string>& sites) {
+    for (const std::string& site : sites) {
+      Landmark& landmark = file.landmarks.emplace_back();
+      landmark.site = site;
+      landmark.depth_along_normal_mm = file.landmarks.size();
+      dowels.emplace_back().site = site;
+    }
+  }
+  std::vector<double> Depths() const {
+    std::vector<double> depths;
+    for (const Dowel& dowel : dowels) {
+      depths.push_back(dowel.depth_mm);
+    }
+    return depths;
+  }
+};
+
+TEST(TissueOptions, AreReadFromAConfiguration) {
+  const auto options = ReadConfigText<TissueOptions>(
+      "depths: table\ntable: t/a.yaml\nsex: female\nbuild: obese\nset_mm: {me: 7, go_l: 12.5}\n",
+      "/study/run.yaml");
+  EXPECT_EQ(options.table, "/study/t/a.yaml");
+  EXPECT_EQ(options.sex, Sex::kFemale);
+  EXPECT_EQ(options.build, Build::kObese);
+  EXPECT_THAT(options.set_mm, ElementsAre(std::pair("go_l", 12.5), std::pair("me", 7.0)));
+  EXPECT_THROW(ReadConfigText<TissueOptions>("set_mm: {me: 0}\n", "x.yaml"), ConfigError);
+  EXPECT_THAT(OptionsReference<TissueOptions>(), HasSubstr("set_mm"));
+  const auto place = ReadConfigText<PlaceOptions>("{max_distance_mm: 4}", "x.yaml");
+  EXPECT_EQ(place.max_distance_mm, 4);
+  EXPECT_EQ(place.normal_radius_mm, 3);
+}
+
+TEST(FillDepths, TakesTheTablesCellsForBothSides) {
+  Subject s({"sg", "go_l", "go_r"});
+  EXPECT_THAT(
+      FillDepths(FromTable("rhine_caucasoid", Sex::kFemale, Build::kObese), s.file, s.dowels),
+      IsEmpty());
+  EXPECT_THAT(s.Depths(), ElementsAre(4.25, 17.5, 17.5));
+  EXPECT_TRUE(std::isnan(s.dowels[0].sd_mm));
+}
+
+TEST(FillDepths, TakesTheDeviationWhereTheTableHasOne) {
+  Subject s({"g", "go_l"});
+  FillDepths(FromTable("t_table_2023", Sex::kMale, Build::kNormal), s.file, s.dowels);
+  EXPECT_THAT(s.Depths(), ElementsAre(5.5, 12.5));
+  EXPECT_EQ(s.dowels[1].sd_mm, 6);
+}
+
+TEST(FillDepths, SaysThatASuspectCellIsUsed) {
+  Subject s({"n", "g"});
+  EXPECT_THAT(
+      FillDepths(FromTable("rhine_sw_indian", Sex::kMale, Build::kNormal), s.file, s.dowels),
+      ElementsAre("site n (Nasion): the depth of 6.86 mm in table 'rhine_sw_indian' is suspect: "
+                  "footnote 1 of table A.3: may be a typographical error within the original "
+                  "data"));
+  EXPECT_EQ(s.dowels[0].depth_mm, 6.86);
+}
+
+TEST(FillDepths, AMissingCellIsAnErrorUnlessSet) {
+  Subject s({"g", "iM2_l", "iM2_r"});
+  TissueOptions options = FromTable("rhine_caucasoid", Sex::kMale, Build::kEmaciated);
+  EXPECT_THAT(WordsOf<InputError>([&] { FillDepths(options, s.file, s.dowels); }),
+              AllOf(HasSubstr("stratum emaciated_male: no depth for iM2_l (Sub M2)"),
+                    HasSubstr("iM2_r (Sub M2)")));
+  options.set_mm = {{"iM2", 10}};
+  FillDepths(options, s.file, s.dowels);
+  EXPECT_THAT(s.Depths(), ElementsAre(2.5, 10, 10));
+}
+
+TEST(FillDepths, ASidesOwnDepthComesBeforeThatOfThePair) {
+  Subject s({"go_l", "go_r", "g"});
+  TissueOptions options = Measured();
+  options.set_mm = {{"go", 12}, {"go_l", 14}, {"me", 7}};
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels),
+              ElementsAre("site go_l (Gonion): depth set to 14 mm by hand",
+                          "site go_r (Gonion): depth set to 12 mm by hand",
+                          "set_mm: no dowel takes the depth of site me (Beneath Chin)"));
+  EXPECT_THAT(s.Depths(), ElementsAre(14, 12, 3));
+}
+
+TEST(FillDepths, RefusesToSetAnUnknownSiteOrNoDepth) {
+  Subject s({"g"});
+  TissueOptions options = Measured();
+  options.set_mm = {{"go_ll", 12}};
+  EXPECT_EQ(WordsOf<InputError>([&] { FillDepths(options, s.file, s.dowels); }),
+            "set_mm: unknown site 'go_ll'; did you mean 'go_l'?");
+  options.set_mm = {{"g", 0}};
+  EXPECT_EQ(WordsOf<InputError>([&] { FillDepths(options, s.file, s.dowels); }),
+            "set_mm: the depth of site g (Glabella) is 0 mm; it must be above 0");
+}
+
+TEST(FillDepths, NeedsATable) {
+  Subject s({"g"});
+  EXPECT_EQ(WordsOf<InputError>([&] { FillDepths({}, s.file, s.dowels); }),
+            "tissue depths come from a table, but none is given; set `table` to a file such as "
+            "configs/tables/rhine_caucasoid.yaml, or `depths: measured`");
+}
+
+TEST(FillDepths, MeasuredFallsBackToTheClosestSkinAndDropsTheRest) {
+  Subject s({"sg", "go_l", "me"});
+  s.file.landmarks[1].depth_along_normal_mm.reset();
+  s.file.landmarks[1].depth_closest_mm = 11.25;
+  s.file.landmarks[2].depth_along_normal_mm.reset();
+  EXPECT_THAT(
+      FillDepths(Measured(), s.file, s.dowels),
+      ElementsAre("site go_l (Gonion): no depth along the normal; 11.25 mm to the closest skin "
+                  "taken instead",
+                  "site me (Beneath Chin): no measured depth; dowel dropped"));
+  EXPECT_THAT(s.Depths(), ElementsAre(1, 11.25));
+  EXPECT_EQ(s.dowels[1].site, "go_l");
+}
+
+TEST(FillDepths, NoDepthAtAllIsAnError) {
+  Subject s({"me"});
+  s.file.landmarks[0].depth_along_normal_mm.reset();
+  EXPECT_THAT(WordsOf<InputError>([&] { FillDepths(Measured(), s.file, s.dowels); }),
+              HasSubstr("no dowel has a tissue depth; measure at least one"));
+}
+
+}  // namespace
+}  // namespace semblance

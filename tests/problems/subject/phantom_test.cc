@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/phantom.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <sstream>
+
+#include "problems/face_template/template_sites.h"
+#include "problems/subject/phantom_shape.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+// The areas of the thesis' network, right side, by its numbers of the sites.
+constexpr const char* kAreas =
+    "1 11 12 1 12 2 2 12 3 3 12 13 3 13 4 4 13 14 4 14 5 5 14 19 5 19 6 6 19 20 6 20 7 7 20 21 "
+    "7 21 8 8 21 9 9 21 18 9 18 10 11 15 12 12 15 13 13 15 14 14 15 16 14 16 19 16 20 19 16 17 20 "
+    "17 18 20 18 21 20 11 16 15 11 17 16";
+const std::vector<std::string> kCodes = {"sg", "g",  "n",   "rhi", "mp",  "pr",  "id",
+                                         "sm", "pg", "me",  "fe",  "mso", "mio", "im",
+                                         "lo", "zy", "sgl", "go",  "sM2", "mr",  "iM2"};
+
+std::vector<std::uint8_t> Bytes(const Phantom& p) {
+  std::vector<std::uint8_t> bytes;
+  const auto add = [&](const auto* data, std::size_t count) {
+    const auto* from = reinterpret_cast<const std::uint8_t*>(data);
+    bytes.insert(bytes.end(), from, from + count * sizeof(*data));
+  };
+  add(p.skull.points.data(), p.skull.points.size());
+  add(p.skull.triangles.data(), p.skull.triangles.size());
+  add(p.depth_mm.data(), p.depth_mm.size());
+  add(p.face.points.data(), p.face.points.size());
+  for (const PhantomSite& s : p.sites) {
+    add(s.base.data(), 3);
+    add(s.normal.data(), 3);
+    add(&s.depth_mm, 1);
+  }
+  return bytes;
+}
+
+// The sites' bases joined by the areas of both sides.
+TriMesh SiteMesh(const Phantom& p) {
+  std::map<std::string, int> index;
+  TriMesh mesh;
+  for (const PhantomSite& s : p.sites) {
+    index[s.site] = static_cast<int>(mesh.points.size());
+    mesh.points.push_back(s.base);
+  }
+  for (const char* side : {"_r", "_l"}) {
+    std::istringstream numbers(kAreas);
+    for (int a, b, c; numbers >> a >> b >> c;) {
+      const auto at = [&](int n) { return index.at(kCodes[n - 1] + (n > 10 ? side : "")); };
+      mesh.triangles.push_back({at(a), at(b), at(c)});
+    }
+  }
+  return mesh;
+}
+
+// The sites' depths, linear over the area through which the ray to `vertex` leaves; NaN if none.
+double InterpolatedDepth(const Phantom& p, const TriMesh& sites, const MeshQuery& query,
+                         const Vec3& vertex) {
+  const auto hit = query.FirstHit(p.centre, vertex - p.centre, 400);
+  if (!hit) {
+    return kNaN;
+  }
+  Mat3 corners;
+  Vec3 depths;
+  for (int i = 0; i < 3; ++i) {
+    const int site = sites.triangles[hit->triangle][i];
+    corners.col(i) = sites.points[site] - p.centre;
+    depths[i] = p.sites[site].depth_mm;
+  }
+  return depths.dot(corners.inverse() * (hit->position - p.centre));
+}
+
+double WorstTurnDegrees(const TriMesh& from, const TriMesh& to) {
+  double cosine = 1;
+  for (const Triangle& t : from.triangles) {
+    cosine = std::min(cosine, TriangleAreaVector(from, t).normalized().dot(
+                                  TriangleAreaVector(to, t).normalized()));
+  }
+  return std::acos(cosine) * 180 / std::numbers::pi;
+}
+
+class PhantomOfSeed : public ::testing::TestWithParam<int> {
+ protected:
+  const Phantom phantom_ = MakePhantom({.random_seed = static_cast<std::uint64_t>(GetParam())});
+};
+INSTANTIATE_TEST_SUITE_P(Seeds, PhantomOfSeed, ::testing::Range(1, 6));
+
+TEST_P(PhantomOfSeed, SkullIsClosedAndOutwardAndOfAdultSize) {
+  const TriMesh& skull = phantom_.skull;
+  const EdgeReport edges = CheckEdges(skull);
+  EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
+  EXPECT_EQ(ConnectedComponents(skull).count, 1);
+  // One closed surface of the sphere's kind: Euler's number is 2.
+  EXPECT_EQ(static_cast<std::int64_t>(skull.points.size()) - edges.edges +
+                static_cast<std::int64_t>(skull.triangles.size()),
+            2);
+  const Vec3 size = Bounds(skull).sizes();
+  EXPECT_NEAR(size.x(), 145, 12);
+  EXPECT_NEAR(size.y(), 190, 10);
+  EXPECT_NEAR(size.z(), 200, 10);
+  EXPECT_NEAR(SignedVolume(skull), 2.4e6, 0.4e6);
+  EXPECT_LT(Bounds(skull).center().head<1>().norm(), 4);
+}
+
+TEST_P(PhantomOfSeed, EveryRayFromTheCentreLeavesOutward) {
+  for (const Triangle& t : phantom_.skull.triangles) {
+    const Vec3 ray = TriangleCentroid(phantom_.skull, t) - phantom_.centre;
+    ASSERT_GT(ray.normalized().dot(TriangleAreaVector(phantom_.skull, t).normalized()), 0.2);
+  }
+}
+
+TEST_P(PhantomOfSeed, FaceLiesTheDepthAlongTheNormalAboveTheSkull) {
+  const std::vector<Vec3> normals = VertexNormals(phantom_.skull);
+  ASSERT_EQ(phantom_.face.points.size(), normals.size());
+  EXPECT_EQ(phantom_.face.triangles, phantom_.skull.triangles);
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    const Vec3 tissue = phantom_.face.points[i] - phantom_.skull.points[i];
+    ASSERT_NEAR(tissue.norm(), phantom_.depth_mm[i], 1e-9);
+    ASSERT_GT(tissue.normalized().dot(normals[i]), std::cos(0.04));
+    ASSERT_GT(phantom_.depth_mm[i], 2.5);
+    ASSERT_LT(phantom_.depth_mm[i], 20);
+  }
+}
+
+TEST_P(PhantomOfSeed, NeitherTheFaceNorASheet20MmOutIsFolded) {
+  EXPECT_LT(WorstTurnDegrees(phantom_.skull, phantom_.face), 60);
+  TriMesh sheet = phantom_.skull;
+  for (std::size_t i = 0; i < sheet.points.size(); ++i) {
+    sheet.points[i] += 20 * (phantom_.face.points[i] - sheet.points[i]).normalized();
+  }
+  EXPECT_LT(WorstTurnDegrees(phantom_.skull, sheet), 60);
+}
+
+TEST_P(PhantomOfSeed, SitesLieOnTheSkullWithItsNormalAndDepth) {
+  const MeshQuery skull(phantom_.skull);
+  const MeshQuery face(phantom_.face);
+  for (const PhantomSite& s : phantom_.sites) {
+    EXPECT_LT(skull.Closest(s.base).distance_mm, 0.05) << s.site;
+    EXPECT_LT(face.Closest(s.base + s.depth_mm * s.normal).distance_mm, 0.1) << s.site;
+    EXPECT_NEAR(s.normal.norm(), 1, 1e-12);
+    EXPECT_EQ(s.site.ends_with("_l"), s.base.x() > 5) << s.site;
+    EXPECT_EQ(s.site.ends_with("_r"), s.base.x() < -5) << s.site;
+  }
+  EXPECT_LT(phantom_.sites[2].base.norm(), 1e-9) << "nasion is the origin";
+}
+
+TEST_P(PhantomOfSeed, LinearDepthsBetweenTheSitesAreNearlyRight) {
+  const TriMesh sites = SiteMesh(phantom_);
+  const MeshQuery query(sites);
+  double sum = 0;
+  int covered = 0;
+  for (std::size_t i = 0; i < phantom_.depth_mm.size(); ++i) {
+    const double depth = InterpolatedDepth(phantom_, sites, query, phantom_.skull.points[i]);
+    if (std::isfinite(depth)) {
+      sum += (depth - phantom_.depth_mm[i]) * (depth - phantom_.depth_mm[i]);
+      ++covered;
+    }
+  }
+  EXPECT_GT(covered, 4000);
+  EXPECT_LT(std::sqrt(sum / covered), 0.6);
+}
+
+TEST(Phantom, SitesAreThe32OfTheTemplate) {
+  std::vector<std::string> codes;
+  for (const PhantomSite& s : MakePhantom({.rings = 8}).sites) {
+    codes.push_back(s.site);
+  }
+  std::ranges::sort(codes);
+  EXPECT_EQ(codes, TemplateSiteCodes());
+}
+
+TEST(Phantom, SameSeedSameBytesAndAnotherSeedAnotherHead) {
+  const Phantom a = MakePhantom({.random_seed = 7, .rings = 20});
+  const Phantom b = MakePhantom({.random_seed = 8, .rings = 20});
+  EXPECT_EQ(Bytes(a), Bytes(MakePhantom({.random_seed = 7, .rings = 20})));
+  double bone = 0, tissue = 0;
+  for (std::size_t i = 0; i < a.depth_mm.size(); ++i) {
+    bone = std::max(bone, (a.skull.points[i] - b.skull.points[i]).norm());
+    tissue = std::max(tissue, std::abs(a.depth_mm[i] - b.depth_mm[i]));
+  }
+  EXPECT_GT(bone, 1);
+  EXPECT_GT(tissue, 0.5);
+}
+
+TEST(Phantom, SidesDifferMildly) {
+  const std::vector<PhantomSite> sites = MakePhantom({.rings = 8}).sites;
+  double largest = 0;
+  for (std::size_t i = 10; i < sites.size(); i += 2) {
+    const Vec3 mirrored = sites[i + 1].base.cwiseProduct(Vec3(-1, 1, 1));
+    largest = std::max(largest, (sites[i].base - mirrored).norm());
+  }
+  EXPECT_GT(largest, 0.1);
+  EXPECT_LT(largest, 5);
+}
+
+TEST(Phantom, RingsSetTheMeshAndNotTheSites) {
+  const Phantom coarse = MakePhantom({.rings = 9}), fine = MakePhantom({.rings = 50});
+  EXPECT_EQ(CheckEdges(coarse.skull).boundary, 0);
+  EXPECT_EQ(fine.skull.triangles.size(), 3 * 50 * 50);
+  for (std::size_t i = 0; i < fine.sites.size(); ++i) {
+    EXPECT_EQ(coarse.sites[i].base, fine.sites[i].base);
+  }
+}
+
+TEST(Phantom, RingsOutOfRangeAreNamed) {
+  for (const int rings : {-1, 7, 1001}) {
+    EXPECT_THROW(MakePhantom({.rings = rings}), InputError);
+  }
+}
+
+TEST(PhantomShape, NormalIsThatOfTheSurfaceByDifferences) {
+  SeededNumbers random(3);
+  const PhantomShape shape(random);
+  const auto point = [&](const Vec3& x) {
+    return Vec3(shape.Radius(x.normalized()) * x.normalized());
+  };
+  for (int i = 0; i < 500; ++i) {
+    const Vec3 d = random.Direction();
+    const Vec3 along = 1e-4 * d.unitOrthogonal(), across = d.cross(along);
+    const Vec3 normal = (point(d + along) - point(d - along))
+                            .cross(point(d + across) - point(d - across))
+                            .normalized();
+    EXPECT_LT((normal - shape.Normal(d)).norm(), 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace semblance

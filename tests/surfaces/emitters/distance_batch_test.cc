@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/emitters/distance_batch.h"
+
+#include <gtest/gtest.h>
+
+#include "surfaces/mesh/point_triangle.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using testing::Random;
+
+struct Emitting {
+  Vec3 a, b, c, normal = Vec3::Zero();
+  double advance_mm = 0, floor_mm = 0, gain = 0;
+};
+
+Emitting RandomTriangle(Random& random) {
+  Emitting t{random.InBox(-4, 4), random.InBox(-4, 4), random.InBox(-4, 4)};
+  t.normal = (t.b - t.a).cross(t.c - t.a).normalized();
+  t.advance_mm = random.Uniform(0, 1) < 0.3 ? 0 : random.Uniform(1, 5);
+  t.floor_mm = random.Uniform(0.1, 0.4);
+  t.gain = random.Uniform(1, 1e4);
+  return t;
+}
+
+// Thesis 3.1 and 3.2, by the closest point.
+double Emission(const Emitting& t, const Vec3& p, const DistanceFall& fall) {
+  const double height = (p - t.a).dot(t.normal);
+  const Vec3 from = p - t.advance_mm * t.normal;
+  const TrianglePoint closest = ClosestPointOnTriangle(from, t.a, t.b, t.c);
+  const double distance = (from - closest.position).norm();
+  if (height <= 0) {
+    return 0;
+  }
+  if (height < t.advance_mm) {
+    const bool over = std::abs(distance - (t.advance_mm - height)) < 1e-9;
+    return over ? fall.most : 0;
+  }
+  const double emission = t.gain * std::pow(std::max(distance, t.floor_mm), -fall.decay);
+  return emission < fall.cut ? 0 : std::min(emission, fall.most);
+}
+
+class DistanceBatchTest : public ::testing::TestWithParam<DistanceFall> {};
+INSTANTIATE_TEST_SUITE_P(Decays, DistanceBatchTest,
+                         ::testing::Values(DistanceFall{6, 6, 0, 1e12},
+                                           DistanceFall{3, 3, 0.01, 1e12},
+                                           DistanceFall{15, 15, 0, 1e12},
+                                           DistanceFall{4.5, -1, 0.01, 1e12}));
+
+TEST_P(DistanceBatchTest, EachLaneIsTheEmitterAloneAndTheThesis) {
+  Random random(21);
+  for (int n = 0; n < 500; ++n) {
+    DistanceBatch batch;
+    std::vector<Emitting> triangles;
+    const int set = n % (DistanceBatch::kLanes + 1);
+    for (int lane = 0; lane < set; ++lane) {
+      const Emitting t = triangles.emplace_back(RandomTriangle(random));
+      batch.Set(lane, t.a, t.b, t.c, t.normal, t.advance_mm, t.floor_mm, t.gain);
+    }
+    const Vec3 p = n % 2 == 0 ? random.InBox(-9, 9) : random.InBox(-40, 40);  // out of reach too
+    DistanceBatch::Lanes emission;
+    EmitByDistance(batch, p, GetParam(), emission);
+    const std::vector<DistanceBatch> one = {batch};
+    const std::vector<BatchReach> reaches = ReachesOf(one, GetParam());
+    const double sum = ((emission[0] + emission[1]) + (emission[2] + emission[3])) +
+                       ((emission[4] + emission[5]) + (emission[6] + emission[7]));
+    std::int64_t reaching = 0;
+    const auto sum_of = [&](const std::vector<std::int32_t>& which) {
+      return SumByDistance(one, which, SideBySide(reaches, which), p, GetParam(), reaching);
+    };
+    EXPECT_EQ(sum_of({0}), sum);
+    EXPECT_GE(reaching, sum > 0 ? 1 : 0);
+    EXPECT_EQ(sum_of({0, 0}), 2 * sum);
+    for (int lane = 0; lane < DistanceBatch::kLanes; ++lane) {
+      EXPECT_EQ(emission[lane], EmitByDistance(batch, lane, p, GetParam()));
+      const double expected = lane < set ? Emission(triangles[lane], p, GetParam()) : 0;
+      EXPECT_NEAR(emission[lane], expected, 1e-9 * expected) << n << " " << lane;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/hspline_files/hspline_json.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "surfaces/base/error.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+using testing::RandomSurface;
+
+const HSplineShape kShape{
+    .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicU};
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(HSplineJson, RoundTripsToTheBit) {
+  const HSplineSurface surface = RandomSurface(kShape, 3);
+  const std::string text = HSplineToJson(surface);
+  const HSplineSurface read = HSplineFromJson(text, "a.json");
+  EXPECT_EQ(read.shape(), surface.shape());
+  EXPECT_EQ(read.Offsets(), surface.Offsets());
+  for (int level = 0; level <= kShape.max_level; ++level) {
+    EXPECT_EQ(read.Net(level).vertices, surface.Net(level).vertices);
+  }
+  EXPECT_EQ(HSplineToJson(read), text);
+}
+
+TEST(HSplineJson, RefusesEveryOtherText) {
+  const std::string good = HSplineToJson(RandomSurface(kShape, 3, 1));
+  const std::vector<std::pair<std::string, std::string>> faults = {
+      {"", "parse error"},
+      {good.substr(0, good.size() / 2), "parse error"},
+      {"[1]", "the top is not an object"},
+      {Replaced(good, "\"version\":1", "\"version\":2"),
+       "only semblance-hspline version 1 in mm can be read"},
+      {Replaced(good, "\"units\":\"mm\"", "\"units\":\"m\""), "in mm can be read"},
+      {Replaced(good, "\"closure\"", "\"colour\""), "unknown entry 'colour'"},
+      {Replaced(good, "\"periodic_u\"", "\"closed\""), "'closed' is not one of open, periodic_u"},
+      {Replaced(good, "\"max_level\":2", "\"max_level\":9"),
+       "the finest level is 9; it must be in 0..8"},
+      {Replaced(good, "\"patches\":[4,5]", "\"patches\":[4,6]"), "does not fit level 0"},
+      {Replaced(good, "\"level0\":[[", "\"level0\":[[1e999,"), "number overflow"},
+      {Replaced(good, "\"level0\":[[", "\"level0\":[[0,0],["), "is not a list of 3 numbers"},
+      {Replaced(good, "\"patches\":[4,", "\"patches\":[4.5,"), "4.5 is not a whole number"},
+      {Replaced(good, "\"patches\":[4,", "\"patches\":[4294967300,"), "is not a whole number"},
+      {Replaced(good, "\"patches\":[4,", "\"patches\":[true,"), "true is not a whole number"},
+      {Replaced(good, "\"patches\":[4,", "\"patches\":[-4,"), "patches are not allowed"},
+      {Replaced(good, "\"level0\":[[", "\"level0\":[[\"1\",0,0],["), "\"1\" is not a number"},
+      {Replaced(good, "\"level0\":[[", "\"level0\":[[null,0,0],["), "null is not a number"},
+      {Replaced(good, "\"level0\":[[", "\"level0\":[[0,0,0],["), "does not fit level 0"},
+      {Replaced(good, "\"version\":1", "\"version\":1,\"version\":1"), "'version' stands twice"},
+      {Replaced(good, "\"offsets\":[[", "\"offsets\":[[1,2,2,0,0,0],[1,2,2,0,0,0],["),
+       "has two offsets"},
+      {Replaced(good, "\"offsets\":[", "\"offsets\":[3,"), "3 is not a list of 6 numbers"},
+      {Replaced(good, "\"offsets\":[[1,", "\"offsets\":[[7,"), "there is no vertex"},
+  };
+  for (const auto& [text, words] : faults) {
+    try {
+      HSplineFromJson(text, "a.json");
+      ADD_FAILURE() << "accepted; expected: " << words;
+    } catch (const IoError& e) {
+      EXPECT_THAT(e.what(), ::testing::StartsWith("a.json: not an H-spline that can be read: "));
+      EXPECT_THAT(e.what(), ::testing::HasSubstr(words));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/mesh/mesh_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_io.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::SphereMesh;
+
+std::string ErrorOf(const TriMesh& mesh) {
+  try {
+    CheckHeadMesh(mesh, "skull.ply");
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+TEST(MeshCheck, ASoundHeadHasNoNotes) {
+  EXPECT_TRUE(CheckHeadMesh(SphereMesh({0, 0, 0}, 100, 20), "a").empty());
+}
+
+TEST(MeshCheck, AnotherUnitIsNamed) {
+  EXPECT_THAT(ErrorOf(SphereMesh({0, 0, 0}, 0.1, 20)),
+              "skull.ply: its longest side is 0.2 mm, which is no head's (60 to 500 mm); it looks "
+              "like metres; multiply by 1000");
+  EXPECT_THAT(ErrorOf(SphereMesh({0, 0, 0}, 10, 20)),
+              HasSubstr("it looks like centimetres; multiply by 10"));
+}
+
+TEST(MeshCheck, AMeshInsideOutIsRefusedNotTurned) {
+  TriMesh sphere = SphereMesh({0, 0, 0}, 100, 20);
+  for (Triangle& t : sphere.triangles) {
+    std::swap(t[0], t[1]);
+  }
+  EXPECT_THAT(ErrorOf(sphere), HasSubstr("skull.ply: 100 % of its outside shows triangles' backs: "
+                                         "the mesh is inside out; flip its normals"));
+  EXPECT_THAT(ErrorOf(TriMesh{}), HasSubstr("has no triangles"));
+}
+
+TEST(MeshCheck, LesserDefectsAreNotes) {
+  TriMesh sphere = SphereMesh({0, 0, 0}, 100, 20);
+  sphere.triangles.pop_back();
+  EXPECT_THAT(CheckHeadMesh(sphere, "a"), ::testing::ElementsAre(HasSubstr("a: 3 of")));
+}
+
+TEST(MeshCheck, RealScansAreOutward) {
+  for (const char* file : {"vhm/skull.ply", "vhm/skin.ply", "cthead/skull.ply", "cranium/skull.ply",
+                           "cranium/skin.ply"}) {
+    const auto path = std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "../shared/data" / file;
+    if (!std::filesystem::exists(path)) {
+      GTEST_SKIP() << "the prepared real subjects are not here";
+    }
+    EXPECT_NO_THROW(CheckHeadMesh(ReadMesh(path), file));
+  }
+}
+
+}  // namespace
+}  // namespace semblance

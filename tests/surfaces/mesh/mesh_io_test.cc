@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/mesh/mesh_io.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "surfaces/base/error.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::Plate;
+using testing::SphereMesh;
+
+class MeshIo : public ::testing::Test {
+ protected:
+  MeshIo()
+      : folder_(std::filesystem::temp_directory_path() /
+                ("semblance_mesh_io_" + std::to_string(getpid()))) {
+    std::filesystem::create_directories(folder_);
+  }
+  ~MeshIo() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path Write(const std::string& name, const std::string& bytes) {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    return folder_ / name;
+  }
+  std::string ErrorOf(const std::filesystem::path& path) {
+    try {
+      ReadMesh(path);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "accepted";
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(MeshIo, EveryFormatRoundTrips) {
+  const TriMesh sphere = SphereMesh({1, 2, 3}, 100, 12);
+  for (const std::string extension : {".ply", ".obj", ".off", ".stl"}) {
+    const TriMesh read = ReadMesh(Write("sphere" + extension, EncodeMesh(sphere, extension)));
+    ASSERT_EQ(read.points.size(), sphere.points.size()) << extension;
+    ASSERT_EQ(read.triangles.size(), sphere.triangles.size()) << extension;
+    for (std::size_t t = 0; t < read.triangles.size(); ++t) {
+      for (int c = 0; c < 3; ++c) {  // the same corners, whatever their numbers
+        EXPECT_LT(
+            (read.points[read.triangles[t][c]] - sphere.points[sphere.triangles[t][c]]).norm(),
+            1e-4)
+            << extension;
+      }
+    }
+  }
+}
+
+TEST_F(MeshIo, NonManifoldFacesAreKeptInPly) {
+  TriMesh mesh = Plate(10, 1);
+  mesh.points.emplace_back(5, 5, 5);
+  mesh.triangles.push_back({0, 3, 4});  // a third triangle at the diagonal
+  EXPECT_EQ(ReadMesh(Write("fin.ply", EncodeMesh(mesh, ".ply"))).triangles, mesh.triangles);
+  EXPECT_EQ(CheckEdges(mesh).non_manifold, 1);
+  EXPECT_THROW(EncodeMesh(mesh, ".obj"), InputError);
+}
+
+TEST_F(MeshIo, PlyCarriesColoursAndNamedScalars) {
+  const TriMesh plate = Plate(10, 1);
+  MeshAttributes attributes;
+  attributes.colors.assign(4, {1, 2, 3});
+  attributes.scalars = {{"quality", {0, 1, 2, 3}}, {"scalar_error_mm", {0, 1, kNaN, 3}}};
+  const std::string bytes = EncodeMesh(plate, ".ply", attributes);
+  EXPECT_THAT(bytes, HasSubstr("property uchar red\nproperty uchar green\nproperty uchar "
+                               "blue\nproperty float quality\nproperty float scalar_error_mm\n"));
+  EXPECT_EQ(ReadMesh(Write("a.ply", bytes)).points, plate.points);
+  attributes.scalars[0].values.pop_back();
+  EXPECT_THROW(EncodeMesh(plate, ".ply", attributes), InputError);
+}
+
+TEST_F(MeshIo, QuadsBecomeTriangles) {
+  const auto path = Write("quad.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
+  EXPECT_EQ(ReadMesh(path).triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST_F(MeshIo, EachDefectIsNamed) {
+  const std::string ply = EncodeMesh(Plate(10, 2), ".ply");
+  const std::string stl = EncodeMesh(Plate(10, 2), ".stl");
+  EXPECT_THAT(ErrorOf(folder_ / "none.ply"), HasSubstr("none.ply: no such file"));
+  EXPECT_THAT(ErrorOf(Write("empty.ply", "")), HasSubstr("empty.ply: the file is empty"));
+  EXPECT_THAT(ErrorOf(Write("a.xyz", "1 2 3")),
+              HasSubstr("'.xyz' is no mesh format that is known; use .ply, .obj, .stl or .off"));
+  EXPECT_THAT(ErrorOf(Write("cut.ply", ply.substr(0, ply.size() - 5))),
+              HasSubstr("cut.ply is truncated: its header says 8 of element 'face', its"));
+  EXPECT_THAT(ErrorOf(Write("cut2.ply", ply.substr(0, 60))),
+              HasSubstr("cut2.ply is truncated: its header has no end"));
+  EXPECT_THAT(
+      ErrorOf(Write("cut.stl", stl.substr(0, stl.size() - 1))),
+      HasSubstr(
+          "cut.stl is truncated: its header says 8 triangles, that is 484 bytes; it has 483"));
+  EXPECT_THAT(ErrorOf(Write("text.ply", "hello")), HasSubstr("text.ply does not begin with 'ply'"));
+  EXPECT_THAT(ErrorOf(Write("points.obj", "v 0 0 0\nv 1 0 0\n")),
+              HasSubstr("points.obj: the mesh has no triangles"));
+  TriMesh bad = Plate(10, 2);
+  bad.points[3].y() = kNaN;
+  EXPECT_THAT(ErrorOf(Write("nan.ply", EncodeMesh(bad, ".ply"))),
+              HasSubstr("nan.ply: vertex 3 is not finite"));
+  TriMesh beyond = Plate(10, 1);
+  beyond.triangles[0][0] = 77;
+  EXPECT_THAT(ErrorOf(Write("index.ply", EncodeMesh(beyond, ".ply"))), HasSubstr("index.ply"));
+  EXPECT_NE(ErrorOf(Write("index.ply", EncodeMesh(beyond, ".ply"))), "accepted");
+}
+
+TEST_F(MeshIo, RealScansAreReadWhole) {
+  const std::filesystem::path skull = SEMBLANCE_SOURCE_DIR "/../shared/data/vhm/skull.ply";
+  if (!std::filesystem::exists(skull)) {
+    GTEST_SKIP() << "the prepared real subjects are not here";
+  }
+  const TriMesh mesh = ReadMesh(skull);
+  EXPECT_EQ(mesh.points.size(), 194942u);
+  EXPECT_EQ(mesh.triangles.size(), 393818u);
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/mesh/mesh_query.h"
+
+#include <gtest/gtest.h>
+
+#include "surfaces/base/error.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using testing::Plate;
+using testing::Random;
+using testing::SphereMesh;
+
+// Oracle: the nearest of many points spread over each triangle.
+double SampledDistance(const TriMesh& mesh, const Vec3& p) {
+  double nearest = std::numeric_limits<double>::infinity();
+  constexpr int kSteps = 24;
+  for (const Triangle& t : mesh.triangles) {
+    for (int a = 0; a <= kSteps; ++a) {
+      for (int b = 0; a + b <= kSteps; ++b) {
+        const double u = double(a) / kSteps, v = double(b) / kSteps;
+        const Vec3 q =
+            (1 - u - v) * mesh.points[t[0]] + u * mesh.points[t[1]] + v * mesh.points[t[2]];
+        nearest = std::min(nearest, (p - q).norm());
+      }
+    }
+  }
+  return nearest;
+}
+
+TEST(MeshQuery, ClosestPointAgreesWithDenseSampling) {
+  const TriMesh sphere = SphereMesh({0, 0, 0}, 10, 8);
+  const MeshQuery query(sphere);
+  Random random(7);
+  for (int i = 0; i < 50; ++i) {
+    const Vec3 p = random.InBox(-15, 15);
+    const MeshPoint closest = query.Closest(p);
+    const double sampled = SampledDistance(sphere, p);
+    EXPECT_LE(closest.distance_mm, sampled + 1e-12);
+    EXPECT_NEAR(closest.distance_mm, sampled, 0.1);
+    EXPECT_NEAR((closest.position - p).norm(), closest.distance_mm, 1e-12);
+  }
+}
+
+TEST(MeshQuery, RayThroughAPlateHitsItOnce) {
+  const MeshQuery query(Plate(10, 3));
+  const auto hit = query.FirstHit({4.1, 2.3, 5}, {0, 0, -2}, 100);
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->distance_mm, 5, 1e-12);
+  EXPECT_LT((hit->position - Vec3(4.1, 2.3, 0)).norm(), 1e-12);
+  EXPECT_FALSE(query.FirstHit({4.1, 2.3, 5}, {0, 0, 1}, 100));
+  EXPECT_FALSE(query.FirstHit({4.1, 2.3, 5}, {0, 0, -1}, 4.9));
+}
+
+TEST(MeshQuery, RayThroughASphereGoesInAndOut) {
+  const MeshQuery query(SphereMesh({0, 0, 0}, 10, 32));
+  const auto hits = query.AllHits({-20, 0.3, 0.2}, {1, 0, 0}, 100);
+  ASSERT_EQ(hits.size(), 2u);
+  EXPECT_LT(hits[0].distance_mm, hits[1].distance_mm);
+}
+
+TEST(MeshQuery, RefusesAMeshThatCannotBeSearched) {
+  EXPECT_THROW(MeshQuery(TriMesh{}), InputError);
+  TriMesh mesh = Plate(1, 1);
+  mesh.points[2].x() = kNaN;
+  EXPECT_THROW({ MeshQuery query(mesh); }, InputError);
+}
+
+}  // namespace
+}  // namespace semblance

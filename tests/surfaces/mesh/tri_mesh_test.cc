@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/mesh/tri_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using testing::Plate;
+using testing::SphereMesh;
+
+TEST(TriMesh, SphereHasTheVolumeAndAreaOfItsBall) {
+  const TriMesh sphere = SphereMesh({1, 2, 3}, 10, 64);
+  EXPECT_NEAR(SignedVolume(sphere), 4.0 / 3.0 * std::numbers::pi * 1000, 10);
+  EXPECT_NEAR(Area(sphere), 4 * std::numbers::pi * 100, 2);
+}
+
+TEST(TriMesh, VertexNormalsOfASpherePointAwayFromItsCenter) {
+  const Vec3 center(1, 2, 3);
+  const TriMesh sphere = SphereMesh(center, 10, 32);
+  const std::vector<Vec3> normals = VertexNormals(sphere);
+  for (std::size_t v = 0; v < sphere.points.size(); ++v) {
+    EXPECT_GT(normals[v].dot((sphere.points[v] - center) / 10), 0.999);
+    EXPECT_NEAR(normals[v].norm(), 1, 1e-12);
+  }
+}
+
+TEST(TriMesh, VertexWithoutTrianglesHasZeroNormal) {
+  TriMesh mesh = Plate(1, 1);
+  mesh.points.emplace_back(9, 9, 9);
+  EXPECT_EQ(VertexNormals(mesh).back(), Vec3(Vec3::Zero()));
+}
+
+TEST(TriMesh, EdgesOfAClosedMeshArePairedAndConsistent) {
+  const EdgeReport report = CheckEdges(SphereMesh({0, 0, 0}, 1, 8));
+  EXPECT_GT(report.edges, 0);
+  EXPECT_EQ(report.boundary, 0);
+  EXPECT_EQ(report.non_manifold, 0);
+  EXPECT_EQ(report.inconsistent, 0);
+}
+
+TEST(TriMesh, EdgeDefectsAreCounted) {
+  TriMesh mesh = Plate(1, 1);
+  EXPECT_EQ(CheckEdges(mesh).boundary, 4);
+  std::swap(mesh.triangles[0][0], mesh.triangles[0][1]);
+  EXPECT_EQ(CheckEdges(mesh).inconsistent, 1);
+  mesh.triangles.push_back(mesh.triangles[0]);
+  EXPECT_EQ(CheckEdges(mesh).non_manifold, 1);
+}
+
+TEST(TriMesh, TwoSpheresAreTwoComponentsAndEachCanBeTaken) {
+  TriMesh both = SphereMesh({0, 0, 0}, 1, 8);
+  const TriMesh second = SphereMesh({5, 0, 0}, 2, 8);
+  const auto offset = static_cast<std::int32_t>(both.points.size());
+  both.points.insert(both.points.end(), second.points.begin(), second.points.end());
+  for (const Triangle& t : second.triangles) {
+    both.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+  }
+  const Components components = ConnectedComponents(both);
+  ASSERT_EQ(components.count, 2);
+  std::vector<bool> keep;
+  for (const int component : components.of_triangle) {
+    keep.push_back(component == 1);
+  }
+  const TriMesh taken = Submesh(both, keep);
+  EXPECT_EQ(taken.points.size(), second.points.size());
+  EXPECT_EQ(taken.triangles, second.triangles);
+}
+
+}  // namespace
+}  // namespace semblance
