@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "fitting/adaptive/tree_overlay.h"
+#include "fitting/adaptive/refinement_marking.h"
 #include "fitting/adaptive/tree_solver.h"
 #include "fitting/problem/seeding.h"
 
@@ -39,12 +39,12 @@ class AdaptiveFitter {
       context_.ThrowIfStopped();
       context_.Report(
           "fit", fmt::format("{} vertices to level {}", tree_.unknowns().size(), tree_.finest()));
-      result.levels.push_back(solver_.Solve(Settling::kRoughly));
+      result.levels.push_back(solver_.Solve(SolveTolerance::kLoose));
       if (mesh_) {
         result.relaxations.push_back(MovePoints());
       }
       const std::vector<VertexId> finer =
-          FinerVertices(tree_, std::get<AdaptivePlan>(options_.plan));
+          MarkForRefinement(tree_, std::get<AdaptivePlan>(options_.plan));
       more = !finer.empty();
       if (more) {
         tree_.Edit(finer);
@@ -53,7 +53,7 @@ class AdaptiveFitter {
     }
     points_.Settle();
     points_.Measure();
-    result.levels.push_back(solver_.Solve(Settling::kConverged));
+    result.levels.push_back(solver_.Solve(SolveTolerance::kTight));
     solver_.MeasureCoverage(result.levels.back());
     Finish(result);
     return result;
@@ -103,7 +103,7 @@ class AdaptiveFitter {
   std::optional<DowelMesh> mesh_;
   PointCloud cloud_;
   OffsetTree tree_;
-  TreePoints points_;
+  RobustPointResiduals points_;
   TreeSolver solver_;
 };
 

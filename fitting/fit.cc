@@ -20,12 +20,12 @@ namespace semblance {
 namespace {
 
 // Every level of the steps, coarse to fine.
-std::vector<LevelFit> SweepOf(const std::vector<LevelFit>& steps) {
+std::vector<ScheduleStep> SweepOf(const std::vector<ScheduleStep>& steps) {
   std::set<int> levels;
-  for (const LevelFit& step : steps) {
+  for (const ScheduleStep& step : steps) {
     levels.insert(step.level);
   }
-  std::vector<LevelFit> sweep;
+  std::vector<ScheduleStep> sweep;
   for (const int level : levels) {
     sweep.push_back({level, 1});
   }
@@ -79,7 +79,7 @@ LevelView ViewOf(int level, const HSplineSurface& surface, const HSplineSurface&
 
 // c + fraction (c' - c); a vertex that the solve left alone, or that stays, keeps its bits. Returns
 // the longest way.
-double WriteBack(ControlNet solved, const LevelFit& step, std::span<const int> stay,
+double WriteBack(ControlNet solved, const ScheduleStep& step, std::span<const int> stay,
                  HSplineSurface& surface) {
   ControlNet net = surface.Net(step.level);
   double longest = 0;
@@ -115,8 +115,8 @@ double PointRms(const HSplineSurface& surface, const FitTarget& target) {
   return WeightedRms(std::move(all));
 }
 
-int GiveBack(const HSplineSurface& rest, std::span<const VertexId> features,
-             HSplineSurface& surface) {
+int RestoreTemplateFeatures(const HSplineSurface& rest, std::span<const VertexId> features,
+                            HSplineSurface& surface) {
   RestoreFeature(ExtractFeature(rest, "rest", features), features, surface);
   return static_cast<int>(std::set(features.begin(), features.end()).size());
 }
@@ -152,7 +152,7 @@ void MeasureAnew(FitTarget target, FitResult& result) {
 }
 
 // The terms with points that may slide along the surface; what `weight: auto` was before holds.
-std::vector<Term> Sliding(std::vector<Term> terms, double tangential, double auto_weight) {
+std::vector<Term> AsTangentPoints(std::vector<Term> terms, double tangential, double auto_weight) {
   if (const int automatic = AutoTerm(terms); automatic >= 0) {
     SetWeight(auto_weight, terms[automatic]);
   }
@@ -165,7 +165,7 @@ std::vector<Term> Sliding(std::vector<Term> terms, double tangential, double aut
 }
 
 // The weight of a PriorTerm that holds features.
-double Resistance(const FeatureRule& rule) {
+double FeaturePriorWeight(const FeatureRule& rule) {
   constexpr double kFrozen = 1e6;
   const auto* const weighted = std::get_if<WeightedFeatures>(&rule);
   return weighted != nullptr                            ? weighted->weight
@@ -195,7 +195,7 @@ class Fitter {
         context_(context),
         result_(result),
         rms_mm_(PointRms(result.surface, target)) {
-    if (const double weight = Resistance(options.features); weight > 0) {
+    if (const double weight = FeaturePriorWeight(options.features); weight > 0) {
       held_.insert(features.begin(), features.end());
       terms_.emplace_back(PriorTerm{.weight = weight, .held_only = true});
     }
@@ -205,8 +205,8 @@ class Fitter {
     }
   }
 
-  void TakeAll(const std::vector<LevelFit>& steps) {
-    for (const LevelFit& step : steps) {
+  void TakeAll(const std::vector<ScheduleStep>& steps) {
+    for (const ScheduleStep& step : steps) {
       context_.ThrowIfStopped();
       context_.Report("fit", fmt::format("level {}, fraction {}", step.level, step.fraction),
                       static_cast<double>(result_.levels.size()) / most_steps_);
@@ -219,7 +219,7 @@ class Fitter {
   const FitTarget& target() const { return mesh_ ? moved_ : given_; }
 
  private:
-  void Take(const LevelFit& step) {
+  void Take(const ScheduleStep& step) {
     result_.levels.push_back(Solve(step, terms_));
     const RelaxationOptions& options = options_.relaxation;
     if (!mesh_) {
@@ -239,10 +239,10 @@ class Fitter {
     }
   }
 
-  void Slide(const LevelFit& step) {
+  void Slide(const ScheduleStep& step) {
     const RelaxationOptions& options = options_.relaxation;
     const std::vector<Term> terms =
-        Sliding(terms_, options.tangential, result_.levels.back().auto_weight);
+        AsTangentPoints(terms_, options.tangential, result_.levels.back().auto_weight);
     for (int round = 0; round < options.tangent_rounds; ++round) {
       SolveAgain(step, terms);
       Keep(Move(1));
@@ -256,7 +256,7 @@ class Fitter {
     return ViewOf(level, result_.surface, rest_, target, options_.aim, held_);
   }
 
-  LevelSummary Solve(const LevelFit& step, std::span<const Term> terms) {
+  LevelSummary Solve(const ScheduleStep& step, std::span<const Term> terms) {
     LevelView view = View(step.level, target());
     const std::vector<int> stay = IsFrozen() ? view.held : std::vector<int>();
     LevelSolution solution = FitLevel(std::move(view), terms, options_.solver);
@@ -270,7 +270,7 @@ class Fitter {
   }
 
   // As a part of the last step.
-  void SolveAgain(const LevelFit& step, std::span<const Term> terms) {
+  void SolveAgain(const ScheduleStep& step, std::span<const Term> terms) {
     const double rms_before_mm = result_.levels.back().rms_before_mm;
     result_.levels.back() = Solve(step, terms);
     result_.levels.back().rms_before_mm = rms_before_mm;
@@ -283,7 +283,7 @@ class Fitter {
     return summary;
   }
 
-  RelaxationSummary MoveJointly(const LevelFit& step) {
+  RelaxationSummary MoveJointly(const ScheduleStep& step) {
     std::vector<Term> terms = terms_;
     if (const int automatic = AutoTerm(terms); automatic >= 0) {
       SetWeight(result_.levels.back().auto_weight, terms[automatic]);
@@ -333,13 +333,13 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
   if (std::holds_alternative<AdaptivePlan>(options.plan)) {
     FitResult result = FitAdaptively(start, rest, given, options, context);
     if (std::holds_alternative<RestoreFeatures>(options.features) && !features.empty()) {
-      result.restored_features = GiveBack(rest, features, result.surface);
+      result.restored_features = RestoreTemplateFeatures(rest, features, result.surface);
       MeasureAnew(given, result);
     }
     return result;
   }
   FitResult result{.surface = start};
-  const std::vector<LevelFit> steps = StepsOf(options), sweep = SweepOf(steps);
+  const std::vector<ScheduleStep> steps = StepsOf(options), sweep = SweepOf(steps);
   const auto* const until = std::get_if<UntilPlan>(&options.plan);
   const int passes = until == nullptr ? 1 : until->max_passes;
   Fitter fitter(rest, given, features, options,
@@ -355,7 +355,8 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
     fitter.TakeAll(sweep);
   }
   const bool restore = std::holds_alternative<RestoreFeatures>(options.features);
-  result.restored_features = restore ? GiveBack(rest, features, result.surface) : fitter.frozen();
+  result.restored_features =
+      restore ? RestoreTemplateFeatures(rest, features, result.surface) : fitter.frozen();
   MeasurePoints(fitter.target(), restore && !features.empty() ? kNaN : fitter.rms_mm(), result);
   return result;
 }

@@ -22,7 +22,7 @@ enum class FitAim { kSurface, kLevel };
 constexpr auto EnumNames(FitAim) { return std::to_array<std::string_view>({"surface", "level"}); }
 
 struct FitOptions {
-  std::vector<LevelFit> schedule = PublishedSchedule();
+  std::vector<ScheduleStep> schedule = PublishedSchedule();
   std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};
   FeatureRule features = RestoreFeatures{};
   FitAim aim = FitAim::kSurface;

@@ -14,7 +14,7 @@ namespace {
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("fit: " + what); }
 
-void CheckSchedule(const std::vector<LevelFit>& schedule, int max_level) {
+void CheckSchedule(const std::vector<ScheduleStep>& schedule, int max_level) {
   if (schedule.empty()) {
     Fail("the schedule is empty; give at least one {level, fraction}");
   }
@@ -86,12 +86,12 @@ void CheckRule(const FitOptions& options) {
 
 }  // namespace
 
-std::vector<LevelFit> StepsOf(const FitOptions& options) {
+std::vector<ScheduleStep> StepsOf(const FitOptions& options) {
   const auto* const plan = std::get_if<CoarseToFinePlan>(&options.plan);
   if (plan == nullptr) {
     return options.schedule;
   }
-  std::vector<LevelFit> steps;
+  std::vector<ScheduleStep> steps;
   for (int level = 0; level <= plan->finest; ++level) {
     steps.push_back({level, plan->fraction});
   }

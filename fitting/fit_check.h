@@ -14,6 +14,6 @@ void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
               std::span<const VertexId> features, const FitOptions& options);
 
 // The steps of the plan, if it goes level by level: of one pass.
-std::vector<LevelFit> StepsOf(const FitOptions& options);
+std::vector<ScheduleStep> StepsOf(const FitOptions& options);
 
 }  // namespace semblance

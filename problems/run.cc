@@ -76,9 +76,9 @@ bool LooksAtBone(const std::vector<Term>& terms) {
 }
 
 // Where seeds stand on the shell of the skull: nearest, and seen from there.
-std::vector<BoneFoot> FeetOf(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
+std::vector<BoneAnchor> FeetOf(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
   const MeshQuery query(shell);
-  std::vector<BoneFoot> feet;
+  std::vector<BoneAnchor> feet;
   for (const FitPoint& seed : seeds) {
     const MeshPoint nearest = query.Closest(seed.position);
     const Vec3 out = nearest.distance_mm > 1e-6
@@ -113,7 +113,7 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
     target.points.insert(target.points.end(), seeding.points.begin(), seeding.points.end());
     target.feet.resize(target.points.size());
     if (LooksAtBone(experiment.fit.terms)) {
-      const std::vector<BoneFoot> feet = FeetOf(seeding.points, shell);
+      const std::vector<BoneAnchor> feet = FeetOf(seeding.points, shell);
       std::copy(feet.begin(), feet.end(), target.feet.end() - std::ssize(feet));
     }
     FitResult fit = Fit(surface, placed.surface, target, features, experiment.fit, context);
@@ -132,9 +132,10 @@ bool TakesTableAsExact(const Experiment& experiment, const Case& subject) {
          std::ranges::any_of(subject.dowels, [](const Dowel& d) { return std::isnan(d.sd_mm); });
 }
 
-std::optional<FaceUncertainty> Doubt(const Experiment& experiment, const DepthStage& stage,
-                                     const FittedFace& fitted, Case& subject,
-                                     const RunContext& context) {
+std::optional<FaceUncertainty> EstimateUncertainty(const Experiment& experiment,
+                                                   const DepthStage& stage,
+                                                   const FittedFace& fitted, Case& subject,
+                                                   const RunContext& context) {
   if (!experiment.uncertainty.sigma && experiment.uncertainty.samples == 0) {
     return std::nullopt;
   }
@@ -198,13 +199,13 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   Tessellation face =
       step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
   std::optional<FaceUncertainty> uncertainty = step("uncertainty", [&] {
-    return Doubt(experiment, *skull->depth_stage, {placed.surface, fitted.target, fitted.fit, face},
-                 subject, context);
+    return EstimateUncertainty(experiment, *skull->depth_stage,
+                               {placed.surface, fitted.target, fitted.fit, face}, subject, context);
   });
   std::optional<TruthComparison> truth = step("measure", [&] {
     return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(placed), context);
   });
-  std::vector<FeatureDamage> features = MeasureFeatures(placed, fitted.fit.surface);
+  std::vector<FeatureDistortion> features = MeasureFeatures(placed, fitted.fit.surface);
   return {std::move(subject),        skull->depth_stage->shell,
           skull->depth_stage->depth, skull->implicit,
           face_from_template,        std::move(placed),

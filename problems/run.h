@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "problems/metrics/face_metrics.h"
-#include "problems/metrics/feature_damage.h"
+#include "problems/metrics/feature_distortion.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/depth_comparison.h"
 #include "problems/pipeline/skull_stage.h"
@@ -38,7 +38,7 @@ struct RunResult {
   Tessellation face;    // of fit.surface
   std::optional<FaceUncertainty> uncertainty;  // where it was asked for
   std::optional<TruthComparison> truth;
-  std::vector<FeatureDamage> features;
+  std::vector<FeatureDistortion> features;
   std::vector<StepTime> times;  // not part of the result proper
 
   bool usable() const { return fit.usable && face.mesh.points.size() > 0; }

@@ -220,7 +220,7 @@ void OffsetTree::Measure(std::span<const double> factors, int threads,
   ParallelFor(stale.size(), threads, 1, [&](std::size_t k) {
     TreeNode& node = nodes_[stale[k]];
     const bool moments = !node.has_moments || !factors.empty();
-    PatchSums sums;
+    PatchMoments sums;
     if (!moments) {
       std::copy(&node.sums.moments[0][0], &node.sums.moments[0][0] + 56, &sums.moments[0][0]);
     }

@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "fitting/adaptive/patch_sums.h"
+#include "fitting/adaptive/patch_moments.h"
 #include "fitting/terms/term.h"
 #include "surfaces/hspline/hspline_surface.h"
 
@@ -31,7 +31,7 @@ struct TreeNode {
   std::array<int, 16> unknowns;  // of this level, or -1
   PatchMatrix vertices;          // absolute, mm
   PatchMatrix rest;              // of the template
-  PatchSums sums;                // of a leaf, at `vertices`
+  PatchMoments sums;             // of a leaf, at `vertices`
   bool has_moments = false;
   bool measured = false;  // sums.residual belongs to `vertices`
 };

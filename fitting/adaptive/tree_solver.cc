@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kMostTreeSteps = 50;
 
-double Enough(Settling until) { return until == Settling::kConverged ? 1e-14 : 1e-4; }
+double Enough(SolveTolerance until) { return until == SolveTolerance::kTight ? 1e-14 : 1e-4; }
 
 Vec2 LengthsOf(const HSplineSurface& rest) {
   const HSplineShape& shape = rest.shape();
@@ -72,7 +72,7 @@ PointTerm PointsOf(std::span<const Term> terms) {
 }
 
 TreeSolver::TreeSolver(const HSplineSurface& rest, std::span<const Term> terms,
-                       const PointCloud& cloud, OffsetTree& tree, TreePoints& points)
+                       const PointCloud& cloud, OffsetTree& tree, RobustPointResiduals& points)
     : terms_(terms.begin(), terms.end()),
       auto_term_(AutoTerm(terms)),
       cloud_(cloud),
@@ -134,7 +134,7 @@ double TreeSolver::ChooseSmoothness() {
   return chosen_;
 }
 
-LevelSummary TreeSolver::Solve(Settling until) {
+LevelSummary TreeSolver::Solve(SolveTolerance until) {
   const double auto_weight = ChooseSmoothness();
   LevelSummary summary{.level = tree_.finest(),
                        .fraction = 1,
@@ -154,7 +154,7 @@ LevelSummary TreeSolver::Solve(Settling until) {
       summary.termination = summary.usable ? "convergence" : "failure";
       break;
     }
-    if (until == Settling::kRoughly && !points_.HasLoss()) {
+    if (until == SolveTolerance::kLoose && !points_.HasLoss()) {
       summary.termination = "first step";
       break;
     }

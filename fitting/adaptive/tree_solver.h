@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "fitting/adaptive/tree_points.h"
+#include "fitting/adaptive/robust_point_residuals.h"
 #include "fitting/adaptive/tree_system.h"
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/level/level_fit.h"
@@ -20,18 +20,18 @@ PointTerm PointsOf(std::span<const Term> terms);
 // How far a step may move the surface, root mean square, of the size of the net of level 0, and be
 // the last. How far it moves the unknowns says nothing where a coarse vertex is a sum of finer
 // ones.
-enum class Settling { kRoughly, kConverged };
+enum class SolveTolerance { kLoose, kTight };
 
 class TreeSolver {
  public:
   // rest: the placed template. InputError as PointsOf, for more than one `weight: auto`, and for a
   // template without extent where a term needs it.
   TreeSolver(const HSplineSurface& rest, std::span<const Term> terms, const PointCloud& cloud,
-             OffsetTree& tree, TreePoints& points);
+             OffsetTree& tree, RobustPointResiduals& points);
 
   // Chooses `weight: auto`, then Gauss-Newton steps, each on the residuals themselves, until they
   // are small. The tree must be measured, and then is.
-  LevelSummary Solve(Settling until);
+  LevelSummary Solve(SolveTolerance until);
 
   // What the points alone determine.
   void MeasureCoverage(LevelSummary& summary) const;
@@ -45,7 +45,7 @@ class TreeSolver {
   int auto_term_;            // among them, or -1
   const PointCloud& cloud_;
   OffsetTree& tree_;
-  TreePoints& points_;
+  RobustPointResiduals& points_;
   Vec2 lengths_mm_;
   std::vector<LevelForms> forms_;  // none without smoothness
   double chosen_ = 0;              // weight; 0: none yet

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "fitting/least_squares/row_reduction.h"
+#include "fitting/least_squares/qr_compression.h"
 
 namespace semblance {
 namespace {
@@ -120,7 +120,7 @@ void AddCoupledResidual(const Eigen::MatrixXd& a, Eigen::VectorXd b, std::span<c
 void ProblemSink::Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                       std::span<const int> vertices) {
   if (reduce_ && a->rows() > a->cols()) {
-    LinearRows rows = ReducedRows(*a, b);
+    LinearRows rows = CompressRows(*a, b);
     a = std::make_shared<const Eigen::MatrixXd>(std::move(rows.a));
     b = std::move(rows.b);
   }

@@ -54,7 +54,7 @@ void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                        ControlNet& net, ceres::Problem& problem);
 
 // Rows become residuals over the vertices of `net`, a parameter block of 3 doubles each. Blocks
-// with more rows than columns are reduced first (row_reduction.h), unless told not to.
+// with more rows than columns are reduced first (qr_compression.h), unless told not to.
 class ProblemSink final : public RowSink {
  public:
   ProblemSink(ControlNet& net, ceres::Problem& problem, bool reduce = true)

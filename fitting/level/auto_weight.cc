@@ -181,7 +181,7 @@ int AutoTerm(std::span<const Term> terms) {
   for (std::size_t k = 0; k < terms.size(); ++k) {
     const bool automatic = std::visit(
         []<class T>(const T& t) {
-          if constexpr (std::is_same_v<decltype(t.weight), AutoNumber>) {
+          if constexpr (std::is_same_v<decltype(t.weight), AutoOr<double>>) {
             return t.weight.automatic;
           }
           return false;
@@ -200,7 +200,7 @@ int AutoTerm(std::span<const Term> terms) {
 void SetWeight(double weight, Term& term) {
   std::visit(
       [&]<class T>(T& t) {
-        if constexpr (std::is_same_v<decltype(t.weight), AutoNumber>) {
+        if constexpr (std::is_same_v<decltype(t.weight), AutoOr<double>>) {
           t.weight = weight;
         }
       },

@@ -134,7 +134,7 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver 
   const std::vector<Term> terms = WithChosenWeight(view, given, solution.summary.auto_weight);
   const bool coupled = !SeparableButForLoss(terms);
   const bool direct = solver == LevelSolver::kFastest && !coupled;
-  const auto solve = coupled ? SolveByCeres : direct ? SolveDirectly : SolveByTiles;
+  const auto solve = coupled ? SolveByCeres : direct ? SolveDirectly : SolveBlocked;
   const SolverOutcome outcome = coupled || AllSeparable(terms)
                                     ? solve(view, terms, solution.net)
                                     : SolveReweighted(view, terms, solve, solution.net);

@@ -27,7 +27,7 @@ SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, C
 
 // Separable terms: Ceres, one problem a coordinate with a block of 3 x 3 vertices of the net each,
 // the rows of each patch reduced to at most sixteen. The same minimiser, many times faster.
-SolverOutcome SolveByTiles(const LevelView& view, std::span<const Term> terms, ControlNet& net);
+SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, ControlNet& net);
 
 // Separable terms: the same iteration with one Cholesky factor of the scalar normal equations for
 // all coordinates and steps. The same minimiser, many times faster, and in memory that does not

@@ -12,12 +12,12 @@ namespace semblance {
 
 // One step of the fit (thesis 4.2): level L is fitted by least squares, and every control vertex
 // goes `fraction` of the way to its solution, c + fraction (c' - c).
-struct LevelFit {
+struct ScheduleStep {
   int level = 0;
   double fraction = 1;
 };
 template <class Visitor>
-void Fields(Visitor& visit, LevelFit& o) {
+void Fields(Visitor& visit, ScheduleStep& o) {
   visit(FieldInfo{.name = "level",
                   .min = 0,
                   .max = 12,
@@ -33,7 +33,7 @@ void Fields(Visitor& visit, LevelFit& o) {
 
 // Thesis 4.4. What is left of a misfit that every level could remove is the product of
 // 1 - fraction, 8 % here.
-inline std::vector<LevelFit> PublishedSchedule() {
+inline std::vector<ScheduleStep> PublishedSchedule() {
   return {{0, 0.4}, {1, 0.35}, {2, 0.35}, {0, 0.35}, {1, 0.3}, {2, 0.3}};
 }
 

@@ -18,14 +18,14 @@ struct FitPoint {
 };
 
 // Where a point stands on bone; for the terms that look at it.
-struct BoneFoot {
+struct BoneAnchor {
   Vec3 foot = Vec3::Constant(kNaN);       // mm; NaN where it is not known
   Vec3 direction = Vec3::Constant(kNaN);  // unit, out of the bone
 };
 
 struct FitTarget {
   std::vector<FitPoint> points;
-  std::vector<BoneFoot> feet = {};  // one a point, or none
+  std::vector<BoneAnchor> feet = {};  // one a point, or none
 };
 
 // Throws InputError, naming the point, if one has a position that is not finite, a (u,v) outside

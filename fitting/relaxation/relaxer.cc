@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-Spot SpotAt(const HSplineSurface& surface, const Vec2& uv) {
+SurfaceSample SampleAt(const HSplineSurface& surface, const Vec2& uv) {
   const SurfaceFrame frame = surface.Frame(uv);
   Vec3 normal = frame.Normal();
   if (!normal.allFinite()) {
@@ -32,7 +32,7 @@ Relaxer::Relaxer(const HSplineSurface& surface, const HSplineSurface& rest, cons
   for (std::size_t k = 0; k < target.points.size(); ++k) {
     uv_.push_back(target.points[k].uv);
     rest_points_.push_back(rest.Point(mesh.rest_uv()[k]));
-    spots_.push_back(SpotAt(surface, uv_.back()));
+    spots_.push_back(SampleAt(surface, uv_.back()));
   }
   LinkMembers();
   LinkNeighbours();
@@ -73,8 +73,8 @@ void Relaxer::LinkNeighbours() {
   }
 }
 
-void Relaxer::AddNeighbour(int corner, int other, const Vec2& uv, const Spot& spot, double share,
-                           LocalPenalty& local) const {
+void Relaxer::AddNeighbour(int corner, int other, const Vec2& uv, const SurfaceSample& spot,
+                           double share, LocalPenalty& local) const {
   if (options_.bunching > 0) {
     const Vec2 rest = mesh_.rest_uv()[corner] - mesh_.rest_uv()[other];
     local.Add(share * options_.bunching, InMm(uv - uv_[other] - rest), InMm({1, 0}), InMm({0, 1}));
@@ -89,16 +89,17 @@ void Relaxer::AddNeighbour(int corner, int other, const Vec2& uv, const Spot& sp
   }
   if (options_.crease > 0) {
     constexpr double kStep = 1e-5;
-    const Vec3 nu =
-        SpotAt(surface_, uv + Vec2(kStep, 0)).normal - SpotAt(surface_, uv - Vec2(kStep, 0)).normal;
-    const Vec3 nv =
-        SpotAt(surface_, uv + Vec2(0, kStep)).normal - SpotAt(surface_, uv - Vec2(0, kStep)).normal;
+    const Vec3 nu = SampleAt(surface_, uv + Vec2(kStep, 0)).normal -
+                    SampleAt(surface_, uv - Vec2(kStep, 0)).normal;
+    const Vec3 nv = SampleAt(surface_, uv + Vec2(0, kStep)).normal -
+                    SampleAt(surface_, uv - Vec2(0, kStep)).normal;
     local.Add(share * options_.crease, distance * (spot.normal - spots_[other].normal),
               distance * nu / (2 * kStep), distance * nv / (2 * kStep));
   }
 }
 
-LocalPenalty Relaxer::LocalAt(int corner, const Vec2& uv, const Spot& spot, double distance) const {
+LocalPenalty Relaxer::LocalAt(int corner, const Vec2& uv, const SurfaceSample& spot,
+                              double distance) const {
   LocalPenalty local;
   for (const int m : members_[corner]) {
     const FitPoint& p = target_.points[m];
@@ -119,7 +120,7 @@ LocalPenalty Relaxer::Held(int corner) const {
   return LocalAt(corner, uv_[corner], spots_[corner], 0);
 }
 
-Eigen::Matrix2d Relaxer::DampingAt(const Spot& spot) const {
+Eigen::Matrix2d Relaxer::DampingAt(const SurfaceSample& spot) const {
   Eigen::Matrix<double, 3, 2> tangents;
   tangents << spot.du, spot.dv;
   Eigen::Matrix2d metric = tangents.transpose() * tangents;
@@ -129,7 +130,7 @@ Eigen::Matrix2d Relaxer::DampingAt(const Spot& spot) const {
 }
 
 Vec2 Relaxer::LongestMove(int corner) const {
-  const Spot& spot = spots_[corner];
+  const SurfaceSample& spot = spots_[corner];
   return options_.max_move_mm *
          Vec2(1 / std::max(spot.du.norm(), 1e-9), 1 / std::max(spot.dv.norm(), 1e-9));
 }
@@ -144,12 +145,12 @@ Vec2 Relaxer::Inside(const Vec2& uv) const {
 void Relaxer::SetUv(const std::vector<Vec2>& uv) {
   uv_ = uv;
   for (std::size_t k = 0; k < uv_.size(); ++k) {
-    spots_[k] = SpotAt(surface_, uv_[k]);
+    spots_[k] = SampleAt(surface_, uv_[k]);
   }
 }
 
 // Levenberg's step, damped by the length of the move on the surface, and no longer than allowed.
-Vec2 Relaxer::StepOf(const LocalPenalty& local, const Spot& spot) const {
+Vec2 Relaxer::StepOf(const LocalPenalty& local, const SurfaceSample& spot) const {
   const Eigen::Matrix2d matrix = local.matrix + DampingAt(spot);
   const Vec2 step = matrix.ldlt().solve(-local.gradient);
   if (!step.allFinite()) {
@@ -183,7 +184,7 @@ void Relaxer::MoveCorner(int corner, RelaxationSummary& summary) {
       prevented = std::max(prevented, flips);
       continue;
     }
-    const Spot spot = SpotAt(surface_, uv);
+    const SurfaceSample spot = SampleAt(surface_, uv);
     if (LocalAt(corner, uv, spot, options_.distance).energy < here.energy) {
       uv_[corner] = uv;
       spots_[corner] = spot;

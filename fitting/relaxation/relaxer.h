@@ -9,7 +9,7 @@
 namespace semblance {
 
 // A place on the surface, as the penalties see it.
-struct Spot {
+struct SurfaceSample {
   Vec3 point, du, dv, normal;
 };
 
@@ -53,11 +53,12 @@ class Relaxer {
  private:
   void LinkMembers();
   void LinkNeighbours();
-  LocalPenalty LocalAt(int corner, const Vec2& uv, const Spot& spot, double distance) const;
-  void AddNeighbour(int corner, int other, const Vec2& uv, const Spot& spot, double share,
+  LocalPenalty LocalAt(int corner, const Vec2& uv, const SurfaceSample& spot,
+                       double distance) const;
+  void AddNeighbour(int corner, int other, const Vec2& uv, const SurfaceSample& spot, double share,
                     LocalPenalty& local) const;
-  Eigen::Matrix2d DampingAt(const Spot& spot) const;
-  Vec2 StepOf(const LocalPenalty& local, const Spot& spot) const;
+  Eigen::Matrix2d DampingAt(const SurfaceSample& spot) const;
+  Vec2 StepOf(const LocalPenalty& local, const SurfaceSample& spot) const;
   Vec2 Inside(const Vec2& uv) const;
   int FlipsWith(int corner, const Vec2& uv);
   void MoveCorner(int corner, RelaxationSummary& summary);
@@ -73,7 +74,7 @@ class Relaxer {
   double mean_weight_ = 1;
   std::vector<Vec2> uv_;
   std::vector<Vec3> rest_points_;
-  std::vector<Spot> spots_;
+  std::vector<SurfaceSample> spots_;
   std::vector<int> order_;                    // of the corners, by the template's (u,v)
   std::vector<std::vector<int>> members_;     // of a corner
   std::vector<std::vector<int>> neighbours_;  // of a corner

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "fitting/terms/stretch.h"
+#include "fitting/terms/strain.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
@@ -23,7 +23,7 @@ std::vector<Sample> SamplesOf(const LevelView& view) {
   const PatchGrid& grid = view.grid;
   std::vector<Sample> samples;
   for (int k = 0; k < 4 * grid.patches_u * grid.patches_v; ++k) {
-    const Vec2 uv = GaussPlace(k, grid.patches_u, grid.patches_v);
+    const Vec2 uv = GaussPoint(k, grid.patches_u, grid.patches_v);
     const Stencil du = grid.StencilAt(uv, {1, 0}), dv = grid.StencilAt(uv, {0, 1});
     const auto axes = TemplateAxes::At(du.Apply(view.rest), dv.Apply(view.rest));
     if (!axes) {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fitting/terms/stretch.h"
+#include "fitting/terms/strain.h"
 
 namespace semblance {
 
@@ -14,7 +14,7 @@ MetricDistortion DistortionWhere(const HSplineSurface& surface, const HSplineSur
   const int columns = shape.PatchesU(shape.max_level), rows = shape.PatchesV(shape.max_level);
   double area = 0, strains = 0, areas = 0, largest = 0;
   for (int k = 0; k < 4 * columns * rows; ++k) {
-    const Vec2 uv = GaussPlace(k, columns, rows);
+    const Vec2 uv = GaussPoint(k, columns, rows);
     const SurfaceFrame from = rest.Frame(uv);
     const auto axes = TemplateAxes::At(from.du, from.dv);
     if (!axes || !wanted(from.point)) {

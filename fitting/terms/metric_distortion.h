@@ -9,7 +9,7 @@
 namespace semblance {
 
 struct MetricDistortion {
-  double rms_strain = kNaN;  // of Green's strain |E| (stretch.h), by the template's area
+  double rms_strain = kNaN;  // of Green's strain |E| (strain.h), by the template's area
   double max_strain = kNaN;
   double rms_area = kNaN;  // of dA / dA of the template - 1
   double area_cm2 = 0;     // of the template where it was looked at

@@ -47,7 +47,7 @@ constexpr auto EnumNames(SmoothnessOf) {
 // the default keeps waves longer than about 20 mm.
 struct SmoothnessTerm {
   static constexpr std::string_view kName = "smoothness";
-  AutoNumber weight = 0.01;
+  AutoOr<double> weight = 0.01;
   SmoothnessOf of = SmoothnessOf::kDisplacement;
   double length_mm = 10;
 };
@@ -70,7 +70,7 @@ void Fields(Visitor& visit, SmoothnessTerm& o) {
 // there is no point, the surface moves along with its neighbourhood.
 struct MembraneTerm {
   static constexpr std::string_view kName = "membrane";
-  AutoNumber weight = 0.1;
+  AutoOr<double> weight = 0.1;
   SmoothnessOf of = SmoothnessOf::kDisplacement;
   double length_mm = 10;
 };

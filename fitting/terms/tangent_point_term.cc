@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "fitting/least_squares/linear_cost.h"
-#include "fitting/least_squares/row_reduction.h"
+#include "fitting/least_squares/qr_compression.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
@@ -36,7 +36,7 @@ void AddPatch(const TangentPointTerm& term, const LevelView& view,
     }
     b.block<3, 1>(3 * k, 0) = shape * points[k].position;
   }
-  const LinearRows rows = ReducedRows(a, b);
+  const LinearRows rows = CompressRows(a, b);
   const Stencil first = view.grid.StencilAt(points.front().uv);
   AddCoupledResidual(rows.a, rows.b.col(0), first.index, net, problem);
 }

@@ -36,7 +36,7 @@ bool IsSeparable(const T&) {
 
 // Adds the residuals of a term over `net`, whose vertices become parameter blocks of 3 doubles. The
 // sum of their squares (robust: of their losses), which is twice Ceres' cost, equals TermCost but
-// for a constant: the points of a patch are reduced to at most 16 rows (row_reduction.h), without
+// for a constant: the points of a patch are reduced to at most 16 rows (qr_compression.h), without
 // what no net can change. Points are reduced best in the order of SortObservations.
 void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem);

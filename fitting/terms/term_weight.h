@@ -2,7 +2,7 @@
 // The option `weight` that every term has.
 #pragma once
 
-#include "surfaces/base/auto_number.h"
+#include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {
@@ -19,7 +19,7 @@ void WeightField(Visitor& visit, double& weight) {
 
 // The same, or `auto`: then each solve chooses it by generalised cross-validation (auto_weight.h).
 template <class Visitor>
-void AutoWeightField(Visitor& visit, AutoNumber& weight) {
+void AutoWeightField(Visitor& visit, AutoOr<double>& weight) {
   visit(FieldInfo{.name = "weight",
                   .min = 0,
                   .max = 1e6,

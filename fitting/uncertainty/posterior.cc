@@ -9,12 +9,12 @@
 #include <utility>
 #include <variant>
 
+#include "fitting/least_squares/gaussian_random.h"
 #include "fitting/least_squares/normal_equations.h"
-#include "fitting/least_squares/normal_noise.h"
 #include "fitting/level/auto_weight.h"
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term_cost.h"
-#include "fitting/uncertainty/surface_space.h"
+#include "fitting/uncertainty/subspace.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -106,7 +106,7 @@ void AddModel(const LevelView& view, std::span<const double> sd_mm, std::span<co
   AddPrior(view, terms, PriorScale(view, sd_mm, terms), sink);
 }
 
-void RequireFactor(const SpaceFactor& factor) {
+void RequireFactor(const SubspaceSolver& factor) {
   if (!factor.usable()) {
     throw InputError("posterior: the normal matrix has no factor; add a prior or smoothness term");
   }
@@ -125,7 +125,7 @@ std::vector<double> SigmaWithin(const LevelView& view, std::span<const double> s
   Check(view, sd_mm, given);
   double chosen = kNaN;
   const SparseMatrix lower = NormalOf(view, sd_mm, WithChosenWeight(view, given, chosen));
-  const SpaceFactor factor(lower, std::move(space));
+  const SubspaceSolver factor(lower, std::move(space));
   RequireFactor(factor);
   constexpr std::size_t kAtOnce = 64;  // right-hand sides, to bound the memory
   std::vector<double> sigma;
@@ -152,9 +152,9 @@ std::vector<ControlNet> SamplesWithin(const LevelView& view, std::span<const dou
   Check(view, sd_mm, given);
   double chosen = kNaN;
   const std::vector<Term> terms = WithChosenWeight(view, given, chosen);
-  const SpaceFactor factor(NormalOf(view, sd_mm, terms), std::move(space));
+  const SubspaceSolver factor(NormalOf(view, sd_mm, terms), std::move(space));
   RequireFactor(factor);
-  NormalNumbers normal(random_seed);
+  GaussianRandom normal(random_seed);
   std::vector<ControlNet> samples;
   for (int sample = 0; sample < count; ++sample) {
     NoiseSink noise(static_cast<Eigen::Index>(view.start.vertices.size()), normal);
@@ -180,7 +180,7 @@ std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineS
                                    int level, std::span<const Term> terms,
                                    std::span<const Vec2> uv) {
   return SigmaWithin(ViewOfLevel(surface, rest, target, level), sd_mm, terms, uv,
-                     SpaceOf(surface, level));
+                     SubspaceBasis(surface, level));
 }
 
 std::vector<ControlNet> PosteriorSamples(const LevelView& view, std::span<const double> sd_mm,
@@ -197,7 +197,7 @@ std::vector<HSplineSurface> PosteriorSamples(const HSplineSurface& surface,
   std::vector<HSplineSurface> samples;
   const LevelView view = ViewOfLevel(surface, rest, target, level);
   for (const ControlNet& net :
-       SamplesWithin(view, sd_mm, terms, count, random_seed, SpaceOf(surface, level))) {
+       SamplesWithin(view, sd_mm, terms, count, random_seed, SubspaceBasis(surface, level))) {
     samples.push_back(surface);
     samples.back().SetNet(level, net);
   }

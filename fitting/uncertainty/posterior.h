@@ -27,7 +27,7 @@ std::vector<double> PosteriorSigma(const LevelView& view, std::span<const double
 // The same for one level of a surface that was fitted to `target` (fit.h), whose finer detail is
 // taken as known: give the finest level of the schedule. Where only some of the level's vertices
 // are edited (adaptive fits), the surface is taken to move as those and the coarser ones can, no
-// more (surface_space.h). rest: the placed template.
+// more (subspace.h). rest: the placed template.
 std::vector<double> PosteriorSigma(const HSplineSurface& surface, const HSplineSurface& rest,
                                    const FitTarget& target, std::span<const double> sd_mm,
                                    int level, std::span<const Term> terms,

@@ -80,7 +80,7 @@ MeshLaplacian BuildLaplacian(const TriMesh& mesh) {
   return laplacian;
 }
 
-std::vector<int> Pieces(const Eigen::SparseMatrix<double>& stiffness) {
+std::vector<int> LabelComponents(const Eigen::SparseMatrix<double>& stiffness) {
   std::vector<int> piece(static_cast<std::size_t>(stiffness.cols()), -1);
   int count = 0;
   std::vector<int> open;

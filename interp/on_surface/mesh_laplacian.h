@@ -24,6 +24,6 @@ MeshLaplacian BuildLaplacian(const TriMesh& mesh);
 
 // The piece of each vertex by the matrix's entries, numbered 0, 1, ... in order of the first
 // vertex.
-std::vector<int> Pieces(const Eigen::SparseMatrix<double>& stiffness);
+std::vector<int> LabelComponents(const Eigen::SparseMatrix<double>& stiffness);
 
 }  // namespace semblance

@@ -61,7 +61,7 @@ class Spline {
          const RunContext& run)
       : options_(options),
         laplacian_(BuildLaplacian(skull)),
-        pieces_(Pieces(laplacian_.stiffness)),
+        pieces_(LabelComponents(laplacian_.stiffness)),
         solver_(skull.points, Grounded()) {
     run.ThrowIfStopped();
     piece_area_.resize(1 + *std::ranges::max_element(pieces_), 0);

@@ -9,8 +9,8 @@
 #include <sstream>
 #include <vector>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/whole_file.h"
 #include "surfaces/mesh/mesh_io.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/ply_layout.h"

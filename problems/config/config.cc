@@ -15,7 +15,7 @@
 #include <optional>
 #include <sstream>
 
-#include "problems/config/config_bytes.h"
+#include "problems/config/utf8_check.h"
 
 namespace semblance {
 namespace {

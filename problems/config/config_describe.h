@@ -14,7 +14,7 @@ ConfigNode ScalarToTree(bool value);
 ConfigNode ScalarToTree(int value);
 ConfigNode ScalarToTree(std::uint64_t value);
 ConfigNode ScalarToTree(double value);
-ConfigNode ScalarToTree(const AutoNumber& value);
+ConfigNode ScalarToTree(const AutoOr<double>& value);
 ConfigNode ScalarToTree(const std::string& value);
 ConfigNode ScalarToTree(const std::filesystem::path& value);
 
@@ -99,7 +99,7 @@ constexpr ConfigType::Kind ScalarKind() {
     return Kind::kUnsigned;
   } else if constexpr (std::is_same_v<T, double>) {
     return Kind::kNumber;
-  } else if constexpr (std::is_same_v<T, AutoNumber>) {
+  } else if constexpr (std::is_same_v<T, AutoOr<double>>) {
     return Kind::kAutoNumber;
   } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
     return Kind::kPath;

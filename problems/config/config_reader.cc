@@ -10,7 +10,7 @@
 #include <system_error>
 #include <vector>
 
-#include "problems/config/nearest_word.h"
+#include "problems/config/spelling_suggestion.h"
 
 namespace semblance {
 namespace {
@@ -184,7 +184,7 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, double& out) {
   }
 }
 
-void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoNumber& out) {
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoOr<double>& out) {
   if (item.node.IsScalar() && !item.node.quoted && item.node.text == "auto") {
     out.automatic = true;
     return;

@@ -12,7 +12,7 @@
 
 #include "problems/config/config_errors.h"
 #include "problems/config/config_tree.h"
-#include "surfaces/base/auto_number.h"
+#include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {
@@ -35,7 +35,7 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, bool& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, int& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::uint64_t& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, double& out);
-void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoNumber& out);  // or `auto`
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoOr<double>& out);  // or `auto`
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::string& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::path& out);
 

@@ -133,7 +133,7 @@ ConfigNode ScalarToTree(std::uint64_t value) {
   return ConfigNode::Scalar(fmt::format("{}", value));
 }
 
-ConfigNode ScalarToTree(const AutoNumber& value) {
+ConfigNode ScalarToTree(const AutoOr<double>& value) {
   return value.automatic ? ConfigNode::Scalar("auto") : ScalarToTree(value.value);
 }
 ConfigNode ScalarToTree(double value) { return ConfigNode::Scalar(fmt::format("{}", value)); }

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/ct/edge_shift.h"
+#include "problems/ct/half_maximum_edge.h"
 #include "problems/ct/voxel_mask.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
@@ -47,8 +47,8 @@ void RequireAny(const VoxelMask& mask, const std::string& complaint) {
   }
 }
 
-VoxelMask Largest(const VoxelMask& mask, const VoxelGrid& grid) {
-  const VoxelPieces pieces = FindPieces(mask, grid);
+VoxelMask LargestComponent(const VoxelMask& mask, const VoxelGrid& grid) {
+  const VoxelComponents pieces = LabelComponents(mask, grid);
   if (pieces.sizes.empty()) {
     return VoxelMask(mask.size(), 0);
   }
@@ -84,9 +84,9 @@ VoxelMask FindOutsideAir(VoxelMask tissue, VoxelGrid grid, double widest_mm, int
   grid.counts[2] += 1 + static_cast<int>(std::ceil(widest_mm / grid.spacing_mm.z()));
   tissue.resize(static_cast<std::size_t>(grid.Count()), 0);
   const double radius = 0.5 * widest_mm;
-  const VoxelMask wide_air = Not(Grow(tissue, grid, radius, threads));
+  const VoxelMask wide_air = Not(Dilate(tissue, grid, radius, threads));
   const VoxelMask reached = Flood(wide_air, SideFaces(tissue, grid), grid);
-  const VoxelMask back = Grow(reached, grid, radius + grid.spacing_mm.maxCoeff(), threads);
+  const VoxelMask back = Dilate(reached, grid, radius + grid.spacing_mm.maxCoeff(), threads);
   VoxelMask outside = Flood(And(back, Not(tissue)), reached, grid);
   outside.resize(voxels);
   return outside;
@@ -98,9 +98,9 @@ VoxelMask FindOutsideAir(VoxelMask tissue, VoxelGrid grid, double widest_mm, int
 VoxelMask FindHead(const VoxelMask& tissue, const VoxelMask& outside, const VoxelGrid& grid,
                    double thinnest_mm, int threads) {
   constexpr double kEar_mm = 20;
-  const VoxelMask core = Not(Grow(outside, grid, 0.5 * thinnest_mm, threads));
-  const VoxelMask head_core = Largest(core, grid);
-  const VoxelMask near = And(Grow(head_core, grid, 0.5 * thinnest_mm + kEar_mm, threads), tissue);
+  const VoxelMask core = Not(Dilate(outside, grid, 0.5 * thinnest_mm, threads));
+  const VoxelMask head_core = LargestComponent(core, grid);
+  const VoxelMask near = And(Dilate(head_core, grid, 0.5 * thinnest_mm + kEar_mm, threads), tissue);
   return Flood(near, head_core, grid);
 }
 

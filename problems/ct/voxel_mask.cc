@@ -29,8 +29,8 @@ void ForNeighbours(const VoxelGrid& grid, std::int64_t index, const Visit& visit
 
 // Lowers each squared distance to that over a neighbour on the same line along `axis`, if that is
 // within the reach.
-void PassAlong(int axis, const VoxelGrid& grid, double reach_mm, int threads,
-               std::vector<float>& squared) {
+void DistancePass(int axis, const VoxelGrid& grid, double reach_mm, int threads,
+                  std::vector<float>& squared) {
   std::int64_t stride = 1;
   for (int a = 0; a < axis; ++a) {
     stride *= grid.counts[a];
@@ -59,8 +59,8 @@ void PassAlong(int axis, const VoxelGrid& grid, double reach_mm, int threads,
 
 }  // namespace
 
-VoxelPieces FindPieces(const VoxelMask& mask, const VoxelGrid& grid) {
-  VoxelPieces pieces;
+VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid) {
+  VoxelComponents pieces;
   pieces.of_voxel.assign(mask.size(), -1);
   std::vector<std::int64_t> open;
   for (std::int64_t start = 0; start < grid.Count(); ++start) {
@@ -108,13 +108,13 @@ VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& seeds, const VoxelGri
   return reached;
 }
 
-VoxelMask Grow(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads) {
+VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads) {
   std::vector<float> squared(mask.size());
   std::transform(mask.begin(), mask.end(), squared.begin(), [](std::uint8_t in) {
     return in ? 0.0F : std::numeric_limits<float>::infinity();
   });
   for (int axis = 0; axis < 3; ++axis) {
-    PassAlong(axis, grid, distance_mm, threads, squared);
+    DistancePass(axis, grid, distance_mm, threads, squared);
   }
   const auto limit = static_cast<float>(distance_mm * distance_mm * (1 + 1e-6));
   VoxelMask grown(mask.size());

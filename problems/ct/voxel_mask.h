@@ -26,17 +26,17 @@ using VoxelMask = std::vector<std::uint8_t>;
 
 // The piece of each voxel by shared faces, numbered 0, 1, ... in order of the first voxel; -1 where
 // the mask is 0.
-struct VoxelPieces {
+struct VoxelComponents {
   std::vector<std::int32_t> of_voxel;
   std::vector<std::int64_t> sizes;  // voxels, one a piece
 };
-VoxelPieces FindPieces(const VoxelMask& mask, const VoxelGrid& grid);
+VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid);
 
 // The voxels of `allowed` that can be reached from those of `seeds` that are in it, by shared
 // faces.
 VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& seeds, const VoxelGrid& grid);
 
 // The voxels whose centre is within distance_mm (>= 0) of the centre of one in the mask. Exact.
-VoxelMask Grow(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads);
+VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads);
 
 }  // namespace semblance

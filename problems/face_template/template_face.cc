@@ -171,7 +171,7 @@ void CheckOptions(const TemplateOptions& o) {
 }
 
 void Disturb(double error, std::uint64_t random_seed, std::map<std::string, Vec2>& site_uv) {
-  SeededNumbers random(random_seed);
+  UniformRandom random(random_seed);
   for (auto& [site, uv] : site_uv) {
     for (int axis = 0; axis < 2; ++axis) {
       uv[axis] = std::clamp(uv[axis] + random.Between(-error, error), 0.0, 1.0);

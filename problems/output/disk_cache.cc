@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "problems/output/manifest.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/whole_file.h"
 
 namespace semblance {
 namespace {

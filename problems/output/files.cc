@@ -83,8 +83,8 @@ fs::path OutputFolder::PathOf(std::string_view name) const {
   return path;
 }
 
-void OutputFolder::Write(std::string_view name, std::string_view bytes, Outlasts outlasts) {
-  WriteFileAtomically(PathOf(name), bytes, outlasts);
+void OutputFolder::Write(std::string_view name, std::string_view bytes, Durability durability) {
+  WriteFileAtomically(PathOf(name), bytes, durability);
   written_.emplace_back(name);
 }
 

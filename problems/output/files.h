@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 
 namespace semblance {
 
@@ -32,9 +32,9 @@ class OutputFolder {
   // if `name` is empty, absolute or leads out of the folder, IoError if a folder cannot be created.
   std::filesystem::path PathOf(std::string_view name) const;
 
-  // WriteFileAtomically(PathOf(name), bytes, outlasts).
+  // WriteFileAtomically(PathOf(name), bytes, durability).
   void Write(std::string_view name, std::string_view bytes,
-             Outlasts outlasts = Outlasts::kPowerFailure);
+             Durability durability = Durability::kSynced);
 
  private:
   std::vector<std::string> written_;

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/pictures/lettering.h"
 #include "problems/pictures/srgb.h"
+#include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
-#include "problems/pictures/lettering.h"
-#include "problems/pictures/solids.h"
+#include "problems/pictures/mesh_primitives.h"
+#include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

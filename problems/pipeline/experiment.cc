@@ -20,7 +20,7 @@ class LevelCheck {
                                      level, finest_)});
     }
   }
-  void Steps(const std::string& path, const std::vector<LevelFit>& steps) {
+  void Steps(const std::string& path, const std::vector<ScheduleStep>& steps) {
     for (std::size_t n = 0; n < steps.size(); ++n) {
       At(fmt::format("{}[{}].level", path, n), steps[n].level);
     }

@@ -93,7 +93,7 @@ struct Experiment {
   ImplicitFaceOptions implicit;
   TemplateOptions face_template;
   PlacementOptions placement;
-  std::vector<LevelFit> first_fit = {{.level = 0, .fraction = 1}};
+  std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;
   int rounds = 1;

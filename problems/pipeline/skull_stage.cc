@@ -2,8 +2,8 @@
 #include "problems/pipeline/skull_stage.h"
 
 #include "problems/pipeline/cut_planes.h"
+#include "problems/pipeline/dowel_projection.h"
 #include "problems/pipeline/implicit_cache.h"
-#include "problems/pipeline/shell_dowels.h"
 #include "problems/pipeline/stage_key.h"
 
 namespace semblance {
@@ -22,8 +22,9 @@ DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
                               [&] { return FillSkull(data->skull, e.fill, context); });
   });
   const auto* const wrap = std::get_if<WrapFill>(&e.fill);
-  TriMesh pressed = wrap ? PressedIn(*shell, subject.dowels, data->skull, wrap->press_mm) : *shell;
-  ShellDowels standing = StandOnShell(subject.dowels, pressed, kLeastDepth_mm);
+  TriMesh pressed =
+      wrap ? IndentShell(*shell, subject.dowels, data->skull, wrap->press_mm) : *shell;
+  ProjectedDowels standing = ProjectOntoShell(subject.dowels, pressed, kLeastDepth_mm);
   subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
   std::vector<Vec3> normals = VertexNormals(pressed);
   DepthStage stage{

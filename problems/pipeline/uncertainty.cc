@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "fitting/problem/seeding.h"
-#include "fitting/uncertainty/error_spread.h"
+#include "fitting/uncertainty/error_propagation.h"
 #include "interp/evaluation/calibration.h"
 #include "interp/schemes/kriging_process.h"
 #include "surfaces/base/parallel.h"
@@ -199,8 +199,8 @@ FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& 
   const FitTarget target = AsLeft(fitted.target, fitted.fit);
   const int level = FinestLevel(fitted.fit);
   FaceUncertainty result;
-  const ErrorSpread spread(surface, fitted.rest, target, level, experiment.fit.terms,
-                           ErrorsOf(experiment, stage, surface, target, result, context));
+  const ErrorPropagation spread(surface, fitted.rest, target, level, experiment.fit.terms,
+                                ErrorsOf(experiment, stage, surface, target, result, context));
   for (const std::string_view name : spread.left_out()) {
     result.left_out.emplace_back(name);
   }

@@ -26,7 +26,7 @@ struct FaceUncertainty {
   std::vector<double> sigma_mm;  // one a vertex of the tessellated face; NaN where nothing is known
   double median_mm = kNaN;       // of sigma by area, over the vertices that dowels or seeds hold
   double p95_mm = kNaN;
-  double prior_sd = kNaN;             // ErrorSpread::prior_sd
+  double prior_sd = kNaN;             // ErrorPropagation::prior_sd
   double depth_length_mm = kNaN;      // over which depths resemble each other (Kriging)
   double depth_signal_mm = kNaN;      // their standard deviation over the skull
   std::vector<std::string> left_out;  // terms of the fit that could not be taken into account
@@ -48,7 +48,8 @@ struct FittedFace {
 // scheme states there (where it states none, the dowels' by inverse squared distance) and
 // resembling itself over kriging's length. A dowel's tip
 // is off along the dowel, a seed along the face's normal; a seed also by implicit_sd_mm, over the
-// same length. ErrorSpread carries this through the fit. Throws InputError as ErrorSpread.
+// same length. ErrorPropagation carries this through the fit. Throws InputError as
+// ErrorPropagation.
 FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& stage,
                                 const FittedFace& fitted, const RunContext& context);
 

@@ -28,7 +28,7 @@ int FinestLevel(const FitOptions& fit) {
     return plan->finest;
   }
   int finest = 0;
-  for (const LevelFit& step : fit.schedule) {
+  for (const ScheduleStep& step : fit.schedule) {
     finest = std::max(finest, step.level);
   }
   return finest;

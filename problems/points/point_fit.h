@@ -21,7 +21,7 @@ struct PointFitOptions {
   Closure closure = Closure::kOpen;
   Parameters parameters;
   FitOptions fit = {
-      .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoNumber::Auto(), .length_mm = 1}},
+      .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .plan = AdaptivePlan{},
       .solver = LevelSolver::kFastest};
   double chord_mm = 0.05;

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <string>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/whole_file.h"
 
 namespace semblance {
 namespace {

@@ -14,8 +14,8 @@
 #include "problems/program/edit_script.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/face_export.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/whole_file.h"
 #include "surfaces/hspline_files/feature.h"
 #include "surfaces/hspline_files/hspline_io.h"
 

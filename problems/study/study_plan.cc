@@ -12,7 +12,7 @@
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/study/study_rows.h"
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 
 namespace semblance {
 namespace {

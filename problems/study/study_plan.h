@@ -32,8 +32,8 @@
 
 namespace semblance {
 
-enum class StudyKeep { kSummary, kView, kRun };
-constexpr auto EnumNames(StudyKeep) {
+enum class TrialFiles { kSummary, kView, kRun };
+constexpr auto EnumNames(TrialFiles) {
   return std::to_array<std::string_view>({"summary", "view", "run"});
 }
 
@@ -51,7 +51,7 @@ struct StudyTrial {
 struct StudyPlan {
   std::string title = "untitled";
   std::string metric = "face.rms_mm";
-  StudyKeep keep = StudyKeep::kSummary;
+  TrialFiles keep = TrialFiles::kSummary;
   StudyJob job = StudyJob::kFace;
   std::vector<std::string> axes;   // option paths, in the order of the file
   std::vector<StudyTrial> trials;  // subject by subject

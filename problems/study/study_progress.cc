@@ -19,7 +19,7 @@ std::string Duration(double seconds) {
 
 }  // namespace
 
-std::string PaceText(const StudyPace& pace) {
+std::string PaceText(const StudyEta& pace) {
   std::string text = fmt::format("{} of {} trials", pace.finished, pace.trials);
   const int here = pace.finished - pace.finished_before;
   if (here == 0 && pace.elapsed_s >= 1) {
@@ -36,7 +36,7 @@ std::string PaceText(const StudyPace& pace) {
   return text + (pace.failed > 0 ? fmt::format("; {} failed", pace.failed) : "");
 }
 
-std::string BarText(const StudyPace& pace, int width) {
+std::string BarText(const StudyEta& pace, int width) {
   const int full = pace.trials > 0 ? width * pace.finished / pace.trials : width;
   return fmt::format("[{:#<{}}{:.<{}}]", "", full, "", width - full);
 }
@@ -44,7 +44,7 @@ std::string BarText(const StudyPace& pace, int width) {
 StudyProgress::StudyProgress(std::FILE* stream, std::chrono::milliseconds interval)
     : stream_(stream), is_terminal_(isatty(fileno(stream)) == 1), interval_(interval) {}
 
-void StudyProgress::operator()(const StudyPace& pace, const std::string& trial) {
+void StudyProgress::operator()(const StudyEta& pace, const std::string& trial) {
   constexpr const char* kClearLine = "\r\033[K";
   const bool is_last = pace.finished == pace.trials;
   if (is_over_) {

@@ -12,16 +12,16 @@ namespace semblance {
 
 // What is known of a study on its way. elapsed_s counts from when `finished_before` trials were
 // done.
-struct StudyPace {
+struct StudyEta {
   int trials = 0, finished = 0, finished_before = 0, failed = 0;
   double elapsed_s = 0;
 };
 
 // "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without what is not known yet.
-std::string PaceText(const StudyPace& pace);
+std::string PaceText(const StudyEta& pace);
 
 // "[######......]", `width` characters between the brackets.
-std::string BarText(const StudyPace& pace, int width);
+std::string BarText(const StudyEta& pace, int width);
 
 // Shows a study's pace: on a terminal as a bar that is drawn over, otherwise as a line every
 // `interval`, and at the end. A trial that failed has a line of its own.
@@ -31,7 +31,7 @@ class StudyProgress {
                          std::chrono::milliseconds interval = std::chrono::seconds(5));
 
   // Any time. trial: the one that ended, subject, values and status; said alone where it failed.
-  void operator()(const StudyPace& pace, const std::string& trial);
+  void operator()(const StudyEta& pace, const std::string& trial);
 
  private:
   using Clock = std::chrono::steady_clock;

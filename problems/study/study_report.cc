@@ -9,7 +9,7 @@
 #include "problems/report/report.h"
 #include "problems/report/svg_plot.h"
 #include "problems/study/results_sqlite.h"
-#include "problems/study/study_breakdown.h"
+#include "problems/study/study_subtables.h"
 
 namespace semblance {
 namespace {

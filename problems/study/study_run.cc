@@ -19,7 +19,7 @@
 #include "problems/report/scene_json.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/study_tables.h"
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 
 namespace semblance {
 namespace {
@@ -183,7 +183,7 @@ class StudyRunner {
     // Last: it says that the trial is whole. A broken one counts as none; with other files beside
     // it, it must not outlast them.
     output.Write("trial.json", json.dump(1) + "\n",
-                 plan_.keep == StudyKeep::kSummary ? Outlasts::kProcess : Outlasts::kPowerFailure);
+                 plan_.keep == TrialFiles::kSummary ? Durability::kUnsynced : Durability::kSynced);
     Tell(trial, json);
   }
 
@@ -201,12 +201,12 @@ class StudyRunner {
     const double cpu_s = ThreadCpu_s() - cpu_before_s;
     return [this, &trial, result, cpu_s](OutputFolder& output) {
       const RunContext quiet;
-      if (plan_.keep == StudyKeep::kRun) {
+      if (plan_.keep == TrialFiles::kRun) {
         WriteRun(trial.experiment, *result, output, quiet);
         return;
       }
-      output.Write("timing.json", TimingJson(result->times, cpu_s), Outlasts::kProcess);
-      if (plan_.keep == StudyKeep::kView) {
+      output.Write("timing.json", TimingJson(result->times, cpu_s), Durability::kUnsynced);
+      if (plan_.keep == TrialFiles::kView) {
         output.Write("scene.json", SceneJson(*result, quiet));
       }
     };
@@ -219,11 +219,11 @@ class StudyRunner {
     json["result"] = Json::parse(DepthResultJson(trial.experiment, *result));
     const double cpu_s = ThreadCpu_s() - cpu_before_s;
     return [this, &trial, result, cpu_s](OutputFolder& output) {
-      if (plan_.keep == StudyKeep::kRun) {
+      if (plan_.keep == TrialFiles::kRun) {
         WriteDepth(trial.experiment, *result, output, {});
       }
-      output.Write("timing.json", TimingJson(result->times, cpu_s), Outlasts::kProcess);
-      if (plan_.keep == StudyKeep::kView && trial.subject == plan_.trials.front().subject) {
+      output.Write("timing.json", TimingJson(result->times, cpu_s), Durability::kUnsynced);
+      if (plan_.keep == TrialFiles::kView && trial.subject == plan_.trials.front().subject) {
         const std::string title =
             fmt::format("{}: {}", trial.subject, TreatmentLabel(plan_.axes, trial.values));
         output.Write("depth.png", DepthPicture(*result, title, 1));

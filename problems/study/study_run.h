@@ -23,7 +23,7 @@ struct StudyRunOptions {
   int cache_limit_mb = 2000;
   // May be empty. Called from one thread at a time: each second, and after each trial with its
   // subject, values and status.
-  std::function<void(const StudyPace&, const std::string& trial)> on_pace = {};
+  std::function<void(const StudyEta&, const std::string& trial)> on_pace = {};
 };
 
 struct StudySummary {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/config/nearest_word.h"
+#include "problems/config/spelling_suggestion.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "problems/config/config.h"
-#include "problems/subject/patch_normal.h"
+#include "problems/subject/averaged_normal.h"
 #include "problems/subject/sites.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -37,7 +37,8 @@ Vec3 DirectionAt(const LandmarkFile& file, const Landmark& landmark, const TriMe
   if (landmark.normal) {
     return ToVec3(*landmark.normal).normalized();
   }
-  const Vec3 normal = PatchNormal(skull, base.triangle, {base.position, options.normal_radius_mm});
+  const Vec3 normal =
+      AveragedNormal(skull, base.triangle, {base.position, options.normal_radius_mm});
   if (normal.isZero()) {
     throw InputError(fmt::format(
         "{}: site {}: the skull's triangles within {} mm have no area, so they give no direction; "

@@ -41,7 +41,7 @@ struct DirectionAnchor {
 
 class DepthFormula {
  public:
-  explicit DepthFormula(SeededNumbers& random);
+  explicit DepthFormula(UniformRandom& random);
   double At(const Vec3& direction) const;  // mm, > 0
 
  private:
@@ -82,7 +82,7 @@ std::vector<DirectionAnchor> VaultAnchors(const std::vector<DirectionAnchor>& si
   return anchors;
 }
 
-DepthFormula::DepthFormula(SeededNumbers& random)
+DepthFormula::DepthFormula(UniformRandom& random)
     : anchors_(SiteAnchors()),
       subject_(std::clamp(1 + 0.08 * random.Normal(), 0.84, 1.16)),
       waves_(DrawWaves(random)) {
@@ -168,7 +168,7 @@ class Head {
   const Vec3& Centre() const { return centre_; }
 
  private:
-  SeededNumbers random_;
+  UniformRandom random_;
   PhantomShape shape_;
   DepthFormula depth_;
   Vec3 centre_;

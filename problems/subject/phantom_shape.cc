@@ -45,7 +45,7 @@ const Body kBodies[] = {
 };
 constexpr double kBlend = 6;  // more joins the bodies with a sharper crease
 
-Vec3 Jittered(const Vec3& v, double share, SeededNumbers& random) {
+Vec3 Jittered(const Vec3& v, double share, UniformRandom& random) {
   Vec3 factor;
   for (int i = 0; i < 3; ++i) {
     factor[i] = 1 + random.Between(-share, share);
@@ -55,7 +55,7 @@ Vec3 Jittered(const Vec3& v, double share, SeededNumbers& random) {
 
 }  // namespace
 
-double SeededNumbers::Normal() {
+double UniformRandom::Normal() {
   double sum = -6;
   for (int i = 0; i < 12; ++i) {
     sum += Between(0, 1);
@@ -63,7 +63,7 @@ double SeededNumbers::Normal() {
   return sum;
 }
 
-Vec3 SeededNumbers::Direction() {
+Vec3 UniformRandom::Direction() {
   const double z = Between(-1, 1);
   const double azimuth = Between(0, 2 * std::numbers::pi);
   const double s = std::sqrt(1 - z * z);
@@ -88,7 +88,7 @@ Vec3 WaveSum::Gradient(const Vec3& direction) const {
   return sum;
 }
 
-WaveSum DrawWaves(SeededNumbers& random) {
+WaveSum DrawWaves(UniformRandom& random) {
   constexpr int kWaves = 5;
   WaveSum sum;
   for (int i = 0; i < kWaves; ++i) {
@@ -100,7 +100,7 @@ WaveSum DrawWaves(SeededNumbers& random) {
   return sum;
 }
 
-PhantomShape::PhantomShape(SeededNumbers& random) {
+PhantomShape::PhantomShape(UniformRandom& random) {
   for (const Body& body : kBodies) {
     const Mat3 turn = Eigen::AngleAxisd(body.tilt, Vec3::UnitX()).toRotationMatrix();
     const Vec3 half = Jittered(body.half_mm, 0.03, random);

@@ -11,9 +11,9 @@
 namespace semblance {
 
 // Uniform numbers from a seed; the same on every machine.
-class SeededNumbers {
+class UniformRandom {
  public:
-  explicit SeededNumbers(std::uint64_t random_seed) : engine_(random_seed) {}
+  explicit UniformRandom(std::uint64_t random_seed) : engine_(random_seed) {}
   double Between(double low, double high) {
     return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
   }
@@ -41,12 +41,12 @@ struct WaveSum {  // a smooth function of direction; as drawn, rms about 0.7, ne
   double Value(const Vec3& direction) const;
   Vec3 Gradient(const Vec3& direction) const;
 };
-WaveSum DrawWaves(SeededNumbers& random);
+WaveSum DrawWaves(UniformRandom& random);
 
 // A closed smooth surface that every ray from the centre meets once.
 class PhantomShape {
  public:
-  explicit PhantomShape(SeededNumbers& random);  // draws sizes, heights of features, asymmetry
+  explicit PhantomShape(UniformRandom& random);  // draws sizes, heights of features, asymmetry
 
   double Radius(const Vec3& direction) const;  // from the centre, mm; direction unit
   Vec3 Normal(const Vec3& direction) const;    // of the surface there, unit, outward; exact

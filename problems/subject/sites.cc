@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "problems/config/nearest_word.h"
+#include "problems/config/spelling_suggestion.h"
 
 namespace semblance {
 

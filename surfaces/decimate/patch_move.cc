@@ -36,8 +36,8 @@ class SheetPair {
  public:
   explicit SheetPair(const PatchPlaces& patch);
 
-  // Largest difference of height where both sheets are; NaN where they are no two height fields
-  // over the same ring.
+  // LargestComponent difference of height where both sheets are; NaN where they are no two height
+  // fields over the same ring.
   double Difference() const;
   // The largest 1 / cosine of the slopes.
   double Steepness() const { return 1 / least_cosine_; }

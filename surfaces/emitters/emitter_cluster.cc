@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "surfaces/emitters/wide.h"
+#include "surfaces/emitters/simd.h"
 
 namespace semblance {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "surfaces/emitters/wide.h"
+#include "surfaces/emitters/simd.h"
 
 namespace semblance {
 namespace {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/whole_file.h"
 #include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {

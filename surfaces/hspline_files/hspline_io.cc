@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/hspline_files/hspline_io.h"
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {

@@ -30,8 +30,8 @@ using Vec4 = double __attribute__((vector_size(32)));  // x, y, z and nothing, i
 constexpr std::size_t kChunk = 16384;  // (u,v) to one thread
 constexpr std::size_t kBlock = 256;    // (u,v) whose leaves are looked up together
 
-// A stretch of the questions, and where its answers go.
-struct Stretch {
+// A batch of the questions, and where its answers go.
+struct Batch {
   const Polynomial* polynomials;  // one a leaf
   const std::int32_t* leaves;     // one a (u,v)
   const Vec2* uv;                 // in the domain
@@ -80,25 +80,25 @@ struct Row {  // along s, of one power of t
   return squares[0] + squares[1] + squares[2];
 }
 
-SEMBLANCE_KERNEL void EvaluatePoints(const Stretch& stretch) {
-  for (std::size_t k = 0; k < stretch.count; ++k) {
-    const Polynomial& p = stretch.polynomials[stretch.leaves[k]];
-    const double s = stretch.uv[k][0] * p.scale_u - p.first_u,
-                 t = stretch.uv[k][1] * p.scale_v - p.first_v;
+SEMBLANCE_KERNEL void EvaluatePoints(const Batch& batch) {
+  for (std::size_t k = 0; k < batch.count; ++k) {
+    const Polynomial& p = batch.polynomials[batch.leaves[k]];
+    const double s = batch.uv[k][0] * p.scale_u - p.first_u,
+                 t = batch.uv[k][1] * p.scale_v - p.first_v;
     const Vec4 point =
         ((ValueOf(p, 3, s) * t + ValueOf(p, 2, s)) * t + ValueOf(p, 1, s)) * t + ValueOf(p, 0, s);
-    Store(point, stretch.points[k]);
+    Store(point, batch.points[k]);
   }
 }
 
 // Returns how many points have no normal.
-SEMBLANCE_KERNEL std::int64_t EvaluateNormals(const Stretch& stretch) {
+SEMBLANCE_KERNEL std::int64_t EvaluateNormals(const Batch& batch) {
   std::int64_t degenerate = 0;
   constexpr double kDegenerate = 1e-12;  // as HSplineSurface::Frame judges
-  for (std::size_t k = 0; k < stretch.count; ++k) {
-    const Polynomial& p = stretch.polynomials[stretch.leaves[k]];
-    const double s = stretch.uv[k][0] * p.scale_u - p.first_u,
-                 t = stretch.uv[k][1] * p.scale_v - p.first_v;
+  for (std::size_t k = 0; k < batch.count; ++k) {
+    const Polynomial& p = batch.polynomials[batch.leaves[k]];
+    const double s = batch.uv[k][0] * p.scale_u - p.first_u,
+                 t = batch.uv[k][1] * p.scale_v - p.first_v;
     const Row r0 = RowOf(p, 0, s), r1 = RowOf(p, 1, s), r2 = RowOf(p, 2, s), r3 = RowOf(p, 3, s);
     const Vec4 high = r3.value * t + r2.value, middle = high * t + r1.value;
     const Vec4 du = p.scale_u * (((r3.slope * t + r2.slope) * t + r1.slope) * t + r0.slope);
@@ -106,8 +106,8 @@ SEMBLANCE_KERNEL std::int64_t EvaluateNormals(const Stretch& stretch) {
     const Vec4 normal = Cross(du, dv);
     const double length = std::sqrt(SquaredNorm(normal));
     const bool regular = length > kDegenerate * (SquaredNorm(du) + SquaredNorm(dv));
-    Store(middle * t + r0.value, stretch.points[k]);
-    Store(normal * (regular ? 1 / length : 0.0), stretch.normals[k]);
+    Store(middle * t + r0.value, batch.points[k]);
+    Store(normal * (regular ? 1 / length : 0.0), batch.normals[k]);
     degenerate += !regular;
   }
   return degenerate;
@@ -178,12 +178,12 @@ void HSplineBatch::Sample(std::span<const Vec2> uv, int threads, Vec3* points, V
         inside[k] = tree_.IntoDomain(uv[begin + k]);
         leaves[k] = tree_.LeafAt(inside[k]);
       }
-      Stretch stretch{polynomials_.data(), leaves.data(), inside.data(), count, points + begin, {}};
+      Batch batch{polynomials_.data(), leaves.data(), inside.data(), count, points + begin, {}};
       if (normals == nullptr) {
-        EvaluatePoints(stretch);
+        EvaluatePoints(batch);
       } else {
-        stretch.normals = normals + begin;
-        zero[c] += EvaluateNormals(stretch);
+        batch.normals = normals + begin;
+        zero[c] += EvaluateNormals(batch);
       }
     }
   });

@@ -85,7 +85,7 @@ Measured Score(const Scene& scene, double begin, const Height& height) {
 Measured FitScene(const Scene& scene, const SchedulePlan& plan, int finest) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = finest};
   const SmoothnessTerm smooth{
-      .weight = AutoNumber::Auto(), .of = SmoothnessOf::kSurface, .length_mm = 1};
+      .weight = AutoOr<double>::Auto(), .of = SmoothnessOf::kSurface, .length_mm = 1};
   const FitOptions options{.schedule = {{finest, 1}},
                            .terms = {PointTerm{}, smooth},
                            .plan = plan,

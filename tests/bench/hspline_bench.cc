@@ -152,7 +152,7 @@ void ProjectBoth(const HSplineSurface& surface, const Handle(Geom_BSplineSurface
   Print("hspline.projection_vs_occt", 1e6 * ours, 1e6 * peer, 1, "a second");
 }
 
-double Largest(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+double LargestComponent(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   double largest = 0;
   for (std::size_t k = 0; k < a.size(); ++k) {
     largest = std::max(largest, (a[k] - b[k]).norm());
@@ -193,11 +193,12 @@ int Main() {
                                                     }
                                                   });
   constexpr double kSame = 1e-10;  // the peers must have been asked the same
-  if (Largest(ours.points, points) > kSame || Largest(ours.normals, normals) > kSame ||
-      Largest(ours.points, plain) > kSame) {
+  if (LargestComponent(ours.points, points) > kSame ||
+      LargestComponent(ours.normals, normals) > kSame ||
+      LargestComponent(ours.points, plain) > kSame) {
     fmt::print(stderr, "hspline_bench: the values differ by {} mm and {} (normals), {} mm\n",
-               Largest(ours.points, points), Largest(ours.normals, normals),
-               Largest(ours.points, plain));
+               LargestComponent(ours.points, points), LargestComponent(ours.normals, normals),
+               LargestComponent(ours.points, plain));
     return 1;
   }
   Print("hspline.point_normal_vs_occt", batch_normals, occt_normals, 5, "million a second");

@@ -9,7 +9,7 @@
 
 #include "problems/study/study_report.h"
 #include "problems/study/study_run.h"
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 
 namespace semblance {
 namespace {

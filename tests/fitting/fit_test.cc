@@ -267,9 +267,9 @@ TEST(Fit, AScheduleCanBeFittedInParts) {
   const HSplineSurface start = RandomSurface(Shape(), 2);
   const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 200);
   const HSplineSurface whole = Fit(start, target, {}, {}, {}).surface;
-  const std::vector<LevelFit> published = PublishedSchedule();
+  const std::vector<ScheduleStep> published = PublishedSchedule();
   HSplineSurface parts = start;
-  for (const LevelFit& step : published) {
+  for (const ScheduleStep& step : published) {
     parts = Fit(parts, start, target, {}, {.schedule = {step}}, {}).surface;
   }
   EXPECT_TRUE(SameBytes(parts.Net(3), whole.Net(3)));

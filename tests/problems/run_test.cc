@@ -11,7 +11,7 @@
 
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
@@ -115,7 +115,7 @@ TEST(Run, SaysWhatItDidToTheFeatures) {
         semblance::Run(SmallPhantom({fmt::format("fit.features={}", rule)}), {});
     EXPECT_EQ(result.fit.restored_features > 0, frozen);
     EXPECT_EQ(result.features.back().part, "elsewhere");
-    const FeatureDamage& all = *(result.features.end() - 2);
+    const FeatureDistortion& all = *(result.features.end() - 2);
     EXPECT_EQ(all.part, "features");
     EXPECT_GT(all.distortion.rms_strain, 0);
     EXPECT_GT(all.distortion.max_strain, all.distortion.rms_strain);

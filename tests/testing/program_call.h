@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance::testing {

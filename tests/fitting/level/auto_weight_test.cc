@@ -21,15 +21,15 @@ using testing::Scattered;
 
 const HSplineShape kShape{.patches_u = 12, .patches_v = 12, .max_level = 0};
 
-std::vector<Term> Terms(AutoNumber weight) {
+std::vector<Term> Terms(AutoOr<double> weight) {
   return {PointTerm{}, SmoothnessTerm{.weight = weight, .length_mm = 1}};
 }
 
-FitOptions Options(AutoNumber weight, LevelSolver solver = LevelSolver::kFastest) {
+FitOptions Options(AutoOr<double> weight, LevelSolver solver = LevelSolver::kFastest) {
   return {.schedule = {{0, 1}}, .terms = Terms(weight), .solver = solver};
 }
 
-double CleanRms(const FitTarget& target, AutoNumber weight) {
+double CleanRms(const FitTarget& target, AutoOr<double> weight) {
   return ErrorAgainst(FrankePoint, Fit(PlainStart(kShape), target, {}, Options(weight), {}).surface,
                       60)
       .rms;
@@ -45,7 +45,7 @@ TEST(AutoWeight, IsNearlyAsGoodAsTheBestThereIs) {
       best = std::min(best, rms);
       worst = std::max(worst, rms);
     }
-    const double chosen = CleanRms(target, AutoNumber::Auto());
+    const double chosen = CleanRms(target, AutoOr<double>::Auto());
     EXPECT_LT(chosen, 1.2 * best) << noise;
     EXPECT_LT(chosen, 0.8 * worst) << noise;
   }
@@ -55,7 +55,8 @@ TEST(AutoWeight, MoreNoiseIsSmoothedMore) {
   double before = 0;
   for (const double noise : {0.001, 0.01, 0.1}) {
     const FitTarget target = Scattered(FrankePoint, 1500, noise, 4);
-    const FitResult result = Fit(PlainStart(kShape), target, {}, Options(AutoNumber::Auto()), {});
+    const FitResult result =
+        Fit(PlainStart(kShape), target, {}, Options(AutoOr<double>::Auto()), {});
     const double weight = result.levels[0].auto_weight;
     EXPECT_GT(weight, before);
     before = weight;
@@ -67,7 +68,7 @@ TEST(AutoWeight, IsTheWeightThatIsReported) {
   const FitTarget target = Scattered(FrankePoint, 600, 0.03, 4);
   for (const LevelSolver solver : {LevelSolver::kFastest, LevelSolver::kCeres}) {
     const FitResult a =
-        Fit(PlainStart(kShape), target, {}, Options(AutoNumber::Auto(), solver), {});
+        Fit(PlainStart(kShape), target, {}, Options(AutoOr<double>::Auto(), solver), {});
     const FitResult b =
         Fit(PlainStart(kShape), target, {}, Options(a.levels[0].auto_weight, solver), {});
     EXPECT_EQ(a.point_rms_mm, b.point_rms_mm);
@@ -114,7 +115,7 @@ TEST(AutoWeight, AHoleIsBridgedByTheAdaptiveFitToo) {
   std::erase_if(target.points, [](const FitPoint& p) {
     return (p.uv - Vec2(0.5, 0.5)).cwiseAbs().maxCoeff() < 0.15;
   });
-  const FitOptions options{.terms = Terms(AutoNumber::Auto()),
+  const FitOptions options{.terms = Terms(AutoOr<double>::Auto()),
                            .plan = AdaptivePlan{.tolerance_mm = 6e-3, .finest = 2}};
   const FitResult result = Fit(PlainStart(shape), target, {}, options, {});
   EXPECT_GT(result.levels.back().auto_weight, 0);
@@ -131,8 +132,8 @@ TEST(AutoWeight, WrongInputIsNamed) {
     }
     return "";
   };
-  const SmoothnessTerm smooth{.weight = AutoNumber::Auto()};
-  const MembraneTerm membrane{.weight = AutoNumber::Auto()};
+  const SmoothnessTerm smooth{.weight = AutoOr<double>::Auto()};
+  const MembraneTerm membrane{.weight = AutoOr<double>::Auto()};
   EXPECT_THAT(message({PointTerm{}, smooth, membrane}), HasSubstr("both have weight: auto"));
   EXPECT_THAT(message({PointTerm{}, smooth, SymmetryTerm{}}), HasSubstr("'symmetry'"));
   EXPECT_THAT(message({PointTerm{.loss = RobustLoss::kHuber}, smooth}), HasSubstr("a loss"));

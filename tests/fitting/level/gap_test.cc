@@ -60,7 +60,7 @@ double MostBeyond(const FitTarget& target, const HSplineSurface& surface) {
   return most / (all.high - all.low);
 }
 
-HSplineSurface FitDrawn(const FitTarget& target, const SchedulePlan& plan, AutoNumber weight) {
+HSplineSurface FitDrawn(const FitTarget& target, const SchedulePlan& plan, AutoOr<double> weight) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 3};
   const SmoothnessTerm smooth{.weight = weight, .of = SmoothnessOf::kSurface, .length_mm = 1};
   return Fit(testing::PlainStart(shape), target, {},
@@ -78,7 +78,7 @@ TEST(Gap, TheSurfaceStaysNearTheHeightsAroundIt) {
   for (const double noise : {1e-4, 1e-3}) {
     const FitTarget target = testing::DrawnScan(12000, noise, 3);
     for (const SchedulePlan& plan : kPlans) {
-      EXPECT_LT(MostBeyond(target, FitDrawn(target, plan, AutoNumber::Auto())), kShare)
+      EXPECT_LT(MostBeyond(target, FitDrawn(target, plan, AutoOr<double>::Auto())), kShare)
           << noise << " plan " << plan.index();
     }
   }

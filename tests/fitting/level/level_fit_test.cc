@@ -10,7 +10,7 @@
 #include <cstring>
 #include <utility>
 
-#include "fitting/least_squares/row_reduction.h"
+#include "fitting/least_squares/qr_compression.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/level_views.h"
@@ -40,7 +40,7 @@ bool SameBytes(const ControlNet& a, const ControlNet& b) {
          std::memcmp(a.vertices.data(), b.vertices.data(), a.vertices.size() * sizeof(Vec3)) == 0;
 }
 
-TEST(LevelFit, ReproducesASurfaceOfTheSpace) {
+TEST(ScheduleStep, ReproducesASurfaceOfTheSpace) {
   const ControlNet truth = Sheet(6, 5, 3, 4);
   std::vector<Observation> lattice;
   for (int k = 0; k < 31 * 31; ++k) {
@@ -106,7 +106,7 @@ void AddThinPlate(const LevelView& view, const SmoothnessTerm& term, DenseSystem
   }
 }
 
-TEST(LevelFit, EqualsDenseLeastSquares) {
+TEST(ScheduleStep, EqualsDenseLeastSquares) {
   const LevelView view = NoisyView();
   const SmoothnessTerm smoothness{.weight = 0.05};
   const PriorTerm prior{.weight = 0.02};
@@ -127,7 +127,7 @@ TEST(LevelFit, EqualsDenseLeastSquares) {
   }
 }
 
-TEST(LevelFit, TakesTheNearestOfManySolutions) {
+TEST(ScheduleStep, TakesTheNearestOfManySolutions) {
   const ControlNet start = Sheet(6, 5, 0, 0);
   const LevelView view = View(start, Observe(Sheet(6, 5, 4, 6), 9, 7));
   DenseSystem dense;
@@ -147,7 +147,7 @@ TEST(LevelFit, TakesTheNearestOfManySolutions) {
   EXPECT_LT(solution.summary.rms_after_mm, 1e-7);
 }
 
-TEST(LevelFit, CoverageCountsThePointsOfEachPatch) {
+TEST(ScheduleStep, CoverageCountsThePointsOfEachPatch) {
   const PatchCoverage odd = CoverageOf({0, 4, 1, 0, 9}), even = CoverageOf({3, 0, 8});
   EXPECT_EQ(odd.patches, 5);
   EXPECT_EQ(odd.empty_patches, 2);
@@ -156,7 +156,7 @@ TEST(LevelFit, CoverageCountsThePointsOfEachPatch) {
   EXPECT_TRUE(std::isnan(CoverageOf({0, 0}).median_patch_points));
 }
 
-TEST(LevelFit, VerticesThatNoTermTouchesStayToTheBit) {
+TEST(ScheduleStep, VerticesThatNoTermTouchesStayToTheBit) {
   const ControlNet start = Sheet(8, 3, 1, 8);
   const LevelView view = View(start, Observe(Sheet(8, 3, 4, 9), 60, 10, 0, 0.49));  // patches 0..3
   const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
@@ -202,7 +202,7 @@ double ObservationDistance(const LevelView& view, const ControlNet& a, const Con
 
 // A disc of 36 mm without data: exact thin-plate smoothness stays bounded there however weak,
 // where sampled smoothness is known to run away.
-TEST(LevelFit, AHoleInTheDataStaysBounded) {
+TEST(ScheduleStep, AHoleInTheDataStaysBounded) {
   const int m = 16, n = 12;
   const ControlNet rest = Sheet(m, n, 0, 0);
   ControlNet truth = rest;
@@ -260,7 +260,7 @@ ControlNet DenseMinimiser(const LevelView& view) {
 }
 
 // Ceres stops where its cost no longer falls, so it is held to less.
-TEST(LevelFit, ReducedPointsAndTheDirectPathKeepTheMinimiser) {
+TEST(ScheduleStep, ReducedPointsAndTheDirectPathKeepTheMinimiser) {
   const std::vector<Term> points = {PointTerm{}};
   const std::vector<Term> held = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}, PriorTerm{}};
   for (const LevelView& view : ViewsOfEveryRank()) {
@@ -285,7 +285,7 @@ TEST(RowReduction, KeepsTheNormalEquationsInAsFewRows) {
       const Eigen::MatrixXd a = Eigen::MatrixXd::NullaryExpr(count, rank, number) *
                                 Eigen::MatrixXd::NullaryExpr(rank, 16, number);
       const Rows3 b = 100 * Rows3::NullaryExpr(count, 3, number);
-      const LinearRows few = ReducedRows(a, b);
+      const LinearRows few = CompressRows(a, b);
       EXPECT_LE(few.a.rows(), count > 16 ? rank : count);
       EXPECT_LT((few.a.transpose() * few.a - a.transpose() * a).norm(), 1e-13 * a.squaredNorm());
       EXPECT_LT((few.a.transpose() * few.b - a.transpose() * b).norm(),
@@ -294,7 +294,7 @@ TEST(RowReduction, KeepsTheNormalEquationsInAsFewRows) {
   }
 }
 
-TEST(LevelFit, OrderOfPointsChangesNoByte) {
+TEST(ScheduleStep, OrderOfPointsChangesNoByte) {
   LevelView view = NoisyView();
   const std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}};
   const LevelSolution a = FitLevel(view, terms);
@@ -305,7 +305,7 @@ TEST(LevelFit, OrderOfPointsChangesNoByte) {
   EXPECT_EQ(a.summary.rms_after_mm, b.summary.rms_after_mm);
 }
 
-TEST(LevelFit, TheCostFallsAndNoNeighbourIsBetter) {
+TEST(ScheduleStep, TheCostFallsAndNoNeighbourIsBetter) {
   const LevelView view = NoisyView();
   const std::vector<Term> terms = AllTerms();
   const auto cost = [&](const ControlNet& net) {
@@ -334,7 +334,7 @@ TEST(LevelFit, TheCostFallsAndNoNeighbourIsBetter) {
   }
 }
 
-TEST(LevelFit, RobustLossesForgiveOutliers) {
+TEST(ScheduleStep, RobustLossesForgiveOutliers) {
   const ControlNet truth = Sheet(4, 3, 3, 2);
   std::vector<Observation> observations = Observe(truth, 300, 3);
   for (int k = 0; k < 15; ++k) {
@@ -356,7 +356,7 @@ TEST(LevelFit, RobustLossesForgiveOutliers) {
   EXPECT_LT(Distance(FitLevel(near, std::vector<Term>{tukey}).net, truth), 1e-3 * plain);
 }
 
-TEST(LevelFit, NothingToSolveLeavesTheNet) {
+TEST(ScheduleStep, NothingToSolveLeavesTheNet) {
   const LevelView view = View(Sheet(4, 3, 1, 1), {});
   const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
   EXPECT_TRUE(SameBytes(solution.net, view.start));
@@ -365,7 +365,7 @@ TEST(LevelFit, NothingToSolveLeavesTheNet) {
   EXPECT_EQ(solution.summary.rank, 0);
 }
 
-TEST(LevelFit, WrongInputIsNamed) {
+TEST(ScheduleStep, WrongInputIsNamed) {
   LevelView view = NoisyView();
   view.lengths_mm.x() = 0;
   const std::vector<Term> smooth = {PointTerm{}, SmoothnessTerm{}}, points = {PointTerm{}};

@@ -67,7 +67,7 @@ TEST(MeshLaplacian, StaysFiniteAndNegativeOffTheDiagonalOnSliversAndDegenerateTr
   EXPECT_GT(laplacian.area_mm2.minCoeff(), 0);
 }
 
-TEST(Pieces, AreThoseOfTheTriangles) {
+TEST(LabelComponents, AreThoseOfTheTriangles) {
   TriMesh mesh = Plate(10, 2);
   const TriMesh other = Plate(10, 1);
   for (const Triangle& t : other.triangles) {
@@ -75,7 +75,7 @@ TEST(Pieces, AreThoseOfTheTriangles) {
   }
   mesh.points.insert(mesh.points.end(), other.points.begin(), other.points.end());
   mesh.points.emplace_back(0, 0, 9);
-  EXPECT_THAT(Pieces(BuildLaplacian(mesh).stiffness),
+  EXPECT_THAT(LabelComponents(BuildLaplacian(mesh).stiffness),
               ::testing::ElementsAre(0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2));
 }
 

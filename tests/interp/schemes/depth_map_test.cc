@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/whole_file.h"
 #include "surfaces/mesh/mesh_io.h"
 #include "tests/testing/dowel_scenes.h"
 #include "tests/testing/scratch_file.h"

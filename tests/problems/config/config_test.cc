@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-#include "problems/config/nearest_word.h"
+#include "problems/config/spelling_suggestion.h"
 #include "tests/testing/config_samples.h"
 
 namespace semblance {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "problems/ct/edge_shift.h"
+#include "problems/ct/half_maximum_edge.h"
 #include "surfaces/marching/polygonize.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/ct_phantom.h"

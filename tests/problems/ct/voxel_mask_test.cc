@@ -35,7 +35,7 @@ bool ShareAFace(std::int64_t a, std::int64_t b) {
 TEST(VoxelMask, GrowIsTheBruteForceDistance) {
   const VoxelMask mask = RandomMask(1, 0.02);
   for (const double reach : {0.0, 0.9, 2.1, 4.0}) {
-    const VoxelMask grown = Grow(mask, kGrid, reach, 2);
+    const VoxelMask grown = Dilate(mask, kGrid, reach, 2);
     for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
       bool near = false;
       for (std::int64_t m = 0; m < kGrid.Count(); ++m) {
@@ -48,7 +48,7 @@ TEST(VoxelMask, GrowIsTheBruteForceDistance) {
 
 TEST(VoxelMask, PiecesAreThoseOfAGraphSearch) {
   const VoxelMask mask = RandomMask(2, 0.35);
-  const VoxelPieces pieces = FindPieces(mask, kGrid);
+  const VoxelComponents pieces = LabelComponents(mask, kGrid);
   std::int64_t total = 0;
   for (const std::int64_t size : pieces.sizes) {
     total += size;
@@ -67,7 +67,7 @@ TEST(VoxelMask, PiecesAreThoseOfAGraphSearch) {
 TEST(VoxelMask, AFloodIsThePiecesThatItsSeedsTouch) {
   const VoxelMask allowed = RandomMask(3, 0.4), seeds = RandomMask(4, 0.05);
   const VoxelMask reached = Flood(allowed, seeds, kGrid);
-  const VoxelPieces pieces = FindPieces(allowed, kGrid);
+  const VoxelComponents pieces = LabelComponents(allowed, kGrid);
   std::vector<bool> wet(pieces.sizes.size(), false);
   for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
     if (allowed[n] && seeds[n]) {

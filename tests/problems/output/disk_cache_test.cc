@@ -10,7 +10,7 @@
 #include "problems/output/manifest.h"
 #include "problems/pipeline/implicit_cache.h"
 #include "problems/subject/phantom.h"
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {

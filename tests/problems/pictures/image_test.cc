@@ -9,8 +9,8 @@
 #include <cmath>
 
 #include "problems/pictures/colour_map.h"
-#include "problems/pictures/lettering.h"
 #include "problems/pictures/srgb.h"
+#include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "problems/pictures/mesh_primitives.h"
 #include "problems/pictures/pictures.h"
-#include "problems/pictures/solids.h"
 #include "problems/pictures/srgb.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"

@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_io.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/shapes.h"

@@ -11,7 +11,7 @@
 #include "problems/report/report.h"
 #include "problems/report/report_assets.h"
 #include "problems/report/scene_json.h"
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {

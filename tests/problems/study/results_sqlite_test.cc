@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ScratchFolder;
 
-TEST(StudyPace, SaysRateAndTimeLeftOfWhatWasDoneHere) {
+TEST(StudyEta, SaysRateAndTimeLeftOfWhatWasDoneHere) {
   EXPECT_EQ(PaceText({.trials = 80, .finished = 30, .finished_before = 20, .elapsed_s = 40}),
             "30 of 80 trials, 4.0 s each, about 3 min left");
   EXPECT_EQ(PaceText({.trials = 80, .finished = 21, .finished_before = 1, .elapsed_s = 4}),
@@ -28,7 +28,7 @@ TEST(StudyPace, SaysRateAndTimeLeftOfWhatWasDoneHere) {
             "3 of 8 trials, 75 s so far");
 }
 
-TEST(StudyPace, TheBarFillsFromEmptyToFull) {
+TEST(StudyEta, TheBarFillsFromEmptyToFull) {
   EXPECT_EQ(BarText({.trials = 4, .finished = 0}, 8), "[........]");
   EXPECT_EQ(BarText({.trials = 4, .finished = 3}, 8), "[######..]");
   EXPECT_EQ(BarText({.trials = 4, .finished = 4}, 8), "[########]");

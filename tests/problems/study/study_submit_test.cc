@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {

@@ -12,7 +12,7 @@
 #include "problems/study/study_report.h"
 #include "problems/study/study_rows.h"
 #include "problems/study/study_run.h"
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "problems/subject/patch_normal.h"
+#include "problems/subject/averaged_normal.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
@@ -147,7 +147,7 @@ TriMesh Roof(double slope, int n) {
   return mesh;
 }
 
-TEST(PatchNormal, IsWeightedByAreaNotByTriangles) {
+TEST(AveragedNormal, IsWeightedByAreaNotByTriangles) {
   // Points crowd on the left of the ridge; both sides weigh the same all the same.
   TriMesh mesh = Plate(40, 80);
   for (Vec3& p : mesh.points) {
@@ -159,7 +159,7 @@ TEST(PatchNormal, IsWeightedByAreaNotByTriangles) {
   EXPECT_LT(DegreesBetween(dowel.direction, Vec3(0, 0, 1)), 2);
 }
 
-TEST(PatchNormal, IsTheSameOnACoarseMeshAndOnAFineOne) {
+TEST(AveragedNormal, IsTheSameOnACoarseMeshAndOnAFineOne) {
   const Vec3 base(21, 20, -0.5);
   const Sphere ball{base, 3};
   const auto nearest = [&](const TriMesh& mesh) {
@@ -173,13 +173,13 @@ TEST(PatchNormal, IsTheSameOnACoarseMeshAndOnAFineOne) {
     return best;
   };
   const TriMesh coarse = Roof(0.5, 2), fine = Roof(0.5, 100);
-  const Vec3 a = PatchNormal(coarse, nearest(coarse), ball);
-  const Vec3 b = PatchNormal(fine, nearest(fine), ball);
+  const Vec3 a = AveragedNormal(coarse, nearest(coarse), ball);
+  const Vec3 b = AveragedNormal(fine, nearest(fine), ball);
   EXPECT_LT(DegreesBetween(a, b), 1);
   EXPECT_GT(DegreesBetween(b, Vec3(0, 0, 1)), 5);  // more of the right side is within reach
 }
 
-TEST(PatchNormal, TheInnerSideOfAThinWallHasNoSay) {
+TEST(AveragedNormal, TheInnerSideOfAThinWallHasNoSay) {
   TriMesh wall = Plate(40, 40);
   const int count = static_cast<int>(wall.points.size());
   const TriMesh front = wall;
@@ -193,7 +193,7 @@ TEST(PatchNormal, TheInnerSideOfAThinWallHasNoSay) {
   EXPECT_LT(DegreesBetween(dowel.direction, Vec3(0, 0, 1)), 1e-6);
 }
 
-TEST(PatchNormal, TheBackOfAThinWallHasNoSayNearItsRim) {
+TEST(AveragedNormal, TheBackOfAThinWallHasNoSayNearItsRim) {
   TriMesh disc = SphereMesh({0, 0, 0}, 50, 200);  // front and back hang together over the rim
   for (Vec3& p : disc.points) {
     p.z() *= 0.01;

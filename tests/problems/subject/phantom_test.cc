@@ -219,7 +219,7 @@ TEST(Phantom, RingsOutOfRangeAreNamed) {
 }
 
 TEST(PhantomShape, NormalIsThatOfTheSurfaceByDifferences) {
-  SeededNumbers random(3);
+  UniformRandom random(3);
   const PhantomShape shape(random);
   const auto point = [&](const Vec3& x) {
     return Vec3(shape.Radius(x.normalized()) * x.normalized());

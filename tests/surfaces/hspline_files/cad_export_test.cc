@@ -17,7 +17,7 @@
 #include <TopoDS_Face.hxx>
 #include <numeric>
 
-#include "surfaces/base/whole_file.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/hspline/patch_regions.h"
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"

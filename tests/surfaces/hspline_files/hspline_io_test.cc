@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/whole_file.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "tests/testing/splines.h"
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a patch's points contribute to the normal equations of its sixteen control vertices, in one
+// pass over the points.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "fitting/adaptive/point_cloud.h"
+#include "fitting/least_squares/patch_energy.h"
+
+namespace semblance {
+
+using PatchMatrix = Eigen::Matrix<double, 16, 3>;  // sixteen vertices' x, y, z
+
+// Sums over the points of a patch, in the powers of z = 2 s - 1 and of the same along v.
+struct PatchMoments {
+  alignas(64) double moments[7][8] = {};    // [q][p]: of w z_u^p z_v^q, p and q up to 6
+  alignas(64) double residual[16][4] = {};  // [a + 4 b]: of w z_u^a z_v^b e, e the residual p - S
+  double squares = 0;                       // of w |e|^2
+  double largest = 0;                       // |e|^2, of points whose factor is 0.5 or more
+};
+
+// What AddPoints takes and gives one a point; each may be null.
+struct PointFactors {
+  const double* factors = nullptr;  // of the points' weights
+  double* squares = nullptr;        // |e|^2
+};
+
+// Adds the points of `patch`, whose surface is the bicubic B-spline of `vertices`.
+// moments: whether they too are wanted (they do not change with the vertices).
+void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
+               const PatchMatrix& vertices, bool moments, const PointFactors& each,
+               PatchMoments& sums);
+
+// Sum of w N_k N_l, and of w N_k e, N_k being the weight of vertex k.
+PatchForm GramOf(const PatchMoments& sums);
+PatchMatrix ResidualOf(const PatchMoments& sums);
+
+// The vertices of the child (right, upper: 0 or 1) of a patch, 16 x 16: RefinePatch as a matrix.
+const PatchForm& RefinementMatrix(int right, int upper);
+
+}  // namespace semblance

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/adaptive/refinement_marking.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <tuple>
+
+namespace semblance {
+namespace {
+
+// Vertices of the next level on the knots of a patch (and beyond, at a border or by the margin)
+// that are not edited.
+std::vector<VertexId> MissingOver(const OffsetTree& tree, const PatchId& patch, int margin) {
+  const HSplineShape& shape = tree.shape();
+  const int level = patch.level + 1, columns = shape.Columns(level), rows = shape.Rows(level);
+  const bool periodic = shape.closure == Closure::kPeriodicU;
+  const auto first = [&](int k) { return k == 0 ? 0 : 2 * k + 1; };
+  const auto last = [&](int k, int patches) { return 2 * k + (k == patches - 1 ? 4 : 3); };
+  const int i0 = (periodic ? 2 * patch.i + 1 : first(patch.i)) - margin,
+            i1 = (periodic ? 2 * patch.i + 3 : last(patch.i, shape.PatchesU(patch.level))) + margin,
+            j0 = std::max(first(patch.j) - margin, 0),
+            j1 = std::min(last(patch.j, shape.PatchesV(patch.level)) + margin, rows - 1);
+  std::vector<VertexId> missing;
+  for (int j = j0; j <= j1; ++j) {
+    for (int i = i0; i <= i1; ++i) {
+      if (!periodic && (i < 0 || i >= columns)) {
+        continue;
+      }
+      const VertexId vertex{level, ((i % columns) + columns) % columns, j};
+      if (!tree.IsEdited(vertex)) {
+        missing.push_back(vertex);
+      }
+    }
+  }
+  return missing;
+}
+
+// How many points the patches of a tree hold.
+class PatchCounts {
+ public:
+  explicit PatchCounts(const OffsetTree& tree) : shape_(tree.shape()) {
+    for (const TreeNode& node : tree.nodes()) {
+      counts_.emplace(KeyOf(node.patch), node.range.size());
+    }
+  }
+
+  // Of the eight patches around one, those that have plainly fewer points than it: a gap, or its
+  // edge. A quarter is seldom by chance where there are min_points.
+  std::vector<PatchId> EmptierAround(const PatchId& patch) const {
+    const std::size_t own = counts_.at(KeyOf(patch));
+    std::vector<PatchId> emptier;
+    for (int k = 0; k < 9; ++k) {
+      PatchId other{patch.level, patch.i + k % 3 - 1, patch.j + k / 3 - 1};
+      if (shape_.closure == Closure::kPeriodicU) {
+        const int around = shape_.PatchesU(patch.level);
+        other.i = (other.i + around) % around;
+      }
+      const auto found = counts_.find(KeyOf(other));
+      if (found != counts_.end() && 4 * found->second < own) {
+        emptier.push_back(other);
+      }
+    }
+    return emptier;
+  }
+
+ private:
+  using Key = std::tuple<int, int, int>;
+  static Key KeyOf(const PatchId& p) { return {p.level, p.i, p.j}; }
+
+  HSplineShape shape_;
+  std::map<Key, std::size_t> counts_;
+};
+
+}  // namespace
+
+std::vector<VertexId> MarkForRefinement(const OffsetTree& tree, const AdaptivePlan& plan) {
+  const double most = plan.tolerance_mm * plan.tolerance_mm;
+  const PatchCounts counts(tree);
+  std::set<VertexId> finer;
+  for (const TreeNode& leaf : tree.nodes()) {
+    if (leaf.children >= 0 || !(leaf.sums.largest > most) ||
+        leaf.range.size() < static_cast<std::size_t>(plan.min_points)) {
+      continue;
+    }
+    for (int level = 0; level <= leaf.patch.level && level < plan.finest; ++level) {
+      const int shift = leaf.patch.level - level;
+      const PatchId patch{level, leaf.patch.i >> shift, leaf.patch.j >> shift};
+      const std::vector<VertexId> missing = MissingOver(tree, patch, plan.margin);
+      if (missing.empty()) {
+        continue;
+      }
+      finer.insert(missing.begin(), missing.end());
+      for (const PatchId& gap : counts.EmptierAround(patch)) {
+        const std::vector<VertexId> into = MissingOver(tree, gap, plan.margin);
+        finer.insert(into.begin(), into.end());
+      }
+      break;
+    }
+  }
+  return {finer.begin(), finer.end()};
+}
+
+}  // namespace semblance

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Ceres on separable terms: its parameter blocks are tiles of 3 x 3 control vertices, one
+// coordinate each, which its sparse Cholesky likes far better than single vertices.
+#include <ceres/cost_function.h>
+#include <ceres/problem.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "fitting/least_squares/qr_compression.h"
+#include "fitting/level/level_cost.h"
+#include "fitting/level/level_solver.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kSide = 3, kTile = kSide * kSide;
+
+// Of all residuals. Ceres stops where the vertices less their gradient are the vertices again, to
+// the last digit; in these units the gradient is larger by the square.
+constexpr double kScale = 1e4;
+
+struct Slot {
+  int tile = -1;   // of the net; in a block of rows: which of its tiles
+  int place = -1;  // in the tile
+};
+
+// A X - B over some vertices of the net; its tiles and where each column is in them.
+struct TileRows {
+  std::shared_ptr<const Eigen::MatrixXd> a;
+  Rows3 b;
+  std::vector<int> tiles;
+  std::vector<Slot> columns;
+};
+
+// One coordinate of TileRows.
+class BlockedLinearCost final : public ceres::CostFunction {
+ public:
+  BlockedLinearCost(std::shared_ptr<const TileRows> rows, int coordinate)
+      : rows_(std::move(rows)), coordinate_(coordinate) {
+    mutable_parameter_block_sizes()->assign(rows_->tiles.size(), kTile);
+    set_num_residuals(static_cast<int>(rows_->a->rows()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, kTile, Eigen::RowMajor>;
+    const Eigen::MatrixXd& a = *rows_->a;
+    Eigen::Map<Eigen::VectorXd> r(residuals, a.rows());
+    r = -rows_->b.col(coordinate_);
+    for (std::size_t t = 0; jacobians != nullptr && t < rows_->tiles.size(); ++t) {
+      if (jacobians[t] != nullptr) {
+        Eigen::Map<Jacobian>(jacobians[t], a.rows(), kTile).setZero();
+      }
+    }
+    for (Eigen::Index k = 0; k < a.cols(); ++k) {
+      const Slot& slot = rows_->columns[k];
+      r += a.col(k) * parameters[slot.tile][slot.place];
+      if (jacobians != nullptr && jacobians[slot.tile] != nullptr) {
+        Eigen::Map<Jacobian>(jacobians[slot.tile], a.rows(), kTile).col(slot.place) += a.col(k);
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::shared_ptr<const TileRows> rows_;
+  int coordinate_;
+};
+
+// Keeps the rows of all terms, those of a patch reduced to at most sixteen.
+class BlockedRowSink final : public RowSink {
+ public:
+  explicit BlockedRowSink(const PatchGrid& grid)
+      : grid_(grid), touched_(grid.Columns() * grid.Rows()) {}
+
+  void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
+           std::span<const int> vertices) override {
+    if (a->rows() > a->cols()) {
+      LinearRows reduced = CompressRows(*a, b);
+      a = std::make_shared<const Eigen::MatrixXd>(std::move(reduced.a));
+      b = std::move(reduced.b);
+    }
+    TileRows rows{.a = std::make_shared<const Eigen::MatrixXd>(kScale * *a),
+                  .b = kScale * b,
+                  .tiles = {},
+                  .columns = {}};
+    for (std::size_t k = 0; k < vertices.size(); ++k) {
+      const Slot slot = SlotOf(vertices[k]);
+      const auto at = std::find(rows.tiles.begin(), rows.tiles.end(), slot.tile);
+      rows.columns.push_back({static_cast<int>(at - rows.tiles.begin()), slot.place});
+      if (at == rows.tiles.end()) {
+        rows.tiles.push_back(slot.tile);
+      }
+      if (!rows.a->col(static_cast<Eigen::Index>(k)).isZero(0)) {
+        touched_[vertices[k]] = 1;
+      }
+    }
+    rows_.push_back(std::make_shared<const TileRows>(std::move(rows)));
+  }
+
+  int Tiles() const { return TilesAcross() * ((grid_.Rows() + kSide - 1) / kSide); }
+  Slot SlotOf(int vertex) const {
+    const int i = vertex % grid_.Columns(), j = vertex / grid_.Columns();
+    return {i / kSide + TilesAcross() * (j / kSide), i % kSide + kSide * (j % kSide)};
+  }
+  int Touched() const { return static_cast<int>(std::count(touched_.begin(), touched_.end(), 1)); }
+  const std::vector<std::shared_ptr<const TileRows>>& rows() const { return rows_; }
+
+ private:
+  int TilesAcross() const { return (grid_.Columns() + kSide - 1) / kSide; }
+
+  PatchGrid grid_;
+  std::vector<char> touched_;  // vertices
+  std::vector<std::shared_ptr<const TileRows>> rows_;
+};
+
+// Solves for one coordinate of the net.
+ceres::Solver::Summary SolveCoordinate(const BlockedRowSink& sink, int coordinate,
+                                       const ceres::Solver::Options& options, ControlNet& net) {
+  std::vector<std::array<double, kTile>> tiles(sink.Tiles());
+  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+    const Slot slot = sink.SlotOf(static_cast<int>(k));
+    tiles[slot.tile][slot.place] = net.vertices[k][coordinate];
+  }
+  ceres::Problem problem;
+  for (const auto& rows : sink.rows()) {
+    std::vector<double*> blocks;
+    for (const int tile : rows->tiles) {
+      blocks.push_back(tiles[tile].data());
+    }
+    problem.AddResidualBlock(new BlockedLinearCost(rows, coordinate), nullptr, blocks);
+  }
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  for (std::size_t k = 0; summary.IsSolutionUsable() && k < net.vertices.size(); ++k) {
+    const Slot slot = sink.SlotOf(static_cast<int>(k));
+    net.vertices[k][coordinate] = tiles[slot.tile][slot.place];
+  }
+  return summary;
+}
+
+}  // namespace
+
+SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
+  BlockedRowSink sink(view.grid);
+  AddAllRows(view, terms, sink);
+  SolverOutcome outcome{.free_vertices = sink.Touched()};
+  if (outcome.free_vertices == 0) {
+    return outcome;
+  }
+  const ControlNet before = net;
+  ceres::Solver::Options options = CeresOptions(terms, net.vertices.size());
+  options.initial_trust_region_radius /= kScale * kScale;
+  options.max_trust_region_radius /= kScale * kScale;
+  for (int coordinate = 0; coordinate < 3; ++coordinate) {
+    const ceres::Solver::Summary summary = SolveCoordinate(sink, coordinate, options, net);
+    const int steps = static_cast<int>(summary.iterations.size()) - 1;
+    if (coordinate == 0 || steps >= outcome.iterations) {
+      outcome.iterations = steps;
+      outcome.termination = TerminationName(summary.termination_type);
+    }
+    outcome.usable = outcome.usable && summary.IsSolutionUsable();
+  }
+  if (!outcome.usable) {
+    outcome.termination = "failure";
+    net = before;
+  }
+  return outcome;
+}
+
+}  // namespace semblance

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How a surface's first fundamental form differs from a template's at the same (u,v).
+#pragma once
+
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "surfaces/base/geometry.h"
+
+namespace semblance {
+
+// One of the 2 x 2 Gauss points of each of columns x rows patches; k: 0 .. 4 columns rows - 1,
+// those of a patch in a row.
+inline Vec2 GaussPoint(int k, int columns, int rows) {
+  const double off = 0.5 / std::numbers::sqrt3;
+  return {(k / 4 % columns + 0.5 + (k % 2 == 0 ? -off : off)) / columns,
+          (k / 4 / columns + 0.5 + (k % 4 < 2 ? -off : off)) / rows};
+}
+
+// Where the template's unit tangents go: e1 along its du, e2 across in its tangent plane. Both are
+// linear in a surface's derivatives: x1 = a1 du, x2 = a2 du + b2 dv.
+struct TemplateAxes {
+  // Nothing where the template's tangents vanish or are parallel.
+  static std::optional<TemplateAxes> At(const Vec3& rest_du, const Vec3& rest_dv) {
+    const double length = rest_du.norm(), area = rest_du.cross(rest_dv).norm();
+    if (!(area > 1e-12 * (rest_du.squaredNorm() + rest_dv.squaredNorm()))) {
+      return std::nullopt;
+    }
+    TemplateAxes axes;
+    axes.a1 = 1 / length;
+    axes.b2 = length / area;
+    axes.a2 = -rest_du.dot(rest_dv) / (length * length) * axes.b2;
+    axes.area = area;
+    return axes;
+  }
+
+  double a1 = kNaN, a2 = kNaN, b2 = kNaN;  // 1/mm
+  double area = kNaN;                      // of the template per unit of u x v, mm^2
+};
+
+// Green's strain in the template's axes, and the change of area; all zero for an isometry.
+struct Strain {
+  double e11 = kNaN, e22 = kNaN, e12 = kNaN;
+  double area = kNaN;  // of the surface over that of the template, less 1
+
+  double SquaredNorm() const { return e11 * e11 + e22 * e22 + 2 * e12 * e12; }
+};
+
+inline Strain StrainOf(const TemplateAxes& axes, const Vec3& du, const Vec3& dv) {
+  const Vec3 x1 = axes.a1 * du, x2 = axes.a2 * du + axes.b2 * dv;
+  return {.e11 = (x1.squaredNorm() - 1) / 2,
+          .e22 = (x2.squaredNorm() - 1) / 2,
+          .e12 = x1.dot(x2) / 2,
+          .area = x1.cross(x2).norm() - 1};
+}
+
+}  // namespace semblance

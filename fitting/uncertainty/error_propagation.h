@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How the errors of the points that a surface was fitted to, which may hang together, spread over
+// it. Where posterior.h asks what a fit with the best weights would know, this asks how far the fit
+// that was made may be off.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "fitting/problem/fit_target.h"
+#include "fitting/terms/term.h"
+#include "surfaces/hspline/hspline_surface.h"
+
+namespace semblance {
+
+struct PointErrors {
+  std::vector<Vec3> directions;  // unit, one a point: along which it may be off
+  Eigen::MatrixXd root;          // points x any number; root root^T is the covariance, mm^2
+};
+
+// A root as PointErrors takes it of a positive semidefinite matrix: its Cholesky factor with
+// pivots, cut off where what is left of each variance is below `share` of the largest (Harbrecht,
+// Peters & Schneider 2012).
+Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd covariance, double share = 1e-3);
+
+// The surface's error is linear in three that do not hang together. With the level's normal matrix
+// M = A'WA + P, of points and other terms at the weights of the fit:
+//   M^-1 A'W e, the points' errors e as given;
+//   M^-1 P (c - c0), what the other terms hold back: the true net is off the one that they draw to
+//     by their own distribution, of the precision P / prior_sd^2;
+//   M^-1 (A'W p + P c0) - c, what the schedule has left undone; known, but taken as a deviation.
+// prior_sd^2 is what the other terms cost at the solution, by coordinate, over the number of
+// parameters that the points determine, trace(M^-1 A'WA) (MacKay 1992).
+// Where only some of the level's vertices are edited (adaptive fits) M^-1 stays within what those
+// and the coarser ones can do (subspace.h). Points with a robust loss count with the weights
+// that they have at the solution, and tangent_points as points. Terms that couple x, y and z
+// otherwise are left out, as if nothing were known of what they say: the errors are then
+// overestimated rather than under.
+class ErrorPropagation {
+ public:
+  // surface: fitted to `target`, whose (u,v) are where the fit left them. level: the finest that
+  // was fitted; finer detail is taken as known. rest: the placed template. Throws InputError for a
+  // level that is not there, errors that are not one a point, or terms of which none with a weight
+  // is of the points; and where `weight: auto` cannot be.
+  ErrorPropagation(const HSplineSurface& surface, const HSplineSurface& rest,
+                   const FitTarget& target, int level, std::span<const Term> terms,
+                   const PointErrors& errors);
+  ~ErrorPropagation();
+  ErrorPropagation(ErrorPropagation&&) noexcept;
+
+  // Standard deviations in mm along `normals` (unit, one a uv) of the surface's points at uv; NaN
+  // where no term says anything.
+  std::vector<double> Sigma(std::span<const Vec2> uv, std::span<const Vec3> normals) const;
+
+  // Draws from the same distribution; finer detail rides along. count >= 0; the same draws for the
+  // same random_seed.
+  std::vector<HSplineSurface> Samples(int count, std::uint64_t random_seed) const;
+
+  double prior_sd() const;                         // see above
+  double determined() const;                       // trace(M^-1 A'WA): parameters, a coordinate
+  std::vector<std::string_view> left_out() const;  // names of the terms that were
+
+ private:
+  struct Model;
+  std::unique_ptr<const Model> model_;
+};
+
+}  // namespace semblance

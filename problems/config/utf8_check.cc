@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/config/utf8_check.h"
+
+#include <algorithm>
+
+namespace semblance {
+namespace {
+
+unsigned char ByteAt(std::string_view text, std::size_t i) {
+  return static_cast<unsigned char>(text[i]);
+}
+
+// The length of the UTF-8 sequence at `i`; 0 if there is none.
+std::size_t SequenceLength(std::string_view text, std::size_t i) {
+  const unsigned char first = ByteAt(text, i);
+  const std::size_t length = first < 0x80                    ? 1
+                             : first >= 0xC2 && first < 0xE0 ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
+  if (length == 0 || i + length > text.size()) {
+    return 0;
+  }
+  for (std::size_t k = 1; k < length; ++k) {
+    if ((ByteAt(text, i + k) & 0xC0) != 0x80) {
+      return 0;
+    }
+  }
+  return length;
+}
+
+bool IsControl(char c) {
+  const auto byte = static_cast<unsigned char>(c);
+  return byte < 0x20 || byte == 0x7F;
+}
+
+// The first complaint about a line, or "". `column` is where, from 0.
+std::string_view FindFault(std::string_view line, std::size_t& column) {
+  const std::size_t first = line.find_first_not_of(" \t");
+  const bool is_comment = first != line.npos && line[first] == '#';
+  for (column = 0; column < line.size();) {
+    const std::size_t length = SequenceLength(line, column);
+    if (length == 0) {
+      return "a byte that is not UTF-8; save the file as UTF-8";
+    }
+    if (line[column] == '\t' && !is_comment) {
+      return "a tab; use spaces (in a text, write \"\\t\")";
+    }
+    if (line[column] != '\t' && IsControl(line[column])) {
+      return "a control character; remove it";
+    }
+    column += length;
+  }
+  return {};
+}
+
+}  // namespace
+
+bool RequireReadableBytes(std::string_view text, const std::shared_ptr<const ConfigSource>& source,
+                          ConfigErrors& errors) {
+  bool is_readable = true;
+  int line_number = 0;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    ++line_number;
+    if (line.ends_with('\r')) {
+      line.remove_suffix(1);
+    }
+    std::size_t column = 0;
+    const std::string_view fault = FindFault(line, column);
+    if (!fault.empty()) {
+      errors.Add({source, line_number, static_cast<int>(column) + 1}, "", fault);
+      is_readable = false;
+    }
+  }
+  return is_readable;
+}
+
+}  // namespace semblance

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/ct/half_maximum_edge.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "surfaces/base/parallel.h"
+
+namespace semblance {
+namespace {
+
+// Values along a line through p, from -reach (inside) to +reach.
+std::vector<double> Profile(const CtVolume& volume, const HalfMaximumOptions& o, const Vec3& p,
+                            const Vec3& outward) {
+  const int steps = static_cast<int>(std::lround(o.reach_mm / o.step_mm));
+  std::vector<double> profile;
+  for (int n = -steps; n <= steps; ++n) {
+    profile.push_back(SampleHu(volume, p + n * o.step_mm * outward));
+  }
+  return profile;
+}
+
+// Where, nearest to the middle of the profile, it falls through half way between its plateaus;
+// NaN if that is too far. The plateaus are the tops that the slope at the middle leads to.
+double HalfMaximum(const std::vector<double>& profile, const HalfMaximumOptions& o) {
+  const int middle = static_cast<int>(profile.size() / 2), last = static_cast<int>(profile.size());
+  int in = middle, out = middle;
+  while (in > 0 && profile[in - 1] >= profile[in]) {
+    --in;
+  }
+  while (out + 1 < last && profile[out + 1] <= profile[out]) {
+    ++out;
+  }
+  const double half = 0.5 * (profile[in] + profile[out]);
+  for (int n = in; n < out; ++n) {
+    if (profile[n] >= half && profile[n + 1] < half) {
+      const double t = (profile[n] - half) / (profile[n] - profile[n + 1]);
+      const double move = (n + t - middle) * o.step_mm;
+      return std::abs(move) <= o.most_move_mm ? move : kNaN;
+    }
+  }
+  return kNaN;
+}
+
+// Each move becomes the mean of its own and those of its neighbours. Marching cubes leaves slivers,
+// whose corners have unlike normals: as vectors, smoothed, their moves do not turn them over.
+std::vector<Vec3> Smoothed(const TriMesh& mesh, const std::vector<Vec3>& moves) {
+  std::vector<Vec3> sum(moves.size(), Vec3::Zero());
+  std::vector<double> count(moves.size(), 0);
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 all = moves[t[0]] + moves[t[1]] + moves[t[2]];
+    for (const std::int32_t corner : t) {
+      sum[corner] += all;
+      count[corner] += 3;
+    }
+  }
+  for (std::size_t v = 0; v < sum.size(); ++v) {
+    sum[v] = count[v] > 0 ? Vec3(sum[v] / count[v]) : moves[v];
+  }
+  return sum;
+}
+
+// Vertices on a side of the volume stay on it, for there the mesh is cut open, and none leaves the
+// volume.
+Vec3 MovedInside(const CtVolume& volume, const Vec3& p, const Vec3& move) {
+  Box3 box;
+  box.extend(volume.World(0, 0, 0));
+  box.extend(volume.World(volume.columns - 1, volume.rows - 1, volume.slices - 1));
+  Vec3 moved = (p + move).cwiseMax(box.min()).cwiseMin(box.max());
+  for (int axis = 0; axis < 3; ++axis) {
+    if (p[axis] == box.min()[axis] || p[axis] == box.max()[axis]) {
+      moved[axis] = p[axis];
+    }
+  }
+  return moved;
+}
+
+}  // namespace
+
+double MoveToHalfMaximum(const CtVolume& volume, const HalfMaximumOptions& options,
+                         const RunContext& context, TriMesh& mesh) {
+  const std::vector<Vec3> normals = VertexNormals(mesh);
+  std::vector<Vec3> moves(mesh.points.size());
+  ParallelFor(moves.size(), context.threads, 1024, [&](std::size_t v) {
+    const double move = HalfMaximum(Profile(volume, options, mesh.points[v], normals[v]), options);
+    moves[v] = (std::isfinite(move) ? move : 0) * normals[v];
+  });
+  for (int n = 0; n < options.smoothings; ++n) {
+    moves = Smoothed(mesh, moves);
+  }
+  double sum = 0;
+  for (std::size_t v = 0; v < moves.size(); ++v) {
+    mesh.points[v] = MovedInside(volume, mesh.points[v], moves[v]);
+    sum += moves[v].dot(normals[v]);
+  }
+  return moves.empty() ? 0 : sum / static_cast<double>(moves.size());
+}
+
+}  // namespace semblance

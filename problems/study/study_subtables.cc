@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study/study_subtables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+namespace semblance {
+namespace {
+
+// A column of a table: its head and the metric in it.
+struct Column {
+  std::string head, metric;
+};
+
+// Over the trials of the treatment that are done, in the order of the plan; NaN for none.
+double MeanOf(const StudyResults& results, const Treatment& treatment, const std::string& metric,
+              double (*of)(double)) {
+  double sum = 0;
+  int count = 0;
+  for (const std::size_t n : treatment.trials) {
+    const auto& metrics = results.trials[n].metrics;
+    if (const auto it = metrics.find(metric); it != metrics.end()) {
+      sum += of(it->second);
+      ++count;
+    }
+  }
+  return count > 0 ? sum / count : kNaN;
+}
+double Itself(double x) { return x; }
+double Square(double x) { return x * x; }
+
+ReportTable TableOf(const StudyResults& results, const std::vector<Treatment>& ranked,
+                    const std::string& caption, const std::vector<Column>& columns) {
+  ReportTable table{caption, {"treatment"}, {}};
+  std::set<std::string> known;
+  for (const TrialRow& row : results.trials) {
+    for (const auto& [metric, value] : row.metrics) {
+      known.insert(metric);
+    }
+  }
+  for (const Treatment& treatment : ranked) {
+    table.rows.push_back({treatment.label});
+  }
+  for (const Column& column : columns) {
+    if (known.contains(column.metric)) {
+      table.header.push_back(column.head);
+      for (std::size_t n = 0; n < ranked.size(); ++n) {
+        table.rows[n].push_back(TableNumber(MeanOf(results, ranked[n], column.metric, Itself)));
+      }
+    }
+  }
+  if (table.header.size() == 1) {
+    table.rows.clear();
+  }
+  return table;
+}
+
+// Names n of metrics `prefix`n`suffix`, sorted.
+std::set<std::string> NamesBetween(const StudyResults& results, const std::string& prefix,
+                                   const std::string& suffix) {
+  std::set<std::string> names;
+  for (const TrialRow& row : results.trials) {
+    for (auto it = row.metrics.lower_bound(prefix);
+         it != row.metrics.end() && it->first.starts_with(prefix); ++it) {
+      const std::string rest = it->first.substr(prefix.size());
+      const std::string name = rest.substr(0, rest.size() - std::min(rest.size(), suffix.size()));
+      if (rest.ends_with(suffix) && name.find('.') == std::string::npos) {
+        names.insert(name);
+      }
+    }
+  }
+  return names;
+}
+
+ReportTable SiblingsTable(const StudyResults& results, const std::vector<Treatment>& ranked,
+                          const std::string& parent) {
+  std::vector<Column> columns;
+  for (const auto& [head, name] : std::to_array<std::pair<const char*, const char*>>(
+           {{"RMS (mm)", "rms_mm"},
+            {"mean (mm)", "mean_abs_mm"},
+            {"median (mm)", "median_mm"},
+            {"p95 (mm)", "p95_mm"},
+            {"max (mm)", "max_mm"},
+            {"signed mean (mm)", "mean_signed_mm"},
+            {"within stated 90 %", "coverage_90"}})) {
+    columns.push_back({head, parent + name});
+  }
+  return TableOf(results, ranked, "The same error by other measures, means over subjects", columns);
+}
+
+ReportTable RegionsTable(const StudyResults& results, const std::vector<Treatment>& ranked,
+                         const std::string& parent, const std::string& leaf) {
+  std::vector<Column> columns;
+  const std::string prefix = parent + "regions.", suffix = "." + leaf;
+  for (const std::string& name : NamesBetween(results, prefix, suffix)) {
+    columns.push_back({name, prefix + name + suffix});
+  }
+  return TableOf(results, ranked, fmt::format("{} by part of the face, means over subjects", leaf),
+                 columns);
+}
+
+ReportTable LeftOutTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  std::vector<Column> columns;
+  for (const auto& [kind, words] : std::to_array<std::pair<const char*, const char*>>(
+           {{"landmark", "a landmark"}, {"side", "a side"}, {"k_fold", "a random part"}})) {
+    columns.push_back(
+        {fmt::format("{}: RMS (mm)", words), fmt::format("cross_validation.{}.rms_mm", kind)});
+    columns.push_back({fmt::format("{}: within 90 %", words),
+                       fmt::format("cross_validation.{}.coverage_90", kind)});
+  }
+  return TableOf(results, ranked, "Dowels left out and predicted, means over subjects", columns);
+}
+
+ReportTable SitesTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  const std::string prefix = "cross_validation.landmark.sites.";
+  ReportTable table{
+      "RMS error (mm) of each dowel when its landmark is left out, over subjects", {"site"}, {}};
+  for (const Treatment& treatment : ranked) {
+    table.header.push_back(treatment.label);
+  }
+  for (const std::string& site : NamesBetween(results, prefix, "")) {
+    std::vector<std::string> row = {site};
+    for (const Treatment& treatment : ranked) {
+      row.push_back(TableNumber(std::sqrt(MeanOf(results, treatment, prefix + site, Square))));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+}  // namespace
+
+std::vector<ReportTable> BreakdownTables(const StudyResults& results,
+                                         const std::vector<Treatment>& ranked) {
+  const std::size_t dot = results.metric.rfind('.');
+  const std::string parent = dot == std::string::npos ? "" : results.metric.substr(0, dot + 1);
+  const std::string leaf = results.metric.substr(parent.size());
+  std::vector<ReportTable> tables = {SiblingsTable(results, ranked, parent),
+                                     RegionsTable(results, ranked, parent, leaf),
+                                     LeftOutTable(results, ranked), SitesTable(results, ranked)};
+  std::erase_if(tables, [](const ReportTable& table) { return table.rows.empty(); });
+  return tables;
+}
+
+}  // namespace semblance

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The ways to solve a level agree.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "fitting/level/level_solver.h"
+#include "fitting/terms/term_cost.h"
+#include "tests/testing/level_views.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+using testing::AllTerms;
+using testing::NoisyView;
+using testing::Random;
+using testing::SmoothSurface;
+
+double Distance(const ControlNet& a, const ControlNet& b) {
+  double largest = 0;
+  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
+    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
+  }
+  return largest;
+}
+
+double CostOf(const std::vector<Term>& terms, const LevelView& view, const ControlNet& net) {
+  double cost = 0;
+  for (const Term& term : terms) {
+    cost += std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
+  }
+  return cost;
+}
+
+void ExpectAllAgree(const LevelView& view, const std::vector<Term>& terms, double tolerance_mm) {
+  ControlNet tiles = view.start, vertices = view.start, direct = view.start;
+  const SolverOutcome a = SolveBlocked(view, terms, tiles);
+  const SolverOutcome b = SolveByCeres(view, terms, vertices);
+  const SolverOutcome c = SolveDirectly(view, terms, direct);
+  EXPECT_TRUE(a.usable && b.usable && c.usable);
+  EXPECT_EQ(a.free_vertices, b.free_vertices);
+  EXPECT_EQ(a.termination, "convergence");
+  EXPECT_LT(Distance(tiles, vertices), tolerance_mm);
+  const double cost = CostOf(terms, view, direct);  // says little of vertices that are hardly held
+  EXPECT_NEAR(CostOf(terms, view, tiles), cost, 1e-9 * cost + 1e-15);
+}
+
+TEST(TileSolver, FindsWhatSingleVerticesFind) {
+  std::vector<Term> separable;
+  for (const Term& term : AllTerms()) {
+    if (std::visit([](const auto& t) { return IsSeparable(t); }, term)) {
+      separable.push_back(term);
+    }
+  }
+  ASSERT_GE(separable.size(), 4u);
+  ExpectAllAgree(NoisyView(), separable, 1e-9);
+  for (const Term& term : separable) {
+    if (!std::holds_alternative<PointTerm>(term)) {
+      // Landmarks do not hold the vertices at the border that points hardly hold.
+      const bool more_points = std::holds_alternative<LandmarkTerm>(term);
+      ExpectAllAgree(NoisyView(), {PointTerm{}, term}, more_points ? 1e-4 : 1e-6);
+    }
+  }
+}
+
+// Nets whose sides are no multiples of three, closed ones too; some vertices no term touches.
+TEST(TileSolver, TilesCoverNetsOfAnySize) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+    for (const int patches : {4, 5, 6}) {
+      const HSplineShape shape{
+          .patches_u = patches, .patches_v = 3, .max_level = 0, .closure = closure};
+      const HSplineSurface start = SmoothSurface(shape, 1), truth = SmoothSurface(shape, 2);
+      LevelView view{.grid = {.patches_u = patches,
+                              .patches_v = 3,
+                              .periodic_u = closure == Closure::kPeriodicU},
+                     .start = start.Net(0),
+                     .rest = start.Net(0),
+                     .lengths_mm = Vec2(130, 80),
+                     .observations = {}};
+      Random random(4);
+      for (int k = 0; k < 400; ++k) {
+        const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 0.6));
+        view.observations.push_back({.uv = uv, .position = truth.Point(uv)});
+      }
+      SortObservations(view.grid, view.observations);
+      ExpectAllAgree(view, {PointTerm{}}, 1e-5);
+      ControlNet net = view.start;
+      EXPECT_LT(SolveBlocked(view, std::vector<Term>{PointTerm{}}, net).free_vertices,
+                static_cast<int>(net.vertices.size()));
+      EXPECT_EQ(net.vertices.back(), view.start.vertices.back());  // to the bit
+    }
+  }
+}
+
+}  // namespace
+}  // namespace semblance

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/uncertainty/error_propagation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "fitting/fit.h"
+#include "surfaces/base/error.h"
+#include "tests/testing/splines.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::Random;
+
+double Gaussian(Random& random) {
+  const double r = std::sqrt(-2 * std::log(random.Uniform(1e-300, 1)));
+  return r * std::cos(2 * std::numbers::pi * random.Uniform(0, 1));
+}
+
+// Points of the template on the part with u < 0.7, which may be off along its normals by errors
+// that hang together.
+struct Scene {
+  HSplineSurface rest = testing::SmoothSurface({.patches_u = 4, .patches_v = 3, .max_level = 1}, 1);
+  FitTarget target;
+  PointErrors errors;
+  std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{.weight = 0.05},
+                             MembraneTerm{.weight = 0.2}};
+  std::vector<Vec2> uv = {{0.1, 0.2}, {0.35, 0.5}, {0.6, 0.8}, {0.95, 0.5}};
+  std::vector<Vec3> normals;
+
+  Scene() {
+    Random random(5);
+    for (int k = 0; k < 90; ++k) {
+      const Vec2 at(random.Uniform(0, 0.7), random.Uniform(0, 1));
+      target.points.push_back(
+          {.label = "p", .position = rest.Point(at), .uv = at, .weight = random.Uniform(0.5, 2)});
+      errors.directions.push_back(rest.Normal(at));
+    }
+    errors.root.resize(90, 4);
+    for (int k = 0; k < 90; ++k) {
+      const Vec2& at = target.points[k].uv;
+      errors.root.row(k) << 1, 2 * at.x(), std::sin(6 * at.y()), random.Uniform(-0.5, 0.5);
+    }
+    for (const Vec2& at : uv) {
+      normals.push_back(rest.Normal(at));
+    }
+  }
+
+  FitTarget Off(Random& random) const {
+    Eigen::VectorXd z(errors.root.cols());
+    for (double& value : z) {
+      value = Gaussian(random);
+    }
+    const Eigen::VectorXd along = errors.root * z;
+    FitTarget off = target;
+    for (std::size_t k = 0; k < off.points.size(); ++k) {
+      off.points[k].position += along[static_cast<Eigen::Index>(k)] * errors.directions[k];
+    }
+    return off;
+  }
+
+  HSplineSurface Fitted(const FitTarget& points) const {
+    return Fit(rest, points, {},
+               {.schedule = {{.level = 1, .fraction = 1}},
+                .terms = terms,
+                .solver = LevelSolver::kFastest},
+               {})
+        .surface;
+  }
+
+  ErrorPropagation Spread(const HSplineSurface& surface, const FitTarget& points) const {
+    return {surface, rest, points, 1, terms, errors};
+  }
+};
+
+// Points drawn with those errors and fitted, again and again: the surface is off as sigma says.
+TEST(ErrorPropagation, SigmaIsHowFarTheFitIsOffWhereItsPointsAre) {
+  const Scene scene;
+  const std::vector<double> sigma =
+      scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
+  Random random(7);
+  constexpr int kDraws = 500;  // the estimate's own deviation is 3 %
+  std::vector<double> squares(scene.uv.size(), 0);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const HSplineSurface fitted = scene.Fitted(scene.Off(random));
+    for (std::size_t k = 0; k < scene.uv.size(); ++k) {
+      const Vec3 off = fitted.Point(scene.uv[k]) - scene.rest.Point(scene.uv[k]);
+      squares[k] += std::pow(off.dot(scene.normals[k]), 2) / kDraws;
+    }
+  }
+  for (std::size_t k = 0; k < scene.uv.size(); ++k) {
+    EXPECT_NEAR(std::sqrt(squares[k]), sigma[k], 0.1 * sigma[k]) << k;
+  }
+}
+
+TEST(ErrorPropagation, SamplesSpreadAsSigmaSays) {
+  Scene scene;
+  Random random(3);
+  const FitTarget off = scene.Off(random);
+  const HSplineSurface fitted = scene.Fitted(off);
+  const ErrorPropagation spread = scene.Spread(fitted, off);
+  EXPECT_GT(spread.prior_sd(), 0);
+  for (std::size_t k = 0; k < scene.uv.size(); ++k) {
+    scene.normals[k] = fitted.Normal(scene.uv[k]);
+  }
+  const std::vector<double> sigma = spread.Sigma(scene.uv, scene.normals);
+  constexpr int kDraws = 500;
+  const std::vector<HSplineSurface> samples = spread.Samples(kDraws, 1);
+  for (std::size_t k = 0; k < scene.uv.size(); ++k) {
+    double squares = 0;
+    for (const HSplineSurface& sample : samples) {
+      const Vec3 away = sample.Point(scene.uv[k]) - fitted.Point(scene.uv[k]);
+      squares += std::pow(away.dot(scene.normals[k]), 2) / kDraws;
+    }
+    EXPECT_NEAR(std::sqrt(squares), sigma[k], 0.1 * sigma[k]) << k;
+  }
+  EXPECT_EQ(spread.Samples(2, 1)[1].Net(1).vertices, samples[1].Net(1).vertices);
+  EXPECT_NE(spread.Samples(1, 2)[0].Net(1).vertices, samples[0].Net(1).vertices);
+}
+
+// Neighbours that are off together are not averaged away; those off by themselves are.
+TEST(ErrorPropagation, ErrorsThatHangTogetherCountInFull) {
+  Scene scene;
+  scene.uv.pop_back();  // where there are points
+  scene.normals.pop_back();
+  scene.errors.root = Eigen::MatrixXd::Constant(90, 1, 2.0);
+  const std::vector<double> together =
+      scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
+  scene.errors.root = 2.0 * Eigen::MatrixXd::Identity(90, 90);
+  const std::vector<double> apart =
+      scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
+  for (std::size_t k = 0; k < scene.uv.size(); ++k) {
+    EXPECT_NEAR(together[k], 2, 0.3);
+    EXPECT_LT(apart[k], 0.7 * together[k]);
+  }
+}
+
+// The smoothness that draws to the template hides what is not seen: a template that has to be bent
+// more is trusted less where there is no point.
+TEST(ErrorPropagation, WhereThereIsNoPointTheOtherTermsSayHowFar) {
+  Scene scene;
+  scene.errors.root.setZero();
+  const auto sigma = [&](double bend_mm) {
+    FitTarget bent = scene.target;
+    for (FitPoint& p : bent.points) {
+      p.position += Vec3(0, 0, bend_mm * std::sin(9 * p.uv.x()));
+    }
+    return scene.Spread(scene.Fitted(bent), bent).Sigma(scene.uv, scene.normals);
+  };
+  const std::vector<double> little = sigma(1), much = sigma(5);
+  EXPECT_GT(little.back(), 2 * little.front());
+  EXPECT_NEAR(much.back(), 5 * little.back(), 0.02 * much.back());
+}
+
+TEST(ErrorPropagation, WhatTheScheduleHasLeftUndoneIsADeviation) {
+  Scene scene;
+  scene.errors.root.setZero();
+  FitTarget shifted = scene.target;
+  for (FitPoint& p : shifted.points) {
+    p.position += Vec3(0, 0, 3);
+  }
+  const std::vector<double> sigma =
+      scene.Spread(scene.rest, shifted).Sigma(scene.uv, scene.normals);
+  for (std::size_t k = 0; k < scene.uv.size(); ++k) {
+    EXPECT_NEAR(sigma[k], 3 * std::abs(scene.normals[k].z()), 1e-6);
+  }
+}
+
+TEST(ErrorPropagation, APointThatALossLeavesOutSaysNothing) {
+  Scene scene;
+  scene.terms[0] = PointTerm{};
+  const std::vector<double> without =
+      scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
+  double sum = 0;
+  for (const FitPoint& p : scene.target.points) {
+    sum += p.weight;
+  }
+  scene.target.points.push_back({"far", scene.rest.Point({0.3, 0.3}) + Vec3(90, 0, 0), {0.3, 0.3}});
+  scene.errors.directions.push_back(Vec3::UnitX());
+  scene.errors.root.conservativeResize(91, Eigen::NoChange);
+  scene.errors.root.row(90).setConstant(70);
+  scene.terms[0] =
+      PointTerm{.weight = (sum + 1) / sum, .loss = RobustLoss::kTukey, .loss_width_mm = 20};
+  const std::vector<double> tamed =
+      scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
+  for (std::size_t k = 0; k < scene.uv.size(); ++k) {
+    EXPECT_NEAR(tamed[k], without[k], 1e-9);
+  }
+}
+
+TEST(ErrorPropagation, WhereNothingIsSaidThereIsNoNumber) {
+  Scene scene;
+  scene.terms = {PointTerm{}};
+  const std::vector<double> sigma =
+      scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
+  EXPECT_TRUE(std::isfinite(sigma[0]));
+  EXPECT_TRUE(std::isnan(sigma[3]));
+}
+
+TEST(ErrorPropagation, CoupledTermsAreLeftOutByName) {
+  Scene scene;
+  scene.terms.push_back(SymmetryTerm{});
+  scene.terms.push_back(SymmetryTerm{.weight = 0});
+  EXPECT_THAT(scene.Spread(scene.rest, scene.target).left_out(), ElementsAre("symmetry"));
+}
+
+TEST(ErrorPropagation, WrongInputIsNamed) {
+  Scene scene;
+  const auto message = [&]() -> std::string {
+    try {
+      scene.Spread(scene.rest, scene.target);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(message(), "no error");
+  scene.terms = {SmoothnessTerm{}};
+  EXPECT_THAT(message(), HasSubstr("no point has a weight"));
+  scene.terms = {PointTerm{}};
+  scene.errors.directions.pop_back();
+  EXPECT_THAT(message(), HasSubstr("89 directions"));
+}
+
+TEST(PivotedRoot, GivesTheMatrixBackToItsShare) {
+  Eigen::MatrixXd covariance(60, 60);
+  for (int i = 0; i < 60; ++i) {
+    for (int j = 0; j < 60; ++j) {
+      covariance(i, j) = 4 * std::exp(-std::pow((i - j) / 12.0, 2));
+    }
+  }
+  const Eigen::MatrixXd root = PivotedRoot(covariance);
+  EXPECT_LT(root.cols(), 20);
+  const Eigen::MatrixXd left = covariance - root * root.transpose();
+  EXPECT_LT(left.cwiseAbs().maxCoeff(), 4e-3);
+  EXPECT_EQ(PivotedRoot(Eigen::MatrixXd::Zero(5, 5)).cols(), 0);
+}
+
+}  // namespace
+}  // namespace semblance
