@@ -6,6 +6,7 @@
 #include <string>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/point_role.h"
 
 namespace semblance {
 
@@ -15,6 +16,7 @@ struct Dowel {
   Vec3 direction = Vec3::Constant(kNaN);  // unit, out of the bone
   double depth_mm = kNaN;                 // tissue depth, > 0
   double sd_mm = kNaN;  // standard deviation of depth_mm where the table gives one, else NaN
+  PointRole role = PointRole::kLandmark;
 
   Vec3 Tip() const { return base + depth_mm * direction; }
 };
