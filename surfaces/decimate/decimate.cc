@@ -5,52 +5,118 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "surfaces/base/error.h"
-#include "surfaces/decimate/edge_patch.h"
-#include "surfaces/decimate/given_points.h"
-#include "surfaces/decimate/patch_move.h"
-#include "surfaces/decimate/patch_shape.h"
-#include "surfaces/decimate/quadric.h"
+#include "surfaces/decimate/edge_collapse.h"
+#include "surfaces/decimate/original_vertices.h"
 #include "surfaces/mesh/half_edges.h"
 
 namespace semblance {
 namespace {
 
-// What a sound collapse keeps to, besides KeepsShape.
-constexpr double kMostErrorOfSize = 0.15;  // of the square root of the area around
-// How a new point is held to the middle of its edge where the surface says little; see Quadric.
-constexpr double kHeldBack = 1e-6;
+// The largest error of a sound collapse, as a share of the square root of the area around it.
+constexpr double kMostErrorOfSize = 0.15;
+// Keep the merged vertex at the middle of its edge where the surface says little; see MinimumNear.
+constexpr double kDamping = 1e-6;
 constexpr int kNewtonSteps = 3;
-// Edges that were refused are asked again as long as that pays.
+// Refused edges are tried again as long as this share of the triangles went since the last time.
 constexpr double kLeastGain = 0.005;
-// Of all edges, those that may collapse in one sweep: the cheapest.
+// The share of waiting edges, the cheapest, that may collapse in one sweep.
 constexpr double kShareOfSweep = 0.1;
-// What makes short edges go first where the surface is flat.
+// Makes short edges go first where the surface is flat.
 constexpr double kShortFirst = 1e-8;
-// Where so few of all edges still wait, for the others were refused, no costlier ones are taken:
-// what is left would pay for all.
+// If a smaller share of all edges waits, because the others were refused, no costlier ones are
+// taken: the few that are left would pay for all.
 constexpr double kLeastWaiting = 0.2;
 constexpr float kNever = std::numeric_limits<float>::infinity();
 
-struct DecimatePoint {
-  Vec3 at;
-  Quadric quadric;  // of the triangles around, and of the border
-  int changed = 0;  // by which collapse the quadric was last
-  int met = 0;      // at which question; see KeepsTopology
+// A sum of weighted squared distances from planes and lines: q(x) = x' A x - 2 b' x + c, A
+// symmetric (Garland & Heckbert 1997).
+struct Quadric {
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;  // A
+  double x = 0, y = 0, z = 0;                             // b
+  double c = 0;
+
+  // area_vector: the triangle's normal times its area, not zero; the weight is the area.
+  static Quadric OfTriangle(const Vec3& p, const Vec3& area_vector) {
+    const double area = area_vector.norm();
+    const Vec3 n = area_vector / area, m = area_vector;
+    const double d = n.dot(p), e = area * d;
+    return {m.x() * n.x(), m.x() * n.y(), m.x() * n.z(), m.y() * n.y(), m.y() * n.z(),
+            m.z() * n.z(), e * n.x(),     e * n.y(),     e * n.z(),     e * d};
+  }
+
+  // Of the line through p and q, which are apart; the weight is the squared length.
+  static Quadric OfLine(const Vec3& p, const Vec3& q) {
+    const Vec3 e = q - p;
+    const double l = e.squaredNorm();
+    Quadric line{l - e.x() * e.x(), -e.x() * e.y(), -e.x() * e.z(),
+                 l - e.y() * e.y(), -e.y() * e.z(), l - e.z() * e.z()};
+    const Vec3 b = line.TimesA(p);
+    line.x = b.x();
+    line.y = b.y();
+    line.z = b.z();
+    line.c = p.dot(b);
+    return line;
+  }
+
+  void Add(const Quadric& o, double times = 1) {
+    xx += times * o.xx, xy += times * o.xy, xz += times * o.xz;
+    yy += times * o.yy, yz += times * o.yz, zz += times * o.zz;
+    x += times * o.x, y += times * o.y, z += times * o.z;
+    c += times * o.c;
+  }
+
+  Vec3 TimesA(const Vec3& p) const {
+    return {xx * p.x() + xy * p.y() + xz * p.z(), xy * p.x() + yy * p.y() + yz * p.z(),
+            xz * p.x() + yz * p.y() + zz * p.z()};
+  }
+  double Trace() const { return xx + yy + zz; }
+  double At(const Vec3& p) const {
+    return p.dot(TimesA(p)) - 2 * (x * p.x() + y * p.y() + z * p.z()) + c;
+  }
+
+  // The minimum, found by Newton steps from `start`, each damped by a share of A's trace: so
+  // `start` is kept in the directions in which the quadric does not rise.
+  Vec3 MinimumNear(const Vec3& start, double damping, int steps) const {
+    const double hold = damping * Trace();
+    const double a = xx + hold, d = yy + hold, f = zz + hold;
+    const double c00 = d * f - yz * yz, c01 = xz * yz - xy * f, c02 = xy * yz - xz * d,
+                 c11 = a * f - xz * xz, c12 = xy * xz - a * yz, c22 = a * d - xy * xy;
+    const double determinant = a * c00 + xy * c01 + xz * c02;
+    if (!(determinant > 0)) {
+      return start;
+    }
+    Vec3 p = start;
+    for (int step = 0; step < steps; ++step) {
+      const Vec3 r = (Vec3(x, y, z) - TimesA(p)) / determinant;
+      p += Vec3(c00 * r.x() + c01 * r.y() + c02 * r.z(), c01 * r.x() + c11 * r.y() + c12 * r.z(),
+                c02 * r.x() + c12 * r.y() + c22 * r.z());
+    }
+    return p;
+  }
 };
 
-// Of an edge, at the place of the lower of its half-edges.
+struct DecimatedVertex {
+  Vec3 position;
+  Quadric quadric;  // of the triangles around, and of the border
+  int changed = 0;  // the last collapse that changed the quadric
+  int met = 0;      // the last attempt that met it; see KeepsTopology
+};
+
+// Of an edge, stored at the lower of its half-edges.
 struct EdgeCost {
   float cost = kNever;
-  int evaluated = 0;  // after which collapse
+  int evaluated = 0;  // the number of collapses by then
 };
 
-struct Placement {
+// Where the ends of an edge would merge. Cost NaN: they must not.
+struct MergeTarget {
   double cost = kNaN;
-  Vec3 at = Vec3::Constant(kNaN);
+  Vec3 position = Vec3::Constant(kNaN);
 };
 
 class Decimator {
@@ -60,53 +126,54 @@ class Decimator {
 
  private:
   void AddQuadrics(std::int32_t triangle, double times);
-  Placement Place(HalfEdgeIndex h) const;
+  MergeTarget TargetOf(HalfEdgeIndex h) const;
   void Evaluate(HalfEdgeIndex h);
   void EvaluateAll();
   bool IsStale(HalfEdgeIndex edge) const;
   void FindWaiting();
-  float MostOfSweep();
-  void Sweep(float most);
-  void Try(HalfEdgeIndex edge);
+  float CostLimitOfSweep();
+  void Sweep(float cost_limit);
+  void TryCollapse(HalfEdgeIndex edge);
   bool KeepsTopology();
-  void SetPlaces(const Vec3& place);
-  void SetSamples();
+  void SetGeometry(const Vec3& target);
+  void GatherSamples();
   bool IsWithinBounds();
   void Collapse();
-  void MoveSamples();
-  TriMesh Rest() const;
+  void ForgetTrianglesAtEdge();
+  void AddQuadricsAround(double times);
+  void EvaluateAround();
+  void ReassignSamples();
+  TriMesh RemainingMesh() const;
   DecimateSummary Summary() const;
 
-  const TriMesh& mesh_;
   DecimateOptions options_;
-  Vec3 centre_;  // quadrics are of places relative to it
+  Vec3 centre_;  // quadrics are of positions relative to it
   HalfEdges edges_;
-  std::vector<DecimatePoint> points_;
-  GivenPoints given_;
+  std::vector<DecimatedVertex> vertices_;
+  OriginalVertices originals_;
   std::vector<std::int32_t> alive_;  // triangles, ascending
   std::vector<EdgeCost> costs_;
   std::vector<HalfEdgeIndex> waiting_;  // edges that have a cost, ascending
   std::vector<float> cheapest_;
-  float dearest_ = 0;  // that was taken, or could have been
-  EdgePatch patch_;
-  PatchPlaces places_;
-  PatchMove move_;
-  std::vector<std::int32_t> sampled_;
-  int collapses_ = 0, questions_ = 0, triangles_ = 0;
-  bool tolerance_refused_ = false, asked_again_ = false;
+  float dearest_ = 0;  // the highest limit of a sweep so far
+  EdgeNeighbourhood around_;
+  CollapseGeometry geometry_;
+  CollapseError error_;
+  std::vector<std::int32_t> sampled_;  // original vertices; geometry_.samples are their positions
+  int collapses_ = 0, attempts_ = 0, triangles_ = 0;
+  bool tolerance_refused_ = false, retrying_ = false;
 };
 
 Decimator::Decimator(const TriMesh& mesh, const DecimateOptions& options)
-    : mesh_(mesh),
-      options_(options),
+    : options_(options),
       centre_(Bounds(mesh).center()),
       edges_(mesh, "decimate"),
-      given_(mesh),
+      originals_(mesh),
       costs_(edges_.End()),
       triangles_(static_cast<int>(mesh.triangles.size())) {
-  points_.reserve(mesh.points.size());
+  vertices_.reserve(mesh.points.size());
   for (const Vec3& p : mesh.points) {
-    points_.push_back({p, {}});
+    vertices_.push_back({p, {}});
   }
   for (int t = 0; t < triangles_; ++t) {
     AddQuadrics(t, 1);
@@ -116,26 +183,27 @@ Decimator::Decimator(const TriMesh& mesh, const DecimateOptions& options)
 
 void Decimator::AddQuadrics(std::int32_t triangle, double times) {
   const Triangle corners = edges_.Corners(triangle);
-  const Vec3 &a = points_[corners[0]].at, &b = points_[corners[1]].at, &c = points_[corners[2]].at;
+  const Vec3 &a = vertices_[corners[0]].position, &b = vertices_[corners[1]].position,
+             &c = vertices_[corners[2]].position;
   const Vec3 area_vector = 0.5 * (b - a).cross(c - a);
   if (area_vector.squaredNorm() > 0) {
     const Quadric quadric = Quadric::OfTriangle(a - centre_, area_vector);
     for (const std::int32_t v : corners) {
-      points_[v].quadric.Add(quadric, times);
+      vertices_[v].quadric.Add(quadric, times);
     }
   }
   for (HalfEdgeIndex h = 4 * triangle; h < 4 * triangle + 3; ++h) {
     if (edges_.Twin(h) < 0) {
-      DecimatePoint &from = points_[edges_.From(h)], &to = points_[edges_.To(h)];
-      const Quadric quadric = Quadric::OfLine(from.at - centre_, to.at - centre_);
+      DecimatedVertex &from = vertices_[edges_.From(h)], &to = vertices_[edges_.To(h)];
+      const Quadric quadric = Quadric::OfLine(from.position - centre_, to.position - centre_);
       from.quadric.Add(quadric, times);
       to.quadric.Add(quadric, times);
     }
   }
 }
 
-Placement Decimator::Place(HalfEdgeIndex h) const {
-  const DecimatePoint &from = points_[edges_.From(h)], &to = points_[edges_.To(h)];
+MergeTarget Decimator::TargetOf(HalfEdgeIndex h) const {
+  const DecimatedVertex &from = vertices_[edges_.From(h)], &to = vertices_[edges_.To(h)];
   const bool from_border = edges_.IsOnBorder(edges_.From(h)),
              to_border = edges_.IsOnBorder(edges_.To(h));
   if (from_border && to_border && edges_.Twin(h) >= 0) {
@@ -143,17 +211,18 @@ Placement Decimator::Place(HalfEdgeIndex h) const {
   }
   Quadric sum = from.quadric;
   sum.Add(to.quadric);
-  Vec3 at = from_border ? from.at : to.at;
+  Vec3 at = from_border ? from.position : to.position;
   if (from_border == to_border) {
-    at = centre_ + sum.LeastNear(0.5 * (from.at + to.at) - centre_, kHeldBack, kNewtonSteps);
+    at = centre_ +
+         sum.MinimumNear(0.5 * (from.position + to.position) - centre_, kDamping, kNewtonSteps);
   }
-  const double flat = kShortFirst * sum.Trace() * (to.at - from.at).squaredNorm();
+  const double flat = kShortFirst * sum.Trace() * (to.position - from.position).squaredNorm();
   return {std::max(0.0, sum.At(at - centre_)) + flat, at};
 }
 
 void Decimator::Evaluate(HalfEdgeIndex h) {
   const HalfEdgeIndex edge = edges_.EdgeOf(h);
-  const double cost = Place(edge).cost;
+  const double cost = TargetOf(edge).cost;
   costs_[edge] = {cost < kNever ? static_cast<float>(cost) : kNever, collapses_};
 }
 
@@ -166,7 +235,7 @@ void Decimator::EvaluateAll() {
 }
 
 bool Decimator::IsStale(HalfEdgeIndex edge) const {
-  return std::max(points_[edges_.From(edge)].changed, points_[edges_.To(edge)].changed) >
+  return std::max(vertices_[edges_.From(edge)].changed, vertices_[edges_.To(edge)].changed) >
          costs_[edge].evaluated;
 }
 
@@ -174,9 +243,9 @@ DecimateResult Decimator::Run() {
   int gained_from = triangles_;
   EvaluateAll();
   while (triangles_ > options_.target_triangles) {
-    const float most = MostOfSweep();
-    if (most < kNever) {
-      Sweep(most);
+    const float cost_limit = CostLimitOfSweep();
+    if (cost_limit < kNever) {
+      Sweep(cost_limit);
       continue;
     }
     if (gained_from - triangles_ < kLeastGain * gained_from) {
@@ -184,14 +253,14 @@ DecimateResult Decimator::Run() {
     }
     gained_from = triangles_;
     tolerance_refused_ = false;
-    asked_again_ = true;
+    retrying_ = true;
     EvaluateAll();
   }
-  return {Rest(), Summary()};
+  return {RemainingMesh(), Summary()};
 }
 
 DecimateSummary Decimator::Summary() const {
-  DecimateSummary summary{.triangles = triangles_, .error_mm = given_.LargestDistance_mm()};
+  DecimateSummary summary{.triangles = triangles_, .error_mm = originals_.LargestDistance_mm()};
   summary.stop = triangles_ <= options_.target_triangles ? DecimateStop::kTarget
                  : tolerance_refused_                    ? DecimateStop::kTolerance
                                                          : DecimateStop::kNoSoundCollapse;
@@ -212,9 +281,9 @@ void Decimator::FindWaiting() {
   }
 }
 
-// What the cheapest edges cost that wait: a share of them, but no more than are needed. Infinite:
-// none is to collapse.
-float Decimator::MostOfSweep() {
+// What the cheapest waiting edges cost: a share of them, but no more than are needed. Infinite: no
+// edge should collapse.
+float Decimator::CostLimitOfSweep() {
   FindWaiting();
   if (waiting_.empty()) {
     return kNever;
@@ -224,122 +293,134 @@ float Decimator::MostOfSweep() {
   const auto nth = cheapest_.begin() + static_cast<std::ptrdiff_t>(std::min(needed, share));
   std::nth_element(cheapest_.begin(), nth, cheapest_.end());
   const bool few = double(waiting_.size()) < kLeastWaiting * 1.5 * triangles_;
-  if (std::isfinite(options_.tolerance_mm) || (!asked_again_ && !few)) {
+  if (std::isfinite(options_.tolerance_mm) || (!retrying_ && !few)) {
     dearest_ = std::max(dearest_, *nth);
   }
   const float cheapest = *std::min_element(cheapest_.begin(), nth + 1);
   return cheapest > dearest_ ? kNever : std::min(*nth, dearest_);
 }
 
-void Decimator::Sweep(float most) {
+void Decimator::Sweep(float cost_limit) {
   for (const HalfEdgeIndex edge : waiting_) {
-    if (costs_[edge].cost <= most && IsStale(edge)) {
+    if (costs_[edge].cost <= cost_limit && IsStale(edge)) {
       Evaluate(edge);
     }
-    if (costs_[edge].cost <= most && triangles_ > options_.target_triangles) {
-      Try(edge);
+    if (costs_[edge].cost <= cost_limit && triangles_ > options_.target_triangles) {
+      TryCollapse(edge);
     }
   }
 }
 
-// Refused, an edge waits no more, until one of its ends changes.
-void Decimator::Try(HalfEdgeIndex edge) {
+// An edge that is refused waits again only once one of its ends has changed.
+void Decimator::TryCollapse(HalfEdgeIndex edge) {
   costs_[edge].cost = kNever;
-  patch_.Gather(edges_, edge);
+  around_.Gather(edges_, edge);
   if (!KeepsTopology()) {
     return;
   }
-  SetPlaces(Place(edge).at);
-  if (!KeepsShape(places_)) {
+  SetGeometry(TargetOf(edge).position);
+  if (!PreservesQuality(geometry_)) {
     return;
   }
-  SetSamples();
-  MeasureMove(places_, move_);
+  GatherSamples();
+  MeasureCollapse(geometry_, error_);
   if (IsWithinBounds()) {
     Collapse();
   }
 }
 
-// The ends have no neighbours in common but those that their triangles give (the link condition),
-// and triangles are left.
+// The link condition: the ends have no common neighbours but those of their common triangles. Also,
+// triangles are left.
 bool Decimator::KeepsTopology() {
-  ++questions_;
-  for (const std::int32_t v : patch_.ring) {
-    if (v < 0 || points_[v].met == questions_) {
+  ++attempts_;
+  for (const std::int32_t v : around_.ring) {
+    if (v < 0 || vertices_[v].met == attempts_) {
       return false;
     }
-    points_[v].met = questions_;
+    vertices_[v].met = attempts_;
   }
-  return patch_.spokes.size() >= (patch_.closed ? 3u : 1u);
+  return around_.spokes.size() >= (around_.closed ? 3u : 1u);
 }
 
-void Decimator::SetPlaces(const Vec3& place) {
-  places_.keep = points_[patch_.keep].at;
-  places_.gone = points_[patch_.gone].at;
-  places_.place = place;
-  places_.closed = patch_.closed;
-  places_.on_border = patch_.on_border;
-  places_.opposite.clear();
-  for (const HalfEdgeIndex h : {patch_.edge, edges_.Twin(patch_.edge)}) {
+void Decimator::SetGeometry(const Vec3& target) {
+  geometry_.keep = vertices_[around_.keep].position;
+  geometry_.gone = vertices_[around_.gone].position;
+  geometry_.target = target;
+  geometry_.closed = around_.closed;
+  geometry_.on_border = around_.on_border;
+  geometry_.opposite.clear();
+  for (const HalfEdgeIndex h : {around_.edge, edges_.Twin(around_.edge)}) {
     if (h >= 0) {
-      places_.opposite.push_back(points_[edges_.From(HalfEdges::Previous(h))].at);
+      geometry_.opposite.push_back(vertices_[edges_.From(HalfEdges::Previous(h))].position);
     }
   }
-  places_.ring.clear();
-  for (const std::int32_t v : patch_.ring) {
-    places_.ring.push_back(points_[v].at);
+  geometry_.ring.clear();
+  for (const std::int32_t v : around_.ring) {
+    geometry_.ring.push_back(vertices_[v].position);
   }
-  places_.at_gone.clear();
-  for (const HalfEdgeIndex spoke : patch_.spokes) {
-    places_.at_gone.push_back(edges_.From(spoke) == patch_.gone);
+  geometry_.at_gone.clear();
+  for (const HalfEdgeIndex spoke : around_.spokes) {
+    geometry_.at_gone.push_back(edges_.From(spoke) == around_.gone);
   }
 }
 
-// The points of the mesh given that belong to triangles around.
-void Decimator::SetSamples() {
+// The original vertices that belong to the triangles around the edge.
+void Decimator::GatherSamples() {
   sampled_.clear();
-  given_.Append(HalfEdges::TriangleOf(patch_.edge), sampled_);
-  if (!patch_.on_border) {
-    given_.Append(HalfEdges::TriangleOf(edges_.Twin(patch_.edge)), sampled_);
+  originals_.AppendOf(HalfEdges::TriangleOf(around_.edge), sampled_);
+  if (!around_.on_border) {
+    originals_.AppendOf(HalfEdges::TriangleOf(edges_.Twin(around_.edge)), sampled_);
   }
-  for (const HalfEdgeIndex spoke : patch_.spokes) {
-    given_.Append(HalfEdges::TriangleOf(spoke), sampled_);
+  for (const HalfEdgeIndex spoke : around_.spokes) {
+    originals_.AppendOf(HalfEdges::TriangleOf(spoke), sampled_);
   }
-  places_.samples.clear();
+  geometry_.samples.clear();
   for (const std::int32_t v : sampled_) {
-    places_.samples.push_back(mesh_.points[v]);
+    geometry_.samples.push_back(originals_.Position(v));
   }
 }
 
 bool Decimator::IsWithinBounds() {
-  double error_mm = move_.sheets_mm;
-  for (const double distance_mm : move_.distance_mm) {
+  double error_mm = error_.sheets_mm;
+  for (const double distance_mm : error_.distance_mm) {
     error_mm = std::max(error_mm, distance_mm);
   }
   if (!(error_mm * error_mm <=
-        kMostErrorOfSize * kMostErrorOfSize * AreaVectorAfter(places_).norm())) {
+        kMostErrorOfSize * kMostErrorOfSize * AreaVectorAfter(geometry_).norm())) {
     return false;
   }
   if (std::isfinite(options_.tolerance_mm)) {
-    error_mm = std::max(error_mm, given_.DistanceBound_mm(places_.place, sampled_));
+    error_mm = std::max(error_mm, originals_.DistanceBound_mm(geometry_.target, sampled_));
   }
   tolerance_refused_ |= error_mm > options_.tolerance_mm;
   return error_mm <= options_.tolerance_mm;
 }
 
-void Decimator::MoveSamples() {
-  for (const HalfEdgeIndex spoke : patch_.spokes) {
-    given_.Clear(HalfEdges::TriangleOf(spoke));
+void Decimator::ReassignSamples() {
+  for (const HalfEdgeIndex spoke : around_.spokes) {
+    originals_.Clear(HalfEdges::TriangleOf(spoke));
   }
   for (std::size_t n = 0; n < sampled_.size(); ++n) {
-    given_.Give(HalfEdges::TriangleOf(patch_.spokes[move_.under[n]]), sampled_[n],
-                move_.distance_mm[n]);
+    originals_.Assign(HalfEdges::TriangleOf(around_.spokes[error_.triangle_of[n]]), sampled_[n],
+                      error_.distance_mm[n]);
   }
 }
 
 void Decimator::Collapse() {
-  const HalfEdgeIndex back = edges_.Twin(patch_.edge);
-  for (const HalfEdgeIndex h : {patch_.edge, back}) {
+  ForgetTrianglesAtEdge();
+  AddQuadricsAround(-1);
+  triangles_ -= around_.on_border ? 1 : 2;
+  edges_.Collapse(around_.edge, around_.of_gone);
+  ++collapses_;
+  vertices_[around_.keep].position = geometry_.target;
+  AddQuadricsAround(1);
+  ReassignSamples();
+  EvaluateAround();
+}
+
+// Those that disappear: takes out their quadrics and the costs of their edges.
+void Decimator::ForgetTrianglesAtEdge() {
+  for (const HalfEdgeIndex h : {around_.edge, edges_.Twin(around_.edge)}) {
     if (h >= 0) {
       for (const HalfEdgeIndex side : {h, HalfEdges::Next(h), HalfEdges::Previous(h)}) {
         costs_[edges_.EdgeOf(side)].cost = kNever;
@@ -347,34 +428,34 @@ void Decimator::Collapse() {
       AddQuadrics(HalfEdges::TriangleOf(h), -1);
     }
   }
-  for (const HalfEdgeIndex spoke : patch_.spokes) {
-    AddQuadrics(HalfEdges::TriangleOf(spoke), -1);
-  }
-  edges_.Collapse(patch_.edge, patch_.of_gone);
-  triangles_ -= back < 0 ? 1 : 2;
-  ++collapses_;
-  points_[patch_.keep].at = places_.place;
-  for (const HalfEdgeIndex spoke : patch_.spokes) {
-    AddQuadrics(HalfEdges::TriangleOf(spoke), 1);
-  }
-  MoveSamples();
-  points_[patch_.keep].changed = collapses_;
-  for (const std::int32_t v : patch_.ring) {
-    points_[v].changed = collapses_;
-  }
-  for (const HalfEdgeIndex spoke : patch_.spokes) {
-    Evaluate(spoke);
-  }
-  if (!patch_.closed) {
-    Evaluate(HalfEdges::Previous(patch_.spokes.back()));
+}
+
+void Decimator::AddQuadricsAround(double times) {
+  for (const HalfEdgeIndex spoke : around_.spokes) {
+    AddQuadrics(HalfEdges::TriangleOf(spoke), times);
   }
 }
 
-// In their old order.
-TriMesh Decimator::Rest() const {
+// The edges at the merged vertex; those farther out at the ring are stale now, and evaluated when
+// their turn comes.
+void Decimator::EvaluateAround() {
+  vertices_[around_.keep].changed = collapses_;
+  for (const std::int32_t v : around_.ring) {
+    vertices_[v].changed = collapses_;
+  }
+  for (const HalfEdgeIndex spoke : around_.spokes) {
+    Evaluate(spoke);
+  }
+  if (!around_.closed) {
+    Evaluate(HalfEdges::Previous(around_.spokes.back()));
+  }
+}
+
+// Vertices and triangles keep their order.
+TriMesh Decimator::RemainingMesh() const {
   TriMesh all;
-  for (const DecimatePoint& point : points_) {
-    all.points.push_back(point.at);
+  for (const DecimatedVertex& vertex : vertices_) {
+    all.points.push_back(vertex.position);
   }
   for (HalfEdgeIndex h = 0; h < edges_.End(); h += 4) {
     if (edges_.IsAlive(h)) {

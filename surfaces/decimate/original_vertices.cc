@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/decimate/given_points.h"
+#include "surfaces/decimate/original_vertices.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -9,7 +10,7 @@
 
 namespace semblance {
 
-GivenPoints::GivenPoints(const TriMesh& mesh)
+OriginalVertices::OriginalVertices(const TriMesh& mesh)
     : mesh_(mesh),
       first_(mesh.triangles.size(), -1),
       next_(mesh.points.size(), -1),
@@ -29,31 +30,32 @@ GivenPoints::GivenPoints(const TriMesh& mesh)
   }
   for (std::int32_t v = 0; v < static_cast<std::int32_t>(mesh.points.size()); ++v) {
     if (last_[v] > (v > 0 ? last_[v - 1] : 0)) {
-      Give(corner_of_[last_[v] - 1], v, 0);
+      Assign(corner_of_[last_[v] - 1], v, 0);
     }
   }
 }
 
-void GivenPoints::Append(std::int32_t triangle, std::vector<std::int32_t>& points) const {
+void OriginalVertices::AppendOf(std::int32_t triangle, std::vector<std::int32_t>& vertices) const {
   for (std::int32_t v = first_[triangle]; v >= 0; v = next_[v]) {
-    points.push_back(v);
+    vertices.push_back(v);
   }
 }
 
-void GivenPoints::Give(std::int32_t triangle, std::int32_t point, double distance_mm) {
-  next_[point] = first_[triangle];
-  first_[triangle] = point;
-  distance_mm_[point] = distance_mm;
+void OriginalVertices::Assign(std::int32_t triangle, std::int32_t vertex, double distance_mm) {
+  next_[vertex] = first_[triangle];
+  first_[triangle] = vertex;
+  distance_mm_[vertex] = distance_mm;
 }
 
-double GivenPoints::LargestDistance_mm() const {
+double OriginalVertices::LargestDistance_mm() const {
   return *std::max_element(distance_mm_.begin(), distance_mm_.end());
 }
 
-double GivenPoints::DistanceBound_mm(const Vec3& p, const std::vector<std::int32_t>& points) const {
+double OriginalVertices::DistanceBound_mm(const Vec3& p,
+                                          const std::vector<std::int32_t>& vertices) const {
   double least = std::numeric_limits<double>::infinity();
   std::int32_t nearest = -1;
-  for (const std::int32_t v : points) {
+  for (const std::int32_t v : vertices) {
     const double distance2 = (mesh_.points[v] - p).squaredNorm();
     if (distance2 < least) {
       least = distance2;

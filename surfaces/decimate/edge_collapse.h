@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The collapse of one edge to a point: which triangles it changes, whether they stay well shaped,
+// and how far they move.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "surfaces/base/geometry.h"
+#include "surfaces/mesh/half_edges.h"
+
+namespace semblance {
+
+// The triangles around an edge from `keep` to `gone`. Outer triangle i is (apex, ring[i],
+// ring[i + 1]), its apex keep or gone; after the collapse its apex is the merged vertex. The one or
+// two triangles at the edge itself disappear.
+struct EdgeNeighbourhood {
+  std::int32_t keep = -1, gone = -1;
+  HalfEdgeIndex edge = -1;             // from keep to gone
+  std::vector<HalfEdgeIndex> spokes;   // of the outer triangles: from the apex to ring[i]
+  std::vector<HalfEdgeIndex> of_gone;  // the spokes that leave `gone`
+  std::vector<std::int32_t> ring;
+  bool closed = false;     // neither end is on a border: the last of the ring meets the first
+  bool on_border = false;  // the edge itself is
+
+  // h: an edge that is on the border if both its ends are. If one end is on the border, that end is
+  // kept.
+  void Gather(const HalfEdges& mesh, HalfEdgeIndex h);
+
+ private:
+  void AppendFan(const HalfEdges& mesh, HalfEdgeIndex from, HalfEdgeIndex before);
+};
+
+// The positions of an EdgeNeighbourhood, in mm: triangle i was (keep or gone, ring[i], ring[i + 1])
+// and becomes (target, ring[i], ring[i + 1]).
+struct CollapseGeometry {
+  Vec3 keep, gone, target;     // both ends, and where they merge
+  std::vector<Vec3> opposite;  // the third corners of the one or two triangles at the edge
+  std::vector<Vec3> ring;
+  std::vector<bool> at_gone;  // whether the apex of triangle i was gone
+  bool closed = false, on_border = false;
+  std::vector<Vec3> samples;  // points near the triangles
+
+  const Vec3& RingAfter(std::size_t i) const { return ring[i + 1 < ring.size() ? i + 1 : 0]; }
+  const Vec3& ApexBefore(std::size_t i) const { return at_gone[i] ? gone : keep; }
+};
+
+// Whether no triangle turns by more than 60 degrees, and none becomes a needle where there was
+// none: the least 4 sqrt(3) area / (sum of squared sides) is at least 0.05, or no less than it was.
+// A triangle without area has no normal of its own and takes that of all.
+bool PreservesQuality(const CollapseGeometry& collapse);
+
+// The sum of the new triangles' area vectors, mm^2.
+Vec3 AreaVectorAfter(const CollapseGeometry& collapse);
+
+struct CollapseError {
+  // No point of either sheet of triangles, before and after, lies further from the other: the
+  // largest difference of height over a common plane, which is where an edge ends or crosses an
+  // edge of the other sheet (Cohen, Manocha & Olano 1997). Where the sheets are no height fields:
+  // how far the ends move.
+  double sheets_mm = kNaN;
+  std::vector<int> triangle_of;     // per sample: the new triangle it belongs to
+  std::vector<double> distance_mm;  // per sample: a bound on its distance from that triangle
+};
+
+// Fills `error`, whose memory is used again.
+void MeasureCollapse(const CollapseGeometry& collapse, CollapseError& error);
+
+}  // namespace semblance

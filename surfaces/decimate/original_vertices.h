@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The vertices of the original mesh, carried along while it is decimated: each belongs to one
+// triangle of the mesh that is left.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "surfaces/base/geometry.h"
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// Keeps a reference to the original mesh; the triangles that are left keep their indices.
+class OriginalVertices {
+ public:
+  explicit OriginalVertices(const TriMesh& mesh);
+
+  const Vec3& Position(std::int32_t vertex) const { return mesh_.points[vertex]; }
+  // Appends the vertices that belong to the triangle.
+  void AppendOf(std::int32_t triangle, std::vector<std::int32_t>& vertices) const;
+  void Clear(std::int32_t triangle) { first_[triangle] = -1; }
+  void Assign(std::int32_t triangle, std::int32_t vertex, double distance_mm);
+
+  // The largest distance assigned to any vertex.
+  double LargestDistance_mm() const;
+
+  // An upper bound on the distance of p from the original mesh: its distance from the original
+  // triangles at the nearest of the given vertices. Infinite if no vertices are given.
+  double DistanceBound_mm(const Vec3& p, const std::vector<std::int32_t>& vertices) const;
+
+ private:
+  const TriMesh& mesh_;
+  std::vector<std::int32_t> first_, next_;  // a linked list per triangle; -1 ends it
+  std::vector<double> distance_mm_;         // per vertex
+  std::vector<std::int32_t> corner_of_;     // the triangles at vertex v end at last_[v]
+  std::vector<std::int32_t> last_;
+};
+
+}  // namespace semblance
