@@ -10,12 +10,10 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
-#include <optional>
 #include <sstream>
 
 #include "problems/config/utf8_check.h"
+#include "surfaces/base/atomic_file.h"
 
 namespace semblance {
 namespace {
@@ -217,15 +215,6 @@ struct Loading {
   std::vector<std::filesystem::path> chain = {};  // the files that lie above, canonical
 };
 
-std::optional<std::string> ReadFile(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in || std::filesystem::is_directory(file)) {
-    return std::nullopt;
-  }
-  std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  return in.bad() ? std::nullopt : std::optional(std::move(bytes));
-}
-
 ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file, Loading& loading);
 
 ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, Loading& loading) {
@@ -241,11 +230,13 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
   if (std::find(loading.chain.begin(), loading.chain.end(), canonical) != loading.chain.end()) {
     return fail(fmt::format("'{}' would be its own base", base.text));
   }
-  const std::optional<std::string> text = ReadFile(base_file);
-  if (!text) {
-    return fail(fmt::format("'{}' cannot be read; paths are relative to this file", base.text));
+  std::string text;
+  try {
+    text = ReadFileBytes(base_file);
+  } catch (const IoError& e) {
+    return fail(fmt::format("{}; paths are relative to this file", e.what()));
   }
-  return LoadDocument(*text, base_file, loading);
+  return LoadDocument(text, base_file, loading);
 }
 
 ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file,
@@ -312,11 +303,7 @@ ConfigNode LoadConfigTextTree(std::string_view text, const std::filesystem::path
 
 ConfigNode LoadConfigTree(const std::filesystem::path& file, std::span<const std::string> overrides,
                           const ConfigNode& defaults, ConfigErrors& errors) {
-  const std::optional<std::string> text = ReadFile(file);
-  if (!text) {
-    throw IoError(fmt::format("{}: cannot be read; check that the file exists", file.string()));
-  }
-  return LoadConfigTextTree(*text, file, overrides, defaults, errors);
+  return LoadConfigTextTree(ReadFileBytes(file), file, overrides, defaults, errors);
 }
 
 void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,

@@ -5,15 +5,11 @@
 #include <openssl/evp.h>
 
 #include <array>
-#include <fstream>
-#include <memory>
 
-#include "surfaces/base/error.h"
+#include "surfaces/base/atomic_file.h"
 
 namespace semblance {
 namespace {
-
-using DigestContext = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
 
 std::string Hex(const unsigned char* bytes, unsigned int count) {
   std::string text;
@@ -33,21 +29,7 @@ std::string Sha256OfText(std::string_view text) {
 }
 
 std::string Sha256OfFile(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    throw IoError(fmt::format("{}: cannot be read; check that the file exists and may be read",
-                              path.string()));
-  }
-  const DigestContext context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
-  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
-  std::array<char, 1 << 16> buffer;
-  while (file.read(buffer.data(), buffer.size()) || file.gcount() > 0) {
-    EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(file.gcount()));
-  }
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
-  unsigned int length = 0;
-  EVP_DigestFinal_ex(context.get(), digest.data(), &length);
-  return Hex(digest.data(), length);
+  return Sha256OfText(ReadFileBytes(path));
 }
 
 std::vector<std::pair<std::string, std::string>> LibraryVersions() {

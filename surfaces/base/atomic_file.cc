@@ -7,8 +7,9 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cstdint>
 #include <fstream>
-#include <sstream>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -105,16 +106,26 @@ void WriteFileAtomically(const fs::path& path, std::string_view bytes, Durabilit
 }
 
 std::string ReadFileBytes(const fs::path& path) {
-  const std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  if (file && !fs::is_directory(path)) {
-    bytes << file.rdbuf();  // sets the fail bit for an empty file, which is none
+  std::error_code error;
+  if (!fs::exists(path, error) && !error) {
+    throw IoError(fmt::format("{}: no such file", path.string()));
   }
-  if (!file || bytes.bad() || fs::is_directory(path)) {
-    throw IoError(fmt::format("{}: cannot be read; check that the file exists and may be read",
-                              path.string()));
+  if (fs::is_directory(path, error)) {
+    throw IoError(fmt::format("{}: is a folder, not a file", path.string()));
   }
-  return std::move(bytes).str();
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  const std::uintmax_t size = fs::is_regular_file(path, error) ? fs::file_size(path, error) : 0;
+  std::string bytes(error ? 0 : size, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  if (file) {  // whatever has no size: a pipe, a file that grew meanwhile
+    bytes.append(std::istreambuf_iterator<char>(file), {});
+  }
+  if (!file.is_open() || file.bad()) {
+    throw IoError(fmt::format("{}: cannot be read: {}", path.string(), Reason(errno)));
+  }
+  return bytes;
 }
 
 }  // namespace semblance

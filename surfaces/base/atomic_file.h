@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Files that are either the old one or the new one, never half of one.
+// Whole files: read at once; written so that they are either the old one or the new one, never half
+// of one.
 #pragma once
 
 #include <filesystem>
@@ -8,9 +9,9 @@
 
 namespace semblance {
 
-// What a written file durability. kUnsynced: the end of the process, however it ends, but after a
-// power failure it may be empty; spares two waits for the disk, and is for what is checked when it
-// is read and can be made again.
+// What a written file survives. kUnsynced: the end of the process, however it ends, but after a
+// power failure the file may be empty. That spares two waits for the disk, and is for files that
+// are checked when read and can be made again.
 enum class Durability { kSynced, kUnsynced };
 
 // Writes a temporary file beside `path`, syncs it, and renames it to `path`, which then holds
@@ -19,7 +20,8 @@ enum class Durability { kSynced, kUnsynced };
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes,
                          Durability durability = Durability::kSynced);
 
-// The whole file. Throws IoError if it cannot be read.
+// The whole file. Throws IoError with the path and the reason: no such file, a folder, or what the
+// system says.
 std::string ReadFileBytes(const std::filesystem::path& path);
 
 }  // namespace semblance

@@ -9,11 +9,11 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/ply_layout.h"
 
@@ -91,21 +91,6 @@ std::string LowerExtension(const std::filesystem::path& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   return extension;
-}
-
-std::string ReadBytes(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) {
-    throw IoError(fmt::format("{}: no such file", path.string()));
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  if (!file.good() && !file.eof()) {
-    throw IoError(fmt::format("{}: cannot be read", path.string()));
-  }
-  if (bytes.empty()) {
-    throw IoError(fmt::format("{}: the file is empty", path.string()));
-  }
-  return bytes;
 }
 
 std::string StlDefect(std::string_view bytes) {
@@ -281,7 +266,10 @@ std::string EncodeThroughOpenMesh(const TriMesh& mesh, const std::string& extens
 TriMesh ReadMesh(const std::filesystem::path& path) {
   const std::string name = path.string(), extension = LowerExtension(path);
   CheckExtension(extension, name);
-  const std::string bytes = ReadBytes(path);
+  const std::string bytes = ReadFileBytes(path);
+  if (bytes.empty()) {
+    throw IoError(fmt::format("{}: the file is empty", name));
+  }
   const std::string defect = Defect(extension, bytes);
   if (!defect.empty()) {
     throw IoError(fmt::format("{} {}", name, defect));

@@ -4,10 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <fstream>
 #include <iterator>
+#include <thread>
 
 #include "surfaces/base/error.h"
 
@@ -86,10 +89,21 @@ TEST_F(FilesTest, OldFileSurvivesAWriteThatStopsHalfWay) {
   EXPECT_EQ(Count(folder_), 1);
 }
 
-TEST_F(FilesTest, ReadingWhatIsNoFileIsAnError) {
+TEST_F(FilesTest, WhatCannotBeReadIsNamedWithItsReason) {
   EXPECT_THAT(MessageOf<IoError>([&] { ReadFileBytes(folder_ / "none"); }),
-              HasSubstr("none: cannot be read"));
-  EXPECT_THAT(MessageOf<IoError>([&] { ReadFileBytes(folder_); }), HasSubstr("cannot be read"));
+              HasSubstr("none: no such file"));
+  EXPECT_THAT(MessageOf<IoError>([&] { ReadFileBytes(folder_); }), HasSubstr("is a folder"));
+  std::filesystem::create_symlink("round", folder_ / "round");
+  EXPECT_THAT(MessageOf<IoError>([&] { ReadFileBytes(folder_ / "round"); }),
+              HasSubstr("round: cannot be read: Too many levels of symbolic links"));
+}
+
+TEST_F(FilesTest, APipeHasNoSizeAndIsReadToItsEnd) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  const std::string bytes(100000, 'x');
+  std::thread writer([&] { std::ofstream(folder_ / "pipe") << bytes; });
+  EXPECT_EQ(ReadFileBytes(folder_ / "pipe"), bytes);
+  writer.join();
 }
 
 TEST_F(FilesTest, OutputFolderIsCreatedEmptyAndTakesFilesInSubfolders) {

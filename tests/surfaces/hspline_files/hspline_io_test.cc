@@ -54,7 +54,7 @@ TEST_F(HSplineIo, ErrorsNameTheFile) {
     }
     return std::string("accepted");
   };
-  EXPECT_THAT(message(), HasSubstr("broken.json: cannot be read"));
+  EXPECT_THAT(message(), HasSubstr("broken.json: no such file"));
   WriteFileAtomically(path, "{\"format\": \"semblance-hspline\"");
   EXPECT_THAT(message(), HasSubstr("broken.json: not an H-spline that can be read"));
   EXPECT_THROW(WriteHSpline(folder_ / "absent" / "x.json",
