@@ -7,11 +7,11 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <random>
 
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -25,10 +25,10 @@ Eigen::MatrixXd ProbesFor(Eigen::Index unknowns, int count) {
     return Eigen::MatrixXd::Identity(unknowns, unknowns);
   }
   constexpr std::uint64_t kRandomSeed = 1;
-  std::mt19937_64 bits(kRandomSeed);
+  Random random(kRandomSeed);
   Eigen::MatrixXd probes(unknowns, count);
   for (Eigen::Index k = 0; k < probes.size(); ++k) {
-    probes(k / count, k % count) = (bits() >> 63) != 0 ? 1 : -1;
+    probes(k / count, k % count) = random.Sign();
   }
   return probes;
 }

@@ -9,7 +9,7 @@
 #include <utility>
 #include <variant>
 
-#include "fitting/least_squares/gaussian_random.h"
+#include "fitting/least_squares/noise_sink.h"
 #include "fitting/least_squares/normal_equations.h"
 #include "fitting/level/auto_weight.h"
 #include "fitting/level/reweighting.h"
@@ -17,6 +17,7 @@
 #include "fitting/terms/term_cost.h"
 #include "fitting/uncertainty/subspace.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -330,14 +331,14 @@ std::vector<double> ErrorPropagation::Sigma(std::span<const Vec2> uv,
 std::vector<HSplineSurface> ErrorPropagation::Samples(int count, std::uint64_t random_seed) const {
   const Model& m = *model_;
   const auto vertices = static_cast<Eigen::Index>(m.view.start.vertices.size());
-  GaussianRandom normal(random_seed);
+  Random random(random_seed);
   std::vector<HSplineSurface> samples;
   for (int sample = 0; sample < count; ++sample) {
-    NoiseSink noise(vertices, normal);
+    NoiseSink noise(vertices, random);
     AddOthers(m.terms, m.view, noise);
-    Eigen::MatrixXd step = m.prior_sd * m.factor.Solve(noise.Sum()) + normal() * m.undone;
-    const Eigen::VectorXd z =
-        Eigen::VectorXd::NullaryExpr(m.points[0].rows(), [&](Eigen::Index) { return normal(); });
+    Eigen::MatrixXd step = m.prior_sd * m.factor.Solve(noise.Sum()) + random.Normal() * m.undone;
+    const Eigen::VectorXd z = Eigen::VectorXd::NullaryExpr(
+        m.points[0].rows(), [&](Eigen::Index) { return random.Normal(); });
     for (int c = 0; c < 3; ++c) {
       step.col(c) += m.points[c].transpose() * z;
     }

@@ -9,13 +9,14 @@
 #include <utility>
 #include <variant>
 
-#include "fitting/least_squares/gaussian_random.h"
+#include "fitting/least_squares/noise_sink.h"
 #include "fitting/least_squares/normal_equations.h"
 #include "fitting/level/auto_weight.h"
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term_cost.h"
 #include "fitting/uncertainty/subspace.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -154,10 +155,10 @@ std::vector<ControlNet> SamplesWithin(const LevelView& view, std::span<const dou
   const std::vector<Term> terms = WithChosenWeight(view, given, chosen);
   const SubspaceSolver factor(NormalOf(view, sd_mm, terms), std::move(space));
   RequireFactor(factor);
-  GaussianRandom normal(random_seed);
+  Random random(random_seed);
   std::vector<ControlNet> samples;
   for (int sample = 0; sample < count; ++sample) {
-    NoiseSink noise(static_cast<Eigen::Index>(view.start.vertices.size()), normal);
+    NoiseSink noise(static_cast<Eigen::Index>(view.start.vertices.size()), random);
     AddModel(view, sd_mm, terms, noise);
     const Eigen::MatrixXd step = factor.Solve(noise.Sum());
     samples.push_back(view.start);

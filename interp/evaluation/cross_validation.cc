@@ -7,11 +7,11 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <random>
 
 #include "interp/evaluation/calibration.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -225,10 +225,7 @@ Folds RandomFolds(std::span<const Dowel> dowels, int count, std::uint64_t random
   std::vector<std::size_t> order(dowels.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::sort(order, {}, [&](std::size_t i) { return dowels[i].site; });
-  std::mt19937_64 engine(random_seed);
-  for (std::size_t k = order.size(); k > 1; --k) {
-    std::swap(order[k - 1], order[(engine() >> 11) % k]);
-  }
+  Random(random_seed).Shuffle(order);
   Folds folds(std::min<std::size_t>(count, order.size()));
   for (std::size_t k = 0; k < order.size(); ++k) {
     folds[k % folds.size()].push_back(order[k]);

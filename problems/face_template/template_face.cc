@@ -14,6 +14,7 @@
 #include "problems/face_template/template_sites.h"
 #include "problems/subject/phantom_shape.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -171,10 +172,10 @@ void CheckOptions(const TemplateOptions& o) {
 }
 
 void Disturb(double error, std::uint64_t random_seed, std::map<std::string, Vec2>& site_uv) {
-  UniformRandom random(random_seed);
+  Random random(random_seed);
   for (auto& [site, uv] : site_uv) {
     for (int axis = 0; axis < 2; ++axis) {
-      uv[axis] = std::clamp(uv[axis] + random.Between(-error, error), 0.0, 1.0);
+      uv[axis] = std::clamp(uv[axis] + random.Uniform(-error, error), 0.0, 1.0);
     }
   }
 }

@@ -9,9 +9,9 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <numeric>
-#include <random>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -32,12 +32,12 @@ double MeanOf(std::span<const double> values) {
 
 Interval BootstrapMean(std::span<const double> values, std::uint64_t random_seed) {
   constexpr int kResamples = 4000;
-  std::mt19937_64 engine(random_seed);
+  Random random(random_seed);
   std::vector<double> means(kResamples);
   for (double& mean : means) {
     double sum = 0;
     for (std::size_t n = 0; n < values.size(); ++n) {
-      sum += values[engine() % values.size()];
+      sum += values[random.Index(values.size())];
     }
     mean = sum / static_cast<double>(values.size());
   }

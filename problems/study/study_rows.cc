@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <boost/random/sobol.hpp>
 #include <cmath>
-#include <random>
 
 #include "problems/config/config_reader.h"
 #include "surfaces/base/fields.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -232,17 +232,16 @@ std::vector<std::vector<double>> UnitSamples(SampleMethod method, int n, int dim
     }
     return points;
   }
-  std::mt19937_64 engine(random_seed);
-  const auto uniform = [&engine] { return static_cast<double>(engine() >> 11) * 0x1.0p-53; };
+  Random random(random_seed);
   for (int d = 0; d < dimensions; ++d) {
     std::vector<int> slice(n);
     for (int k = 0; k < n; ++k) {
-      const int other = static_cast<int>(uniform() * (k + 1));
+      const int other = static_cast<int>(random.Uniform() * (k + 1));
       slice[k] = slice[other];
       slice[other] = k;
     }
     for (int k = 0; k < n; ++k) {
-      points[k][d] = (slice[k] + uniform()) / n;
+      points[k][d] = (slice[k] + random.Uniform()) / n;
     }
   }
   return points;

@@ -9,6 +9,7 @@
 
 #include "problems/subject/phantom_shape.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -41,7 +42,7 @@ struct DirectionAnchor {
 
 class DepthFormula {
  public:
-  explicit DepthFormula(UniformRandom& random);
+  explicit DepthFormula(Random& random);
   double At(const Vec3& direction) const;  // mm, > 0
 
  private:
@@ -82,9 +83,9 @@ std::vector<DirectionAnchor> VaultAnchors(const std::vector<DirectionAnchor>& si
   return anchors;
 }
 
-DepthFormula::DepthFormula(UniformRandom& random)
+DepthFormula::DepthFormula(Random& random)
     : anchors_(SiteAnchors()),
-      subject_(std::clamp(1 + 0.08 * random.Normal(), 0.84, 1.16)),
+      subject_(std::clamp(1 + 0.08 * random.BoundedNormal(), 0.84, 1.16)),
       waves_(DrawWaves(random)) {
   const std::vector<DirectionAnchor> vault = VaultAnchors(anchors_);
   anchors_.insert(anchors_.end(), vault.begin(), vault.end());
@@ -168,7 +169,7 @@ class Head {
   const Vec3& Centre() const { return centre_; }
 
  private:
-  UniformRandom random_;
+  Random random_;
   PhantomShape shape_;
   DepthFormula depth_;
   Vec3 centre_;

@@ -45,30 +45,15 @@ const Body kBodies[] = {
 };
 constexpr double kBlend = 6;  // more joins the bodies with a sharper crease
 
-Vec3 Jittered(const Vec3& v, double share, UniformRandom& random) {
+Vec3 Jittered(const Vec3& v, double share, Random& random) {
   Vec3 factor;
   for (int i = 0; i < 3; ++i) {
-    factor[i] = 1 + random.Between(-share, share);
+    factor[i] = 1 + random.Uniform(-share, share);
   }
   return v.cwiseProduct(factor);
 }
 
 }  // namespace
-
-double UniformRandom::Normal() {
-  double sum = -6;
-  for (int i = 0; i < 12; ++i) {
-    sum += Between(0, 1);
-  }
-  return sum;
-}
-
-Vec3 UniformRandom::Direction() {
-  const double z = Between(-1, 1);
-  const double azimuth = Between(0, 2 * std::numbers::pi);
-  const double s = std::sqrt(1 - z * z);
-  return {s * std::cos(azimuth), s * std::sin(azimuth), z};
-}
 
 Vec3 PhantomDirection(const Vec3& place) { return (place - kPhantomCentre).normalized(); }
 
@@ -88,19 +73,19 @@ Vec3 WaveSum::Gradient(const Vec3& direction) const {
   return sum;
 }
 
-WaveSum DrawWaves(UniformRandom& random) {
+WaveSum DrawWaves(Random& random) {
   constexpr int kWaves = 5;
   WaveSum sum;
   for (int i = 0; i < kWaves; ++i) {
     const Vec3 direction = random.Direction();
-    const double wave_number = random.Between(1.5, 3);
-    const double phase = random.Between(0, 2 * std::numbers::pi);
+    const double wave_number = random.Uniform(1.5, 3);
+    const double phase = random.Uniform(0, 2 * std::numbers::pi);
     sum.waves.push_back({wave_number * direction, phase, 1 / std::sqrt(kWaves)});
   }
   return sum;
 }
 
-PhantomShape::PhantomShape(UniformRandom& random) {
+PhantomShape::PhantomShape(Random& random) {
   for (const Body& body : kBodies) {
     const Mat3 turn = Eigen::AngleAxisd(body.tilt, Vec3::UnitX()).toRotationMatrix();
     const Vec3 half = Jittered(body.half_mm, 0.03, random);
@@ -109,12 +94,12 @@ PhantomShape::PhantomShape(UniformRandom& random) {
   }
   for (const Feature& f : kFeatures) {
     const double reach = (f.place - kPhantomCentre).norm();
-    const double height = f.height_mm * random.Between(0.8, 1.2);
+    const double height = f.height_mm * random.Uniform(0.8, 1.2);
     const bool paired = f.place.x() > 0;
     for (const double side : {1.0, -1.0}) {
       if (side > 0 || paired) {
         const Vec3 place(side * f.place.x(), f.place.y(), f.place.z());
-        const double asymmetry = paired ? random.Between(0.95, 1.05) : 1;
+        const double asymmetry = paired ? random.Uniform(0.95, 1.05) : 1;
         bumps_.push_back({PhantomDirection(place), f.sigma_mm / reach, height * asymmetry});
       }
     }

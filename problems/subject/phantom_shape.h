@@ -2,28 +2,12 @@
 // The bone of a phantom by formula: a radius for every direction, no one's data.
 #pragma once
 
-#include <cstdint>
-#include <random>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
-
-// Uniform numbers from a seed; the same on every machine.
-class UniformRandom {
- public:
-  explicit UniformRandom(std::uint64_t random_seed) : engine_(random_seed) {}
-  double Between(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
-  }
-  // Twelve uniforms less six: mean 0, sd 1, never beyond 6.
-  double Normal();
-  Vec3 Direction();  // unit, every direction alike
-
- private:
-  std::mt19937_64 engine_;
-};
 
 // Where the rays start, mm, before the surface is moved to put nasion at the origin.
 inline const Vec3 kPhantomCentre(0, 75, -20);
@@ -41,12 +25,12 @@ struct WaveSum {  // a smooth function of direction; as drawn, rms about 0.7, ne
   double Value(const Vec3& direction) const;
   Vec3 Gradient(const Vec3& direction) const;
 };
-WaveSum DrawWaves(UniformRandom& random);
+WaveSum DrawWaves(Random& random);
 
 // A closed smooth surface that every ray from the centre meets once.
 class PhantomShape {
  public:
-  explicit PhantomShape(UniformRandom& random);  // draws sizes, heights of features, asymmetry
+  explicit PhantomShape(Random& random);  // draws sizes, heights of features, asymmetry
 
   double Radius(const Vec3& direction) const;  // from the centre, mm; direction unit
   Vec3 Normal(const Vec3& direction) const;    // of the surface there, unit, outward; exact

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "surfaces/base/random.h"
 #include "tests/bench/fit_parts.h"
 #include "tests/bench/mba.h"
 #include "tests/bench/peer_program.h"
@@ -43,7 +44,7 @@ Scene Split(FitTarget all) {
 
 Scene SheetScene() {
   Scene scene = Split(testing::DrawnScan(50000, 1e-4, 5));
-  testing::Random random(9);
+  Random random(9);
   while (scene.gaps.size() < 5000) {
     const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
     if (testing::InDrawnGap(uv)) {

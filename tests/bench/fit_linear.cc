@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <random>
 #include <vector>
 
 #include "fitting/fit.h"
+#include "surfaces/base/random.h"
 #include "tests/bench/fit_parts.h"
 
 namespace semblance::bench {
@@ -32,12 +32,11 @@ FitPoint PointAt(double u, double v) {
 }
 
 FitTarget Points(int count) {
-  std::mt19937_64 bits(1);
-  const auto uniform = [&] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
+  Random random(1);
   FitTarget target;
   target.points.reserve(count);
   for (int k = 0; k < count; ++k) {
-    const double u = uniform(), v = uniform();
+    const double u = random.Uniform(), v = random.Uniform();
     target.points.push_back(PointAt(u, v));
   }
   return target;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fitting/fit.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "tests/bench/fit_parts.h"
 #include "tests/testing/scattered_data.h"
@@ -19,7 +20,7 @@ Measured MeasureRelaxation(int rounds) {
       .patches_u = 64, .patches_v = 64, .max_level = 0, .closure = Closure::kPeriodicU};
   const HSplineSurface start = testing::PlainStart(shape);
   FitTarget target = testing::Scattered(testing::HeadPoint, 100000, 1e-4, 206);
-  testing::Random random(1);
+  Random random(1);
   for (FitPoint& p : target.points) {
     const double u = p.uv.x() + random.Uniform(-0.005, 0.005);
     p.uv = Vec2(u - std::floor(u), std::clamp(p.uv.y() + random.Uniform(-0.005, 0.005), 0.0, 1.0));

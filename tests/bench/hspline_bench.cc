@@ -17,6 +17,7 @@
 #include <gp_Pnt.hxx>
 #include <gp_Vec.hxx>
 
+#include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "tests/testing/splines.h"
@@ -47,7 +48,7 @@ std::pair<double, double> Rates(const Ours& ours, const Peer& peer, int count = 
 HSplineSurface FaceLike() {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 4};
   HSplineSurface surface = testing::SmoothSurface(shape, 1);
-  testing::Random random(2);
+  Random random(2);
   for (int level = 1; level <= 4; ++level) {
     std::map<VertexId, std::optional<Vec3>> offsets;
     for (int e = 0; e < 750; ++e) {
@@ -119,7 +120,7 @@ void Print(const char* name, double ours, double peer, double goal, const char* 
 // Closest points, from 5 mm off the surface: ours against OpenCASCADE's extrema.
 void ProjectBoth(const HSplineSurface& surface, const Handle(Geom_BSplineSurface) & occt) {
   constexpr int kPoints = 100;
-  testing::Random random(4);
+  Random random(4);
   std::vector<Vec3> points;
   for (int k = 0; k < kPoints; ++k) {
     const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
@@ -164,7 +165,7 @@ int Main() {
   const HSplineSurface surface = FaceLike();
   const int level = surface.shape().max_level, m = surface.shape().PatchesU(level),
             n = surface.shape().PatchesV(level);
-  testing::Random random(3);
+  Random random(3);
   std::vector<Vec2> uv;
   for (int k = 0; k < kCount; ++k) {
     uv.emplace_back(random.Uniform(0, 1), random.Uniform(0, 1));

@@ -10,6 +10,7 @@
 #include "fitting/adaptive/tree_system.h"
 #include "fitting/problem/placement.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
@@ -22,7 +23,6 @@ using testing::FrankePoint;
 using ::testing::HasSubstr;
 using testing::HeadPoint;
 using testing::PlainStart;
-using testing::Random;
 using testing::RandomSurface;
 using testing::Scattered;
 using testing::SmoothSurface;

@@ -12,13 +12,13 @@
 #include "fitting/problem/placement.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
 
 using ::testing::HasSubstr;
-using testing::Random;
 using testing::RandomSurface;
 using testing::SmoothSurface;
 

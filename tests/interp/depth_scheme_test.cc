@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -179,7 +180,7 @@ TEST_P(EveryScheme, WorksWithTwoThousandDowels) {
   DowelScene scene;
   scene.skull = testing::SphereMesh({0, 0, 0}, 90, 16);
   scene.normals = VertexNormals(scene.skull);
-  testing::Random random(3);
+  Random random(3);
   for (int k = 0; k < kDowels; ++k) {
     const Triangle& t = scene.skull.triangles[scene.skull.triangles.size() * k / kDowels];
     const double a = random.Uniform(0, 0.5), b = random.Uniform(0, 0.5);

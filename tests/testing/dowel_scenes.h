@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "interp/dowels/depth_input.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {

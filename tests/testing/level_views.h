@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fitting/level/level_fit.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline/hspline_surface.h"
 #include "tests/testing/shapes.h"
 
@@ -132,12 +133,6 @@ inline Vec3 HeadPoint(const Vec2& uv) {
           1.2 * r * std::cos(t)};
 }
 
-// Normally distributed (Box-Muller).
-inline double Normal(Random& random) {
-  const double r = std::sqrt(-2 * std::log(1 - random.Uniform(0, 1)));
-  return r * std::cos(2 * std::numbers::pi * random.Uniform(0, 1));
-}
-
 // `count` points of the surface at random (u,v), each coordinate off by noise (standard deviation).
 template <class Surface>
 FitTarget Scattered(const Surface& surface, int count, double noise, std::uint64_t random_seed) {
@@ -146,7 +141,7 @@ FitTarget Scattered(const Surface& surface, int count, double noise, std::uint64
   target.points.reserve(count);
   for (int k = 0; k < count; ++k) {
     const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
-    const Vec3 off(Normal(random), Normal(random), Normal(random));
+    const Vec3 off(random.Normal(), random.Normal(), random.Normal());
     target.points.push_back({.label = {}, .position = surface(uv) + noise * off, .uv = uv});
   }
   return target;

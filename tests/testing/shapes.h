@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <random>
 
 #include "surfaces/mesh/tri_mesh.h"
 
@@ -67,20 +66,5 @@ inline TriMesh Joined(TriMesh a, const TriMesh& b) {
   }
   return a;
 }
-
-// Uniform numbers from a fixed seed; the same on every machine.
-class Random {
- public:
-  explicit Random(std::uint64_t random_seed) : engine_(random_seed) {}
-  double Uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1.0p-53;
-  }
-  Vec3 InBox(double low, double high) {
-    return {Uniform(low, high), Uniform(low, high), Uniform(low, high)};
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 }  // namespace semblance::testing

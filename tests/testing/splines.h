@@ -2,6 +2,7 @@
 // Random H-spline surfaces for law tests.
 #pragma once
 
+#include "surfaces/base/random.h"
 #include "surfaces/hspline/hspline_surface.h"
 #include "tests/testing/shapes.h"
 

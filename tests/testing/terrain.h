@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {

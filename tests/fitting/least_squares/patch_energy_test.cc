@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
 
@@ -12,7 +13,6 @@ namespace semblance {
 namespace {
 
 using testing::PlainStencil;
-using testing::Random;
 
 // Gauss-Legendre nodes and weights on [0,1] from the Golub-Welsch eigenproblem.
 struct Quadrature {

@@ -6,6 +6,7 @@
 
 #include "fitting/level/level_solver.h"
 #include "fitting/terms/term_cost.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
 #include "tests/testing/splines.h"
 
@@ -14,7 +15,6 @@ namespace {
 
 using testing::AllTerms;
 using testing::NoisyView;
-using testing::Random;
 using testing::SmoothSurface;
 
 double Distance(const ControlNet& a, const ControlNet& b) {

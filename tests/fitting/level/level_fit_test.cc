@@ -13,6 +13,7 @@
 #include "fitting/least_squares/qr_compression.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
 
 namespace semblance {
@@ -23,7 +24,6 @@ using ::testing::HasSubstr;
 using testing::NoisyView;
 using testing::Observe;
 using testing::PlainStencil;
-using testing::Random;
 using testing::Sheet;
 using testing::View;
 

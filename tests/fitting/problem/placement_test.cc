@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 #include "tests/testing/splines.h"
 
@@ -14,7 +15,6 @@ namespace semblance {
 namespace {
 
 using ::testing::HasSubstr;
-using testing::Random;
 
 std::vector<Vec3> Cloud(int n, std::uint64_t random_seed) {
   Random random(random_seed);

@@ -12,13 +12,13 @@
 #include "fitting/fit.h"
 #include "fitting/problem/placement.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
 
-using testing::Random;
 using testing::SmoothSurface;
 
 HSplineShape Shape() { return {.patches_u = 4, .patches_v = 4, .max_level = 1}; }

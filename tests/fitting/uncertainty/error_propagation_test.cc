@@ -9,6 +9,7 @@
 
 #include "fitting/fit.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -16,12 +17,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using testing::Random;
-
-double Gaussian(Random& random) {
-  const double r = std::sqrt(-2 * std::log(random.Uniform(1e-300, 1)));
-  return r * std::cos(2 * std::numbers::pi * random.Uniform(0, 1));
-}
 
 // Points of the template on the part with u < 0.7, which may be off along its normals by errors
 // that hang together.
@@ -55,7 +50,7 @@ struct Scene {
   FitTarget Off(Random& random) const {
     Eigen::VectorXd z(errors.root.cols());
     for (double& value : z) {
-      value = Gaussian(random);
+      value = random.Normal();
     }
     const Eigen::VectorXd along = errors.root * z;
     FitTarget off = target;

@@ -12,6 +12,7 @@
 #include "fitting/least_squares/normal_equations.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
@@ -20,14 +21,8 @@ namespace semblance {
 namespace {
 
 using testing::Observe;
-using testing::Random;
 using testing::Sheet;
 using testing::View;
-
-double Gaussian(Random& random) {
-  const double r = std::sqrt(-2 * std::log(random.Uniform(1e-300, 1)));
-  return r * std::cos(2 * std::numbers::pi * random.Uniform(0, 1));
-}
 
 // 25 points on the left half of the sheet, known to 0.5 to 2 mm and weighted accordingly.
 struct Problem {
@@ -64,7 +59,7 @@ ControlNet DrawTruth(const Problem& problem, Random& random) {
   const Eigen::MatrixXd precision = weight_sum * Eigen::MatrixXd(normal.Lower());  // its lower half
   const Eigen::LLT<Eigen::MatrixXd> factor(precision);
   const Eigen::MatrixXd draw = factor.matrixU().solve(
-      Eigen::MatrixXd::NullaryExpr(precision.rows(), 3, [&] { return Gaussian(random); }));
+      Eigen::MatrixXd::NullaryExpr(precision.rows(), 3, [&] { return random.Normal(); }));
   ControlNet net = problem.view.rest;
   for (std::size_t k = 0; k < net.vertices.size(); ++k) {
     net.vertices[k] += draw.row(k).transpose();
@@ -86,7 +81,7 @@ TEST(Posterior, SigmaIsTheErrorOfTheFit) {
     LevelView view = problem.view;
     for (std::size_t k = 0; k < view.observations.size(); ++k) {
       Observation& o = view.observations[k];
-      const Vec3 noise(Gaussian(random), Gaussian(random), Gaussian(random));
+      const Vec3 noise(random.Normal(), random.Normal(), random.Normal());
       o.position = view.grid.StencilAt(o.uv).Apply(truth) + problem.sd_mm[k] * noise;
     }
     const ControlNet fitted = FitLevel(view, problem.terms).net;
@@ -167,7 +162,7 @@ TEST(Posterior, NinetyPercentIntervalsCoverNineInTen) {
     LevelView view = problem.view;
     for (std::size_t k = 0; k < view.observations.size(); ++k) {
       Observation& o = view.observations[k];
-      const Vec3 noise(Gaussian(random), Gaussian(random), Gaussian(random));
+      const Vec3 noise(random.Normal(), random.Normal(), random.Normal());
       o.position = view.grid.StencilAt(o.uv).Apply(truth) + problem.sd_mm[k] * noise;
     }
     const ControlNet fitted = FitLevel(view, problem.terms, LevelSolver::kFastest).net;

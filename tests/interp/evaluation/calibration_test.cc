@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
@@ -14,23 +15,14 @@ namespace {
 
 using ::testing::Each;
 using ::testing::IsEmpty;
-using testing::Random;
 
 // Sums of twelve uniform numbers: normal to a tenth of a per cent within two deviations.
-double Normal(Random& random) {
-  double sum = -6;
-  for (int k = 0; k < 12; ++k) {
-    sum += random.Uniform(0, 1);
-  }
-  return sum;
-}
-
 TEST(Coverage, OfTrueDeviationsIsWhatTheyState) {
   Random random(1);
   std::vector<double> errors, sds;
   for (int n = 0; n < 20000; ++n) {
     sds.push_back(random.Uniform(0.5, 3));
-    errors.push_back(sds.back() * Normal(random));
+    errors.push_back(sds.back() * random.BoundedNormal());
   }
   const std::vector<double> coverage = Coverage(errors, sds);
   ASSERT_EQ(coverage.size(), 19u);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -13,7 +14,6 @@ using testing::DowelScene;
 using testing::FlatScene;
 using testing::Moved;
 using testing::OnThreads;
-using testing::Random;
 
 std::vector<Vec3> Directions(const DepthDirection& direction, const DowelScene& scene,
                              int threads = 1) {

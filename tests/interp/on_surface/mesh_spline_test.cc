@@ -12,6 +12,7 @@
 #include "interp/schemes/biharmonic.h"
 #include "interp/schemes/harmonic.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -21,7 +22,6 @@ using testing::Count;
 using testing::DowelScene;
 using testing::FlatScene;
 using testing::Plate;
-using testing::Random;
 using testing::ScatteredScene;
 using testing::SphereMesh;
 

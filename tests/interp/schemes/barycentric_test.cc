@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -16,7 +17,6 @@ using testing::Count;
 using testing::DomeScene;
 using testing::DowelScene;
 using testing::FlatScene;
-using testing::Random;
 
 DepthField FieldOf(const DowelScene& scene, const Barycentric& options = {}) {
   return InterpolateDepth(options, scene.Input(), RunContext{});

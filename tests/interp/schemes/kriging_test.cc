@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "interp/schemes/kriging_process.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -12,7 +13,6 @@ namespace {
 
 using testing::DowelScene;
 using testing::FlatScene;
-using testing::Random;
 using testing::ScatteredScene;
 
 DepthField FieldAt(const Kriging& options, const DowelScene& scene, std::vector<Vec3> points) {

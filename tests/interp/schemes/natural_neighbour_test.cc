@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "interp/schemes/power_cell.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -15,7 +16,6 @@ namespace {
 
 using testing::DowelScene;
 using testing::FlatScene;
-using testing::Random;
 using testing::ScatteredScene;
 
 class NaturalNeighbours : public ::testing::TestWithParam<NeighbourWeights> {

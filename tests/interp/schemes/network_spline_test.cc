@@ -8,6 +8,7 @@
 
 #include "interp/schemes/barycentric.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -16,7 +17,6 @@ namespace {
 using testing::DomeScene;
 using testing::DowelScene;
 using testing::FlatScene;
-using testing::Random;
 
 template <class Scheme>
 double DepthAt(const DowelScene& scene, Scheme scheme, const Vec3& p) {

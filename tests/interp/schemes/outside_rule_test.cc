@@ -6,6 +6,7 @@
 
 #include "interp/schemes/barycentric.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/point_triangle.h"
 #include "tests/testing/dowel_scenes.h"
 
@@ -79,7 +80,7 @@ TEST(OutsideRule, ExtendIsContinuousAtTheBorderOfTheNetwork) {
 
 TEST(OutsideRule, ExtendTakesTheClosestOfAllTriangles) {
   const DowelScene dome = DomeScene();
-  testing::Random random(11);
+  Random random(11);
   std::vector<Vec3> points(500);
   std::ranges::generate(points, [&] { return random.InBox(-150, 150); });
   const DowelScene scene = dome.At(points);

@@ -6,12 +6,11 @@
 #include <algorithm>
 #include <vector>
 
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
-
-using testing::Random;
 
 // Sites around the origin, some of them above its plane.
 std::vector<PowerSite> RandomSites(Random& random, int count, double height) {

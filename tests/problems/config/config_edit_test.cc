@@ -10,6 +10,7 @@
 #include <set>
 
 #include "problems/config/config.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/config_samples.h"
 #include "tests/testing/shapes.h"
 
@@ -99,10 +100,10 @@ TEST_F(ConfigFiles, BadBasesAreErrorsWithTheirPlace) {
   EXPECT_EQ(ErrorsOf(a),
             (folder_ / "b.yaml").string() + ":1:7: base: 'a.yaml' would be its own base");
   const auto lost = Write("lost.yaml", "count: 0\nbase: none.yaml\n");
-  EXPECT_EQ(ErrorsOf(lost),
-            lost.string() + ":1:8: count: 0 is out of range; allowed is 1 to 100\n" +
-                lost.string() + ":2:7: base: " + (folder_ / "none.yaml").string() +
-                ": no such file; paths are relative to this file");
+  EXPECT_EQ(ErrorsOf(lost), lost.string() +
+                                ":1:8: count: 0 is out of range; allowed is 1 to 100\n" +
+                                lost.string() + ":2:7: base: " + (folder_ / "none.yaml").string() +
+                                ": no such file; paths are relative to this file");
   EXPECT_THAT(ErrorsOf(Write("list.yaml", "base: [a]\n")), HasSubstr("the path of a file is due"));
   Write("wrong.yaml", "count: x\n");
   EXPECT_EQ(
@@ -165,7 +166,7 @@ TEST(ConfigSet, ErrorsNameTheOverride) {
 }
 
 // Values over all bit patterns of doubles and all bytes of texts that YAML can hold.
-Options RandomOptions(testing::Random& random) {
+Options RandomOptions(Random& random) {
   const auto number = [&] {
     return std::ldexp(random.Uniform(-1, 1), int(random.Uniform(-1070, 1020)));
   };
@@ -188,7 +189,7 @@ Options RandomOptions(testing::Random& random) {
 }
 
 TEST(ConfigWrite, ResolvedTextGivesTheSameValueAndTheSameText) {
-  testing::Random random(20241);
+  Random random(20241);
   for (int i = 0; i < 200; ++i) {
     const Options options = RandomOptions(random);
     const std::string text = WriteConfig(options);

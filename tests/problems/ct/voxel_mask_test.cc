@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
@@ -13,7 +14,7 @@ namespace {
 const VoxelGrid kGrid{{9, 8, 7}, Vec3(1, 1.5, 0.7)};
 
 VoxelMask RandomMask(std::uint64_t random_seed, double share) {
-  testing::Random random(random_seed);
+  Random random(random_seed);
   VoxelMask mask(kGrid.Count());
   for (auto& voxel : mask) {
     voxel = random.Uniform(0, 1) < share;

@@ -11,6 +11,7 @@
 #include "problems/pictures/pictures.h"
 #include "problems/pictures/srgb.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
@@ -58,7 +59,7 @@ Colour Centre(const Image& image) { return PixelAt(image, image.width / 2, image
 // A crowded scene with a transparent layer.
 Scene Crowd() {
   Scene scene;
-  testing::Random random(7);
+  Random random(7);
   for (int i = 0; i < 12; ++i) {
     scene.objects.push_back(SkullObject(MakeSphere(random.InBox(-30, 30), 6, 10)));
   }

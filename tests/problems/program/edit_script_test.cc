@@ -6,13 +6,13 @@
 
 #include "problems/config/config.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
 
 using ::testing::HasSubstr;
-using testing::Random;
 using testing::RandomSurface;
 
 const HSplineShape kShape{.patches_u = 4, .patches_v = 5, .max_level = 3};

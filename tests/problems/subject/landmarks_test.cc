@@ -9,6 +9,7 @@
 #include "problems/subject/averaged_normal.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
@@ -129,7 +130,7 @@ TEST(PlaceDowels, RefusesALandmarkOffTheSkull) {
 
 TEST(PlaceDowels, DirectionIsTheSkullsNormal) {
   const TriMesh ball = SphereMesh({5, 6, 7}, 50, 60);
-  testing::Random random(3);
+  Random random(3);
   for (int i = 0; i < 20; ++i) {
     const Vec3 out = random.InBox(-1, 1).normalized();
     const Vec3 at = Vec3(5, 6, 7) + 50.5 * out;

@@ -13,6 +13,7 @@
 #include "problems/face_template/template_sites.h"
 #include "problems/subject/phantom_shape.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -219,7 +220,7 @@ TEST(Phantom, RingsOutOfRangeAreNamed) {
 }
 
 TEST(PhantomShape, NormalIsThatOfTheSurfaceByDifferences) {
-  UniformRandom random(3);
+  Random random(3);
   const PhantomShape shape(random);
   const auto point = [&](const Vec3& x) {
     return Vec3(shape.Radius(x.normalized()) * x.normalized());

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
@@ -15,7 +16,6 @@ namespace {
 
 using testing::Joined;
 using testing::Plate;
-using testing::Random;
 using testing::SphereMesh;
 
 TriMesh Torus(int around, int across) {

@@ -3,13 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/point_triangle.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
-
-using testing::Random;
 
 struct Emitting {
   Vec3 a, b, c, normal = Vec3::Zero();

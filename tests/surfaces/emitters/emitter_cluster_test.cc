@@ -6,13 +6,12 @@
 #include <cmath>
 #include <numeric>
 
+#include "surfaces/base/random.h"
 #include "surfaces/emitters/implicit_surface.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
-
-using testing::Random;
 
 // Triangles of a bumpy sheet that faces up, within 1 of the origin; sloped: of linear depth.
 std::vector<EmitterTriangle> Sheet(Random& random, int count, double bumps, bool sloped) {

@@ -5,13 +5,12 @@
 
 #include <cmath>
 
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/point_triangle.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
-
-using testing::Random;
 
 // Where the height counts, triangles are not moved.
 EmitterTriangle RandomEmitter(Random& random, const ReachFall& fall) {

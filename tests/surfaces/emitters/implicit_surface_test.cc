@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
@@ -14,7 +15,6 @@ namespace semblance {
 namespace {
 
 using testing::Plate;
-using testing::Random;
 using testing::SphereMesh;
 
 ImplicitSurface Surface(const TriMesh& mesh, double depth_mm, const Emitter& emitter,

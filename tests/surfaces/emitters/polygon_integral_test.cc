@@ -8,12 +8,11 @@
 #include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
-
-using testing::Random;
 
 using Corners = std::vector<Vec2>;  // counter-clockwise
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline/overlay.h"
 #include "surfaces/hspline/patch_tree.h"
 #include "tests/testing/splines.h"
@@ -13,7 +14,6 @@
 namespace semblance {
 namespace {
 
-using testing::Random;
 using testing::SmoothSurface;
 
 // The cardinal B-spline of the degree, on [0, degree + 1], or its derivative.

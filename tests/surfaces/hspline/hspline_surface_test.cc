@@ -9,13 +9,13 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
 
-using testing::Random;
 using testing::RandomSurface;
 using testing::SmoothSurface;
 

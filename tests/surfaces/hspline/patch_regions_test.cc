@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -32,7 +33,7 @@ TEST(PatchRegions, CoverEachLeafOnce) {
 TEST(PatchRegions, TheirNetsGiveThePointsOfTheSurface) {
   for (const HSplineShape& shape : {kOpen, kTube}) {
     const HSplineSurface surface = testing::RandomSurface(shape, 2, 4);
-    testing::Random random(3);
+    Random random(3);
     for (const PatchRegion& region : UniformRegions(PatchTree(surface))) {
       const HSplineShape plain{
           .patches_u = region.columns, .patches_v = region.rows, .max_level = 0};

@@ -18,6 +18,7 @@
 #include <numeric>
 
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline/patch_regions.h"
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
@@ -69,7 +70,7 @@ TEST_P(CadExport, ReadsBackAsTheSameSurface) {
   const std::vector<Handle(Geom_Surface)> faces = ReadBack(format(), format().write(surface));
   ASSERT_EQ(faces.size(), FewRegions(shape(), PatchTree(surface)).size());
   EXPECT_GT(faces.size(), 1u);
-  testing::Random random(2);
+  Random random(2);
   double area = 0;
   for (const Handle(Geom_Surface) & face : faces) {
     const auto spline = Handle(Geom_BSplineSurface)::DownCast(face);

@@ -6,6 +6,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
@@ -96,7 +97,7 @@ TEST_P(FeatureLaws, AMirroredFeatureOnTheMirroredFaceIsTheFaceInTheMirror) {
   const HSplineSurface face = Face(6);
   HSplineSurface mirrored = MirroredLevelZero(face);
   ApplyFeature(MirrorFeature(ExtractFeature(face, "all")), mirrored);
-  testing::Random random(6);
+  Random random(6);
   for (int k = 0; k < 100; ++k) {
     const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
     const Vec3 expected = Vec3(-1, 1, 1).cwiseProduct(face.Point({1 - uv.x(), uv.y()}));

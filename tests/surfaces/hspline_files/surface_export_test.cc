@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline/patch_tree.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "tests/testing/splines.h"
@@ -54,7 +55,7 @@ TEST(SurfaceExport, TheBezierPatchesAreTheSurface) {
   const PatchTree tree(surface);
   const std::vector<double> points = Array(vtu, 0);
   ASSERT_EQ(points.size(), 48 * tree.leaves().size());
-  testing::Random random(1);
+  Random random(1);
   for (std::size_t p = 0; p < tree.leaves().size(); ++p) {
     const PatchId patch = tree.leaves()[p];
     const double s = random.Uniform(0, 1), t = random.Uniform(0, 1);

@@ -6,12 +6,12 @@
 #include <functional>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
 
-using testing::Random;
 using testing::RandomSurface;
 
 // z = a x^2 + b y^2 over [-10, 10]^2, exactly: the vertex of x^2 is x^2 - h^2 / 3.

@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
 
-using testing::Random;
 using testing::RandomSurface;
 
 std::vector<Vec2> RandomParameters(int count, double lowest = -0.2, double highest = 1.2) {

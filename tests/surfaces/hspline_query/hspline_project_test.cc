@@ -4,12 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
 
-using testing::Random;
 using testing::RandomSurface;
 using testing::SmoothSurface;
 

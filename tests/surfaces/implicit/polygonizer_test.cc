@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/implicit_face.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
 
-using testing::Random;
 using testing::SphereMesh;
 
 // A ball with bumps, open at the bottom, and depths from 2 to 4 mm.

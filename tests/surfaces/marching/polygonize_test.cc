@@ -6,14 +6,13 @@
 #include <map>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "surfaces/implicit_face.h"
 #include "surfaces/marching/crossings.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
-
-using testing::Random;
 
 SampleGrid CubeGrid(double half, int n) {
   return {Vec3::Constant(-half), Vec3::Constant(2 * half / (n - 1)), {n, n, n}};

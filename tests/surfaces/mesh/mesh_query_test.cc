@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
 
 using testing::Plate;
-using testing::Random;
 using testing::SphereMesh;
 
 // Oracle: the nearest of many points spread over each triangle.

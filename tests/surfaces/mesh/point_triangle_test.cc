@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
@@ -17,7 +18,7 @@ void ExpectLawful(const TrianglePoint& on, const Vec3& a, const Vec3& b, const V
 }
 
 TEST(PointTriangle, AgreesWithTheSearchTree) {
-  testing::Random random(3);
+  Random random(3);
   for (int n = 0; n < 2000; ++n) {
     const Vec3 a = random.InBox(-10, 10), b = random.InBox(-10, 10), c = random.InBox(-10, 10);
     const MeshQuery query(TriMesh{{a, b, c}, {{0, 1, 2}}});
