@@ -11,6 +11,7 @@
 #include <map>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -244,6 +245,62 @@ TEST(Architecture, TestsMirrorTheRooms) {
       EXPECT_GE(LayerOf(floor, room), 0) << entry.path();
       EXPECT_TRUE(tested == room_of_stem.end() || tested->second == room)
           << entry.path() << " tests a file of " << RoomName(floor, tested->second);
+    }
+  }
+}
+
+// The house as docs/architecture.md draws it: a line is a layer, the top one first; two floors may
+// stand side by side, in columns that begin where their names do.
+std::map<std::string, Layers> DrawnHouse(const std::string& page) {
+  const std::size_t begin = page.find("```\n") + 4, end = page.find("```", begin);
+  std::istringstream drawing(page.substr(begin, end - begin));
+  std::map<std::size_t, std::string> floor_at;  // column
+  std::map<std::string, Layers> drawn;
+  for (std::string line; std::getline(drawing, line);) {
+    const bool names_floors = !line.empty() && line[0] != ' ';
+    if (names_floors) {
+      floor_at.clear();
+    }
+    std::map<std::string, std::set<std::string>> layer_of;
+    static const std::regex kWord(R"(\S+)");
+    for (std::sregex_iterator it(line.begin(), line.end(), kWord), last; it != last; ++it) {
+      const auto column = static_cast<std::size_t>(it->position());
+      if (names_floors) {
+        floor_at[column] = it->str();
+      } else {
+        const std::string& floor = std::prev(floor_at.upper_bound(column))->second;
+        layer_of[floor].insert(it->str()[0] == '[' ? kHall : it->str());
+      }
+    }
+    for (auto& [floor, layer] : layer_of) {
+      drawn[floor].insert(drawn[floor].begin(), std::move(layer));
+    }
+  }
+  return drawn;
+}
+
+TEST(Architecture, TheMapDrawsTheHouseAsItIs) {
+  EXPECT_EQ(DrawnHouse(ReadText(fs::path(SEMBLANCE_SOURCE_DIR) / "docs/architecture.md")), kRooms);
+}
+
+TEST(Architecture, TheMapNamesFilesThatAreThere) {
+  const std::string page = ReadText(fs::path(SEMBLANCE_SOURCE_DIR) / "docs/architecture.md");
+  static const std::regex kPath(R"(`((surfaces|interp|fitting|problems|configs)/[\w/]+\.\w+)`)");
+  static const std::regex kRow(R"(\| `((surfaces|interp|fitting|problems)/\w+)` \| `(\S+)` \|)");
+  std::set<std::string> rooms;
+  for (std::sregex_iterator it(page.begin(), page.end(), kPath), end; it != end; ++it) {
+    EXPECT_TRUE(fs::exists(fs::path(SEMBLANCE_SOURCE_DIR) / (*it)[1].str())) << (*it)[1];
+  }
+  for (std::sregex_iterator it(page.begin(), page.end(), kRow), end; it != end; ++it) {
+    rooms.insert((*it)[1]);
+    EXPECT_TRUE(fs::exists(fs::path(SEMBLANCE_SOURCE_DIR) / (*it)[1].str() / (*it)[3].str()))
+        << (*it)[1] << "/" << (*it)[3];
+  }
+  for (const auto& [floor, layers] : kRooms) {
+    for (const std::set<std::string>& layer : layers) {
+      for (const std::string& room : layer) {
+        EXPECT_TRUE(room == kHall || rooms.contains(floor + "/" + room)) << floor << "/" << room;
+      }
     }
   }
 }
