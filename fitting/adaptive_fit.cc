@@ -22,13 +22,14 @@ class AdaptiveFitter {
         given_(target),
         options_(options),
         context_(context),
+        moves_(MovesOf(options.relaxation)),
         cloud_(start.shape(), target),
         tree_(start, rest, cloud_),
         points_(PointsOf(options.terms), cloud_, tree_, context.threads),
         solver_(rest, options.terms, cloud_, tree_, points_) {
-    if (options.relaxation.mode != RelaxationMode::kNone) {
+    if (moves_) {
       moved_ = target;
-      mesh_.emplace(MeshOf(rest, target, options.relaxation));
+      mesh_.emplace(NetworkOf(rest, target, *moves_));
     }
   }
 
@@ -63,8 +64,7 @@ class AdaptiveFitter {
   const FitTarget& target() const { return mesh_ ? moved_ : given_; }
 
   RelaxationSummary MovePoints() {
-    const RelaxationSummary summary = Relax(tree_.Surface(), rest_, *mesh_, options_.relaxation,
-                                            options_.relaxation.rounds, moved_);
+    const RelaxationSummary summary = Relax(tree_.Surface(), rest_, *mesh_, *moves_, moved_);
     cloud_ = PointCloud(tree_.shape(), moved_);
     tree_.Rebin();
     points_.Measure();
@@ -99,6 +99,7 @@ class AdaptiveFitter {
   const FitTarget& given_;
   const FitOptions& options_;
   const RunContext& context_;
+  std::optional<NetworkMoves> moves_;
   FitTarget moved_;  // the points as relaxation has left them; unused without
   std::optional<DowelMesh> mesh_;
   PointCloud cloud_;

@@ -194,14 +194,15 @@ class Fitter {
         most_steps_(static_cast<double>(most_steps)),
         context_(context),
         result_(result),
-        rms_mm_(PointRms(result.surface, target)) {
+        rms_mm_(PointRms(result.surface, target)),
+        moves_(MovesOf(options.relaxation)) {
     if (const double weight = FeaturePriorWeight(options.features); weight > 0) {
       held_.insert(features.begin(), features.end());
       terms_.emplace_back(PriorTerm{.weight = weight, .held_only = true});
     }
-    if (options.relaxation.mode != RelaxationMode::kNone) {
+    if (moves_) {
       moved_ = target;
-      mesh_.emplace(MeshOf(rest, target, options.relaxation));
+      mesh_.emplace(NetworkOf(rest, target, *moves_));
     }
   }
 
@@ -221,31 +222,39 @@ class Fitter {
  private:
   void Take(const ScheduleStep& step) {
     result_.levels.push_back(Solve(step, terms_));
-    const RelaxationOptions& options = options_.relaxation;
-    if (!mesh_) {
-      return;
-    }
-    result_.relaxations.emplace_back();
-    if (options.mode == RelaxationMode::kFootpoint) {
-      result_.relaxations.back() = Move(options.rounds);
-      return;
-    }
-    for (int round = 0; round < options.rounds; ++round) {
-      Keep(options.mode == RelaxationMode::kJoint ? MoveJointly(step) : Move(1));
-      SolveAgain(step, terms_);
-    }
-    if (options.mode == RelaxationMode::kTangentDistance) {
-      Slide(step);
+    if (mesh_) {
+      result_.relaxations.emplace_back();
+      std::visit([&](const auto& chosen) { After(step, chosen); }, options_.relaxation);
     }
   }
 
-  void Slide(const ScheduleStep& step) {
-    const RelaxationOptions& options = options_.relaxation;
+  void After(const ScheduleStep&, const NoRelaxation&) {}
+  void After(const ScheduleStep&, const FootpointRelaxation&) { Keep(Move(*moves_)); }
+  void After(const ScheduleStep& step, const AlternatingRelaxation&) { Alternate(step); }
+  void After(const ScheduleStep& step, const TangentDistanceRelaxation& chosen) {
+    Alternate(step);
+    Slide(step, chosen);
+  }
+  void After(const ScheduleStep& step, const JointRelaxation& chosen) {
+    for (int round = 0; round < chosen.rounds; ++round) {
+      Keep(MoveJointly(step));
+      SolveAgain(step, terms_);
+    }
+  }
+
+  void Alternate(const ScheduleStep& step) {
+    for (int round = 0; round < moves_->rounds; ++round) {
+      Keep(MoveOnce());
+      SolveAgain(step, terms_);
+    }
+  }
+
+  void Slide(const ScheduleStep& step, const TangentDistanceRelaxation& chosen) {
     const std::vector<Term> terms =
-        AsTangentPoints(terms_, options.tangential, result_.levels.back().auto_weight);
-    for (int round = 0; round < options.tangent_rounds; ++round) {
+        AsTangentPoints(terms_, chosen.tangential, result_.levels.back().auto_weight);
+    for (int round = 0; round < chosen.tangent_rounds; ++round) {
       SolveAgain(step, terms);
-      Keep(Move(1));
+      Keep(MoveOnce());
       result_.levels.back().rms_after_mm = rms_mm_;
     }
   }
@@ -276,9 +285,14 @@ class Fitter {
     result_.levels.back().rms_before_mm = rms_before_mm;
   }
 
-  RelaxationSummary Move(int rounds) {
-    const RelaxationSummary summary =
-        Relax(result_.surface, rest_, *mesh_, options_.relaxation, rounds, moved_);
+  RelaxationSummary MoveOnce() {
+    NetworkMoves once = *moves_;
+    once.rounds = 1;
+    return Move(once);
+  }
+
+  RelaxationSummary Move(const NetworkMoves& moves) {
+    const RelaxationSummary summary = Relax(result_.surface, rest_, *mesh_, moves, moved_);
     rms_mm_ = PointRms(result_.surface, moved_);
     return summary;
   }
@@ -298,7 +312,7 @@ class Fitter {
         .cost = [&](const FitTarget& target) {
           return SumOfCosts(FitLevel(View(step.level, target), terms, options_.solver).summary);
         }};
-    return RelaxJointly(result_.surface, rest_, *mesh_, options_.relaxation, level, moved_);
+    return RelaxJointly(result_.surface, rest_, *mesh_, *moves_, level, moved_);
   }
 
   // As a part of the last step's.
@@ -320,6 +334,7 @@ class Fitter {
   const RunContext& context_;
   FitResult& result_;
   double rms_mm_;
+  std::optional<NetworkMoves> moves_;
   FitTarget moved_;  // the points as relaxation has left them; unused without
   std::optional<DowelMesh> mesh_;
 };

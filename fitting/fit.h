@@ -26,7 +26,7 @@ struct FitOptions {
   std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};
   FeatureRule features = RestoreFeatures{};
   FitAim aim = FitAim::kSurface;
-  RelaxationOptions relaxation = {};
+  Relaxation relaxation = NoRelaxation{};
   SchedulePlan plan = ListedPlan{};
   int sweeps = 0;
   LevelSolver solver = LevelSolver::kCeres;
@@ -50,9 +50,15 @@ void Fields(Visitor& visit, FitOptions& o) {
                          "finer levels as it stands, meets the points; level: so that the level "
                          "alone does, as the thesis may be read, which lets detail overshoot"},
         o.aim);
-  visit(FieldInfo{.name = "relaxation",
-                  .doc = "whether and how the points' (u,v) move over the surface after each step"},
-        o.relaxation);
+  visit(
+      FieldInfo{.name = "relaxation",
+                .doc = "whether and how the points' (u,v) move over the surface; none: they stay; "
+                       "footpoint: after each step of the schedule towards the nearest point of "
+                       "the surface; alternating: against their neighbours' pull too, and the "
+                       "level is fitted again after each round; tangent_distance: alternating, "
+                       "then fits in which the points may slide along the surface; joint: each "
+                       "round moves (u,v) and vertices in one problem, then fits the level"},
+      o.relaxation);
   visit(
       FieldInfo{.name = "plan",
                 .doc =

@@ -45,30 +45,30 @@ void CheckFeatures(std::span<const VertexId> features, const HSplineShape& shape
   }
 }
 
-// Modes that are more than moves of points between fits.
+// Relaxations that are more than moves of points between fits.
 void CheckRelaxation(const FitOptions& options) {
-  const RelaxationMode mode = options.relaxation.mode;
-  if (mode != RelaxationMode::kTangentDistance && mode != RelaxationMode::kJoint) {
+  const bool slides = std::holds_alternative<TangentDistanceRelaxation>(options.relaxation);
+  if (!slides && !std::holds_alternative<JointRelaxation>(options.relaxation)) {
     return;
   }
-  const std::string_view name = EnumNames(mode)[static_cast<std::size_t>(mode)];
+  const std::string_view name =
+      std::visit([](const auto& chosen) { return chosen.kName; }, options.relaxation);
   const auto points = std::find_if(options.terms.begin(), options.terms.end(), [](const Term& t) {
     const auto* const p = std::get_if<PointTerm>(&t);
     return p != nullptr && p->weight > 0;
   });
   if (points == options.terms.end()) {
-    Fail(fmt::format("the relaxation mode {} needs a term 'points' with a weight; add one", name));
+    Fail(fmt::format("the relaxation {} needs a term 'points' with a weight; add one", name));
   }
-  if (mode == RelaxationMode::kTangentDistance &&
-      std::get<PointTerm>(*points).loss != RobustLoss::kNone) {
+  if (slides && std::get<PointTerm>(*points).loss != RobustLoss::kNone) {
     Fail(
-        fmt::format("the relaxation mode {} lets points slide without a loss; write loss: none "
-                    "for the term 'points', or take the mode alternating or joint",
+        fmt::format("the relaxation {} lets points slide without a loss; write loss: none "
+                    "for the term 'points', or take alternating or joint",
                     name));
   }
   if (std::holds_alternative<AdaptivePlan>(options.plan)) {
     Fail(
-        fmt::format("the relaxation mode {} goes level by level; with the adaptive plan take "
+        fmt::format("the relaxation {} goes level by level; with the adaptive plan take "
                     "footpoint or alternating",
                     name));
   }

@@ -102,7 +102,7 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
     first.schedule = experiment.first_fit;
     first.plan = ListedPlan{};
     first.sweeps = 0;
-    first.relaxation.mode = RelaxationMode::kNone;
+    first.relaxation = NoRelaxation{};
     surface = Fit(surface, placed.surface, dowels, features, first, context).surface;
   }
   std::optional<FaceFit> result;

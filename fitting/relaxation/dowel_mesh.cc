@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/relaxation/dowel_mesh.h"
+
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
 
 #include "fitting/least_squares/patch_energy.h"
-#include "fitting/relaxation/relaxation.h"
 
 namespace semblance {
 namespace {
@@ -87,15 +90,17 @@ int DowelMesh::Flips(std::span<const Vec2> uv) const {
                                         [&](const auto& t) { return Turned(t, uv); }));
 }
 
-DowelMesh MeshOf(const HSplineSurface& rest, const FitTarget& target,
-                 const RelaxationOptions& options) {
-  std::vector<Vec2> uv;
-  for (const FitPoint& p : target.points) {
-    uv.push_back(p.uv);
+double SharpestCrease_deg(const HSplineSurface& surface, const DowelMesh& mesh,
+                          std::span<const Vec2> uv) {
+  std::vector<Vec3> normals;
+  for (const Vec2& place : uv) {
+    normals.push_back(surface.Normal(place));
   }
-  const bool neighbours = options.mode != RelaxationMode::kFootpoint &&
-                          (options.bunching > 0 || options.distortion > 0 || options.crease > 0);
-  return {rest, uv, options.barrier || neighbours ? DowelLinks::kDelaunay : DowelLinks::kNone};
+  double cosine = 1;
+  for (const auto& [a, b] : mesh.edges()) {
+    cosine = std::min(cosine, normals[a].dot(normals[b]));
+  }
+  return std::acos(std::max(cosine, -1.0)) * 180 / std::numbers::pi;
 }
 
 }  // namespace semblance

@@ -133,12 +133,12 @@ double PointWeight(std::span<const Term> terms) {
 class JointRound {
  public:
   JointRound(const HSplineSurface& surface, const HSplineSurface& rest, const DowelMesh& mesh,
-             const RelaxationOptions& options, const JointLevel& level, const FitTarget& target)
+             const NetworkMoves& moves, const JointLevel& level, const FitTarget& target)
       : mesh_(mesh),
-        options_(options),
+        moves_(moves),
         level_(level),
         target_(target),
-        relaxer_(surface, rest, mesh, options, target),
+        relaxer_(surface, rest, mesh, moves, target),
         start_(relaxer_.uv()),
         penalty_weight_(PointWeight(level.terms) / static_cast<double>(target.points.size())),
         weight_sum_(relaxer_.mean_weight() * static_cast<double>(target.points.size())) {}
@@ -151,7 +151,7 @@ class JointRound {
     double share = 1;
     for (int k = 0; k < kAllHalvings; ++k, share /= 2) {
       const std::vector<Vec2> uv = At(way, share);
-      if ((!options_.barrier || mesh_.Flips(uv) == 0) && Energy(uv) < before) {
+      if ((!moves_.barrier || mesh_.Flips(uv) == 0) && Energy(uv) < before) {
         summary.after = relaxer_.Penalties();
         return uv;
       }
@@ -174,7 +174,7 @@ class JointRound {
   // Halves the ways to the corners of triangles that would turn over; the last resort is to stay.
   std::vector<Vec2> Shortened(std::vector<Vec2> way, RelaxationSummary& summary) const {
     std::vector<char> cut(way.size());
-    bool moving = options_.barrier;
+    bool moving = moves_.barrier;
     for (int pass = 0; moving; ++pass) {
       const std::vector<Vec2> uv = At(way, 1);
       int turned = 0;
@@ -222,7 +222,7 @@ class JointRound {
   }
 
   const DowelMesh& mesh_;
-  const RelaxationOptions& options_;
+  const NetworkMoves& moves_;
   const JointLevel& level_;
   const FitTarget& target_;
   Relaxer relaxer_;
@@ -357,14 +357,14 @@ std::vector<Vec2> JointRound::Solved() {
 }  // namespace
 
 RelaxationSummary RelaxJointly(const HSplineSurface& surface, const HSplineSurface& rest,
-                               const DowelMesh& mesh, const RelaxationOptions& options,
+                               const DowelMesh& mesh, const NetworkMoves& moves,
                                const JointLevel& level, FitTarget& target) {
   if (PointWeight(level.terms) <= 0) {
     throw InputError(
-        "relaxation: the mode joint moves points that the fit draws to the surface; add a term "
+        "relaxation: joint moves points that the fit draws to the surface; add a term "
         "'points' with a weight");
   }
-  JointRound round(surface, rest, mesh, options, level, target);
+  JointRound round(surface, rest, mesh, moves, level, target);
   RelaxationSummary summary;
   MovePoints(surface, round.Run(summary), target, summary);
   return summary;

@@ -27,7 +27,7 @@ struct JointLevel {
 // at all, until the terms, fitted there, and the penalties cost less than before. The vertices are
 // the caller's to fit. Throws InputError without a term `points`.
 RelaxationSummary RelaxJointly(const HSplineSurface& surface, const HSplineSurface& rest,
-                               const DowelMesh& mesh, const RelaxationOptions& options,
+                               const DowelMesh& mesh, const NetworkMoves& moves,
                                const JointLevel& level, FitTarget& target);
 
 }  // namespace semblance

@@ -1,33 +1,43 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/relaxation/relaxation.h"
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <type_traits>
+#include <vector>
 
 #include "fitting/relaxation/relaxer.h"
 
 namespace semblance {
 
-double SharpestCrease_deg(const HSplineSurface& surface, const DowelMesh& mesh,
-                          std::span<const Vec2> uv) {
-  std::vector<Vec3> normals;
-  for (const Vec2& place : uv) {
-    normals.push_back(surface.Normal(place));
+std::optional<NetworkMoves> MovesOf(const Relaxation& relaxation) {
+  return std::visit(
+      []<class R>(const R& chosen) -> std::optional<NetworkMoves> {
+        if constexpr (std::is_base_of_v<NetworkMoves, R>) {
+          return chosen;
+        } else if constexpr (std::is_base_of_v<PointMoves, R>) {
+          return NetworkMoves{chosen, /*bunching=*/0, /*distortion=*/0, /*crease=*/0};
+        } else {
+          return std::nullopt;
+        }
+      },
+      relaxation);
+}
+
+DowelMesh NetworkOf(const HSplineSurface& rest, const FitTarget& target,
+                    const NetworkMoves& moves) {
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    uv.push_back(p.uv);
   }
-  double cosine = 1;
-  for (const auto& [a, b] : mesh.edges()) {
-    cosine = std::min(cosine, normals[a].dot(normals[b]));
-  }
-  return std::acos(std::max(cosine, -1.0)) * 180 / std::numbers::pi;
+  const bool linked =
+      moves.barrier || moves.bunching > 0 || moves.distortion > 0 || moves.crease > 0;
+  return {rest, uv, linked ? DowelLinks::kDelaunay : DowelLinks::kNone};
 }
 
 RelaxationSummary Relax(const HSplineSurface& surface, const HSplineSurface& rest,
-                        const DowelMesh& mesh, const RelaxationOptions& options, int rounds,
-                        FitTarget& target) {
-  Relaxer relaxer(surface, rest, mesh, options, target);
+                        const DowelMesh& mesh, const NetworkMoves& moves, FitTarget& target) {
+  Relaxer relaxer(surface, rest, mesh, moves, target);
   RelaxationSummary summary{.before = relaxer.Penalties(), .after = {}};
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < moves.rounds; ++round) {
     relaxer.Round(summary);
   }
   summary.after = relaxer.Penalties();

@@ -2,50 +2,27 @@
 // Moves the (u,v) of a fit's points over the surface, so that no hand has to (thesis 4.4).
 #pragma once
 
-#include <array>
-#include <span>
+#include <optional>
 #include <string_view>
-#include <vector>
+#include <variant>
 
 #include "fitting/problem/fit_target.h"
+#include "fitting/relaxation/dowel_mesh.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {
 
-enum class RelaxationMode { kNone, kFootpoint, kAlternating, kTangentDistance, kJoint };
-constexpr auto EnumNames(RelaxationMode) {
-  return std::to_array<std::string_view>(
-      {"none", "footpoint", "alternating", "tangent_distance", "joint"});
-}
-
-// What a point's move in (u,v) weighs against each other; all in mm on the surface, so that a
-// weight means the same for every domain.
-struct RelaxationOptions {
-  RelaxationMode mode = RelaxationMode::kNone;
+// How points move in a round, and what stops them; of every mode.
+struct PointMoves {
   int rounds = 3;
   double damping = 0.1;
   double max_move_mm = 5;
-  double distance = 1;
-  double bunching = 0.005;
-  double distortion = 0.005;
-  double crease = 0;
   double standard = 0;
-  int tangent_rounds = 3;
-  double tangential = 0.1;
   bool barrier = true;
 };
 template <class Visitor>
-void Fields(Visitor& visit, RelaxationOptions& o) {
-  visit(FieldInfo{.name = "mode",
-                  .doc = "none: dowels keep their (u,v); footpoint: after each step of the "
-                         "schedule they move towards the nearest point of the surface, and of the "
-                         "other weights only `standard` counts; alternating: all weights count, "
-                         "and each round of moves is followed by another fit of the level; "
-                         "tangent_distance: alternating, then `tangent_rounds` fits in which the "
-                         "points may slide along the surface, each followed by a move; joint: each "
-                         "round moves (u,v) and vertices in one problem, then fits the level"},
-        o.mode);
+void Fields(Visitor& visit, PointMoves& o) {
   visit(FieldInfo{.name = "rounds",
                   .min = 1,
                   .max = 100,
@@ -63,16 +40,34 @@ void Fields(Visitor& visit, RelaxationOptions& o) {
                   .max = 100,
                   .doc = "longest move of a point on the surface in one round"},
         o.max_move_mm);
-  visit(FieldInfo{.name = "distance",
+  visit(FieldInfo{.name = "standard",
                   .min = 0,
-                  .max = 1e3,
-                  .doc = "weight of the distance of a point from the surface at its (u,v)"},
-        o.distance);
+                  .max = 1e6,
+                  .doc = "weight that holds points which are not seeded (the standard landmarks) "
+                         "at the template's (u,v)"},
+        o.standard);
+  visit(FieldInfo{.name = "barrier",
+                  .doc = "no triangle of the points' network in (u,v) may turn over; false for "
+                         "points so dense that errors of (u,v) have changed their order"},
+        o.barrier);
+}
+
+// The same, and what a point's neighbours in the network weigh against its distance from the
+// surface, whose weight is 1. All penalties are in mm^2 of the surface, so that a weight means the
+// same for every domain.
+struct NetworkMoves : PointMoves {
+  double bunching = 0.005;
+  double distortion = 0.005;
+  double crease = 0;
+};
+template <class Visitor>
+void Fields(Visitor& visit, NetworkMoves& o) {
+  Fields(visit, static_cast<PointMoves&>(o));
   visit(FieldInfo{.name = "bunching",
                   .min = 0,
                   .max = 1e3,
                   .doc = "weight of the change of the (u,v) spacing between neighbours from the "
-                         "template's"},
+                         "template's; a point's distance from the surface has the weight 1"},
         o.bunching);
   visit(FieldInfo{.name = "distortion",
                   .min = 0,
@@ -85,37 +80,68 @@ void Fields(Visitor& visit, RelaxationOptions& o) {
                   .max = 1e3,
                   .doc = "weight of the change of normal, times the distance, between neighbours"},
         o.crease);
-  visit(FieldInfo{.name = "standard",
-                  .min = 0,
-                  .max = 1e6,
-                  .doc = "weight that holds points which are not seeded (the standard landmarks) "
-                         "at the template's (u,v)"},
-        o.standard);
+}
+
+// The points keep their (u,v).
+struct NoRelaxation {
+  static constexpr std::string_view kName = "none";
+};
+template <class Visitor>
+void Fields(Visitor&, NoRelaxation&) {}
+
+// After each step of the schedule the points move towards the nearest point of the surface.
+struct FootpointRelaxation : PointMoves {
+  static constexpr std::string_view kName = "footpoint";
+};
+
+// All weights count, and each round of moves is followed by another fit of the level.
+struct AlternatingRelaxation : NetworkMoves {
+  static constexpr std::string_view kName = "alternating";
+};
+
+// Alternating, then fits in which the points may slide along the surface, each followed by a move.
+struct TangentDistanceRelaxation : NetworkMoves {
+  static constexpr std::string_view kName = "tangent_distance";
+  int tangent_rounds = 3;
+  double tangential = 0.1;
+};
+template <class Visitor>
+void Fields(Visitor& visit, TangentDistanceRelaxation& o) {
+  Fields(visit, static_cast<NetworkMoves&>(o));
   visit(FieldInfo{.name = "tangent_rounds",
                   .min = 1,
                   .max = 100,
-                  .doc = "of tangent_distance: sliding fits after the alternating rounds"},
+                  .doc = "sliding fits after the alternating rounds"},
         o.tangent_rounds);
   visit(FieldInfo{.name = "tangential",
                   .min = 0,
                   .max = 1,
-                  .doc = "of tangent_distance: what a misfit along the surface counts in a sliding "
-                         "fit against one along its normal"},
+                  .doc = "what a misfit along the surface counts in a sliding fit, relative to one "
+                         "along its normal"},
         o.tangential);
-  visit(FieldInfo{.name = "barrier",
-                  .doc = "no triangle of the points' network in (u,v) may turn over; false for "
-                         "points so dense that errors of (u,v) have changed their order"},
-        o.barrier);
 }
+
+// Each round moves (u,v) and vertices in one problem (joint_relaxation.h), then fits the level.
+struct JointRelaxation : NetworkMoves {
+  static constexpr std::string_view kName = "joint";
+};
+
+using Relaxation = std::variant<NoRelaxation, FootpointRelaxation, AlternatingRelaxation,
+                                TangentDistanceRelaxation, JointRelaxation>;
+
+// The moves of one round or more, with the weights that count; nothing for NoRelaxation.
+std::optional<NetworkMoves> MovesOf(const Relaxation& relaxation);
+
+// The network of the points in the template; without links where no weight and no barrier needs it.
+DowelMesh NetworkOf(const HSplineSurface& rest, const FitTarget& target, const NetworkMoves& moves);
 
 // Mean penalties, mm^2, before their weights.
 struct RelaxationPenalties {
   double distance = kNaN;  // |S(u,v) - p|^2
   double bunching = kNaN;  // of neighbours: change of the (u,v) between them, in mm of the surface
-  double distortion =
-      kNaN;                // of neighbours: change of the vector between them in the tangent plane
-  double crease = kNaN;    // of neighbours: |n_a - n_b|^2 d^2; d: the template's distance
-  double standard = kNaN;  // of the standard landmarks: way from the template's (u,v)
+  double distortion = kNaN;  // of neighbours: change of the distance between them
+  double crease = kNaN;      // of neighbours: |n_a - n_b|^2 d^2; d: the template's distance
+  double standard = kNaN;    // of the standard landmarks: way from the template's (u,v)
 };
 
 struct RelaxationSummary {
@@ -125,53 +151,11 @@ struct RelaxationSummary {
   int steps_shortened = 0;  // of single points in one round, for that
 };
 
-enum class DowelLinks { kDelaunay, kNone };
-
-// The triangles of the points' (u,v), Delaunay in mm of the template; they never turn over. Points
-// of the same (u,v) share a corner. With a periodic u the network is cut at u = 0, which no point
-// passes. Without links it is the points alone, each its own corner.
-class DowelMesh {
- public:
-  // template_surface: where `uv` are the points' places before any move. Needs no particular count
-  // of points: fewer than three, or all on a line, have no triangles.
-  DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv,
-            DowelLinks links = DowelLinks::kDelaunay);
-  const std::vector<std::array<int, 3>>& triangles() const { return triangles_; }
-  const std::vector<std::array<int, 2>>& edges() const { return edges_; }
-  // Point that stands for each; itself, or the first of the same (u,v).
-  const std::vector<int>& corner() const { return corner_; }
-  const std::vector<Vec2>& rest_uv() const { return rest_uv_; }
-  const Vec2& lengths_mm() const { return lengths_mm_; }  // of the template along u and v
-  // Triangles that are turned over, or have lost nearly all of their area.
-  int Flips(std::span<const Vec2> uv) const;
-  bool Turned(const std::array<int, 3>& triangle, std::span<const Vec2> uv) const;
-
- private:
-  void Link(std::span<const Vec2> uv);
-
-  std::vector<Vec2> rest_uv_;
-  std::vector<int> corner_;
-  std::vector<std::array<int, 3>> triangles_;
-  std::vector<std::array<int, 2>> edges_;
-  Vec2 lengths_mm_;
-};
-
-// The network of the points in the template; without links where no option needs one.
-DowelMesh MeshOf(const HSplineSurface& rest, const FitTarget& target,
-                 const RelaxationOptions& options);
-
-// The largest angle between the surface's normals at two neighbours of the network, whose points
-// are at uv; 0 without neighbours.
-double SharpestCrease_deg(const HSplineSurface& surface, const DowelMesh& mesh,
-                          std::span<const Vec2> uv);
-
 // Moves the (u,v) of the points of `target` on the surface as it stands, each by a damped
-// Gauss-Newton step of its penalties a round, shortened until they fall and no triangle turns over.
-// `mesh` was made of the points in the template `rest`, in their order. The options' mode says
-// which weights count, their rounds are the caller's. Without links a closed surface is passed
-// round.
+// Gauss-Newton step of its penalties per round, shortened until they fall and no triangle turns
+// over. `mesh` was made of the points in the template `rest`, in their order. Without links a point
+// may pass u = 0 of a closed surface.
 RelaxationSummary Relax(const HSplineSurface& surface, const HSplineSurface& rest,
-                        const DowelMesh& mesh, const RelaxationOptions& options, int rounds,
-                        FitTarget& target);
+                        const DowelMesh& mesh, const NetworkMoves& moves, FitTarget& target);
 
 }  // namespace semblance

@@ -12,6 +12,8 @@
 namespace semblance {
 namespace {
 
+constexpr double kDistance = 1;  // weight of a point's distance, to which the others relate
+
 SurfaceSample SampleAt(const HSplineSurface& surface, const Vec2& uv) {
   const SurfaceFrame frame = surface.Frame(uv);
   Vec3 normal = frame.Normal();
@@ -24,11 +26,8 @@ SurfaceSample SampleAt(const HSplineSurface& surface, const Vec2& uv) {
 }  // namespace
 
 Relaxer::Relaxer(const HSplineSurface& surface, const HSplineSurface& rest, const DowelMesh& mesh,
-                 const RelaxationOptions& options, const FitTarget& target)
-    : surface_(surface), mesh_(mesh), options_(options), target_(target) {
-  if (options_.mode == RelaxationMode::kFootpoint) {
-    options_.bunching = options_.distortion = options_.crease = 0;
-  }
+                 const NetworkMoves& moves, const FitTarget& target)
+    : surface_(surface), mesh_(mesh), moves_(moves), target_(target) {
   for (std::size_t k = 0; k < target.points.size(); ++k) {
     uv_.push_back(target.points[k].uv);
     rest_points_.push_back(rest.Point(mesh.rest_uv()[k]));
@@ -75,25 +74,25 @@ void Relaxer::LinkNeighbours() {
 
 void Relaxer::AddNeighbour(int corner, int other, const Vec2& uv, const SurfaceSample& spot,
                            double share, LocalPenalty& local) const {
-  if (options_.bunching > 0) {
+  if (moves_.bunching > 0) {
     const Vec2 rest = mesh_.rest_uv()[corner] - mesh_.rest_uv()[other];
-    local.Add(share * options_.bunching, InMm(uv - uv_[other] - rest), InMm({1, 0}), InMm({0, 1}));
+    local.Add(share * moves_.bunching, InMm(uv - uv_[other] - rest), InMm({1, 0}), InMm({0, 1}));
   }
   const double distance = RestDistance(corner, other);
   const Vec3 way = spot.point - spots_[other].point;
   const double length = way.norm();
-  if (options_.distortion > 0 && length > 0) {
+  if (moves_.distortion > 0 && length > 0) {
     const Vec3 along = way / length;
-    local.Add(share * options_.distortion, Vec3(length - distance, 0, 0),
+    local.Add(share * moves_.distortion, Vec3(length - distance, 0, 0),
               Vec3(along.dot(spot.du), 0, 0), Vec3(along.dot(spot.dv), 0, 0));
   }
-  if (options_.crease > 0) {
+  if (moves_.crease > 0) {
     constexpr double kStep = 1e-5;
     const Vec3 nu = SampleAt(surface_, uv + Vec2(kStep, 0)).normal -
                     SampleAt(surface_, uv - Vec2(kStep, 0)).normal;
     const Vec3 nv = SampleAt(surface_, uv + Vec2(0, kStep)).normal -
                     SampleAt(surface_, uv - Vec2(0, kStep)).normal;
-    local.Add(share * options_.crease, distance * (spot.normal - spots_[other].normal),
+    local.Add(share * moves_.crease, distance * (spot.normal - spots_[other].normal),
               distance * nu / (2 * kStep), distance * nv / (2 * kStep));
   }
 }
@@ -104,8 +103,8 @@ LocalPenalty Relaxer::LocalAt(int corner, const Vec2& uv, const SurfaceSample& s
   for (const int m : members_[corner]) {
     const FitPoint& p = target_.points[m];
     local.Add(distance * p.weight / mean_weight_, spot.point - p.position, spot.du, spot.dv);
-    if (options_.standard > 0 && !IsSeeded(p)) {
-      local.Add(options_.standard, InMm(uv - mesh_.rest_uv()[corner]), InMm({1, 0}), InMm({0, 1}));
+    if (moves_.standard > 0 && !IsSeeded(p)) {
+      local.Add(moves_.standard, InMm(uv - mesh_.rest_uv()[corner]), InMm({1, 0}), InMm({0, 1}));
     }
   }
   const double share =
@@ -125,13 +124,13 @@ Eigen::Matrix2d Relaxer::DampingAt(const SurfaceSample& spot) const {
   tangents << spot.du, spot.dv;
   Eigen::Matrix2d metric = tangents.transpose() * tangents;
   metric.diagonal().array() += 1e-12 * metric.trace();
-  const double weight = std::max(options_.distance + options_.bunching + options_.distortion, 1e-6);
-  return ((options_.damping + 1e-9) * weight) * metric;
+  const double weight = kDistance + moves_.bunching + moves_.distortion;
+  return ((moves_.damping + 1e-9) * weight) * metric;
 }
 
 Vec2 Relaxer::LongestMove(int corner) const {
   const SurfaceSample& spot = spots_[corner];
-  return options_.max_move_mm *
+  return moves_.max_move_mm *
          Vec2(1 / std::max(spot.du.norm(), 1e-9), 1 / std::max(spot.dv.norm(), 1e-9));
 }
 
@@ -157,11 +156,11 @@ Vec2 Relaxer::StepOf(const LocalPenalty& local, const SurfaceSample& spot) const
     return Vec2::Zero();
   }
   const double length = (spot.du * step.x() + spot.dv * step.y()).norm();
-  return length > options_.max_move_mm ? step * (options_.max_move_mm / length) : step;
+  return length > moves_.max_move_mm ? step * (moves_.max_move_mm / length) : step;
 }
 
 int Relaxer::FlipsWith(int corner, const Vec2& uv) {
-  if (!options_.barrier) {
+  if (!moves_.barrier) {
     return 0;
   }
   const Vec2 kept = std::exchange(uv_[corner], uv);
@@ -175,7 +174,7 @@ int Relaxer::FlipsWith(int corner, const Vec2& uv) {
 
 // Halves the step until no triangle turns over and the corner's penalties fall; else stays.
 void Relaxer::MoveCorner(int corner, RelaxationSummary& summary) {
-  const LocalPenalty here = LocalAt(corner, uv_[corner], spots_[corner], options_.distance);
+  const LocalPenalty here = LocalAt(corner, uv_[corner], spots_[corner], kDistance);
   Vec2 step = StepOf(here, spots_[corner]);
   int prevented = 0;
   for (int halving = 0; halving < 8; ++halving, step /= 2) {
@@ -185,7 +184,7 @@ void Relaxer::MoveCorner(int corner, RelaxationSummary& summary) {
       continue;
     }
     const SurfaceSample spot = SampleAt(surface_, uv);
-    if (LocalAt(corner, uv, spot, options_.distance).energy < here.energy) {
+    if (LocalAt(corner, uv, spot, kDistance).energy < here.energy) {
       uv_[corner] = uv;
       spots_[corner] = spot;
       break;

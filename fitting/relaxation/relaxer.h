@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What holds the (u,v) of a fit's points, and their moves against it; of the modes of relaxation.h.
+// What holds the (u,v) of a fit's points, and their moves against it; of every mode in
+// relaxation.h.
 #pragma once
 
 #include <vector>
@@ -30,9 +31,9 @@ struct LocalPenalty {
 
 class Relaxer {
  public:
-  // All but the options must outlive it.
+  // Everything but the moves must outlive it.
   Relaxer(const HSplineSurface& surface, const HSplineSurface& rest, const DowelMesh& mesh,
-          const RelaxationOptions& options, const FitTarget& target);
+          const NetworkMoves& moves, const FitTarget& target);
   // Moves every corner once, in an order that is the network's own.
   void Round(RelaxationSummary& summary);
   RelaxationPenalties Penalties() const;
@@ -69,7 +70,7 @@ class Relaxer {
 
   const HSplineSurface& surface_;
   const DowelMesh& mesh_;
-  RelaxationOptions options_;
+  NetworkMoves moves_;
   const FitTarget& target_;
   double mean_weight_ = 1;
   std::vector<Vec2> uv_;

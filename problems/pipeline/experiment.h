@@ -97,7 +97,7 @@ struct Experiment {
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;
   int rounds = 1;
-  FitOptions fit = {.relaxation = {.mode = RelaxationMode::kFootpoint}};
+  FitOptions fit = {.relaxation = FootpointRelaxation{}};
   UncertaintyOptions uncertainty;
   FaceRegionOptions region;
   DepthDirection direction;

@@ -26,15 +26,12 @@ Measured MeasureRelaxation(int rounds) {
     p.uv = Vec2(u - std::floor(u), std::clamp(p.uv.y() + random.Uniform(-0.005, 0.005), 0.0, 1.0));
   }
   FitOptions options{.schedule = {{0, 1}}, .terms = {PointTerm{}}, .solver = LevelSolver::kFastest};
-  options.relaxation = {.mode = RelaxationMode::kTangentDistance,
-                        .rounds = 2,
-                        .damping = 0,
-                        .max_move_mm = 0.1,
-                        .bunching = 0,
-                        .distortion = 0,
-                        .tangent_rounds = rounds,
-                        .tangential = 0.01,
-                        .barrier = false};
+  TangentDistanceRelaxation sliding{{{.rounds = 2, .damping = 0, .max_move_mm = 0.1}}};
+  sliding.barrier = false;
+  sliding.bunching = sliding.distortion = 0;
+  sliding.tangent_rounds = rounds;
+  sliding.tangential = 0.01;
+  options.relaxation = sliding;
   const double begin = CpuSecondsSoFar();
   const FitResult result = Fit(start, target, {}, options, {});
   Measured measured;

@@ -98,7 +98,7 @@ TEST(Run, TermsThatLookAtBoneChangeTheFace) {
   const auto height = [](const std::string& term) {
     return MeanHeight_mm(semblance::Run(
         SmallPhantom({fmt::format("fit.terms=[points, smoothness, membrane{}]", term),
-                      "fit.schedule=[{level: 0, fraction: 1}]", "fit.relaxation.mode=none"}),
+                      "fit.schedule=[{level: 0, fraction: 1}]", "fit.relaxation=none"}),
         {}));
   };
   const double plain = height("");

@@ -5,9 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
+#include <string_view>
+#include <variant>
+#include <vector>
 
 #include "fitting/fit.h"
 #include "fitting/problem/placement.h"
@@ -64,24 +65,32 @@ double HeldOutRms(const HSplineSurface& subject, const HSplineSurface& fitted) {
   return std::sqrt(sum / count);
 }
 
-// All that moves points.
-constexpr std::array kModes = {RelaxationMode::kFootpoint, RelaxationMode::kAlternating,
-                               RelaxationMode::kTangentDistance, RelaxationMode::kJoint};
+// Every relaxation that moves points, in so many rounds each.
+std::vector<Relaxation> EveryRelaxation(int rounds) {
+  const PointMoves moves{.rounds = rounds};
+  return {FootpointRelaxation{moves}, AlternatingRelaxation{{moves}},
+          TangentDistanceRelaxation{{moves}}, JointRelaxation{{moves}}};
+}
 
-FitOptions Options(RelaxationMode mode) {
+std::string_view NameOf(const Relaxation& relaxation) {
+  return std::visit([](const auto& chosen) { return chosen.kName; }, relaxation);
+}
+
+FitOptions Options(const Relaxation& relaxation) {
   FitOptions options;
   options.schedule = {{0, 0.5}, {0, 0.5}, {0, 0.5}, {0, 1}};
   options.terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-3}, MembraneTerm{.weight = 1e-2}};
-  options.relaxation.mode = mode;
-  options.relaxation.rounds = 5;
+  options.relaxation = relaxation;
   return options;
 }
 
-// The same in a tenth of the time.
-FitOptions ShortOptions(RelaxationMode mode) {
-  FitOptions options = Options(mode);
+// The same in a tenth of the time, with relaxations of one round.
+FitOptions ShortOptions(Relaxation relaxation) {
+  if (auto* const sliding = std::get_if<TangentDistanceRelaxation>(&relaxation)) {
+    sliding->tangent_rounds = 1;
+  }
+  FitOptions options = Options(relaxation);
   options.schedule = {{0, 0.5}, {0, 1}};
-  options.relaxation.rounds = options.relaxation.tangent_rounds = 1;
   return options;
 }
 
@@ -94,9 +103,9 @@ std::vector<Vec2> Places(const FitTarget& target) {
 }
 
 // Mean over three sets of dowels, known to 0.3 mm.
-double MeanHeldOutRms(double error, RelaxationMode mode, int steps) {
+double MeanHeldOutRms(double error, const Relaxation& relaxation, int steps) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
-  FitOptions options = Options(mode);
+  FitOptions options = Options(relaxation);
   options.schedule.assign(steps - 1, {0, 0.5});
   options.schedule.push_back({0, 1});
   double sum = 0;
@@ -108,13 +117,13 @@ double MeanHeldOutRms(double error, RelaxationMode mode, int steps) {
 }
 
 TEST(Relaxation, UndoesAnErrorOfFivePercentOfTheDomain) {
-  const double unperturbed = MeanHeldOutRms(0, RelaxationMode::kNone, 4);
-  EXPECT_GT(MeanHeldOutRms(0.05, RelaxationMode::kNone, 4), 2.5 * unperturbed);
-  EXPECT_GT(MeanHeldOutRms(0.05, RelaxationMode::kNone, 10), 2.5 * unperturbed);
-  for (const RelaxationMode mode : kModes) {
-    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
-    const int steps = mode == RelaxationMode::kFootpoint ? 10 : 4;
-    EXPECT_LT(MeanHeldOutRms(0.05, mode, steps), 1.1 * unperturbed);
+  const double unperturbed = MeanHeldOutRms(0, NoRelaxation{}, 4);
+  EXPECT_GT(MeanHeldOutRms(0.05, NoRelaxation{}, 4), 2.5 * unperturbed);
+  EXPECT_GT(MeanHeldOutRms(0.05, NoRelaxation{}, 10), 2.5 * unperturbed);
+  for (const Relaxation& relaxation : EveryRelaxation(5)) {
+    SCOPED_TRACE(NameOf(relaxation));
+    const int steps = std::holds_alternative<FootpointRelaxation>(relaxation) ? 10 : 4;
+    EXPECT_LT(MeanHeldOutRms(0.05, relaxation, steps), 1.1 * unperturbed);
   }
 }
 
@@ -123,17 +132,17 @@ TEST(Relaxation, LeavesNoCrease) {
   const FitTarget exact = Dowels(subject, 0);
   const DowelMesh mesh(rest, Places(exact));
   const FitTarget target = Dowels(subject, 0.05);
-  const auto crease_deg = [&](const FitTarget& t, RelaxationMode mode) {
-    FitOptions options = Options(mode);
+  const auto crease_deg = [&](const FitTarget& t, const Relaxation& relaxation) {
+    FitOptions options = Options(relaxation);
     options.schedule = {{0, 0.5}, {0, 1}};
     const FitResult result = Fit(rest, t, {}, options, {});
     return SharpestCrease_deg(result.surface, mesh, result.uv);
   };
-  const double clean = crease_deg(exact, RelaxationMode::kNone);
-  EXPECT_GT(crease_deg(target, RelaxationMode::kNone), clean + 10);
-  for (const RelaxationMode mode : kModes) {
-    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
-    EXPECT_LT(crease_deg(target, mode), clean + 10);
+  const double clean = crease_deg(exact, NoRelaxation{});
+  EXPECT_GT(crease_deg(target, NoRelaxation{}), clean + 10);
+  for (const Relaxation& relaxation : EveryRelaxation(5)) {
+    SCOPED_TRACE(NameOf(relaxation));
+    EXPECT_LT(crease_deg(target, relaxation), clean + 10);
   }
 }
 
@@ -142,15 +151,16 @@ TEST(Relaxation, NeverTurnsATriangleOver) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   int prevented = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
-    for (const RelaxationMode mode : kModes) {
+    for (std::size_t k = 0; k < 4; ++k) {
       FitTarget target = Dowels(subject, 0.15, seed);
       const DowelMesh mesh(rest, Places(target));
       ASSERT_EQ(mesh.Flips(Places(target)), 0);
       const RelaxationSummary summary =
-          Relax(rest, rest, mesh, Options(mode).relaxation, 10, target);
+          Relax(rest, rest, mesh, *MovesOf(EveryRelaxation(10)[k]), target);
       EXPECT_EQ(mesh.Flips(Places(target)), 0);
       prevented += summary.flips_prevented;
-      const FitResult result = Fit(rest, Dowels(subject, 0.15, seed), {}, ShortOptions(mode), {});
+      const FitResult result =
+          Fit(rest, Dowels(subject, 0.15, seed), {}, ShortOptions(EveryRelaxation(1)[k]), {});
       EXPECT_EQ(mesh.Flips(result.uv), 0);
     }
   }
@@ -161,13 +171,14 @@ TEST(Relaxation, PenaltiesFall) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   FitTarget target = Dowels(subject, 0.05);
   const DowelMesh mesh(rest, Places(target));
-  RelaxationOptions options{.mode = RelaxationMode::kAlternating, .crease = 0.1, .standard = 0.1};
-  const RelaxationSummary some = Relax(subject, rest, mesh, options, 5, target);
+  NetworkMoves moves{{.rounds = 5, .standard = 0.1}};
+  moves.crease = 0.1;
+  const RelaxationSummary some = Relax(subject, rest, mesh, moves, target);
   EXPECT_LT(some.after.distance, 0.5 * some.before.distance);
   EXPECT_GT(some.after.standard, 0);
   FitTarget held = Dowels(subject, 0.05);
-  options.standard = 1e6;
-  const RelaxationSummary none = Relax(subject, rest, mesh, options, 5, held);
+  moves.standard = 1e6;
+  const RelaxationSummary none = Relax(subject, rest, mesh, moves, held);
   EXPECT_LT(none.max_move_mm, 1e-2);
   EXPECT_GT(some.max_move_mm, 1);
 }
@@ -177,8 +188,8 @@ TEST(Relaxation, APointOnTheSurfaceArrivesAtIt) {
   const Vec2 truth(0.4, 0.6);
   FitTarget target{{{.label = "a", .position = rest.Point(truth), .uv = Vec2(0.45, 0.52)}}};
   const DowelMesh mesh(rest, Places(target));
-  const RelaxationOptions options{.mode = RelaxationMode::kFootpoint, .damping = 0};
-  const RelaxationSummary summary = Relax(rest, rest, mesh, options, 20, target);
+  const FootpointRelaxation footpoint{{.rounds = 20, .damping = 0}};
+  const RelaxationSummary summary = Relax(rest, rest, mesh, *MovesOf(footpoint), target);
   EXPECT_LT((target.points[0].uv - truth).norm(), 1e-8);
   EXPECT_LT(summary.after.distance, 1e-12);
 }
@@ -193,9 +204,9 @@ TEST(Relaxation, IsEquivariantUnderRigidMotion) {
   for (FitPoint& p : moved.points) {
     p.position = pose * p.position;
   }
-  for (const RelaxationMode mode : kModes) {
-    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
-    const FitOptions options = ShortOptions(mode);
+  for (const Relaxation& relaxation : EveryRelaxation(1)) {
+    SCOPED_TRACE(NameOf(relaxation));
+    const FitOptions options = ShortOptions(relaxation);
     const FitResult a = Fit(rest, target, {}, options, {});
     const FitResult b = Fit(Transformed(rest, pose), moved, {}, options, {});
     for (std::size_t k = 0; k < a.uv.size(); ++k) {
@@ -213,9 +224,9 @@ TEST(Relaxation, OrderOfPointsAndDuplicatesDoNotMatter) {
   two.threads = 2;
   FitTarget reversed = target;
   std::reverse(reversed.points.begin(), reversed.points.end());
-  for (const RelaxationMode mode : kModes) {
-    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
-    const FitOptions options = ShortOptions(mode);
+  for (const Relaxation& relaxation : EveryRelaxation(1)) {
+    SCOPED_TRACE(NameOf(relaxation));
+    const FitOptions options = ShortOptions(relaxation);
     const FitResult a = Fit(rest, target, {}, options, {});
     EXPECT_EQ(a.uv.back(), a.uv[5]);
     EXPECT_EQ(a.uv, Fit(rest, target, {}, options, two).uv);
@@ -228,18 +239,17 @@ TEST(Relaxation, OrderOfPointsAndDuplicatesDoNotMatter) {
 }
 
 // Points and penalties together, at full steps, so that each round ends where it was solved.
-TEST(Relaxation, EveryModeBringsThePointsNearer) {
+TEST(Relaxation, EveryKindBringsThePointsNearer) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   const FitTarget target = Dowels(subject, 0.05);
-  FitOptions options = Options(RelaxationMode::kNone);
+  FitOptions options = Options(NoRelaxation{});
   options.schedule = {{0, 1}};
   const double without = Fit(rest, target, {}, options, {}).point_rms_mm;
-  for (const RelaxationMode mode : kModes) {
-    SCOPED_TRACE(EnumNames(mode)[static_cast<std::size_t>(mode)]);
-    options.relaxation.mode = mode;
+  for (std::size_t k = 0; k < 4; ++k) {
     double before = without;
     for (const int rounds : {1, 2, 4}) {
-      options.relaxation.rounds = rounds;
+      options.relaxation = EveryRelaxation(rounds)[k];
+      SCOPED_TRACE(NameOf(options.relaxation));
       const double rms = Fit(rest, target, {}, options, {}).point_rms_mm;
       EXPECT_LT(rms, before);
       before = rms;
@@ -253,18 +263,19 @@ TEST(Relaxation, WithoutABarrierPointsPassEachOther) {
   FitTarget target = Dowels(rest, 0);
   std::swap(target.points[27].uv, target.points[28].uv);
   const FitTarget given = target;
-  RelaxationOptions options{.mode = RelaxationMode::kFootpoint, .damping = 0, .max_move_mm = 50};
-  Relax(rest, rest, MeshOf(rest, target, options), options, 20, target);
+  NetworkMoves moves =
+      *MovesOf(FootpointRelaxation{{.rounds = 20, .damping = 0, .max_move_mm = 50}});
+  Relax(rest, rest, NetworkOf(rest, target, moves), moves, target);
   EXPECT_GT((rest.Point(target.points[27].uv) - target.points[27].position).norm(), 1);
   target = given;
-  options.barrier = false;
-  const DowelMesh loose = MeshOf(rest, target, options);
+  moves.barrier = false;
+  const DowelMesh loose = NetworkOf(rest, target, moves);
   EXPECT_TRUE(loose.triangles().empty());
-  Relax(rest, rest, loose, options, 20, target);
+  Relax(rest, rest, loose, moves, target);
   EXPECT_LT((rest.Point(target.points[27].uv) - target.points[27].position).norm(), 1e-6);
 }
 
-TEST(Relaxation, AModeThatCannotSaysWhy) {
+TEST(Relaxation, OneThatCannotBeTakenSaysWhy) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2);
   const FitTarget target = Dowels(rest, 0);
   const auto message = [&](const FitOptions& options) -> std::string {
@@ -275,12 +286,12 @@ TEST(Relaxation, AModeThatCannotSaysWhy) {
     }
     return "no error";
   };
-  FitOptions options = Options(RelaxationMode::kTangentDistance);
+  FitOptions options = Options(TangentDistanceRelaxation{});
   options.terms = {PointTerm{.loss = RobustLoss::kTukey}};
   EXPECT_THAT(message(options), ::testing::HasSubstr("loss: none"));
   options.terms = {PriorTerm{}};
   EXPECT_THAT(message(options), ::testing::HasSubstr("'points'"));
-  options = Options(RelaxationMode::kJoint);
+  options = Options(JointRelaxation{});
   options.plan = AdaptivePlan{.finest = 1};
   EXPECT_THAT(message(options), ::testing::HasSubstr("joint goes level by level"));
 }
@@ -288,10 +299,10 @@ TEST(Relaxation, AModeThatCannotSaysWhy) {
 TEST(Relaxation, IsReportedByStep) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   const FitTarget target = Dowels(subject, 0.05);
-  const FitResult none = Fit(rest, target, {}, Options(RelaxationMode::kNone), {});
+  const FitResult none = Fit(rest, target, {}, Options(NoRelaxation{}), {});
   EXPECT_TRUE(none.relaxations.empty());
   EXPECT_EQ(none.uv, Places(target));
-  const FitResult result = Fit(rest, target, {}, Options(RelaxationMode::kFootpoint), {});
+  const FitResult result = Fit(rest, target, {}, Options(FootpointRelaxation{}), {});
   ASSERT_EQ(result.relaxations.size(), 4u);
   EXPECT_GT(result.relaxations[0].max_move_mm, 0);
   EXPECT_LT(result.relaxations[0].after.distance, result.relaxations[0].before.distance);

@@ -14,12 +14,12 @@ struct Worth {
   double crease_deg = kNaN;  // the sharpest
 };
 
-Worth WorthOf(const std::string& site_error, const std::string& mode, StageCache& cache) {
+Worth WorthOf(const std::string& site_error, const std::string& relaxation, StageCache& cache) {
   const auto experiment = ReadConfig<Experiment>(
       std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "configs/phantom.yaml",
       std::vector<std::string>{"subject.rings=40", "implicit.resolution=48", "rounds=2",
                                "uncertainty.sigma=false", "template.site_error=" + site_error,
-                               "fit.relaxation.mode=" + mode});
+                               "fit.relaxation=" + relaxation});
   const RunResult run = Run(experiment, {}, &cache);
   std::vector<Vec2> uv;
   for (const FitPoint& p : run.target.points) {
