@@ -9,7 +9,6 @@
 
 #include "fitting/adaptive/refinement_marking.h"
 #include "fitting/adaptive/tree_solver.h"
-#include "fitting/problem/seeding.h"
 
 namespace semblance {
 namespace {
@@ -80,7 +79,7 @@ class AdaptiveFitter {
     double dowels = 0, weights = 0;
     for (std::size_t k = 0; k < squares.size(); ++k) {
       result.residual_mm[cloud_.Given(k)] = std::sqrt(squares[k]);
-      if (!IsSeeded(target().points[cloud_.Given(k)])) {
+      if (target().points[cloud_.Given(k)].role != PointRole::kSeed) {
         dowels += cloud_.points()[k].weight * squares[k];
         weights += cloud_.points()[k].weight;
       }

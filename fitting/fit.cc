@@ -12,7 +12,6 @@
 #include "fitting/adaptive_fit.h"
 #include "fitting/fit_check.h"
 #include "fitting/level/auto_weight.h"
-#include "fitting/problem/seeding.h"
 #include "fitting/relaxation/joint_relaxation.h"
 #include "surfaces/hspline_files/feature.h"
 
@@ -43,7 +42,7 @@ Observation Observe(const FitPoint& point, const HSplineSurface& surface, int le
   Observation o{.uv = point.uv,
                 .position = point.position,
                 .weight = point.weight,
-                .landmark = IsLandmark(point)};
+                .landmark = point.role == PointRole::kLandmark};
   if (aim == FitAim::kSurface && level < surface.shape().max_level) {
     o.position -= surface.Point(point.uv) - surface.LevelDerivative(level, point.uv);
   }
@@ -62,11 +61,11 @@ LevelView ViewOf(int level, const HSplineSurface& surface, const HSplineSurface&
   for (const FitPoint& point : target.points) {
     view.observations.push_back(Observe(point, surface, level, aim));
   }
-  for (std::size_t k = 0; k < target.feet.size(); ++k) {
+  for (std::size_t k = 0; k < target.anchors.size(); ++k) {
     const Observation& o = view.observations[k];
     const Vec3 detail = target.points[k].position - o.position;
-    if (target.feet[k].foot.allFinite()) {
-      view.bone.push_back({o, target.feet[k].foot - detail, target.feet[k].direction});
+    if (target.anchors[k].foot.allFinite()) {
+      view.bone.push_back({o, target.anchors[k].foot - detail, target.anchors[k].direction});
     }
   }
   for (const VertexId& vertex : held) {
@@ -129,7 +128,7 @@ void MeasurePoints(const FitTarget& target, double known_rms_mm, FitResult& resu
     result.uv.push_back(p.uv);
     result.residual_mm.push_back((result.surface.Point(p.uv) - p.position).norm());
     all.push_back({p.weight, result.residual_mm.back()});
-    if (IsSeeded(p)) {
+    if (p.role == PointRole::kSeed) {
       continue;
     }
     dowels.push_back(all.back());

@@ -20,8 +20,9 @@ FitTarget DowelTarget(const std::vector<Dowel>& dowels, const TemplateFace& face
   for (const Dowel& dowel : dowels) {
     const auto uv = face.site_uv.find(dowel.site);
     if (uv != face.site_uv.end()) {
-      target.points.push_back({dowel.site, dowel.Tip(), uv->second, 1});
-      target.feet.push_back({dowel.base, dowel.direction});
+      target.points.push_back(
+          {.label = dowel.site, .position = dowel.Tip(), .uv = uv->second, .role = dowel.role});
+      target.anchors.push_back({dowel.base, dowel.direction});
     }
   }
   return target;
@@ -76,17 +77,17 @@ bool LooksAtBone(const std::vector<Term>& terms) {
 }
 
 // Where seeds stand on the shell of the skull: nearest, and seen from there.
-std::vector<BoneAnchor> FeetOf(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
+std::vector<BoneAnchor> AnchorsOf(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
   const MeshQuery query(shell);
-  std::vector<BoneAnchor> feet;
+  std::vector<BoneAnchor> anchors;
   for (const FitPoint& seed : seeds) {
     const MeshPoint nearest = query.Closest(seed.position);
     const Vec3 out = nearest.distance_mm > 1e-6
                          ? Vec3(seed.position - nearest.position)
                          : TriangleAreaVector(shell, shell.triangles[nearest.triangle]);
-    feet.push_back({nearest.position, out.normalized()});
+    anchors.push_back({nearest.position, out.normalized()});
   }
-  return feet;
+  return anchors;
 }
 
 // Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
@@ -111,10 +112,10 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
     SeedResult seeding = SeedDowels(surface, query, implicit, masks, experiment.seeds);
     FitTarget target = dowels;
     target.points.insert(target.points.end(), seeding.points.begin(), seeding.points.end());
-    target.feet.resize(target.points.size());
+    target.anchors.resize(target.points.size());
     if (LooksAtBone(experiment.fit.terms)) {
-      const std::vector<BoneAnchor> feet = FeetOf(seeding.points, shell);
-      std::copy(feet.begin(), feet.end(), target.feet.end() - std::ssize(feet));
+      const std::vector<BoneAnchor> anchors = AnchorsOf(seeding.points, shell);
+      std::copy(anchors.begin(), anchors.end(), target.anchors.end() - std::ssize(anchors));
     }
     FitResult fit = Fit(surface, placed.surface, target, features, experiment.fit, context);
     surface = fit.surface;

@@ -15,9 +15,9 @@ bool InDomain(const Vec2& uv) { return (uv.array() >= 0).all() && (uv.array() <=
 }  // namespace
 
 void CheckTarget(const FitTarget& target) {
-  if (!target.feet.empty() && target.feet.size() != target.points.size()) {
-    throw InputError(fmt::format("fit target: {} feet on bone for {} points; give one a point",
-                                 target.feet.size(), target.points.size()));
+  if (!target.anchors.empty() && target.anchors.size() != target.points.size()) {
+    throw InputError(fmt::format("fit target: {} anchors on bone for {} points; give one per point",
+                                 target.anchors.size(), target.points.size()));
   }
   for (std::size_t i = 0; i < target.points.size(); ++i) {
     const FitPoint& p = target.points[i];
@@ -33,10 +33,10 @@ void CheckTarget(const FitTarget& target) {
     if (!(std::isfinite(p.weight) && p.weight > 0)) {
       fail(fmt::format("weight {} is not a positive number", p.weight));
     }
-    if (!target.feet.empty() && target.feet[i].foot.allFinite() &&
-        !(std::abs(target.feet[i].direction.norm() - 1) < 1e-6)) {
+    if (!target.anchors.empty() && target.anchors[i].foot.allFinite() &&
+        !(std::abs(target.anchors[i].direction.norm() - 1) < 1e-6)) {
       fail(fmt::format("its direction out of the bone has the length {}; give a unit vector",
-                       target.feet[i].direction.norm()));
+                       target.anchors[i].direction.norm()));
     }
   }
 }

@@ -7,17 +7,19 @@
 #include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/point_role.h"
 
 namespace semblance {
 
 struct FitPoint {
-  std::string label;  // site of a dowel, or the name of a seeded one; for reports
+  std::string label;                     // site of a dowel, or patch of a seed; for reports
   Vec3 position = Vec3::Constant(kNaN);  // mm
   Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
   double weight = 1;                     // > 0; relative to the other points
+  PointRole role = PointRole::kScattered;
 };
 
-// Where a point stands on bone; for the terms that look at it.
+// Where a point stands on bone, for the terms that look at bone.
 struct BoneAnchor {
   Vec3 foot = Vec3::Constant(kNaN);       // mm; NaN where it is not known
   Vec3 direction = Vec3::Constant(kNaN);  // unit, out of the bone
@@ -25,12 +27,12 @@ struct BoneAnchor {
 
 struct FitTarget {
   std::vector<FitPoint> points;
-  std::vector<BoneAnchor> feet = {};  // one a point, or none
+  std::vector<BoneAnchor> anchors = {};  // one per point, or none
 };
 
 // Throws InputError, naming the point, if one has a position that is not finite, a (u,v) outside
 // the domain, a weight that is not positive and finite, or a foot without a unit direction; or if
-// there are feet, but not one a point.
+// there are anchors, but not one per point.
 void CheckTarget(const FitTarget& target);
 
 }  // namespace semblance

@@ -14,15 +14,13 @@
 namespace semblance {
 namespace {
 
-constexpr std::string_view kPrefix = "seed_";
-
 struct Patches {
   int u = 0, v = 0;
   bool periodic_u = false;
   Vec2 Center(int i, int j) const { return {(i + 0.5) / u, (j + 0.5) / v}; }
 };
 
-// One entry a patch, i fastest.
+// One per patch, i fastest.
 struct Seed {
   Vec3 on_surface = Vec3::Constant(kNaN);
   std::optional<Vec3> on_mesh;
@@ -208,17 +206,14 @@ SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
   for (std::size_t k = 0; k < seeds.size(); ++k) {
     const int i = static_cast<int>(k) % patches.u, j = static_cast<int>(k) / patches.u;
     if (seeds[k].on_mesh) {
-      result.points.push_back({.label = fmt::format("{}{}_{}", kPrefix, i, j),
+      result.points.push_back({.label = fmt::format("seed_{}_{}", i, j),
                                .position = *seeds[k].on_mesh,
                                .uv = patches.Center(i, j),
-                               .weight = options.weight});
+                               .weight = options.weight,
+                               .role = PointRole::kSeed});
     }
   }
   return result;
 }
-
-bool IsSeeded(const FitPoint& point) { return point.label.starts_with(kPrefix); }
-
-bool IsLandmark(const FitPoint& point) { return !point.label.empty() && !IsSeeded(point); }
 
 }  // namespace semblance

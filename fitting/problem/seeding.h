@@ -66,7 +66,7 @@ void Fields(Visitor& visit, SeedOptions& o) {
 }
 
 struct SeedResult {
-  std::vector<FitPoint> points;  // labels seed_i_j of patch (i, j), i fastest
+  std::vector<FitPoint> points;  // seeds, labelled seed_i_j by their patch (i, j), i fastest
   int masked = -1;               // patches whose centre, or whose seed, lies in a mask
   int missed = -1;               // patches for which the mesh has no fitting point
   int folded = -1;               // seeds dropped because neighbours had changed places
@@ -85,10 +85,5 @@ struct SeedResult {
 SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
                       const TriMesh& implicit_mesh, std::span<const Sphere> masks,
                       const SeedOptions& options);
-
-// Whether a point of a target was made by SeedDowels, by its label.
-bool IsSeeded(const FitPoint& point);
-// Whether it is one that has a name of its own: a dowel at a site.
-bool IsLandmark(const FitPoint& point);
 
 }  // namespace semblance

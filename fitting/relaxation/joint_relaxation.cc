@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "fitting/least_squares/blas_threads.h"
-#include "fitting/problem/seeding.h"
 #include "fitting/relaxation/relaxer.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
@@ -248,7 +247,7 @@ void JointRound::AddPoints(ControlNet& net, std::vector<Vec2>& places,
           AddPoint(p, k, scale,
                    points->loss == RobustLoss::kNone ? nullptr : MakeLoss(*points, scale), net,
                    places, problem);
-        } else if (IsLandmark(p)) {
+        } else if (p.role == PointRole::kLandmark) {
           AddPoint(p, k, landmarks->weight * p.weight / landmark_sum, nullptr, net, places,
                    problem);
         }

@@ -7,8 +7,6 @@
 #include <numeric>
 #include <utility>
 
-#include "fitting/problem/seeding.h"
-
 namespace semblance {
 namespace {
 
@@ -103,7 +101,7 @@ LocalPenalty Relaxer::LocalAt(int corner, const Vec2& uv, const SurfaceSample& s
   for (const int m : members_[corner]) {
     const FitPoint& p = target_.points[m];
     local.Add(distance * p.weight / mean_weight_, spot.point - p.position, spot.du, spot.dv);
-    if (moves_.standard > 0 && !IsSeeded(p)) {
+    if (moves_.standard > 0 && p.role != PointRole::kSeed) {
       local.Add(moves_.standard, InMm(uv - mesh_.rest_uv()[corner]), InMm({1, 0}), InMm({0, 1}));
     }
   }
@@ -218,7 +216,7 @@ RelaxationPenalties Relaxer::Penalties() const {
   std::vector<double> distance, standard, bunching, distortion, crease;
   for (std::size_t k = 0; k < uv_.size(); ++k) {
     distance.push_back((spots_[k].point - target_.points[k].position).squaredNorm());
-    if (!IsSeeded(target_.points[k])) {
+    if (target_.points[k].role != PointRole::kSeed) {
       standard.push_back(InMm(uv_[k] - mesh_.rest_uv()[k]).squaredNorm());
     }
   }

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include "fitting/problem/seeding.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -50,7 +49,7 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
     view.observations.push_back({.uv = p.uv,
                                  .position = p.position - finer,
                                  .weight = p.weight,
-                                 .landmark = IsLandmark(p)});
+                                 .landmark = p.role == PointRole::kLandmark});
   }
   return view;
 }

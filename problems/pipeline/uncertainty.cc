@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fitting/problem/seeding.h"
 #include "fitting/uncertainty/error_propagation.h"
 #include "interp/evaluation/calibration.h"
 #include "interp/schemes/kriging_process.h"
@@ -129,7 +128,7 @@ PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
                                     [&](const Dowel& d) { return d.site == point.label; });
     errors.directions.push_back(dowel != dowels.end() ? dowel->direction
                                                       : surface.Normal(point.uv));
-    laid_mm.push_back(IsSeeded(point) ? experiment.uncertainty.implicit_sd_mm : 0);
+    laid_mm.push_back(point.role == PointRole::kSeed ? experiment.uncertainty.implicit_sd_mm : 0);
   }
   AddSmoothErrors(places, laid_mm, result.depth_length_mm, covariance);
   errors.root = PivotedRoot(std::move(covariance));

@@ -124,7 +124,7 @@ std::string SeedsCsv(const RunResult& result) {
   std::string csv = "seed,x_mm,y_mm,z_mm,u,v,weight,fit_residual_mm\n";
   for (std::size_t k = 0; k < result.target.points.size(); ++k) {
     const FitPoint& p = result.target.points[k];
-    if (IsSeeded(p)) {
+    if (p.role == PointRole::kSeed) {
       csv += fmt::format("{},{},{},{},{},{},{},{}\n", p.label, p.position.x(), p.position.y(),
                          p.position.z(), result.fit.uv[k].x(), result.fit.uv[k].y(), p.weight,
                          Cell(result.fit.residual_mm[k]));

@@ -346,7 +346,7 @@ TEST(Fit, SmoothnessMeansTheSameAtEveryLevel) {
 TEST(Fit, DowelsAndSeedsAreReportedApart) {
   const HSplineSurface start = SmoothSurface(Shape(), 2);
   FitTarget target = TargetOn(start, 20, Vec3(0, 0, 3));
-  target.points[4].label = "seed_1_2";
+  target.points[4].role = PointRole::kSeed;
   target.points[4].position += Vec3(0, 0, 50);
   const FitResult result = Fit(start, target, {}, {.schedule = {{0, 0}}}, {});
   EXPECT_NEAR(result.dowel_rms_mm, 3, 1e-12);

@@ -54,7 +54,7 @@ TEST(Seeding, FindsTheSphereFromInsideAndOutside) {
         EXPECT_NEAR(p.position.norm(), 75, 0.2);
         EXPECT_LT(p.position.normalized().cross(cap.Point(p.uv).normalized()).norm(), 0.03);
         EXPECT_GT(p.position.dot(cap.Point(p.uv)), 0);
-        EXPECT_TRUE(IsSeeded(p));
+        EXPECT_EQ(p.role, PointRole::kSeed);
       }
       EXPECT_LT((result.points[13].uv - Vec2(1.5 / 12, 1.5 / 10)).norm(), 1e-15);
     }
