@@ -8,8 +8,8 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/implicit/open_ends.h"
-#include "surfaces/marching/crossings.h"
+#include "surfaces/implicit/trim_to_border.h"
+#include "surfaces/marching/edge_intersections.h"
 
 namespace semblance {
 namespace {
@@ -42,8 +42,8 @@ int ExtremePoint(const TriMesh& shell, std::span<const double> depth_mm, const V
 
 // The cell above the last edge, going outward along an axis from a corner near `start`, on which
 // the field turns negative, and that edge. False if it is positive up to the grid's end.
-bool AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& start, int axis,
-                 int step, std::vector<SeedCell>& seeds) {
+bool AppendStartCell(const ScalarField& field, const SampleGrid& grid, const Vec3& start, int axis,
+                     int step, std::vector<StartCell>& starts) {
   std::array<int, 3> at;
   for (int a = 0; a < 3; ++a) {
     at[a] = std::clamp(static_cast<int>(std::lround((start[a] - grid.origin[a]) / grid.cell_mm[a])),
@@ -62,19 +62,20 @@ bool AppendSeeds(const ScalarField& field, const SampleGrid& grid, const Vec3& s
     return !inside;
   }
   at[axis] = crossing;
-  seeds.push_back({grid.Index(at[0], at[1], at[2]), EdgeBits(1 << EdgeFrom(0, axis))});
+  starts.push_back({grid.Index(at[0], at[1], at[2]), EdgeBits(1 << EdgeFrom(0, axis))});
   return true;
 }
 
 // False if the surface leaves the grid, as far as is seen from the shell's extreme points.
-bool FindSeeds(const TriMesh& shell, std::span<const double> depth_mm, const ScalarField& field,
-               const SampleGrid& grid, std::vector<SeedCell>& seeds) {
+bool FindStartCells(const TriMesh& shell, std::span<const double> depth_mm,
+                    const ScalarField& field, const SampleGrid& grid,
+                    std::vector<StartCell>& starts) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const int step : {-1, 1}) {
       const Vec3 direction = step * Vec3::Unit(axis);
       const int extreme = ExtremePoint(shell, depth_mm, direction);
-      if (!AppendSeeds(field, grid, shell.points[extreme] + 0.4 * depth_mm[extreme] * direction,
-                       axis, step, seeds)) {
+      if (!AppendStartCell(field, grid, shell.points[extreme] + 0.4 * depth_mm[extreme] * direction,
+                           axis, step, starts)) {
         return false;
       }
     }
@@ -89,12 +90,12 @@ PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_
   const ScalarField field = [&surface](const Vec3& p) { return surface.Flattened(p); };
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
     const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
-    std::vector<SeedCell> seeds;
-    if (!FindSeeds(shell, depth_mm, field, grid, seeds)) {
+    std::vector<StartCell> starts;
+    if (!FindStartCells(shell, depth_mm, field, grid, starts)) {
       continue;
     }
     PolygonizeResult result =
-        PolygonizeSurface(options.polygonizer, surface, grid, seeds, options.edges, context);
+        PolygonizeSurface(options.polygonizer, surface, grid, starts, options.edges, context);
     cell_mm = grid.cell_mm.x();
     if (!result.touches_border && !result.mesh.triangles.empty()) {
       return result;
@@ -223,7 +224,7 @@ ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> dep
   face.counts = polygonized.summary;
   face.dense = KeepOutermost(polygonized.mesh, face.dropped_components);
   if (options.ends == FaceEnds::kOpen) {
-    face.dense = OverDepths(face.dense, shell, depth_mm, context);
+    face.dense = TrimToSkull(face.dense, shell, depth_mm, context);
   }
   context.Report("decimate");
   DecimateFace(options, face);

@@ -33,7 +33,7 @@ struct SplitEmitter {
 // at exactly l, whatever the mesh.
 //
 // With the depth linear over T, l^k stands under the integral: no steps where depth changes from
-// triangle to triangle. (The thesis's emitters know but one depth a triangle.)
+// triangle to triangle. (The thesis's emitters know one depth per triangle.)
 enum class EmitterDepth { kMean, kLinear };
 constexpr auto EnumNames(EmitterDepth) {
   return std::to_array<std::string_view>({"mean", "linear"});
@@ -43,6 +43,11 @@ struct FlatEmitter {
   static constexpr std::string_view kName = "flat";
   double decay = 6;
   EmitterDepth depth = EmitterDepth::kMean;
+};
+
+// What an emitter gives in a box: nowhere less than `least`, nowhere more than `most`.
+struct EmissionBounds {
+  double least = 0, most = 0;
 };
 
 using Emitter = std::variant<FlatEmitter, SplitEmitter, ThesisEmitter>;

@@ -1,48 +1,50 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A triangle of the skull as its emission needs it. For the emitters' kernels alone.
+// A triangle of the skull as its emission needs it, and how emission falls with distance. For the
+// emitters' kernels alone.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/emitters/emitter.h"
+#include "surfaces/emitters/simd.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 
 inline constexpr double kMostEmission = 1e12;  // of one triangle
 inline constexpr double kRounding = 1e-9;      // share by which bounds are widened
 
-// r^-n from r^2. Whole n, the usual case, needs no pow.
-class InversePower {
- public:
-  explicit InversePower(double n) : n_(n), whole_(n == std::floor(n) ? static_cast<int>(n) : -1) {}
-  double operator()(double r2) const {
-    if (whole_ < 0) {
-      return std::pow(r2, -0.5 * n_);
-    }
-    const double inverse2 = 1 / r2;
-    double result = whole_ & 1 ? std::sqrt(inverse2) : 1;
-    double power = inverse2;
-    for (int rest = whole_ >> 1; rest != 0; rest >>= 1, power *= power) {
-      result *= rest & 1 ? power : 1;
-    }
-    return result;
+// gain / distance^power, times the height over the triangle's plane where by_height; 0 where that
+// is less than the cut, at most kMostEmission.
+struct Falloff {
+  double power = kNaN;  // > 0
+  int whole = -1;       // the power if it is whole; -1: powers are taken one by one
+  bool by_height = false;
+  double cut = 0;
+
+  double InversePower(double squared) const {
+    return InversePowerOf<double>(squared, power, whole);
   }
-
- private:
-  double n_;
-  int whole_;
+  // For a gain of 1, without the cut, at least so far away and at most so high.
+  double Most(double squared, double height) const {
+    const double most = InversePower(squared);
+    return by_height ? std::min(height, std::sqrt(squared)) * most : most;
+  }
 };
+// whole is set if the power is whole.
+inline Falloff MakeFalloff(double power, bool by_height, double cut) {
+  return {power, power == std::floor(power) ? static_cast<int>(power) : -1, by_height, cut};
+}
 
-// One triangle of the skull as its emission needs it.
 struct EmitterTriangle {
   Vec3 a, b, c;
   Vec3 centroid, normal;
   double area_mm2 = kNaN, depth_mm = kNaN;
   double longest2_mm2 = kNaN;  // squared length of the longest edge
-  double gain = kNaN;          // the factor of its emission that does not depend on the point
-  double most_gain = kNaN;     // with the most of its depths
-  Vec3 moved = Vec3::Zero();   // to where it is that it emits from
   // Where the depth is linear over the triangle: its least and most at the corners, as shares of
   // depth_mm, which is their mean, and its gradient over depth_mm, in the plane; 1 / mm.
   double least_share = 1, most_share = 1;
@@ -50,6 +52,11 @@ struct EmitterTriangle {
   // In the plane, out of the triangle, across ab, bc, ca.
   Vec3 edge_normal_a = Vec3::Constant(kNaN), edge_normal_b = edge_normal_a,
        edge_normal_c = edge_normal_a;
+
+  // Set by its kernel.
+  double gain = kNaN;         // the factor of its emission that does not depend on the point
+  double most_gain = kNaN;    // the gain with the greatest of its depths
+  Vec3 moved = Vec3::Zero();  // from the triangle to where it emits from
 
   bool IsSloped() const { return most_share > least_share; }
 
@@ -60,26 +67,13 @@ struct EmitterTriangle {
   }
 };
 
-// From p to the triangle, wherever it was moved to.
-inline double SquaredDistance(const EmitterTriangle& t, const Vec3& p) {
-  const Vec3 ap = p - t.a, bp = p - t.b, cp = p - t.c;
-  const double out_ab = ap.dot(t.edge_normal_a), out_bc = bp.dot(t.edge_normal_b),
-               out_ca = cp.dot(t.edge_normal_c);
-  if (out_ab <= 0 && out_bc <= 0 && out_ca <= 0) {
-    const double h = ap.dot(t.normal);
-    return h * h;
-  }
-  const auto to_segment = [&p](const Vec3& u, const Vec3& v) {
-    const Vec3 uv = v - u;
-    const double s = std::clamp((p - u).dot(uv) / uv.squaredNorm(), 0.0, 1.0);
-    return (p - u - s * uv).squaredNorm();
-  };
-  return std::min({to_segment(t.a, t.b), to_segment(t.b, t.c), to_segment(t.c, t.a)});
-}
+// mm^2, from p to the triangle, not moved.
+double SquaredDistance(const EmitterTriangle& t, const Vec3& p);
+bool ProjectsOnto(const EmitterTriangle& t, const Vec3& p);
 
-inline bool ProjectsOnto(const EmitterTriangle& t, const Vec3& p) {
-  return (p - t.a).dot(t.edge_normal_a) <= 0 && (p - t.b).dot(t.edge_normal_b) <= 0 &&
-         (p - t.c).dot(t.edge_normal_c) <= 0;
-}
+// One emitter per triangle that has depths and an area; several where the depth is linear over it
+// and changes by more than 15 %. Throws InputError as ImplicitSurface does.
+std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
+                                          EmitterDepth over_triangle);
 
 }  // namespace semblance

@@ -4,53 +4,63 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <type_traits>
+#include <variant>
+#include <vector>
 
-#include "surfaces/emitters/emitter_bounds.h"
+#include "surfaces/emitters/distance_kernel.h"
+#include "surfaces/emitters/emission_bounds.h"
 #include "surfaces/emitters/emitter_search.h"
-#include "surfaces/emitters/make_emitters.h"
-#include "surfaces/emitters/near_emitters.h"
+#include "surfaces/emitters/emitter_triangle.h"
+#include "surfaces/emitters/flat_kernel.h"
+#include "surfaces/emitters/neighbour_list_cache.h"
 
 namespace semblance {
 namespace {
+
+using Kernel = std::variant<FlatKernel, DistanceKernel>;
+
+Kernel MakeKernel(const FlatEmitter& o) { return FlatKernel(o); }
+Kernel MakeKernel(const SplitEmitter& o) { return DistanceKernel(o); }
+Kernel MakeKernel(const ThesisEmitter& o) { return DistanceKernel(o); }
 
 EmitterDepth DepthOver(const Emitter& emitter) {
   const auto* flat = std::get_if<FlatEmitter>(&emitter);
   return flat ? flat->depth : EmitterDepth::kMean;
 }
 
-static_assert(FlatBatch::kLanes == DistanceBatch::kLanes &&
-              FlatBatch::kLanes == EmitterReach::kLanes);
-
 // Integrals of a flat emitter by two numerical ways, each within 1 %.
 constexpr double kFlatShare = 0.025;
 
-// Of the tree's leaves, whose emitters are 8 each but for the last.
-std::vector<FlatBatch> MakeFlatBatches(const std::vector<EmitterTriangle>& emitters) {
-  constexpr std::size_t kLanes = FlatBatch::kLanes;
-  std::vector<FlatBatch> batches((emitters.size() + kLanes - 1) / kLanes);
-  for (std::size_t e = 0; e < emitters.size(); ++e) {
-    const EmitterTriangle& t = emitters[e];
-    FlatBatch& batch = batches[e / kLanes];
-    const int lane = static_cast<int>(e % kLanes);
-    batch.Set(lane, t.a, t.b, t.c, t.normal, t.gain);
-    if (t.IsSloped()) {
-      batch.SetSlope(lane, t.slope);
-    }
-  }
-  return batches;
+void SetGains(const Kernel& kernel, std::vector<EmitterTriangle>& emitters) {
+  std::visit(
+      [&emitters](const auto& k) {
+        for (EmitterTriangle& t : emitters) {
+          t.gain = k.Gain(t);
+          t.most_gain = t.gain * std::pow(t.most_share, k.Decay());
+          t.moved = k.Advance(t) * t.normal;
+        }
+      },
+      kernel);
 }
 
-template <class EmitterKernel>
-std::vector<DistanceBatch> MakeDistanceBatches(const EmitterKernel& kernel,
-                                               const std::vector<EmitterTriangle>& emitters) {
-  constexpr std::size_t kLanes = DistanceBatch::kLanes;
-  std::vector<DistanceBatch> batches((emitters.size() + kLanes - 1) / kLanes);
-  for (std::size_t e = 0; e < emitters.size(); ++e) {
-    const EmitterTriangle& t = emitters[e];
-    batches[e / kLanes].Set(static_cast<int>(e % kLanes), t.a, t.b, t.c, t.normal,
-                            kernel.Advance(t), kernel.Floor(t), t.gain);
-  }
-  return batches;
+std::vector<EmitterTriangle> EmittersOf(const TriMesh& skull, std::span<const double> depth_mm,
+                                        EmitterDepth over_triangle, const Kernel& kernel) {
+  std::vector<EmitterTriangle> emitters = MakeEmitters(skull, depth_mm, over_triangle);
+  SetGains(kernel, emitters);
+  return emitters;
+}
+
+EmitterSearchOptions SearchOptions(const Kernel& kernel, double tail_error) {
+  return std::visit(
+      [tail_error]<class EmitterKernel>(const EmitterKernel& k) {
+        EmitterSearchOptions options{k.Fall(), EmitterKernel::kRun, false, tail_error};
+        if constexpr (std::is_same_v<EmitterKernel, FlatKernel>) {
+          options.multipoles = k.HasLanes();
+        }
+        return options;
+      },
+      kernel);
 }
 
 // Of the cubes that share a list of what is near. With a cut a point passes quickly over what does
@@ -64,7 +74,7 @@ double CubeSize(const std::vector<EmitterTriangle>& emitters, bool cut) {
 }
 
 bool HasCut(const Kernel& kernel) {
-  return std::visit([](const auto& k) { return k.Cut(); }, kernel) > 0;
+  return std::visit([](const auto& k) { return k.Fall().cut; }, kernel) > 0;
 }
 
 }  // namespace
@@ -72,32 +82,30 @@ bool HasCut(const Kernel& kernel) {
 struct ImplicitSurface::Impl {
   Impl(const TriMesh& skull, std::span<const double> depth_mm, const ImplicitOptions& options)
       : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
-        emitters(MakeEmitters(skull, depth_mm, DepthOver(options.emitter), kernel)),
-        search(emitters, kernel, options.tail_error),
-        near_table(CubeSize(emitters, HasCut(kernel))),
+        emitters(EmittersOf(skull, depth_mm, DepthOver(options.emitter), kernel)),
+        search(emitters, SearchOptions(kernel, options.tail_error)),
+        neighbours(CubeSize(emitters, HasCut(kernel))),
         tail_error(options.tail_error),
         decay(std::visit([](const auto& k) { return k.Decay(); }, kernel)) {
-    std::visit([this](const auto& k) { MakeBatches(k); }, kernel);
+    std::visit([this](const auto& k) { MakeLanes(k); }, kernel);
   }
 
-  void MakeBatches(const FlatKernel& k) {
-    if (k.Batches()) {
-      flat_batches = MakeFlatBatches(emitters);
+  void MakeLanes(const FlatKernel& k) {
+    if (k.HasLanes()) {
+      flat_lanes = k.LanesOf(emitters);
     }
   }
-  template <class EmitterKernel>
-  void MakeBatches(const EmitterKernel& k) {
-    distance_batches = MakeDistanceBatches(k, emitters);
-    batch_reaches = ReachesOf(distance_batches, k.Fall());
+  void MakeLanes(const DistanceKernel& k) {
+    distance_lanes = k.LanesOf(emitters);
+    reach_balls = ReachBallsOf(distance_lanes, k.Fall());
   }
 
-  template <class EmitterKernel>
-  NearEmittersTable::List Near(const EmitterKernel& k, const Vec3& p) const {
-    return near_table.Find(p, [&](const Box3& box) {
+  NeighbourListCache::List Near(const Vec3& p) const {
+    return neighbours.Find(p, [&](const Box3& box) {
       double left_out = 0;
-      NearEmitters near = search.InBox(k, box, FarField::kClusters, left_out);
-      if (!batch_reaches.empty()) {
-        near.reaches = SideBySide(batch_reaches, near.runs);
+      NeighbourList near = search.InBox(box, FarField::kMultipole, left_out);
+      if (!reach_balls.empty()) {
+        near.reaches = Gather(reach_balls, near.runs);
       }
       return near;
     });
@@ -105,60 +113,63 @@ struct ImplicitSurface::Impl {
 
   double Emission(const FlatKernel& k, int e, const Vec3& p) const {
     const double height = (p - emitters[e].a).dot(emitters[e].normal);
-    return height > 0 ? std::min(k.Emission(emitters[e], p, height), kMostEmission) : 0;
+    return height > 0 ? k.Emission(emitters[e], p, height) : 0;
   }
-  template <class EmitterKernel>
-  double Emission(const EmitterKernel& k, int e, const Vec3& p) const {
-    constexpr int kLanes = DistanceBatch::kLanes;
-    return EmitByDistance(distance_batches[e / kLanes], e % kLanes, p, k.Fall());
+  double Emission(const DistanceKernel& k, int e, const Vec3& p) const {
+    constexpr int kLanes = DistanceEmitterLanes::kLanes;
+    return EmitByDistance(distance_lanes[e / kLanes], e % kLanes, p, k.Fall());
   }
 
-  double SumOf(const FlatKernel& k, const NearEmitters& list, const Vec3& p,
-               std::int64_t& evaluations) const {
-    evaluations +=
-        FlatKernel::kRun * std::ssize(list.runs) + ClusterBatch::kLanes * std::ssize(list.clusters);
-    if (!k.Batches()) {
-      return SumOneByOne(k, list, p);
-    }
-    return k.Sum(flat_batches, list.runs, emitters, p) +
-           SumClusters(search.clusters(), list.clusters, p, k.Power());
-  }
-  template <int kRun, class Visit>
-  void ForEachOf(const NearEmitters& list, const Visit& visit) const {
+  // visit(e) for each emitter of a list's runs.
+  template <class Visit>
+  void ForEachOf(const NeighbourList& list, int run_length, const Visit& visit) const {
     for (const std::int32_t run : list.runs) {
-      const int end = std::min<int>(kRun * (run + 1), static_cast<int>(emitters.size()));
-      for (int e = kRun * run; e < end; ++e) {
+      const int end = std::min<int>(run_length * (run + 1), static_cast<int>(emitters.size()));
+      for (int e = run_length * run; e < end; ++e) {
         visit(e);
       }
     }
   }
-  double SumOneByOne(const FlatKernel& k, const NearEmitters& list, const Vec3& p) const {
-    double sum = 0;
-    ForEachOf<FlatKernel::kRun>(list, [&](int e) { sum += Emission(k, e, p); });
-    return sum;
+
+  double SumOf(const FlatKernel& k, const NeighbourList& list, const Vec3& p,
+               std::int64_t& evaluations) const {
+    evaluations += FlatKernel::kRun * std::ssize(list.runs) +
+                   MultipoleLanes::kLanes * std::ssize(list.multipoles);
+    if (!k.HasLanes()) {
+      double sum = 0;
+      ForEachOf(list, FlatKernel::kRun, [&](int e) { sum += Emission(k, e, p); });
+      return sum;
+    }
+    return k.Sum(flat_lanes, list.runs, emitters, p) +
+           SumMultipoles(search.multipoles(), list.multipoles, p, k.Fall().whole);
   }
-  template <class EmitterKernel>
-  double SumOf(const EmitterKernel& k, const NearEmitters& list, const Vec3& p,
+  double SumOf(const DistanceKernel& k, const NeighbourList& list, const Vec3& p,
                std::int64_t& evaluations) const {
     std::int64_t reaching = 0;
     const double sum =
-        SumByDistance(distance_batches, list.runs, list.reaches, p, k.Fall(), reaching);
-    evaluations += EmitterKernel::kRun * reaching;
+        SumByDistance(distance_lanes, list.runs, list.reaches, p, k.Fall(), reaching);
+    evaluations += DistanceKernel::kRun * reaching;
     return sum;
   }
 
-  template <class EmitterKernel>
-  double Sum(const EmitterKernel& k, const Vec3& p, std::int64_t& evaluations) const {
-    return SumOf(k, *Near(k, p), p, evaluations);
+  // Of all emitters at p, within the tail error.
+  double Sum(const Vec3& p, std::int64_t& evaluations) const {
+    const NeighbourListCache::List near = Near(p);
+    return std::visit([&](const auto& k) { return SumOf(k, *near, p, evaluations); }, kernel);
+  }
+
+  int RunLength() const {
+    return std::visit([]<class EmitterKernel>(const EmitterKernel&) { return EmitterKernel::kRun; },
+                      kernel);
   }
 
   Kernel kernel;
   std::vector<EmitterTriangle> emitters;
   EmitterSearch search;
-  NearEmittersTable near_table;
-  std::vector<FlatBatch> flat_batches;  // of the tree's leaves; or
-  std::vector<DistanceBatch> distance_batches;
-  std::vector<BatchReach> batch_reaches;  // of the distance batches
+  NeighbourListCache neighbours;
+  std::vector<FlatEmitterLanes> flat_lanes;  // of each eight emitters; or
+  std::vector<DistanceEmitterLanes> distance_lanes;
+  std::vector<ReachBall> reach_balls;  // of the distance lanes
   double tail_error, decay;
 };
 
@@ -170,9 +181,7 @@ ImplicitSurface::ImplicitSurface(ImplicitSurface&&) noexcept = default;
 
 double ImplicitSurface::Value(const Vec3& p) const {
   std::int64_t evaluations = 0;
-  return std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p, evaluations); },
-                    impl_->kernel) -
-         1;
+  return impl_->Sum(p, evaluations) - 1;
 }
 
 double ImplicitSurface::Flattened(const Vec3& p) const {
@@ -181,8 +190,7 @@ double ImplicitSurface::Flattened(const Vec3& p) const {
 }
 
 double ImplicitSurface::Flattened(const Vec3& p, std::int64_t& emitters) const {
-  return Flatten(std::visit([&](const auto& kernel) { return impl_->Sum(kernel, p, emitters); },
-                            impl_->kernel));
+  return Flatten(impl_->Sum(p, emitters));
 }
 
 double ImplicitSurface::Flatten(double emission) const {
@@ -222,13 +230,9 @@ void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> em
 
 EmissionBounds ImplicitSurface::BoundsIn(const Box3& box) const {
   double left_out = 0;
+  const NeighbourList near = impl_->search.InBox(box, FarField::kNone, left_out);
   std::vector<std::int32_t> emitters;
-  std::visit(
-      [&]<class EmitterKernel>(const EmitterKernel& kernel) {
-        const NearEmitters near = impl_->search.InBox(kernel, box, FarField::kNone, left_out);
-        impl_->ForEachOf<EmitterKernel::kRun>(near, [&](int e) { emitters.push_back(e); });
-      },
-      impl_->kernel);
+  impl_->ForEachOf(near, impl_->RunLength(), [&](int e) { emitters.push_back(e); });
   std::vector<EmissionBounds> bounds(emitters.size());
   BoundsIn(box, emitters, bounds);
   EmissionBounds sum{-impl_->tail_error, left_out + impl_->tail_error};
@@ -252,15 +256,6 @@ Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
 }
 
 double ImplicitSurface::TailError() const { return impl_->tail_error; }
-
-std::int64_t ImplicitSurface::EmittersNear(const Vec3& p) const {
-  return std::visit(
-      [&]<class EmitterKernel>(const EmitterKernel& kernel) {
-        const std::int64_t runs = std::ssize(impl_->Near(kernel, p)->runs);
-        return std::min(EmitterCount(), EmitterKernel::kRun * runs);
-      },
-      impl_->kernel);
-}
 
 std::int64_t ImplicitSurface::EmitterCount() const {
   return static_cast<std::int64_t>(impl_->emitters.size());

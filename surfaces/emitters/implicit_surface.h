@@ -22,23 +22,18 @@ void Fields(Visitor& visit, ImplicitOptions& o) {
   visit(FieldInfo{.name = "tail_error",
                   .min = 0,
                   .max = 0.1,
-                  .doc = "bound on the error of the far field, which is summed by clusters of "
+                  .doc = "bound on the error of the far field, which is summed by multipoles of "
                          "emitters or, where they are too far for that, left out, where 1 is the "
                          "surface; 0 sums every emitter"},
         o.tail_error);
 }
-
-// What an emitter gives in a box: nowhere less than `least`, nowhere more than `most`.
-struct EmissionBounds {
-  double least = 0, most = 0;
-};
 
 // Value(p) = sum of emissions - 1: positive inside. Bounded: each emission is capped at
 // 1e12, and at distances (for `flat` with a whole decay: heights) below 5 % of the depth it is
 // taken as from 5 %, so that it is finite on vertices, edges and planes of emitters.
 class ImplicitSurface {
  public:
-  // depth_mm: one a vertex; a triangle emits with the mean of its three (thesis 3.1), or, if the
+  // depth_mm: one per vertex; a triangle emits with the mean of its three (thesis 3.1), or, if the
   // emitter says so, linear between them, and not at all where one is NaN. With linear depths a
   // triangle over which the depth changes by more than 15 % counts as several emitters. Throws
   // InputError if nothing emits, if a depth is not positive, or if the sizes differ.
@@ -67,13 +62,11 @@ class ImplicitSurface {
                 std::span<EmissionBounds> bounds) const;
   // Of Value(p) + 1 in the box.
   EmissionBounds BoundsIn(const Box3& box) const;
-  // The emitter, or the moved triangle of `split`, and d = l m^(1/k) around it (thesis 3.2.2): the
-  // distance at which m of the thesis's emitters would just make a surface.
+  // The triangle, for `split` also where it is moved to and its depth (1 - t) l, with d = l m^(1/k)
+  // of room each way (thesis 3.2.2): m emitters at that distance would just make a surface.
   Box3 InfluenceBox(std::int32_t emitter, double m) const;
   double TailError() const;  // by which Value may be off, either way
 
-  // Emitters that the tail bound makes Value(p) sum one by one.
-  std::int64_t EmittersNear(const Vec3& p) const;
   std::int64_t EmitterCount() const;
   double MaxDepth_mm() const;
 

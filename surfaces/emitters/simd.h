@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Four or eight numbers in one register, and how the batches of emitters are compiled. For the
-// batches alone: their files have compiler options of their own.
+// Four or eight numbers in one register. Files that use more than one number at once have compiler
+// options of their own (CMakeLists.txt).
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ using Wider = double __attribute__((vector_size(64)));
 
 // What follows is for N = Wider, Wide or double, and gives the same bits for both.
 template <class N>
-inline constexpr int kWidth = sizeof(N) / sizeof(double);
+inline constexpr int kLaneCount = sizeof(N) / sizeof(double);
 
 template <class N, std::size_t count>
 SEMBLANCE_INLINE N Load(const std::array<double, count>& from, int first) {
@@ -58,7 +58,7 @@ SEMBLANCE_INLINE N Magnitude(const N& a) {
 
 template <class N>
 SEMBLANCE_INLINE N SquareRoot(const N& a) {
-  double root[kWidth<N>];
+  double root[kLaneCount<N>];
   std::memcpy(root, &a, sizeof(a));
   for (double& r : root) {
     r = std::sqrt(r);
@@ -72,7 +72,7 @@ SEMBLANCE_INLINE N SquareRoot(const N& a) {
 template <class N>
 SEMBLANCE_INLINE N InversePowerOf(const N& square, double power, int whole) {
   if (whole < 0) {
-    double result[kWidth<N>];
+    double result[kLaneCount<N>];
     std::memcpy(result, &square, sizeof(square));
     for (double& r : result) {
       r = std::pow(r, -0.5 * power);

@@ -7,7 +7,7 @@
 #include <memory>
 #include <numeric>
 
-#include "surfaces/marching/slab_march.h"
+#include "surfaces/marching/slice_marching_cubes.h"
 
 namespace semblance {
 namespace {
@@ -22,7 +22,7 @@ struct Influence {
 
 // A cube of cells, 2^depth along the grid's longest side, aligned with the grid's cells.
 struct Node {
-  std::array<int, 3> low{};
+  GridIndex low{};
   int size = 0;  // cells, a power of 2
   Influence influence;
   bool empty = false;    // proven: no surface
@@ -93,7 +93,7 @@ class MinMaxRule {
   const ImplicitSurface& surface_;
 };
 
-// The octree as far as it meets the slab at hand: nodes are made when the march comes to them and
+// The octree as far as it meets the slice at hand: nodes are made when the march comes to them and
 // freed when it has passed (thesis 3.2.2).
 template <class Rule>
 class Octree {
@@ -109,7 +109,7 @@ class Octree {
     rule_.Set(root_, all, BoxOf(root_), summary_);
   }
 
-  // Calls visit(leaf) for each leaf that meets slab k and is not empty. k must not fall.
+  // Calls visit(leaf) for each leaf that meets slice k and is not empty. k must not fall.
   template <class Visit>
   void ForEachLeaf(int k, const Visit& visit) {
     Descend(root_, k, visit);
@@ -195,36 +195,32 @@ class ListedField {
 class LeafMarch {
  public:
   LeafMarch(const ImplicitSurface& surface, const SampleGrid& grid,
-            const EdgeSearchOptions& options, SlabMarch& march)
+            const EdgeSearchOptions& options, SliceMarchingCubes& march)
       : surface_(surface), grid_(grid), options_(options), march_(march) {}
 
-  // The cells of a leaf in the slab at hand.
+  // The cells of a leaf in the slice at hand.
   void operator()(const Node& leaf) const {
     const ListedField field(surface_, leaf.influence, march_.Summary());
+    const auto value = [&](const GridIndex& corner) { return field(grid_.Corner(corner)); };
     const auto search = [&](CrossedEdge& edge) { Search(field, edge); };
     for (int j = leaf.low[1]; j < std::min(leaf.low[1] + leaf.size, grid_.counts[1] - 1); ++j) {
       for (int i = leaf.low[0]; i < std::min(leaf.low[0] + leaf.size, grid_.counts[0] - 1); ++i) {
-        march_.Cell(i, j, field, search);
+        march_.Cell(i, j, value, search);
       }
     }
   }
 
  private:
   void Search(const ListedField& field, CrossedEdge& edge) const {
-    const std::array<int, 3> low = grid_.At(edge.id / 3);
-    std::array<int, 3> high = low;
-    ++high[edge.id % 3];
-    const Vec3 a = grid_.Corner(low[0], low[1], low[2]),
-               along = grid_.Corner(high[0], high[1], high[2]) - a;
+    const EdgeLine line = LineOf(grid_, edge);
     std::int64_t& evaluations = march_.Summary().edge_evaluations;
     if (options_.method == EdgeSearch::kBisection) {  // asks for signs alone
       edge.at = SearchCrossing(
-          edge.from, edge.to, options_, [&](double t) { return field(a + t * along); },
-          evaluations);
+          edge.from, edge.to, options_, [&](double t) { return field(line.At(t)); }, evaluations);
       return;
     }
     const auto exact = [&](double t) {
-      return surface_.Flattened(a + t * along, march_.Summary().emitter_evaluations);
+      return surface_.Flattened(line.At(t), march_.Summary().emitter_evaluations);
     };
     edge.at = SearchCrossing(exact(0), exact(1), options_, exact, evaluations);
     evaluations += 2;
@@ -233,13 +229,13 @@ class LeafMarch {
   const ImplicitSurface& surface_;
   const SampleGrid& grid_;
   const EdgeSearchOptions& options_;
-  SlabMarch& march_;
+  SliceMarchingCubes& march_;
 };
 
 template <class Rule>
 PolygonizeResult March(const Rule& rule, const ImplicitSurface& surface, const SampleGrid& grid,
                        const EdgeSearchOptions& options, const RunContext& context) {
-  SlabMarch march(grid);
+  SliceMarchingCubes march(grid);
   Octree<Rule> octree(rule, surface, grid, march.Summary());
   for (int k = 0; k + 1 < grid.counts[2]; ++k) {
     context.ThrowIfStopped();

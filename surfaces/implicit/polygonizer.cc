@@ -25,18 +25,17 @@ PolygonizeResult Counted(const ImplicitSurface& surface, const Polygonize& polyg
 }
 
 // Appends the cells of a cube of `size` cells where bounds do not prove that there is no surface.
-void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid,
-                    const std::array<int, 3>& low, int size, std::vector<SeedCell>& cells) {
+void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid, const GridIndex& low,
+                    int size, std::vector<StartCell>& cells) {
   constexpr int kLeast = 2;  // below, corners cost less than bounds
-  std::array<int, 3> end;
+  GridIndex end;
   for (int axis = 0; axis < 3; ++axis) {
     end[axis] = std::min(low[axis] + size, grid.counts[axis] - 1);
     if (low[axis] >= end[axis]) {
       return;
     }
   }
-  const EmissionBounds bounds = surface.BoundsIn(
-      Box3(grid.Corner(low[0], low[1], low[2]), grid.Corner(end[0], end[1], end[2])));
+  const EmissionBounds bounds = surface.BoundsIn(Box3(grid.Corner(low), grid.Corner(end)));
   if (bounds.most < 1 || bounds.least > 1) {
     return;
   }
@@ -59,10 +58,10 @@ void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid,
   }
 }
 
-std::vector<SeedCell> UnprovenCells(const ImplicitSurface& surface, const SampleGrid& grid,
-                                    const RunContext& context) {
+std::vector<StartCell> UnprovenCells(const ImplicitSurface& surface, const SampleGrid& grid,
+                                     const RunContext& context) {
   constexpr int kCube = 16;
-  std::vector<std::array<int, 3>> cubes;
+  std::vector<GridIndex> cubes;
   for (int k = 0; k < grid.counts[2]; k += kCube) {
     for (int j = 0; j < grid.counts[1]; j += kCube) {
       for (int i = 0; i < grid.counts[0]; i += kCube) {
@@ -70,13 +69,13 @@ std::vector<SeedCell> UnprovenCells(const ImplicitSurface& surface, const Sample
       }
     }
   }
-  std::vector<std::vector<SeedCell>> found(cubes.size());
+  std::vector<std::vector<StartCell>> found(cubes.size());
   ParallelFor(cubes.size(), context.threads, 4, [&](std::size_t n) {
     context.ThrowIfStopped();
     AppendUnproven(surface, grid, cubes[n], kCube, found[n]);
   });
-  std::vector<SeedCell> cells;
-  for (const std::vector<SeedCell>& some : found) {
+  std::vector<StartCell> cells;
+  for (const std::vector<StartCell>& some : found) {
     cells.insert(cells.end(), some.begin(), some.end());
   }
   return cells;
@@ -85,7 +84,7 @@ std::vector<SeedCell> UnprovenCells(const ImplicitSurface& surface, const Sample
 struct Polygonize {
   const ImplicitSurface& surface;
   const SampleGrid& grid;
-  std::span<const SeedCell> seeds;
+  std::span<const StartCell> starts;
   const EdgeSearchOptions& options;
   const RunContext& context;
 
@@ -94,7 +93,7 @@ struct Polygonize {
       return band.components == FollowedComponents::kAll
                  ? PolygonizeFrom(field, grid, UnprovenCells(surface, grid, context), options,
                                   context)
-                 : PolygonizeThrough(field, grid, seeds, options, context);
+                 : PolygonizeThrough(field, grid, starts, options, context);
     });
   }
   PolygonizeResult operator()(const BruteForce&) const {
@@ -113,10 +112,10 @@ struct Polygonize {
 }  // namespace
 
 PolygonizeResult PolygonizeSurface(const Polygonizer& polygonizer, const ImplicitSurface& surface,
-                                   const SampleGrid& grid, std::span<const SeedCell> seeds,
+                                   const SampleGrid& grid, std::span<const StartCell> starts,
                                    const EdgeSearchOptions& options, const RunContext& context) {
   CheckGrid(grid);
-  return std::visit(Polygonize{surface, grid, seeds, options, context}, polygonizer);
+  return std::visit(Polygonize{surface, grid, starts, options, context}, polygonizer);
 }
 
 }  // namespace semblance

@@ -13,7 +13,7 @@
 namespace semblance {
 
 // The components of the surface that are followed: that which passes through the outermost
-// surface's seeds, or all in the grid, inner sheets and fragments too.
+// surface's starts, or all in the grid, inner sheets and fragments too.
 enum class FollowedComponents { kOutermost, kAll };
 constexpr auto EnumNames(FollowedComponents) {
   return std::to_array<std::string_view>({"outermost", "all"});
@@ -82,10 +82,10 @@ void Fields(Visitor& visit, MinMaxOctree& o) {
 
 using Polygonizer = std::variant<NarrowBand, BruteForce, McOctree, MinMaxOctree>;
 
-// The surface Flattened = 0 in the grid. seeds: where NarrowBand starts. Throws InputError for
+// The surface Flattened = 0 in the grid. starts: where NarrowBand starts. Throws InputError for
 // a grid that is none.
 PolygonizeResult PolygonizeSurface(const Polygonizer& polygonizer, const ImplicitSurface& surface,
-                                   const SampleGrid& grid, std::span<const SeedCell> seeds,
+                                   const SampleGrid& grid, std::span<const StartCell> starts,
                                    const EdgeSearchOptions& options, const RunContext& context);
 
 }  // namespace semblance

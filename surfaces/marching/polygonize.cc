@@ -4,18 +4,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <utility>
+#include <vector>
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/marching/corner_blocks.h"
-#include "surfaces/marching/crossings.h"
-#include "surfaces/marching/slab_march.h"
+#include "surfaces/marching/edge_intersections.h"
+#include "surfaces/marching/slice_marching_cubes.h"
+#include "surfaces/marching/sparse_grid.h"
 
 namespace semblance {
+
 void CheckGrid(const SampleGrid& grid) {
   const bool sized =
       std::all_of(grid.counts.begin(), grid.counts.end(), [](int n) { return n >= 2; });
@@ -29,11 +32,11 @@ void CheckGrid(const SampleGrid& grid) {
 
 namespace {
 
-std::array<int, 3> CornerOf(const std::array<int, 3>& cell, int c) {
+GridIndex CornerOf(const GridIndex& cell, int c) {
   return {cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2 & 1)};
 }
 
-bool IsCell(const SampleGrid& grid, const std::array<int, 3>& cell) {
+bool IsCell(const SampleGrid& grid, const GridIndex& cell) {
   return cell[0] >= 0 && cell[1] >= 0 && cell[2] >= 0 && cell[0] + 1 < grid.counts[0] &&
          cell[1] + 1 < grid.counts[1] && cell[2] + 1 < grid.counts[2];
 }
@@ -66,33 +69,33 @@ std::array<FaceEdges, 6> AllFaces() {
   return faces;
 }
 
-// Goes on from crossed cells to their neighbours, wave by wave, along what hangs together: of two
-// sheets in one cell only that which it came along. In `edges`, what a cell is known to have of
-// that.
+// Goes on from crossed cells to their neighbours, wave by wave, along one component: of two sheets
+// in a cell only the one it came along. A cell's `edges` are those known to belong to the
+// component.
 class Continuation {
  public:
   Continuation(const ScalarField& field, const SampleGrid& grid, const RunContext& context)
       : field_(field), grid_(grid), context_(context), corners_(grid), faces_(AllFaces()) {}
 
-  void Follow(std::span<const SeedCell> seeds) {
-    for (const SeedCell& seed : seeds) {
-      Visit(grid_.At(seed.cell), seed.edges);
+  void Follow(std::span<const StartCell> starts) {
+    for (const StartCell& start : starts) {
+      Visit(grid_.At(start.cell), start.edges);
     }
     while (!next_.empty()) {
       context_.ThrowIfStopped();
       context_.Report("polygonize");
-      const std::vector<SeedCell> wave = std::exchange(next_, {});
+      const std::vector<StartCell> wave = std::exchange(next_, {});
       Evaluate(UnknownCorners());
       for (; known_cells_ < cells_.size(); ++known_cells_) {
         SetMask(grid_.At(cells_[known_cells_]));
       }
-      for (const SeedCell& cell : wave) {
+      for (const StartCell& cell : wave) {
         Cross(cell);
       }
     }
   }
-  bool Reached(const SeedCell& seed) {
-    return (seed.edges & ~corners_.CellAt(grid_.At(seed.cell)).edges) == 0;
+  bool Reached(const StartCell& start) {
+    return (start.edges & ~corners_.CellAt(grid_.At(start.cell)).edges) == 0;
   }
   // From now on all sheets in a cell count as one.
   void TakeWholeCells() {
@@ -102,23 +105,23 @@ class Continuation {
     }
   }
   // The cells in ascending order, and their edges.
-  Crossings Take() {
+  EdgeIntersections Take() {
     std::sort(cells_.begin(), cells_.end());
     for (const std::int64_t cell : cells_) {
       Record(cell);
     }
-    return std::move(crossings_);
+    return std::move(intersections_);
   }
 
  private:
-  void Visit(const std::array<int, 3>& cell, EdgeBits edges) {
+  void Visit(const GridIndex& cell, EdgeBits edges) {
     if (!IsCell(grid_, cell)) {
       return;
     }
     EdgeBits& known = corners_.CellAt(cell).edges;
     const EdgeBits fresh = edges & ~known;
     if (fresh != 0) {
-      const std::int64_t index = grid_.Index(cell[0], cell[1], cell[2]);
+      const std::int64_t index = grid_.Index(cell);
       if (known == 0) {
         cells_.push_back(index);
       }
@@ -130,11 +133,11 @@ class Continuation {
   std::vector<std::int64_t> UnknownCorners() {
     std::vector<std::int64_t> unknown;
     for (std::size_t n = known_cells_; n < cells_.size(); ++n) {
-      const std::array<int, 3> at = grid_.At(cells_[n]);
+      const GridIndex at = grid_.At(cells_[n]);
       for (int c = 0; c < 8; ++c) {
-        const std::array<int, 3> corner = CornerOf(at, c);
+        const GridIndex corner = CornerOf(at, c);
         if (corners_.FirstAsked(corner)) {
-          unknown.push_back(grid_.Index(corner[0], corner[1], corner[2]));
+          unknown.push_back(grid_.Index(corner));
         }
       }
     }
@@ -142,21 +145,21 @@ class Continuation {
   }
   void Evaluate(const std::vector<std::int64_t>& unknown) {
     ParallelFor(unknown.size(), context_.threads, 8, [&](std::size_t n) {
-      const std::array<int, 3> at = grid_.At(unknown[n]);
-      corners_.Set(at, field_(grid_.Corner(at[0], at[1], at[2])));
+      const GridIndex at = grid_.At(unknown[n]);
+      corners_.Set(at, field_(grid_.Corner(at)));
     });
-    crossings_.summary.corner_evaluations += static_cast<std::int64_t>(unknown.size());
+    intersections_.summary.corner_evaluations += static_cast<std::int64_t>(unknown.size());
   }
-  void SetMask(const std::array<int, 3>& cell) {
+  void SetMask(const GridIndex& cell) {
     std::uint8_t mask = 0;
     for (int c = 0; c < 8; ++c) {
       mask |= static_cast<std::uint8_t>((corners_.Get(CornerOf(cell, c)) > 0) << c);
     }
     corners_.CellAt(cell).mask = mask;
   }
-  void Cross(const SeedCell& cell) {
-    const std::array<int, 3> at = grid_.At(cell.cell);
-    CornerBlocks::Cell& kept = corners_.CellAt(at);
+  void Cross(const StartCell& cell) {
+    const GridIndex at = grid_.At(cell.cell);
+    SparseGrid::CellRecord& kept = corners_.CellAt(at);
     const auto& joined = loops_[kept.mask];
     EdgeBits crossed = 0;
     for (EdgeBits rest = cell.edges; rest != 0; rest &= EdgeBits(rest - 1)) {
@@ -169,61 +172,59 @@ class Continuation {
         beyond |= EdgeBits(1 << faces_[f].beyond[std::countr_zero(on)]);
       }
       if (beyond != 0) {
-        std::array<int, 3> neighbour = at;
+        GridIndex neighbour = at;
         neighbour[f / 2] += f % 2 != 0 ? 1 : -1;
         Visit(neighbour, whole_cells_ ? kAllEdges : beyond);
       }
     }
   }
   void Record(std::int64_t cell) {
-    const std::array<int, 3> at = grid_.At(cell);
-    const CornerBlocks::Cell& kept = corners_.CellAt(at);
+    const GridIndex at = grid_.At(cell);
+    const SparseGrid::CellRecord& kept = corners_.CellAt(at);
     if (kept.mask == 0 || kept.mask == 255) {
       return;
     }
-    crossings_.cells.push_back({cell, kept.mask, kept.edges});
-    ForEachOwnEdge(grid_, crossings_.cells.back(), [&](const CellEdge& edge) {
-      crossings_.edges.push_back({EdgeId(grid_, at, edge), corners_.Get(CornerOf(at, edge.from)),
-                                  corners_.Get(CornerOf(at, edge.to))});
+    intersections_.cells.push_back({cell, kept.mask, kept.edges});
+    ForEachOwnEdge(grid_, intersections_.cells.back(), [&](const CellEdge& edge) {
+      intersections_.edges.push_back({EdgeId(grid_, at, edge),
+                                      corners_.Get(CornerOf(at, edge.from)),
+                                      corners_.Get(CornerOf(at, edge.to))});
     });
   }
 
   const ScalarField& field_;
   const SampleGrid& grid_;
   const RunContext& context_;
-  CornerBlocks corners_;
+  SparseGrid corners_;
   std::array<FaceEdges, 6> faces_;
   const std::array<std::array<EdgeBits, 12>, 256>& loops_ = MarchingCubesLoops();
   bool whole_cells_ = false;
   std::vector<std::int64_t> cells_;  // that were visited
   std::size_t known_cells_ = 0;      // of these, whose corners are known
-  std::vector<SeedCell> next_;       // wave
-  Crossings crossings_;
+  std::vector<StartCell> next_;      // wave
+  EdgeIntersections intersections_;
 };
 
 PolygonizeResult Searched(const ScalarField& field, const SampleGrid& grid,
                           const EdgeSearchOptions& options, const RunContext& context,
-                          Crossings crossings) {
-  std::vector<std::int64_t> counts(crossings.edges.size(), 0);
-  ParallelFor(crossings.edges.size(), context.threads, 64, [&](std::size_t n) {
-    CrossedEdge& edge = crossings.edges[n];
-    const std::array<int, 3> low = grid.At(edge.id / 3);
-    std::array<int, 3> high = low;
-    ++high[edge.id % 3];
-    const Vec3 a = grid.Corner(low[0], low[1], low[2]),
-               along = grid.Corner(high[0], high[1], high[2]) - a;
+                          EdgeIntersections intersections) {
+  std::vector<std::int64_t> counts(intersections.edges.size(), 0);
+  ParallelFor(intersections.edges.size(), context.threads, 64, [&](std::size_t n) {
+    CrossedEdge& edge = intersections.edges[n];
+    const EdgeLine line = LineOf(grid, edge);
     edge.at = SearchCrossing(
-        edge.from, edge.to, options, [&](double t) { return field(a + t * along); }, counts[n]);
+        edge.from, edge.to, options, [&](double t) { return field(line.At(t)); }, counts[n]);
   });
-  crossings.summary.edge_evaluations =
+  intersections.summary.edge_evaluations =
       std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
-  return MeshOf(grid, std::move(crossings));
+  return MeshOf(grid, std::move(intersections));
 }
 
 // Marches through all cells; layer(k, values) gives the values of the k-th layer of corners.
 template <class GiveLayer>
-Crossings MarchAll(const SampleGrid& grid, const RunContext& context, const GiveLayer& layer) {
-  SlabMarch march(grid);
+EdgeIntersections MarchAll(const SampleGrid& grid, const RunContext& context,
+                           const GiveLayer& layer) {
+  SliceMarchingCubes march(grid);
   layer(0, march.UpperLayer());
   for (int k = 0; k + 1 < grid.counts[2]; ++k) {
     context.ThrowIfStopped();
@@ -244,35 +245,35 @@ Crossings MarchAll(const SampleGrid& grid, const RunContext& context, const Give
 PolygonizeResult PolygonizeAll(const ScalarField& field, const SampleGrid& grid,
                                const EdgeSearchOptions& options, const RunContext& context) {
   CheckGrid(grid);
-  Crossings crossings = MarchAll(grid, context, [&](int k, std::span<double> values) {
+  EdgeIntersections intersections = MarchAll(grid, context, [&](int k, std::span<double> values) {
     ParallelFor(values.size(), context.threads, 64, [&](std::size_t n) {
       const auto column = static_cast<int>(n);
       values[n] = field(grid.Corner(column % grid.counts[0], column / grid.counts[0], k));
     });
   });
-  crossings.summary.corner_evaluations = grid.CornerCount();
-  return Searched(field, grid, options, context, std::move(crossings));
+  intersections.summary.corner_evaluations = grid.CornerCount();
+  return Searched(field, grid, options, context, std::move(intersections));
 }
 
 PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
-                                std::span<const SeedCell> seeds, const EdgeSearchOptions& options,
+                                std::span<const StartCell> starts, const EdgeSearchOptions& options,
                                 const RunContext& context) {
   CheckGrid(grid);
   Continuation continuation(field, grid, context);
-  continuation.Follow(seeds);
+  continuation.Follow(starts);
   return Searched(field, grid, options, context, continuation.Take());
 }
 
 PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& grid,
-                                   std::span<const SeedCell> seeds,
+                                   std::span<const StartCell> starts,
                                    const EdgeSearchOptions& options, const RunContext& context) {
   CheckGrid(grid);
   Continuation continuation(field, grid, context);
-  continuation.Follow(seeds.first(std::min<std::size_t>(1, seeds.size())));
-  const auto reached = [&](const SeedCell& seed) { return continuation.Reached(seed); };
-  if (!std::all_of(seeds.begin(), seeds.end(), reached)) {
+  continuation.Follow(starts.first(std::min<std::size_t>(1, starts.size())));
+  const auto reached = [&](const StartCell& start) { return continuation.Reached(start); };
+  if (!std::all_of(starts.begin(), starts.end(), reached)) {
     continuation.TakeWholeCells();
-    continuation.Follow(seeds);
+    continuation.Follow(starts);
   }
   return Searched(field, grid, options, context, continuation.Take());
 }
@@ -284,14 +285,14 @@ PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleG
     throw InputError(fmt::format("polygonize: {} samples do not fit a grid of {} corners",
                                  samples.size(), grid.CornerCount()));
   }
-  Crossings crossings = MarchAll(grid, context, [&](int k, std::span<double> values) {
+  EdgeIntersections intersections = MarchAll(grid, context, [&](int k, std::span<double> values) {
     const auto layer = samples.subspan(k * values.size(), values.size());
     std::copy(layer.begin(), layer.end(), values.begin());
   });
-  for (CrossedEdge& edge : crossings.edges) {
+  for (CrossedEdge& edge : intersections.edges) {
     edge.at = edge.from / (edge.from - edge.to);
   }
-  return MeshOf(grid, std::move(crossings));
+  return MeshOf(grid, std::move(intersections));
 }
 
 }  // namespace semblance

@@ -16,19 +16,23 @@
 
 namespace semblance {
 
+using GridIndex = std::array<int, 3>;
+
 // Corners (i, j, k), 0 <= i < counts[0] etc., at origin + (i, j, k) * cell.
 struct SampleGrid {
   Vec3 origin = Vec3::Constant(kNaN);
-  Vec3 cell_mm = Vec3::Constant(kNaN);    // > 0
-  std::array<int, 3> counts = {0, 0, 0};  // each >= 2
+  Vec3 cell_mm = Vec3::Constant(kNaN);  // > 0
+  GridIndex counts = {0, 0, 0};         // each >= 2
 
   Vec3 Corner(int i, int j, int k) const {
     return origin + Vec3(i * cell_mm.x(), j * cell_mm.y(), k * cell_mm.z());
   }
+  Vec3 Corner(const GridIndex& at) const { return Corner(at[0], at[1], at[2]); }
   std::int64_t Index(int i, int j, int k) const {
     return i + std::int64_t{counts[0]} * (j + std::int64_t{counts[1]} * k);
   }
-  std::array<int, 3> At(std::int64_t index) const {
+  std::int64_t Index(const GridIndex& at) const { return Index(at[0], at[1], at[2]); }
+  GridIndex At(std::int64_t index) const {
     return {static_cast<int>(index % counts[0]), static_cast<int>(index / counts[0] % counts[1]),
             static_cast<int>(index / (std::int64_t{counts[0]} * counts[1]))};
   }
@@ -85,28 +89,29 @@ struct PolygonizeResult {
 PolygonizeResult PolygonizeAll(const ScalarField& field, const SampleGrid& grid,
                                const EdgeSearchOptions& options, const RunContext& context);
 
-// Where a surface is to be followed from.
-struct SeedCell {
+// A cell from which a component of the surface is followed.
+struct StartCell {
   std::int64_t cell;           // index of its lowest corner
-  EdgeBits edges = kAllEdges;  // those whose crossings, if there are any, the surface has
+  EdgeBits edges = kAllEdges;  // those whose crossings, if there are any, the component has
 };
 
-// Only the cells that the surface crosses, found from the seeds by going on across every face that
-// it crosses (Wyvill et al. 1986; Bloomenthal 1988). Finds the components that touch a seed, whole,
-// and no others: not even such as share a cell with them. Memory grows with the surface, not with
-// the grid.
+// Only the cells that the surface crosses, found from the start cells by going on across every face
+// that it crosses (Wyvill et al. 1986; Bloomenthal 1988). Finds all of each component that touches
+// a start cell, and no other component: not even one that shares a cell with them. Memory grows
+// with the surface, not with the grid.
 PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
-                                std::span<const SeedCell> seeds, const EdgeSearchOptions& options,
+                                std::span<const StartCell> starts, const EdgeSearchOptions& options,
                                 const RunContext& context);
 
-// The component that passes through all the seeds. If the first seed's does not, since cells are
-// too coarse for it, what touches the seeds, and whatever shares a cell with that, and so on.
+// The component that passes through all the start cells. If the first cell's component does not,
+// because cells are too coarse, then all components that touch a start cell, and whatever shares a
+// cell with these, and so on.
 PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& grid,
-                                   std::span<const SeedCell> seeds,
+                                   std::span<const StartCell> starts,
                                    const EdgeSearchOptions& options, const RunContext& context);
 
-// Marching cubes over samples that are there already, one a corner in the grid's order; crossings
-// by linear interpolation.
+// Marching cubes over given samples, one per corner in the grid's order; crossings by linear
+// interpolation. Throws InputError if their number is not that of the corners.
 PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleGrid& grid,
                                    const RunContext& context);
 

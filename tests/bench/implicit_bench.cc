@@ -12,7 +12,7 @@
 #include <chrono>
 #include <numeric>
 
-#include "surfaces/emitters/flat_batch.h"
+#include "surfaces/emitters/flat_kernel.h"
 #include "surfaces/implicit_face.h"
 #include "tests/bench/entry.h"
 #include "tests/bench/real_head.h"
@@ -328,26 +328,26 @@ void Kernel() {
       sum += surface.Flattened(p, emitters);
     }
   });
-  std::array<FlatBatch, 32> batches;
+  std::array<FlatEmitterLanes, 32> lanes;
   for (int b = 0; b < 32; ++b) {
-    for (int l = 0; l < FlatBatch::kLanes; ++l) {
+    for (int l = 0; l < FlatEmitterLanes::kLanes; ++l) {
       const Vec3 at(b, l, 0);
-      batches[b].Set(l, at, at + Vec3(1, 0, 0), at + Vec3(0, 1, 0), Vec3::UnitZ(), 1);
+      lanes[b].Set(l, at, at + Vec3(1, 0, 0), at + Vec3(0, 1, 0), Vec3::UnitZ(), 1);
     }
   }
   std::array<std::int32_t, 64> runs;
   std::iota(runs.begin(), runs.end(), 0);
-  const FlatFall fall(9);
+  const FlatQuadrature quadrature(9);
   constexpr int kRounds = 40000;
   const double bare = CpuSeconds([&] {
     for (int n = 0; n < kRounds; ++n) {
       FlatWalk walk;
-      AddFlat(batches, runs, Vec3(0.001 * n, 4, 40), fall, walk);
+      AddFlat(lanes, runs, Vec3(0.001 * n, 4, 40), quadrature, walk);
       sum += walk.sum[0];
     }
   });
   const double ours = double(emitters) / seconds,
-               peak = kRounds * double(batches.size()) * FlatBatch::kLanes / bare;
+               peak = kRounds * double(lanes.size()) * FlatEmitterLanes::kLanes / bare;
   Report({"implicit.emitters_per_second_vs_peak", ours, peak, sum == 0 ? kNaN : ours / peak, kNaN,
           "1/s"},
          "kernel");

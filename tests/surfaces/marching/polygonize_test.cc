@@ -8,7 +8,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "surfaces/implicit_face.h"
-#include "surfaces/marching/crossings.h"
+#include "surfaces/marching/edge_intersections.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
@@ -112,7 +112,7 @@ TEST(SearchCrossing, IsWithinTheToleranceHoweverSharpTheBend) {
 }
 
 // The outermost cell that the surface crosses on the line through the middle.
-SeedCell SeedOnLine(const ScalarField& field, const SampleGrid& grid) {
+StartCell StartOnLine(const ScalarField& field, const SampleGrid& grid) {
   int i = 0;
   while (!(field(grid.Corner(i + 1, 12, 12)) > 0)) {
     ++i;
@@ -123,7 +123,7 @@ SeedCell SeedOnLine(const ScalarField& field, const SampleGrid& grid) {
 TEST(Polygonize, ContinuationGivesTheMeshOfAllCells) {
   const SampleGrid grid = CubeGrid(12, 25);
   const PolygonizeResult all = PolygonizeAll(Ball, grid, {}, {});
-  const PolygonizeResult from = PolygonizeFrom(Ball, grid, {{SeedOnLine(Ball, grid)}}, {}, {});
+  const PolygonizeResult from = PolygonizeFrom(Ball, grid, {{StartOnLine(Ball, grid)}}, {}, {});
   EXPECT_EQ(from.mesh.points, all.mesh.points);
   EXPECT_EQ(from.mesh.triangles, all.mesh.triangles);
   EXPECT_LT(from.summary.corner_evaluations, all.summary.corner_evaluations / 3);
@@ -141,12 +141,12 @@ TEST(Polygonize, ContinuationFollowsOneOfTwoSheetsInACell) {
   int dropped = 0;
   const TriMesh outer = KeepOutermost(all.mesh, dropped);
   ASSERT_EQ(dropped, 1);
-  SeedCell seed = SeedOnLine(HollowBall, grid);
-  seed.edges = EdgeBits(1 << EdgeFrom(0, 0));
-  const PolygonizeResult from = PolygonizeFrom(HollowBall, grid, {{seed}}, {}, {});
+  StartCell start = StartOnLine(HollowBall, grid);
+  start.edges = EdgeBits(1 << EdgeFrom(0, 0));
+  const PolygonizeResult from = PolygonizeFrom(HollowBall, grid, {{start}}, {}, {});
   EXPECT_EQ(from.mesh.points, outer.points);
   EXPECT_EQ(from.mesh.triangles, outer.triangles);
-  const PolygonizeResult solid = PolygonizeFrom(Ball, grid, {{SeedOnLine(Ball, grid)}}, {}, {});
+  const PolygonizeResult solid = PolygonizeFrom(Ball, grid, {{StartOnLine(Ball, grid)}}, {}, {});
   EXPECT_EQ(from.summary.active_cells, solid.summary.active_cells);
   EXPECT_EQ(from.summary.corner_evaluations, solid.summary.corner_evaluations);
 }
@@ -169,8 +169,8 @@ TEST(Polygonize, ContinuationFromEachComponentGivesThatComponent) {
       if (i + 1 == grid.counts[0] || (samples[corner] > 0) == (samples[corner + 1] > 0)) {
         continue;
       }
-      const SeedCell seed{corner, EdgeBits(1 << EdgeFrom(0, 0))};
-      const TriMesh one = PolygonizeFrom(nearest, grid, {{seed}}, {}, {}).mesh;
+      const StartCell start{corner, EdgeBits(1 << EdgeFrom(0, 0))};
+      const TriMesh one = PolygonizeFrom(nearest, grid, {{start}}, {}, {}).mesh;
       ASSERT_EQ(ConnectedComponents(one).count, 1);
       std::vector<double> points;
       for (const Vec3& p : one.points) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/marching/crossings.h"
+#include "surfaces/marching/edge_intersections.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 namespace semblance {
 namespace {
@@ -14,7 +16,7 @@ struct Bracket {
   double SecantRoot(double weight_a = 1, double weight_b = 1) const {
     return a + (b - a) * (weight_a * fa) / (weight_a * fa - weight_b * fb);
   }
-  // Puts (x, f) in place of the end of its sign; true if that was the upper end.
+  // Puts (x, f) in cursor of the end of its sign; true if that was the upper end.
   bool Narrow(double x, double f) {
     const bool lower = (f > 0) == (fa > 0);
     (lower ? a : b) = x;
@@ -38,7 +40,7 @@ double Bisect(Bracket e, double tolerance, const LineField& field, std::int64_t&
 // lies between its chords, so the crossing is between where those from both ends to the point have
 // the value 0.
 struct Estimate {
-  double at;            // where the parabola through the three, place over value, has value 0
+  double at;            // where the parabola through the three, position over value, has value 0
   double uncertain_by;  // NaN where the values neither rise nor fall throughout
 };
 
@@ -75,34 +77,26 @@ double FalsePosition(Bracket e, double tolerance, const LineField& field,
   return e.SecantRoot();
 }
 
-Vec3 PointOn(const SampleGrid& grid, const CrossedEdge& edge) {
-  const std::array<int, 3> low = grid.At(edge.id / 3);
-  std::array<int, 3> high = low;
-  ++high[edge.id % 3];
-  const Vec3 a = grid.Corner(low[0], low[1], low[2]);
-  return a + edge.at * (grid.Corner(high[0], high[1], high[2]) - a);
-}
-
-// As cells ascend, so do the ids of the same edge of each: one place a cell edge, which only goes
-// forward, finds them all.
-std::vector<Triangle> Connect(const SampleGrid& grid, const Crossings& crossings) {
-  std::array<std::size_t, 12> place{};
+// As cells ascend, so do the ids of the same edge of each: one cursor per cell edge, which only
+// goes forward, finds them all.
+std::vector<Triangle> Connect(const SampleGrid& grid, const EdgeIntersections& intersections) {
+  std::array<std::size_t, 12> cursor{};
   std::vector<Triangle> triangles;
-  for (const CrossedCell& cell : crossings.cells) {
-    const std::array<int, 3> at = grid.At(cell.index);
+  for (const CrossedCell& cell : intersections.cells) {
+    const GridIndex at = grid.At(cell.index);
     for (std::size_t e = 0; e < kCellEdges.size(); ++e) {
       const std::int64_t id = EdgeId(grid, at, kCellEdges[e]);
-      while (place[e] < crossings.edges.size() && crossings.edges[place[e]].id < id) {
-        ++place[e];
+      while (cursor[e] < intersections.edges.size() && intersections.edges[cursor[e]].id < id) {
+        ++cursor[e];
       }
     }
     for (const auto& corners : MarchingCubesCases()[cell.mask]) {
       if ((cell.edges >> corners[0] & 1) == 0) {
         continue;  // of another sheet in the cell
       }
-      triangles.push_back({static_cast<std::int32_t>(place[corners[0]]),
-                           static_cast<std::int32_t>(place[corners[1]]),
-                           static_cast<std::int32_t>(place[corners[2]])});
+      triangles.push_back({static_cast<std::int32_t>(cursor[corners[0]]),
+                           static_cast<std::int32_t>(cursor[corners[1]]),
+                           static_cast<std::int32_t>(cursor[corners[2]])});
     }
   }
   return triangles;
@@ -110,7 +104,7 @@ std::vector<Triangle> Connect(const SampleGrid& grid, const Crossings& crossings
 
 bool TouchesBorder(const SampleGrid& grid, const std::vector<CrossedCell>& cells) {
   return std::any_of(cells.begin(), cells.end(), [&](const CrossedCell& cell) {
-    const std::array<int, 3> at = grid.At(cell.index);
+    const GridIndex at = grid.At(cell.index);
     return at[0] == 0 || at[1] == 0 || at[2] == 0 || at[0] + 2 == grid.counts[0] ||
            at[1] + 2 == grid.counts[1] || at[2] + 2 == grid.counts[2];
   });
@@ -118,7 +112,15 @@ bool TouchesBorder(const SampleGrid& grid, const std::vector<CrossedCell>& cells
 
 }  // namespace
 
-std::int64_t EdgeId(const SampleGrid& grid, const std::array<int, 3>& cell, const CellEdge& edge) {
+EdgeLine LineOf(const SampleGrid& grid, const CrossedEdge& edge) {
+  const GridIndex low = grid.At(edge.id / 3);
+  GridIndex high = low;
+  ++high[edge.id % 3];
+  const Vec3 from = grid.Corner(low);
+  return {from, grid.Corner(high) - from};
+}
+
+std::int64_t EdgeId(const SampleGrid& grid, const GridIndex& cell, const CellEdge& edge) {
   const int c = edge.from;
   return 3 * grid.Index(cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2 & 1)) +
          edge.axis;
@@ -130,19 +132,19 @@ double SearchCrossing(double from, double to, const EdgeSearchOptions& options,
       {0, from, 1, to}, options.tolerance, field, evaluations);
 }
 
-PolygonizeResult MeshOf(const SampleGrid& grid, Crossings crossings) {
-  std::vector<CrossedEdge>& edges = crossings.edges;
+PolygonizeResult MeshOf(const SampleGrid& grid, EdgeIntersections intersections) {
+  std::vector<CrossedEdge>& edges = intersections.edges;
   std::sort(edges.begin(), edges.end(),
             [](const CrossedEdge& a, const CrossedEdge& b) { return a.id < b.id; });
   PolygonizeResult result;
   result.mesh.points.reserve(edges.size());
   for (const CrossedEdge& edge : edges) {
-    result.mesh.points.push_back(PointOn(grid, edge));
+    result.mesh.points.push_back(LineOf(grid, edge).At(edge.at));
   }
-  result.mesh.triangles = Connect(grid, crossings);
-  result.touches_border = TouchesBorder(grid, crossings.cells);
-  result.summary = crossings.summary;
-  result.summary.active_cells = static_cast<std::int64_t>(crossings.cells.size());
+  result.mesh.triangles = Connect(grid, intersections);
+  result.touches_border = TouchesBorder(grid, intersections.cells);
+  result.summary = intersections.summary;
+  result.summary.active_cells = static_cast<std::int64_t>(intersections.cells.size());
   return result;
 }
 

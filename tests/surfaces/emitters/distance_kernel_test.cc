@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/emitters/distance_batch.h"
+#include "surfaces/emitters/distance_kernel.h"
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ Emitting RandomTriangle(Random& random) {
 }
 
 // Thesis 3.1 and 3.2, by the closest point.
-double Emission(const Emitting& t, const Vec3& p, const DistanceFall& fall) {
+double Emission(const Emitting& t, const Vec3& p, const Falloff& falloff) {
   const double height = (p - t.a).dot(t.normal);
   const Vec3 from = p - t.advance_mm * t.normal;
   const TrianglePoint closest = ClosestPointOnTriangle(from, t.a, t.b, t.c);
@@ -35,45 +35,45 @@ double Emission(const Emitting& t, const Vec3& p, const DistanceFall& fall) {
   }
   if (height < t.advance_mm) {
     const bool over = std::abs(distance - (t.advance_mm - height)) < 1e-9;
-    return over ? fall.most : 0;
+    return over ? kMostEmission : 0;
   }
-  const double emission = t.gain * std::pow(std::max(distance, t.floor_mm), -fall.decay);
-  return emission < fall.cut ? 0 : std::min(emission, fall.most);
+  const double emission = t.gain * std::pow(std::max(distance, t.floor_mm), -falloff.power);
+  return emission < falloff.cut ? 0 : std::min(emission, kMostEmission);
 }
 
-class DistanceBatchTest : public ::testing::TestWithParam<DistanceFall> {};
-INSTANTIATE_TEST_SUITE_P(Decays, DistanceBatchTest,
-                         ::testing::Values(DistanceFall{6, 6, 0, 1e12},
-                                           DistanceFall{3, 3, 0.01, 1e12},
-                                           DistanceFall{15, 15, 0, 1e12},
-                                           DistanceFall{4.5, -1, 0.01, 1e12}));
+class DistanceKernelTest : public ::testing::TestWithParam<Falloff> {};
+INSTANTIATE_TEST_SUITE_P(Decays, DistanceKernelTest,
+                         ::testing::Values(Falloff{6, 6, false, 0}, Falloff{3, 3, false, 0.01},
+                                           Falloff{15, 15, false, 0},
+                                           Falloff{4.5, -1, false, 0.01}));
 
-TEST_P(DistanceBatchTest, EachLaneIsTheEmitterAloneAndTheThesis) {
+TEST_P(DistanceKernelTest, EachLaneIsTheThesisAndTheSumIsTheLanes) {
   Random random(21);
   for (int n = 0; n < 500; ++n) {
-    DistanceBatch batch;
+    DistanceEmitterLanes lanes;
     std::vector<Emitting> triangles;
-    const int set = n % (DistanceBatch::kLanes + 1);
+    const int set = n % (DistanceEmitterLanes::kLanes + 1);
     for (int lane = 0; lane < set; ++lane) {
       const Emitting t = triangles.emplace_back(RandomTriangle(random));
-      batch.Set(lane, t.a, t.b, t.c, t.normal, t.advance_mm, t.floor_mm, t.gain);
+      lanes.Set(lane, t.a, t.b, t.c, t.normal, t.advance_mm, t.floor_mm, t.gain);
     }
     const Vec3 p = n % 2 == 0 ? random.InBox(-9, 9) : random.InBox(-40, 40);  // out of reach too
-    DistanceBatch::Lanes emission;
-    EmitByDistance(batch, p, GetParam(), emission);
-    const std::vector<DistanceBatch> one = {batch};
-    const std::vector<BatchReach> reaches = ReachesOf(one, GetParam());
+    DistanceEmitterLanes::Lanes emission;
+    for (int lane = 0; lane < DistanceEmitterLanes::kLanes; ++lane) {
+      emission[lane] = EmitByDistance(lanes, lane, p, GetParam());
+    }
+    const std::vector<DistanceEmitterLanes> one = {lanes};
+    const std::vector<ReachBall> reaches = ReachBallsOf(one, GetParam());
     const double sum = ((emission[0] + emission[1]) + (emission[2] + emission[3])) +
                        ((emission[4] + emission[5]) + (emission[6] + emission[7]));
     std::int64_t reaching = 0;
     const auto sum_of = [&](const std::vector<std::int32_t>& which) {
-      return SumByDistance(one, which, SideBySide(reaches, which), p, GetParam(), reaching);
+      return SumByDistance(one, which, Gather(reaches, which), p, GetParam(), reaching);
     };
     EXPECT_EQ(sum_of({0}), sum);
     EXPECT_GE(reaching, sum > 0 ? 1 : 0);
     EXPECT_EQ(sum_of({0, 0}), 2 * sum);
-    for (int lane = 0; lane < DistanceBatch::kLanes; ++lane) {
-      EXPECT_EQ(emission[lane], EmitByDistance(batch, lane, p, GetParam()));
+    for (int lane = 0; lane < DistanceEmitterLanes::kLanes; ++lane) {
       const double expected = lane < set ? Emission(triangles[lane], p, GetParam()) : 0;
       EXPECT_NEAR(emission[lane], expected, 1e-9 * expected) << n << " " << lane;
     }

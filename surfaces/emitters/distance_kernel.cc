@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/emitters/distance_batch.h"
+#include "surfaces/emitters/distance_kernel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,8 +19,10 @@ struct Seen {
 };
 
 template <class N>
-SEMBLANCE_INLINE Seen<N> See(const DistanceBatch& b, int first, const Vec3& p) {
-  const auto load = [first](const DistanceBatch::Lanes& lanes) { return Load<N>(lanes, first); };
+SEMBLANCE_INLINE Seen<N> See(const DistanceEmitterLanes& b, int first, const Vec3& p) {
+  const auto load = [first](const DistanceEmitterLanes::Lanes& lanes) {
+    return Load<N>(lanes, first);
+  };
   const N dx = p.x() - load(b.corner[0]), dy = p.y() - load(b.corner[1]),
           dz = p.z() - load(b.corner[2]);
   const N x = dx * load(b.along[0]) + dy * load(b.along[1]) + dz * load(b.along[2]);
@@ -40,14 +42,14 @@ SEMBLANCE_INLINE Seen<N> See(const DistanceBatch& b, int first, const Vec3& p) {
 }
 
 template <class N>
-SEMBLANCE_INLINE N Emit(const DistanceBatch& b, int first, const Vec3& p, const DistanceFall& fall,
-                        int whole) {
+SEMBLANCE_INLINE N Emit(const DistanceEmitterLanes& b, int first, const Vec3& p,
+                        const Falloff& falloff, int whole) {
   const Seen<N> seen = See<N>(b, first, p);
-  const N nothing{}, most = All<N>(fall.most);
+  const N nothing{}, most = All<N>(kMostEmission);
   const N beside2 = seen.within >= 0 ? nothing : seen.beside2;
   const N square = Greater<N>(seen.z * seen.z + beside2, Load<N>(b.floor_mm2, first));
-  const N falling = Load<N>(b.gain, first) * InversePowerOf(square, fall.decay, whole);
-  const N beyond = falling < fall.cut ? nothing : Smaller(falling, most);
+  const N falling = Load<N>(b.gain, first) * InversePowerOf(square, falloff.power, whole);
+  const N beyond = falling < falloff.cut ? nothing : Smaller(falling, most);
   const N solid = seen.within >= 0 ? most : nothing;
   const N either = seen.z < 0 ? solid : beyond;
   return seen.z + Load<N>(b.advance_mm, first) > 0 ? either : nothing;
@@ -56,7 +58,7 @@ SEMBLANCE_INLINE N Emit(const DistanceBatch& b, int first, const Vec3& p, const 
 // Appends to `found` those of some batches, at most eight, that reach p; without a branch that
 // could be guessed wrong. Writes one more than it appends.
 SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> which,
-                                              const EightReaches& reaches, const Vec3& p,
+                                              const ReachLanes& reaches, const Vec3& p,
                                               std::int32_t* found) {
   Wider squared{};
   for (int axis = 0; axis < 3; ++axis) {
@@ -64,7 +66,7 @@ SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> whic
     squared += from * from;
   }
   const auto reach = squared <= Load<Wider>(reaches.squared_mm2, 0);  // -1 or 0, a lane
-  std::array<std::int64_t, DistanceBatch::kLanes> minus;
+  std::array<std::int64_t, DistanceEmitterLanes::kLanes> minus;
   static_assert(sizeof(reach) == sizeof(minus));
   std::memcpy(minus.data(), &reach, sizeof(minus));
   for (std::size_t n = 0; n < which.size(); ++n) {
@@ -74,18 +76,18 @@ SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> whic
   return found;
 }
 
-BatchReach ReachOf(const DistanceBatch& batch, const DistanceFall& fall) {
+ReachBall ReachBallOf(const DistanceEmitterLanes& batch, const Falloff& falloff) {
   constexpr double kSlack = 1 + 1e-9;
-  const auto at = [](const std::array<DistanceBatch::Lanes, 3>& lanes, int l) {
+  const auto at = [](const std::array<DistanceEmitterLanes::Lanes, 3>& lanes, int l) {
     return Vec3(lanes[0][l], lanes[1][l], lanes[2][l]);
   };
   Box3 box;
   double furthest_mm = 0;  // from a triangle: where it emits, or is solid
-  for (int l = 0; l < DistanceBatch::kLanes && batch.gain[l] > 0; ++l) {
+  for (int l = 0; l < DistanceEmitterLanes::kLanes && batch.gain[l] > 0; ++l) {
     const Vec3 a = at(batch.corner, l), x = at(batch.along, l), y = at(batch.across, l);
     box.extend(a).extend(a + batch.ab.length[l] * x);
     box.extend(a + batch.ac.length[l] * (batch.ac.x[l] * x + batch.ac.y[l] * y));
-    const double emitting_mm = std::pow(batch.gain[l] / fall.cut, 1 / fall.decay);
+    const double emitting_mm = std::pow(batch.gain[l] / falloff.cut, 1 / falloff.power);
     furthest_mm = std::max({furthest_mm, emitting_mm, batch.advance_mm[l]});
   }
   if (box.isEmpty()) {
@@ -97,8 +99,9 @@ BatchReach ReachOf(const DistanceBatch& batch, const DistanceFall& fall) {
 
 }  // namespace
 
-void DistanceBatch::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c,
-                        const Vec3& unit_normal, double advance, double floor, double lane_gain) {
+void DistanceEmitterLanes::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c,
+                               const Vec3& unit_normal, double advance, double floor,
+                               double lane_gain) {
   const Vec3 x_axis = (b - a).normalized(), y_axis = unit_normal.cross(x_axis);
   const Vec3 moved = a + advance * unit_normal;
   for (int k = 0; k < 3; ++k) {
@@ -121,27 +124,40 @@ void DistanceBatch::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c,
   gain[lane] = lane_gain;
 }
 
-SEMBLANCE_WIDE void EmitByDistance(const DistanceBatch& batch, const Vec3& p,
-                                   const DistanceFall& fall, DistanceBatch::Lanes& emission) {
-  Store(Emit<Wider>(batch, 0, p, fall, fall.whole), emission, 0);
+double DistanceKernel::AtDistance(const EmitterTriangle& t, double distance) const {
+  const double floored2 = std::max(distance * distance, t.Floor2(1 - split_));
+  const double emission = t.gain * falloff_.InversePower(floored2);
+  return emission < falloff_.cut ? 0 : std::min(emission, kMostEmission);
 }
 
-std::vector<BatchReach> ReachesOf(std::span<const DistanceBatch> batches,
-                                  const DistanceFall& fall) {
-  std::vector<BatchReach> reaches;
-  for (const DistanceBatch& batch : batches) {
-    reaches.push_back(ReachOf(batch, fall));
+std::vector<DistanceEmitterLanes> DistanceKernel::LanesOf(
+    std::span<const EmitterTriangle> emitters) const {
+  constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes;
+  std::vector<DistanceEmitterLanes> lanes((emitters.size() + kLanes - 1) / kLanes);
+  for (std::size_t e = 0; e < emitters.size(); ++e) {
+    const EmitterTriangle& t = emitters[e];
+    lanes[e / kLanes].Set(static_cast<int>(e % kLanes), t.a, t.b, t.c, t.normal, Advance(t),
+                          Floor(t), t.gain);
+  }
+  return lanes;
+}
+
+std::vector<ReachBall> ReachBallsOf(std::span<const DistanceEmitterLanes> batches,
+                                    const Falloff& falloff) {
+  std::vector<ReachBall> reaches;
+  for (const DistanceEmitterLanes& batch : batches) {
+    reaches.push_back(ReachBallOf(batch, falloff));
   }
   return reaches;
 }
 
-std::vector<EightReaches> SideBySide(std::span<const BatchReach> reaches,
-                                     std::span<const std::int32_t> which) {
-  constexpr std::size_t kLanes = DistanceBatch::kLanes;
-  std::vector<EightReaches> eights((which.size() + kLanes - 1) / kLanes);
+std::vector<ReachLanes> Gather(std::span<const ReachBall> reaches,
+                               std::span<const std::int32_t> which) {
+  constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes;
+  std::vector<ReachLanes> eights((which.size() + kLanes - 1) / kLanes);
   for (std::size_t n = 0; n < which.size(); ++n) {
-    const BatchReach& reach = reaches[which[n]];
-    EightReaches& eight = eights[n / kLanes];
+    const ReachBall& reach = reaches[which[n]];
+    ReachLanes& eight = eights[n / kLanes];
     for (int axis = 0; axis < 3; ++axis) {
       eight.center[axis][n % kLanes] = reach.center[axis];
     }
@@ -150,12 +166,12 @@ std::vector<EightReaches> SideBySide(std::span<const BatchReach> reaches,
   return eights;
 }
 
-SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceBatch> batches,
+SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceEmitterLanes> batches,
                                     std::span<const std::int32_t> which,
-                                    std::span<const EightReaches> reaches, const Vec3& p,
-                                    const DistanceFall& fall, std::int64_t& reaching) {
+                                    std::span<const ReachLanes> reaches, const Vec3& p,
+                                    const Falloff& falloff, std::int64_t& reaching) {
   constexpr int kUsual = 6;  // the default decay
-  constexpr std::size_t kLanes = DistanceBatch::kLanes, kAtOnce = 32;
+  constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes, kAtOnce = 32;
   std::array<std::int32_t, kLanes * kAtOnce + 1> found;
   Wider sum{};
   for (std::size_t begin = 0; begin < reaches.size(); begin += kAtOnce) {
@@ -165,21 +181,21 @@ SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceBatch> batches,
       end = AppendReaching(rest.first(std::min(kLanes, rest.size())), reaches[n], p, end);
     }
     for (const std::int32_t* n = found.data(); n != end; ++n) {
-      const DistanceBatch& batch = batches[*n];
-      sum += fall.whole == kUsual ? Emit<Wider>(batch, 0, p, fall, kUsual)
-                                  : Emit<Wider>(batch, 0, p, fall, fall.whole);
+      const DistanceEmitterLanes& batch = batches[*n];
+      sum += falloff.whole == kUsual ? Emit<Wider>(batch, 0, p, falloff, kUsual)
+                                     : Emit<Wider>(batch, 0, p, falloff, falloff.whole);
     }
     reaching += end - found.data();
   }
-  DistanceBatch::Lanes lanes;
+  DistanceEmitterLanes::Lanes lanes;
   Store(sum, lanes, 0);
   return ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) +
          ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
 }
 
-double EmitByDistance(const DistanceBatch& batch, int lane, const Vec3& p,
-                      const DistanceFall& fall) {
-  return Emit<double>(batch, lane, p, fall, fall.whole);
+double EmitByDistance(const DistanceEmitterLanes& batch, int lane, const Vec3& p,
+                      const Falloff& falloff) {
+  return Emit<double>(batch, lane, p, falloff, falloff.whole);
 }
 
 }  // namespace semblance

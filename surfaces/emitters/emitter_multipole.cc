@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/emitters/emitter_cluster.h"
+#include "surfaces/emitters/emitter_multipole.h"
 
 #include <algorithm>
 #include <cmath>
@@ -80,11 +80,11 @@ Moments MomentsOf(std::span<const EmitterTriangle> emitters, int decay, const Ve
 }
 
 // Of the second order, by how much the series is more than gain_normal and spread give.
-double SecondOrderLeft(const Moments& moments, const EmitterCluster& cluster, int power) {
+double SecondOrderLeft(const Moments& moments, const EmitterMultipole& multipole, int power) {
   double all2 = 0;
   Vec3 traces, cross = Vec3::Zero();
   for (int i = 0; i < 3; ++i) {
-    const Mat3 left = moments.second[i] - cluster.gain_normal[i] * cluster.spread_mm2;
+    const Mat3 left = moments.second[i] - multipole.gain_normal[i] * multipole.spread_mm2;
     all2 += left.squaredNorm();
     traces[i] = left.trace();
     cross += moments.second[i].row(i).transpose();
@@ -93,84 +93,85 @@ double SecondOrderLeft(const Moments& moments, const EmitterCluster& cluster, in
 }
 
 // Sets what is bounded by each emitter's furthest corner.
-void SetBounds(std::span<const EmitterTriangle> emitters, int decay, EmitterCluster& cluster) {
-  cluster.radius_mm = 0;
+void SetBounds(std::span<const EmitterTriangle> emitters, int decay, EmitterMultipole& multipole) {
+  multipole.radius_mm = 0;
   for (const EmitterTriangle& t : emitters) {
-    const double plane_mm = std::abs(t.normal.dot(t.a - cluster.center));
+    const double plane_mm = std::abs(t.normal.dot(t.a - multipole.center));
     double furthest_mm = 0;
     for (const Vec3& corner : {t.a, t.b, t.c}) {
-      furthest_mm = std::max(furthest_mm, (corner - cluster.center).norm());
+      furthest_mm = std::max(furthest_mm, (corner - multipole.center).norm());
     }
     double square = 0;
     ForEachPoint(t, decay, [&](const Vec3& x, double mass) {
-      square += mass * (x - cluster.center).squaredNorm();
+      square += mass * (x - multipole.center).squaredNorm();
     });
-    cluster.radius_mm = std::max(cluster.radius_mm, furthest_mm);
-    cluster.plane_mm = std::max(cluster.plane_mm, plane_mm);
-    cluster.tilt = std::max(cluster.tilt, (t.normal - cluster.gain_normal.normalized()).norm());
-    cluster.third += furthest_mm * square;
-    cluster.third_by_plane += plane_mm * square;
+    multipole.radius_mm = std::max(multipole.radius_mm, furthest_mm);
+    multipole.plane_mm = std::max(multipole.plane_mm, plane_mm);
+    multipole.tilt =
+        std::max(multipole.tilt, (t.normal - multipole.gain_normal.normalized()).norm());
+    multipole.third += furthest_mm * square;
+    multipole.third_by_plane += plane_mm * square;
   }
 }
 
 }  // namespace
 
-EmitterCluster ClusterOf(std::span<const EmitterTriangle> emitters, int decay) {
-  EmitterCluster cluster;
+EmitterMultipole MultipoleOf(std::span<const EmitterTriangle> emitters, int decay) {
+  EmitterMultipole multipole;
   ForEachPoint(emitters, decay, [&](const EmitterTriangle& t, const Vec3&, double mass) {
-    cluster.gain_normal += mass * t.normal;
-    cluster.gain += mass;
+    multipole.gain_normal += mass * t.normal;
+    multipole.gain += mass;
   });
-  const double facing = cluster.gain_normal.norm();
+  const double facing = multipole.gain_normal.norm();
   if (!(facing > 0)) {
-    return cluster;
+    return multipole;
   }
-  cluster.center = CenterOf(emitters, decay, cluster.gain_normal);
-  const Moments moments = MomentsOf(emitters, decay, cluster.center);
+  multipole.center = CenterOf(emitters, decay, multipole.gain_normal);
+  const Moments moments = MomentsOf(emitters, decay, multipole.center);
   for (int i = 0; i < 3; ++i) {
-    cluster.spread_mm2 += cluster.gain_normal[i] / (facing * facing) * moments.second[i];
+    multipole.spread_mm2 += multipole.gain_normal[i] / (facing * facing) * moments.second[i];
   }
   const int power = decay + 3;
-  cluster.first = power * (0.5 * (moments.first + moments.first.transpose())).norm();
-  cluster.second = SecondOrderLeft(moments, cluster, power);
-  SetBounds(emitters, decay, cluster);
-  return cluster;
+  multipole.first = power * (0.5 * (moments.first + moments.first.transpose())).norm();
+  multipole.second = SecondOrderLeft(moments, multipole, power);
+  SetBounds(emitters, decay, multipole);
+  return multipole;
 }
 
-ClusterBatch::ClusterBatch() {
+MultipoleLanes::MultipoleLanes() {
   for (Lanes& lanes : at) {
     lanes.fill(1e100);
   }
 }
 
-void ClusterBatch::Set(int lane, const EmitterCluster& cluster, int power) {
+void MultipoleLanes::Set(int lane, const EmitterMultipole& multipole, int power) {
   const double half = 0.5 * power * (power + 2);
-  const bool usable = std::isfinite(cluster.radius_mm);
-  const Vec3 facing = cluster.gain_normal.normalized();
+  const bool usable = std::isfinite(multipole.radius_mm);
+  const Vec3 facing = multipole.gain_normal.normalized();
   for (int k = 0; k < 3; ++k) {
-    at[k][lane] = usable ? cluster.center[k] : 0;
-    gain_normal[k][lane] = cluster.gain_normal[k];
+    at[k][lane] = usable ? multipole.center[k] : 0;
+    gain_normal[k][lane] = multipole.gain_normal[k];
     normal[k][lane] = facing[k];
-    bend[k][lane] = half * cluster.spread_mm2(k, k);
-    bend[3 + k][lane] = 2 * half * cluster.spread_mm2(k == 2 ? 1 : 0, k == 0 ? 1 : 2);
+    bend[k][lane] = half * multipole.spread_mm2(k, k);
+    bend[3 + k][lane] = 2 * half * multipole.spread_mm2(k == 2 ? 1 : 0, k == 0 ? 1 : 2);
   }
-  fade[lane] = 0.5 * power * cluster.spread_mm2.trace();
-  radius_mm[lane] = cluster.radius_mm;
-  plane_mm[lane] = cluster.plane_mm;
-  tilt[lane] = cluster.tilt;
-  gain[lane] = cluster.gain;
-  first[lane] = cluster.first;
-  second[lane] = cluster.second;
-  third[lane] = cluster.third;
-  third_by_plane[lane] = cluster.third_by_plane;
+  fade[lane] = 0.5 * power * multipole.spread_mm2.trace();
+  radius_mm[lane] = multipole.radius_mm;
+  plane_mm[lane] = multipole.plane_mm;
+  tilt[lane] = multipole.tilt;
+  gain[lane] = multipole.gain;
+  first[lane] = multipole.first;
+  second[lane] = multipole.second;
+  third[lane] = multipole.third;
+  third_by_plane[lane] = multipole.third_by_plane;
 }
 
 // The coefficients of |p - x|^-power in powers of |x - center| / |p - center| are Gegenbauer
 // polynomials of the cosine, at most (power + j - 1 over j); each bound is at most `next` times the
 // one before. Heights over the planes differ by at most `apart` from that over the center: where p
 // may be in front of some planes alone, they are at most twice that.
-SEMBLANCE_WIDE double ClusterBatch::ErrorInBox(const Vec3& box_center, const Vec3& half,
-                                               int power) const {
+SEMBLANCE_WIDE double MultipoleLanes::ErrorInBox(const Vec3& box_center, const Vec3& half,
+                                                 int power) const {
   const auto load = [](const Lanes& lanes) { return Load<Wide>(lanes, 0); };
   Wide nearest2{}, furthest2{}, over{}, reach{};
   for (int axis = 0; axis < 3; ++axis) {
@@ -202,13 +203,13 @@ SEMBLANCE_WIDE double ClusterBatch::ErrorInBox(const Vec3& box_center, const Vec
   return (1 + kRounding) * ((errors[0] + errors[1]) + (errors[2] + errors[3]));
 }
 
-SEMBLANCE_WIDE double SumClusters(std::span<const ClusterBatch> batches,
-                                  std::span<const std::int32_t> which, const Vec3& p, int power) {
+SEMBLANCE_WIDE double SumMultipoles(std::span<const MultipoleLanes> lanes,
+                                    std::span<const std::int32_t> which, const Vec3& p, int power) {
   constexpr int kUsual = 9;  // of the default decay
   Wide sum{};
   for (const std::int32_t n : which) {
-    const ClusterBatch& b = batches[n];
-    const auto load = [](const ClusterBatch::Lanes& lanes) { return Load<Wide>(lanes, 0); };
+    const MultipoleLanes& b = lanes[n];
+    const auto load = [](const MultipoleLanes::Lanes& of) { return Load<Wide>(of, 0); };
     const Wide x = p.x() - load(b.at[0]), y = p.y() - load(b.at[1]), z = p.z() - load(b.at[2]);
     const Wide r2 = x * x + y * y + z * z, inverse2 = 1 / r2;
     const Wide facing =
@@ -220,9 +221,9 @@ SEMBLANCE_WIDE double SumClusters(std::span<const ClusterBatch> batches,
         power == kUsual ? InversePowerOf(r2, kUsual, kUsual) : InversePowerOf(r2, power, power);
     sum += Greater(facing, Wide{}) * fall * (1 + order2);
   }
-  ClusterBatch::Lanes lanes;
-  Store(sum, lanes, 0);
-  return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+  MultipoleLanes::Lanes sums;
+  Store(sum, sums, 0);
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
 }  // namespace semblance

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/emitters/make_emitters.h"
+#include "surfaces/emitters/emitter_triangle.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
-
-double DecayOf(const Kernel& kernel) {
-  return std::visit([](const auto& k) { return k.Decay(); }, kernel);
-}
 
 // A triangle with the depths of its corners.
 struct DeepTriangle {
@@ -33,7 +32,7 @@ Vec3 RelativeSlope(const DeepTriangle& t, const Vec3& normal, double area_mm2) {
   return sum / (2 * area_mm2 * t.MeanDepth());
 }
 
-EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel) {
+EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth) {
   EmitterTriangle e;
   e.a = t.corner[0];
   e.b = t.corner[1];
@@ -48,25 +47,22 @@ EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth, const Ke
   e.edge_normal_a = (e.b - e.a).cross(e.normal);
   e.edge_normal_b = (e.c - e.b).cross(e.normal);
   e.edge_normal_c = (e.a - e.c).cross(e.normal);
-  e.moved = std::visit([&e](const auto& k) { return k.Advance(e); }, kernel) * e.normal;
-  e.gain = e.most_gain = std::visit([&e](const auto& k) { return k.Gain(e); }, kernel);
   if (depth == EmitterDepth::kLinear) {
     const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
     e.least_share = *least / e.depth_mm;
     e.most_share = *most / e.depth_mm;
     e.slope = RelativeSlope(t, e.normal, e.area_mm2);
-    e.most_gain *= std::pow(e.most_share, DecayOf(kernel));
   }
   return e;
 }
 
 // Appends the triangle, or, where the depth is linear and changes much, its quarters.
-void AppendEmitters(const DeepTriangle& t, EmitterDepth depth, const Kernel& kernel,
+void AppendEmitters(const DeepTriangle& t, EmitterDepth depth,
                     std::vector<EmitterTriangle>& emitters) {
   constexpr double kMostChange = 0.15;  // of the mean
   const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
   if (depth == EmitterDepth::kMean || *most - *least <= kMostChange * t.MeanDepth()) {
-    emitters.push_back(MakeTriangle(t, depth, kernel));
+    emitters.push_back(MakeTriangle(t, depth));
     return;
   }
   DeepTriangle middle;
@@ -74,24 +70,27 @@ void AppendEmitters(const DeepTriangle& t, EmitterDepth depth, const Kernel& ker
     middle.corner[c] = 0.5 * (t.corner[(c + 1) % 3] + t.corner[(c + 2) % 3]);
     middle.depth_mm[c] = 0.5 * (t.depth_mm[(c + 1) % 3] + t.depth_mm[(c + 2) % 3]);
   }
-  AppendEmitters(middle, depth, kernel, emitters);
+  AppendEmitters(middle, depth, emitters);
   for (int c = 0; c < 3; ++c) {
     DeepTriangle quarter = middle;
     quarter.corner[c] = t.corner[c];
     quarter.depth_mm[c] = t.depth_mm[c];
     std::swap(quarter.corner[(c + 1) % 3], quarter.corner[(c + 2) % 3]);
     std::swap(quarter.depth_mm[(c + 1) % 3], quarter.depth_mm[(c + 2) % 3]);
-    AppendEmitters(quarter, depth, kernel, emitters);
+    AppendEmitters(quarter, depth, emitters);
   }
 }
 
-}  // namespace
+double SquaredDistanceToSegment(const Vec3& p, const Vec3& u, const Vec3& v) {
+  const Vec3 uv = v - u;
+  const double s = std::clamp((p - u).dot(uv) / uv.squaredNorm(), 0.0, 1.0);
+  return (p - u - s * uv).squaredNorm();
+}
 
-std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
-                                          EmitterDepth over_triangle, const Kernel& kernel) {
+void CheckDepths(const TriMesh& skull, std::span<const double> depth_mm) {
   if (depth_mm.size() != skull.points.size()) {
     throw InputError(
-        fmt::format("implicit surface: {} depths for {} vertices; one a vertex is needed",
+        fmt::format("implicit surface: {} depths for {} vertices; one depth per vertex is needed",
                     depth_mm.size(), skull.points.size()));
   }
   for (std::size_t v = 0; v < depth_mm.size(); ++v) {
@@ -102,6 +101,27 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
                       v, depth_mm[v]));
     }
   }
+}
+
+}  // namespace
+
+bool ProjectsOnto(const EmitterTriangle& t, const Vec3& p) {
+  return (p - t.a).dot(t.edge_normal_a) <= 0 && (p - t.b).dot(t.edge_normal_b) <= 0 &&
+         (p - t.c).dot(t.edge_normal_c) <= 0;
+}
+
+double SquaredDistance(const EmitterTriangle& t, const Vec3& p) {
+  if (ProjectsOnto(t, p)) {
+    const double h = (p - t.a).dot(t.normal);
+    return h * h;
+  }
+  return std::min({SquaredDistanceToSegment(p, t.a, t.b), SquaredDistanceToSegment(p, t.b, t.c),
+                   SquaredDistanceToSegment(p, t.c, t.a)});
+}
+
+std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
+                                          EmitterDepth over_triangle) {
+  CheckDepths(skull, depth_mm);
   std::vector<EmitterTriangle> emitters;
   for (const Triangle& t : skull.triangles) {
     DeepTriangle deep;
@@ -110,7 +130,7 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
       deep.depth_mm[c] = depth_mm[t[c]];
     }
     if (std::isfinite(deep.MeanDepth()) && deep.AreaVector().norm() > 0) {
-      AppendEmitters(deep, over_triangle, kernel, emitters);
+      AppendEmitters(deep, over_triangle, emitters);
     }
   }
   if (emitters.empty()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/implicit/open_ends.h"
+#include "surfaces/implicit/trim_to_border.h"
 
 #include <algorithm>
 #include <array>
@@ -181,8 +181,8 @@ void SplitFans(TriMesh& mesh) {
 
 }  // namespace
 
-TriMesh OverDepths(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
-                   const RunContext& context) {
+TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
+                    const RunContext& context) {
   const TriMesh with_depths = WithDepths(shell, depth_mm);
   TriMesh over =
       Submesh(face, TrianglesOver(face, PlacesOf(face, BorderedMesh(with_depths), context)));

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a march over a grid finds, and the mesh that marching cubes makes of it.
+// Where a surface intersects the edges of a grid, and the mesh that marching cubes makes of it.
 #pragma once
 
 #include <bit>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "surfaces/marching/marching_cubes.h"
@@ -24,21 +25,29 @@ struct CrossedEdge {
   double at = kNaN;  // the crossing as a share of the edge; NaN: still to be searched
 };
 
-struct Crossings {
+struct EdgeIntersections {
   std::vector<CrossedCell> cells;  // ascending
   std::vector<CrossedEdge> edges;  // in any order, each once
   PolygonizeSummary summary;
 };
 
 // The edge of a cell, as CrossedEdge::id.
-std::int64_t EdgeId(const SampleGrid& grid, const std::array<int, 3>& cell, const CellEdge& edge);
+std::int64_t EdgeId(const SampleGrid& grid, const GridIndex& cell, const CellEdge& edge);
+
+// A grid edge as from + t along, 0 <= t <= 1.
+struct EdgeLine {
+  Vec3 from, along;
+
+  Vec3 At(double t) const { return from + t * along; }
+};
+EdgeLine LineOf(const SampleGrid& grid, const CrossedEdge& edge);
 
 // Calls visit(edge) for the crossed edges of a cell that are the mesh's and that no other cell of
 // the grid would name: those from its lowest corner and, where the grid ends, those that have no
 // cell of their own.
 template <class Visit>
 void ForEachOwnEdge(const SampleGrid& grid, const CrossedCell& crossed, const Visit& visit) {
-  const std::array<int, 3> cell = grid.At(crossed.index);
+  const GridIndex cell = grid.At(crossed.index);
   for (EdgeBits rest = crossed.edges; rest != 0; rest &= EdgeBits(rest - 1)) {
     const CellEdge& edge = kCellEdges[std::countr_zero(rest)];
     if ((crossed.mask >> edge.from & 1) == (crossed.mask >> edge.to & 1)) {
@@ -60,6 +69,6 @@ double SearchCrossing(double from, double to, const EdgeSearchOptions& options,
                       const std::function<double(double)>& field, std::int64_t& evaluations);
 
 // The mesh: points in the order of the edges' ids, triangles in that of the cells.
-PolygonizeResult MeshOf(const SampleGrid& grid, Crossings crossings);
+PolygonizeResult MeshOf(const SampleGrid& grid, EdgeIntersections intersections);
 
 }  // namespace semblance

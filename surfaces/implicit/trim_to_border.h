@@ -14,7 +14,7 @@ namespace semblance {
 // joined to that. Of the pieces that leaves, the one with the most area; a manifold if the face is,
 // with the same orientation. All of the face where the shell is closed and has a depth everywhere.
 // Throws InputError if nothing is left.
-TriMesh OverDepths(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
-                   const RunContext& context);
+TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
+                    const RunContext& context);
 
 }  // namespace semblance

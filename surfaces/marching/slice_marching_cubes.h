@@ -5,17 +5,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
 #include <utility>
+#include <vector>
 
-#include "surfaces/marching/crossings.h"
+#include "surfaces/marching/edge_intersections.h"
 
 namespace semblance {
 
 // Values start as unknown (NaN). Only corners that were asked for are cleared between layers, so
 // that cells which are not visited cost nothing (thesis 3.3).
-class SlabMarch {
+class SliceMarchingCubes {
  public:
-  explicit SlabMarch(const SampleGrid& grid)
+  explicit SliceMarchingCubes(const SampleGrid& grid)
       : grid_(grid),
         lower_(std::size_t(grid.counts[0]) * grid.counts[1], kNaN),
         upper_(lower_.size(), kNaN) {}
@@ -29,7 +33,7 @@ class SlabMarch {
       upper_[column] = kNaN;
     }
     asked_upper_.clear();
-    ++slab_;
+    ++slice_;
   }
 
   // To be filled whole, each time; counts[0] * counts[1] values, i fastest.
@@ -40,28 +44,30 @@ class SlabMarch {
     Record(i, j, [](CrossedEdge&) {});
   }
 
-  // The same; value(p) gives the corners that are not known, search(edge) the crossings.
+  // The same; value(corner) gives the corners that are not known, search(edge) the crossings.
   template <class Value, class Search>
   void Cell(int i, int j, const Value& value, const Search& search) {
     for (int c = 0; c < 8; ++c) {
-      const int ci = i + (c & 1), cj = j + (c >> 1 & 1), upper = c >> 2 & 1;
-      double& at = (upper ? upper_ : lower_)[Column(ci, cj)];
+      const bool upper = (c >> 2 & 1) != 0;
+      const GridIndex corner = {i + (c & 1), j + (c >> 1 & 1), slice_ + (upper ? 1 : 0)};
+      const std::size_t column = Column(corner[0], corner[1]);
+      double& at = (upper ? upper_ : lower_)[column];
       if (std::isnan(at)) {
-        at = value(grid_.Corner(ci, cj, slab_ + upper));
-        (upper ? asked_upper_ : asked_lower_).push_back(Column(ci, cj));
-        ++crossings_.summary.corner_evaluations;
+        at = value(corner);
+        (upper ? asked_upper_ : asked_lower_).push_back(column);
+        ++intersections_.summary.corner_evaluations;
       }
     }
     Record(i, j, search);
   }
 
-  PolygonizeSummary& Summary() { return crossings_.summary; }
+  PolygonizeSummary& Summary() { return intersections_.summary; }
 
   // Cells in ascending order, whatever the order within a layer was.
-  Crossings Take() {
-    std::sort(crossings_.cells.begin(), crossings_.cells.end(),
+  EdgeIntersections Take() {
+    std::sort(intersections_.cells.begin(), intersections_.cells.end(),
               [](const CrossedCell& a, const CrossedCell& b) { return a.index < b.index; });
-    return std::move(crossings_);
+    return std::move(intersections_);
   }
 
  private:
@@ -79,20 +85,20 @@ class SlabMarch {
     if (mask == 0 || mask == 255) {
       return;
     }
-    const std::array<int, 3> cell = {i, j, slab_};
-    crossings_.cells.push_back({grid_.Index(i, j, slab_), static_cast<std::uint8_t>(mask)});
-    ForEachOwnEdge(grid_, crossings_.cells.back(), [&](const CellEdge& edge) {
+    const GridIndex cell = {i, j, slice_};
+    intersections_.cells.push_back({grid_.Index(cell), static_cast<std::uint8_t>(mask)});
+    ForEachOwnEdge(grid_, intersections_.cells.back(), [&](const CellEdge& edge) {
       CrossedEdge crossed{EdgeId(grid_, cell, edge), At(i, j, edge.from), At(i, j, edge.to)};
       search(crossed);
-      crossings_.edges.push_back(crossed);
+      intersections_.edges.push_back(crossed);
     });
   }
 
   const SampleGrid& grid_;
   std::vector<double> lower_, upper_;
   std::vector<std::size_t> asked_lower_, asked_upper_;  // columns
-  int slab_ = -1;
-  Crossings crossings_;
+  int slice_ = -1;
+  EdgeIntersections intersections_;
 };
 
 }  // namespace semblance

@@ -11,26 +11,26 @@
 #include <mutex>
 #include <vector>
 
-#include "surfaces/emitters/distance_batch.h"
+#include "surfaces/emitters/distance_kernel.h"
 #include "surfaces/emitters/emitter_triangle.h"
 
 namespace semblance {
 
-struct NearEmitters {
-  std::vector<std::int32_t> runs;  // each by the number of its first over its length, in the tree's
-                                   // order
-  std::vector<std::int32_t> clusters;  // batches of them, by number
-  std::vector<EightReaches> reaches;   // of the runs, where the kernel has a cut
+struct NeighbourList {
+  // Runs of 4 or 8 emitters, in the tree's order: each the number of its first over its length.
+  std::vector<std::int32_t> runs;
+  std::vector<std::int32_t> multipoles;  // four at once, by number
+  std::vector<ReachLanes> reaches;       // of the runs, where emitters are summed by distance
 };
 
-// Lists of cubes of a lattice. They are kept in a table of fixed size, where a new one may put out
-// an old one: what is found for a point depends on the point alone.
-class NearEmittersTable {
+// Neighbour lists of cubes of a lattice. They are kept in a table of fixed size, where a new one
+// may put out an old one: what is found for a point depends on the point alone.
+class NeighbourListCache {
  public:
-  using List = std::shared_ptr<const NearEmitters>;
+  using List = std::shared_ptr<const NeighbourList>;
 
   // cube_mm > 0.
-  explicit NearEmittersTable(double cube_mm) : cube_mm_(cube_mm), sets_(kSets) {}
+  explicit NeighbourListCache(double cube_mm) : cube_mm_(cube_mm), sets_(kSets) {}
 
   // make(box) gives the list of a cube. Safe from several threads at once.
   template <class Make>
@@ -45,7 +45,7 @@ class NearEmittersTable {
         }
       }
     }
-    List list = std::make_shared<const NearEmitters>(make(BoxOf(cube)));
+    List list = std::make_shared<const NeighbourList>(make(BoxOf(cube)));
     const std::lock_guard lock(set.mutex);
     set.slots[set.next] = {cube, list};
     set.next = (set.next + 1) % set.slots.size();
@@ -59,7 +59,7 @@ class NearEmittersTable {
     Vec3 cube = Vec3::Zero();
     List list;
   };
-  // Cubes that share a place in the table: with four of them, cubes of one surface, some tens of
+  // Cubes that share a line of the table: with four of them, cubes of one surface, some tens of
   // thousands at most, seldom put each other out.
   struct Set {
     std::mutex mutex;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What several flat emitters give together from afar: as one, by their moments up to the second,
-// with a bound on the error.
+// The second-order multipole expansion of what several flat emitters give together from afar, with
+// a bound on its error.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ namespace semblance {
 // center is kept to the second order as far as
 //   (N.u) |u|^-power (1 + power / 2 |u|^-2 ((power + 2) u'Cu |u|^-2 - tr C))
 // gives it, u = p - center, N = sum of gain n, C the spread; 0 where N.u <= 0.
-struct EmitterCluster {
+struct EmitterMultipole {
   Vec3 gain_normal = Vec3::Zero();
   Vec3 center = Vec3::Constant(kNaN);  // where the first order's trace is 0
   Mat3 spread_mm2 = Mat3::Zero();      // second moment about the center, weighted by gain n.N
@@ -32,15 +32,15 @@ struct EmitterCluster {
 
 // decay: of the flat emitter; power = decay + 3, whole. Where depths are linear, moments are taken
 // by quadrature.
-EmitterCluster ClusterOf(std::span<const EmitterTriangle> emitters, int decay);
+EmitterMultipole MultipoleOf(std::span<const EmitterTriangle> emitters, int decay);
 
-// Four clusters side by side, one a lane. A lane that was not set emits nothing.
-struct alignas(64) ClusterBatch {
+// Four multipoles side by side, one per lane. A lane that was not set emits nothing.
+struct alignas(64) MultipoleLanes {
   static constexpr int kLanes = 4;
   using Lanes = std::array<double, kLanes>;
 
-  ClusterBatch();
-  void Set(int lane, const EmitterCluster& cluster, int power);
+  MultipoleLanes();
+  void Set(int lane, const EmitterMultipole& multipole, int power);
 
   // Not less than how much all four together err anywhere within `half`, each way, of the center;
   // infinity where a series is of no use.
@@ -49,13 +49,13 @@ struct alignas(64) ClusterBatch {
   std::array<Lanes, 3> at, gain_normal{};
   std::array<Lanes, 6> bend{};  // power (power + 2) / 2 times xx, yy, zz, 2 xy, 2 xz, 2 yz
   Lanes fade{};                 // power / 2 times the trace
-  // What bounds the error, as in EmitterCluster.
+  // What bounds the error, as in EmitterMultipole.
   std::array<Lanes, 3> normal{};
   Lanes radius_mm{}, plane_mm{}, tilt{}, gain{}, first{}, second{}, third{}, third_by_plane{};
 };
 
-// The sum at p of some of the batches, by their numbers. The same bits whatever the processor.
-double SumClusters(std::span<const ClusterBatch> batches, std::span<const std::int32_t> which,
-                   const Vec3& p, int power);
+// The sum at p of some of the lanes, by their numbers. The same bits whatever the processor.
+double SumMultipoles(std::span<const MultipoleLanes> lanes, std::span<const std::int32_t> which,
+                     const Vec3& p, int power);
 
 }  // namespace semblance

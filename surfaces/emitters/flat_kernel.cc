@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/emitters/flat_kernel.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "surfaces/emitters/polygon_integral.h"
+#include "surfaces/emitters/simd.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kTiny = 1e-300;       // mm^2
+constexpr double kLostDigits = 1e-13;  // of 1e-16, what cancellation leaves is 0.1 %
+// Squared longest edge over squared distance up to which one triangle alone is taken by its
+// centroid, and a part of one by its edge midpoints.
+constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06;
+
+// A point of a triangle, its centroid + ab u + ac v, and its share of the mean.
+struct Sample {
+  double u, v, weight;
+};
+
+// Weights of the corners of three samples that are alike; the third is what is left of 1.
+constexpr void Append(double corner, double weight, Sample*& to) {
+  const double third = 1.0 / 3, other = 1 - 2 * corner;
+  *to++ = {corner - third, corner - third, weight};
+  *to++ = {other - third, corner - third, weight};
+  *to++ = {corner - third, other - third, weight};
+}
+
+// Dunavant 1985: exact to degree 4 and to degree 6.
+constexpr auto kSix = [] {
+  std::array<Sample, 6> samples{};
+  Sample* to = samples.data();
+  Append(0.445948490915965, 0.223381589678011, to);
+  Append(0.091576213509771, 0.109951743655322, to);
+  return samples;
+}();
+constexpr auto kTwelve = [] {
+  std::array<Sample, 12> samples{};
+  Sample* to = samples.data();
+  Append(0.249286745170910, 0.116786275726379, to);
+  Append(0.063089014491502, 0.050844906370207, to);
+  constexpr double third = 1.0 / 3;
+  constexpr std::array<double, 3> corners = {0.310352451033785, 0.053145049844816,
+                                             0.636502499121399};
+  for (int n = 0; n < 3; ++n) {
+    for (int m = 0; m < 3; ++m) {
+      if (n != m) {
+        *to++ = {corners[n] - third, corners[m] - third, 0.082851075618374};
+      }
+    }
+  }
+  return samples;
+}();
+
+// Squared longest edge over squared distance up to which the centroid and the second derivative
+// there, six and twelve samples keep within 1 %, for powers up to 9.
+constexpr std::array<double, 3> kMostShare = {0.04, 0.35, 0.9};
+
+// Some lanes, from `first` on.
+struct Four {
+  const FlatEmitterLanes& batch;
+  int first;
+  Wide dx, dy, dz, r2, inverse2;  // of the point from the centroid
+  Wide height, share;             // the squared longest edge over the squared distance
+
+  SEMBLANCE_INLINE Wide Of(const FlatEmitterLanes::Lanes& lanes) const {
+    return Load<Wide>(lanes, first);
+  }
+};
+
+SEMBLANCE_INLINE Four See(const FlatEmitterLanes& b, int first, const Vec3& p) {
+  Four seen{b, first, {}, {}, {}, {}, {}, {}, {}};
+  seen.dx = p.x() - seen.Of(b.at[0]);
+  seen.dy = p.y() - seen.Of(b.at[1]);
+  seen.dz = p.z() - seen.Of(b.at[2]);
+  seen.r2 =
+      Greater<Wide>(seen.dx * seen.dx + seen.dy * seen.dy + seen.dz * seen.dz, All<Wide>(kTiny));
+  seen.height = seen.dx * seen.Of(b.normal[0]) + seen.dy * seen.Of(b.normal[1]) +
+                seen.dz * seen.Of(b.normal[2]);
+  seen.inverse2 = 1 / seen.r2;
+  seen.share = seen.Of(b.longest_mm2) * seen.inverse2;
+  return seen;
+}
+
+// By the centroid, corrected by half the trace of the integrand's Hessian times the triangle's
+// covariance. The depth over its mean changes with the integrand (tilt) and on its own (bow).
+SEMBLANCE_INLINE Wide MeanFromAfar(const Four& seen, int power) {
+  const FlatEmitterLanes& b = seen.batch;
+  const Wide along_ab =
+      seen.dx * seen.Of(b.ab[0]) + seen.dy * seen.Of(b.ab[1]) + seen.dz * seen.Of(b.ab[2]);
+  const Wide along_ac =
+      seen.dx * seen.Of(b.ac[0]) + seen.dy * seen.Of(b.ac[1]) + seen.dz * seen.Of(b.ac[2]);
+  const Wide along_bc = along_ac - along_ab, inverse2 = seen.inverse2;
+  const Wide along2 =
+      (along_ab * along_ab + along_ac * along_ac + along_bc * along_bc) * (1.0 / 36);
+  Wide bend =
+      1 + (0.5 * power) * inverse2 * ((power + 2.0) * along2 * inverse2 - seen.Of(b.spread_mm2));
+  if (b.sloped) {
+    const Wide tilt = power * inverse2 *
+                      (seen.dx * seen.Of(b.tilt_mm[0]) + seen.dy * seen.Of(b.tilt_mm[1]) +
+                       seen.dz * seen.Of(b.tilt_mm[2]));
+    bend += (power - 3.0) * (tilt + 0.5 * (power - 4) * seen.Of(b.bow));
+  }
+  return bend * InversePowerOf(seen.r2, power, power);
+}
+
+SEMBLANCE_INLINE Wide MeanOfSamples(const Four& seen, std::span<const Sample> samples, int power) {
+  const FlatEmitterLanes& b = seen.batch;
+  Wide sum{};
+  for (const Sample& s : samples) {
+    const Wide dx = seen.dx - s.u * seen.Of(b.ab[0]) - s.v * seen.Of(b.ac[0]);
+    const Wide dy = seen.dy - s.u * seen.Of(b.ab[1]) - s.v * seen.Of(b.ac[1]);
+    const Wide dz = seen.dz - s.u * seen.Of(b.ab[2]) - s.v * seen.Of(b.ac[2]);
+    const Wide r2 = Greater<Wide>(dx * dx + dy * dy + dz * dz, All<Wide>(kTiny));
+    Wide value = s.weight * InversePowerOf(r2, power, power);
+    if (b.sloped) {
+      Wide depth = 1 + s.u * seen.Of(b.rise_ab) + s.v * seen.Of(b.rise_ac);
+      for (int rest = power - 3; rest > 0; rest >>= 1) {
+        value = (rest & 1) != 0 ? value * depth : value;
+        depth *= depth;
+      }
+    }
+    sum += value;
+  }
+  return sum;
+}
+
+// Adds what four lanes emit; returns those that are too near, as bits. fixed: the power, or 0 where
+// only the quadrature knows it.
+template <int fixed>
+SEMBLANCE_INLINE unsigned AddFour(const FlatEmitterLanes& batch, int first, const Vec3& p,
+                                  const FlatQuadrature& quadrature, Wide& sum) {
+  const int power = fixed > 0 ? fixed : quadrature.power;
+  const Four seen = See(batch, first, p);
+  const Wide share = seen.height > 0 ? seen.share : Wide{};
+  std::array<double, kLaneCount<Wide>>
+      shares;  // g++ 12 miscompiles share[l] where bounds are checked
+  Store(share, shares, 0);
+  unsigned near = 0, ways = 0;  // ways: of taking the mean that some lane needs, as bits
+  for (int l = 0; l < kLaneCount<Wide>; ++l) {
+    const unsigned way = static_cast<unsigned>(shares[l] > quadrature.most_share[0]) +
+                         static_cast<unsigned>(shares[l] > quadrature.most_share[1]) +
+                         static_cast<unsigned>(shares[l] > quadrature.most_share[2]);
+    near |= static_cast<unsigned>(way == 3) << l;
+    ways |= static_cast<unsigned>(shares[l] > 0) << way;
+  }
+  Wide mean{};
+  if ((ways & 1) != 0) {
+    mean = share <= All<Wide>(quadrature.most_share[0]) ? MeanFromAfar(seen, power) : mean;
+  }
+  if ((ways & 2) != 0) {
+    const Wide six = MeanOfSamples(seen, kSix, power);
+    mean = share > All<Wide>(quadrature.most_share[0]) ? six : mean;
+  }
+  if ((ways & 4) != 0) {
+    const Wide twelve = MeanOfSamples(seen, kTwelve, power);
+    mean = share > All<Wide>(quadrature.most_share[1]) ? twelve : mean;
+  }
+  const Wide emission = seen.Of(batch.gain) * seen.height * mean;
+  const Wide taken = share > All<Wide>(quadrature.most_share[2]) ? Wide{} : emission;
+  sum += share > 0 ? taken : Wide{};
+  return near;
+}
+
+EdgeFromFoot SeenFrom(const Vec3& p, const Vec3& u, const Vec3& v, const Vec3& out) {
+  const Vec3 from = u - p, along = v - u;
+  const double inverse = 1 / along.norm(), begin = from.dot(along) * inverse;
+  return {from.dot(out) * inverse, begin, begin + 1 / inverse};
+}
+
+}  // namespace
+
+void FlatEmitterLanes::Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c,
+                           const Vec3& unit_normal, double lane_gain) {
+  const Vec3 centroid = (a + b + c) / 3, to_b = b - a, to_c = c - a;
+  for (int k = 0; k < 3; ++k) {
+    at[k][lane] = centroid[k];
+    normal[k][lane] = unit_normal[k];
+    ab[k][lane] = to_b[k];
+    ac[k][lane] = to_c[k];
+  }
+  const double bc2 = (c - b).squaredNorm();
+  gain[lane] = lane_gain;
+  spread_mm2[lane] = (to_b.squaredNorm() + to_c.squaredNorm() + bc2) / 36;
+  longest_mm2[lane] = std::max({to_b.squaredNorm(), to_c.squaredNorm(), bc2});
+}
+
+void FlatEmitterLanes::SetSlope(int lane, const Vec3& slope) {
+  const Vec3 to_b(ab[0][lane], ab[1][lane], ab[2][lane]),
+      to_c(ac[0][lane], ac[1][lane], ac[2][lane]);
+  sloped = true;
+  rise_ab[lane] = to_b.dot(slope);
+  rise_ac[lane] = to_c.dot(slope);
+  const Vec3 tilt = (to_b * rise_ab[lane] + to_c * rise_ac[lane] +
+                     (to_c - to_b) * (rise_ac[lane] - rise_ab[lane])) /
+                    36;
+  for (int k = 0; k < 3; ++k) {
+    tilt_mm[k][lane] = tilt[k];
+  }
+  bow[lane] = tilt.dot(slope);
+}
+
+FlatQuadrature::FlatQuadrature(int of_power) : power(of_power) {
+  const double of_share = std::min(1.0, std::pow(9.0 / power, 1.6));  // by experiment
+  for (std::size_t n = 0; n < most_share.size(); ++n) {
+    most_share[n] = of_share * kMostShare[n];
+  }
+}
+
+SEMBLANCE_WIDE void AddFlat(std::span<const FlatEmitterLanes> batches,
+                            std::span<const std::int32_t> runs, const Vec3& p,
+                            const FlatQuadrature& quadrature, FlatWalk& walk) {
+  constexpr int kUsual = 9;  // of the default decay
+  Wide sum = Load<Wide>(walk.sum, 0);
+  walk.near = 0;
+  while (walk.next < runs.size() && walk.near == 0) {
+    const std::int32_t run = runs[walk.next++];
+    const FlatEmitterLanes& batch = batches[run / 2];
+    const int first = run % 2 * kLaneCount<Wide>;
+    walk.near = quadrature.power == kUsual ? AddFour<kUsual>(batch, first, p, quadrature, sum)
+                                           : AddFour<0>(batch, first, p, quadrature, sum);
+  }
+  Store(sum, walk.sum, 0);
+}
+
+FlatKernel::FlatKernel(const FlatEmitter& o)
+    : decay_(o.decay),
+      closed_(o.decay == std::floor(o.decay) ? static_cast<int>(o.decay) + 1 : -1),
+      flat_share_(closed_ > 0 ? std::pow(kLostDigits, 2.0 / closed_) : 0),
+      falloff_(MakeFalloff(o.decay + 3, true, 0)),
+      quadrature_(std::max(closed_, 1) + 2) {}
+
+double FlatKernel::Gain(const EmitterTriangle& t) const {
+  return (decay_ + 1) / (2 * std::numbers::pi) * std::pow(t.depth_mm, decay_) * t.area_mm2;
+}
+
+std::vector<FlatEmitterLanes> FlatKernel::LanesOf(std::span<const EmitterTriangle> emitters) const {
+  constexpr std::size_t kLanes = FlatEmitterLanes::kLanes;
+  std::vector<FlatEmitterLanes> lanes((emitters.size() + kLanes - 1) / kLanes);
+  for (std::size_t e = 0; e < emitters.size(); ++e) {
+    const EmitterTriangle& t = emitters[e];
+    const int lane = static_cast<int>(e % kLanes);
+    lanes[e / kLanes].Set(lane, t.a, t.b, t.c, t.normal, t.gain);
+    if (t.IsSloped()) {
+      lanes[e / kLanes].SetSlope(lane, t.slope);
+    }
+  }
+  return lanes;
+}
+
+double FlatKernel::Sum(std::span<const FlatEmitterLanes> lanes, std::span<const std::int32_t> runs,
+                       std::span<const EmitterTriangle> emitters, const Vec3& p) const {
+  FlatWalk walk;
+  while (walk.next < runs.size()) {
+    AddFlat(lanes, runs, p, quadrature_, walk);
+    for (unsigned near = walk.near; near != 0; near &= near - 1) {
+      const int lane = std::countr_zero(near);
+      const EmitterTriangle& t = emitters[kRun * runs[walk.next - 1] + lane];
+      walk.sum[lane] += Emission(t, p, (p - t.a).dot(t.normal));
+    }
+  }
+  return (walk.sum[0] + walk.sum[1]) + (walk.sum[2] + walk.sum[3]);
+}
+
+double FlatKernel::Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
+  const double r2 = (p - t.centroid).squaredNorm();
+  if (t.longest2_mm2 <= kCentroidShare * r2) {
+    const double far = t.gain * height * falloff_.InversePower(r2);
+    return std::min(far * FarShare(t, p - t.centroid, r2), kMostEmission);
+  }
+  if (closed_ < 0) {
+    return std::min(t.gain * height * Mean(t, p, t.a, t.b, t.c, t.longest2_mm2), kMostEmission);
+  }
+  // Lower than that, right on the triangle or flat beside it, the integral is taken as from there.
+  const double lowest = std::sqrt(std::max(t.Floor2(1), flat_share_ * r2));
+  const double integral = ClosedForm(t, p, std::max(height, lowest));
+  return std::min(t.gain * height * integral / t.area_mm2, kMostEmission);
+}
+
+double FlatKernel::Above(const EmitterTriangle& t, double depth_share, double height,
+                         double distance) const {
+  const double gain = depth_share == 1 ? t.gain : t.gain * std::pow(depth_share, decay_);
+  return std::min(gain * height * falloff_.InversePower(distance * distance), kMostEmission);
+}
+
+double FlatKernel::Lowered(const EmitterTriangle& t, double distance) const {
+  return std::sqrt((1 + flat_share_) * distance * distance + t.Floor2(1));
+}
+
+double FlatKernel::ClosedForm(const EmitterTriangle& t, const Vec3& p, double height) const {
+  const std::array<EdgeFromFoot, 3> edges = {SeenFrom(p, t.a, t.b, t.edge_normal_a),
+                                             SeenFrom(p, t.b, t.c, t.edge_normal_b),
+                                             SeenFrom(p, t.c, t.a, t.edge_normal_c)};
+  const double integral = IntegrateInversePower(edges, height, closed_);
+  if (!t.IsSloped()) {
+    return integral;
+  }
+  // R^-(n+2) (q - foot) is the gradient of -R^-n / n: the first moment is an integral over edges.
+  const std::array<const Vec3*, 3> outward = {&t.edge_normal_a, &t.edge_normal_b, &t.edge_normal_c};
+  double moment = 0;  // along the slope
+  for (int e = 0; e < 3; ++e) {
+    moment -= outward[e]->dot(t.slope) / (edges[e].end - edges[e].begin) *
+              IntegrateAlong(edges[e], height, closed_) / closed_;
+  }
+  return integral * Weight(t, (p - t.centroid).dot(t.slope) + moment / integral);
+}
+
+// Depth^k where it is 1 + rise times the mean, over that of the mean. Taken where the integrand has
+// its centroid it is right for a linear depth to second order.
+double FlatKernel::Weight(const EmitterTriangle& t, double rise) const {
+  return std::pow(std::clamp(1 + rise, t.least_share, t.most_share), decay_);
+}
+
+// The mean over a triangle seen from afar, by `from`, over the value at its centroid: by the
+// integrand's second derivative, and with the depth's weight.
+double FlatKernel::FarShare(const EmitterTriangle& t, const Vec3& from, double r2) const {
+  const double power = falloff_.power;
+  double along2 = 0, spread = 0, nearer = 0, rise2 = 0;
+  for (const Vec3& edge : {Vec3(t.b - t.a), Vec3(t.c - t.b), Vec3(t.a - t.c)}) {
+    const double along = from.dot(edge), rise = edge.dot(t.slope);
+    along2 += along * along / 36;
+    spread += edge.squaredNorm() / 36;
+    nearer += along * rise / 36;
+    rise2 += rise * rise / 36;
+  }
+  const double bend = 0.5 * power / r2 * ((power + 2) * along2 / r2 - spread);
+  return 1 + bend + decay_ * (power * nearer / r2 + 0.5 * (decay_ - 1) * rise2);
+}
+
+// Mean of |p - q|^-(k+3), weighted by the depth, over part a, b, c of a triangle.
+double FlatKernel::Mean(const EmitterTriangle& t, const Vec3& p, const Vec3& a, const Vec3& b,
+                        const Vec3& c, double longest2) const {
+  const double floor2 = t.Floor2(1);
+  const Vec3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
+  const double r2 = std::max((p - (a + b + c) / 3).squaredNorm(), floor2);
+  if (longest2 <= kMidpointShare * r2) {
+    const auto at = [&](const Vec3& q) {
+      const double value = falloff_.InversePower(std::max((p - q).squaredNorm(), floor2));
+      return t.IsSloped() ? value * Weight(t, (q - t.centroid).dot(t.slope)) : value;
+    };
+    return (at(ab) + at(bc) + at(ca)) / 3;
+  }
+  const double quarter = longest2 / 4;
+  return (Mean(t, p, a, ab, ca, quarter) + Mean(t, p, ab, b, bc, quarter) +
+          Mean(t, p, ca, bc, c, quarter) + Mean(t, p, ab, bc, ca, quarter)) /
+         4;
+}
+
+}  // namespace semblance
