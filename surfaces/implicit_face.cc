@@ -5,101 +5,36 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "surfaces/base/error.h"
-#include "surfaces/base/parallel.h"
+#include "surfaces/implicit/project_onto.h"
+#include "surfaces/implicit/start_cells.h"
 #include "surfaces/implicit/trim_to_border.h"
-#include "surfaces/marching/edge_intersections.h"
 
 namespace semblance {
 namespace {
 
-// A cubic grid of `resolution` cells along the longest side of the shell with its depth, and
-// `margin` times the depth of room around.
-SampleGrid MakeGrid(const TriMesh& shell, double depth_mm, int resolution, double margin) {
-  const Box3 box = Bounds(shell);
-  SampleGrid grid;
-  grid.cell_mm = Vec3::Constant((box.sizes().maxCoeff() + 2 * depth_mm) / resolution);
-  grid.origin = box.min() - Vec3::Constant(margin * depth_mm) - 2 * grid.cell_mm;
-  for (int axis = 0; axis < 3; ++axis) {
-    grid.counts[axis] = static_cast<int>(std::ceil((box.sizes()[axis] + 2 * margin * depth_mm) /
-                                                   grid.cell_mm[axis])) +
-                        5;
-  }
-  return grid;
-}
-
-// The emitting point of the shell that lies furthest along a direction; -1 if none emits.
-int ExtremePoint(const TriMesh& shell, std::span<const double> depth_mm, const Vec3& direction) {
-  int extreme = -1;
-  for (int v = 0; v < static_cast<int>(shell.points.size()); ++v) {
-    const bool further =
-        extreme < 0 || shell.points[v].dot(direction) > shell.points[extreme].dot(direction);
-    extreme = std::isfinite(depth_mm[v]) && further ? v : extreme;
-  }
-  return extreme;
-}
-
-// The cell above the last edge, going outward along an axis from a corner near `start`, on which
-// the field turns negative, and that edge. False if it is positive up to the grid's end.
-bool AppendStartCell(const ScalarField& field, const SampleGrid& grid, const Vec3& start, int axis,
-                     int step, std::vector<StartCell>& starts) {
-  std::array<int, 3> at;
-  for (int a = 0; a < 3; ++a) {
-    at[a] = std::clamp(static_cast<int>(std::lround((start[a] - grid.origin[a]) / grid.cell_mm[a])),
-                       1, grid.counts[a] - 2);
-  }
-  int crossing = -1;  // the lower corner, along the axis, of the outermost crossed edge
-  bool inside = false;
-  for (; at[axis] > 0 && at[axis] + 1 < grid.counts[axis]; at[axis] += step) {
-    const bool now_inside = field(grid.Corner(at[0], at[1], at[2])) > 0;
-    if (inside && !now_inside) {
-      crossing = step > 0 ? at[axis] - 1 : at[axis];
-    }
-    inside = now_inside;
-  }
-  if (crossing < 0 || inside) {
-    return !inside;
-  }
-  at[axis] = crossing;
-  starts.push_back({grid.Index(at[0], at[1], at[2]), EdgeBits(1 << EdgeFrom(0, axis))});
-  return true;
-}
-
-// False if the surface leaves the grid, as far as is seen from the shell's extreme points.
-bool FindStartCells(const TriMesh& shell, std::span<const double> depth_mm,
-                    const ScalarField& field, const SampleGrid& grid,
-                    std::vector<StartCell>& starts) {
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const int step : {-1, 1}) {
-      const Vec3 direction = step * Vec3::Unit(axis);
-      const int extreme = ExtremePoint(shell, depth_mm, direction);
-      if (!AppendStartCell(field, grid, shell.points[extreme] + 0.4 * depth_mm[extreme] * direction,
-                           axis, step, starts)) {
-        return false;
-      }
-    }
-  }
-  return true;
-}
-
-// Polygonises in a grid that is made larger until the surface fits into it.
-PolygonizeResult Polygonize(const TriMesh& shell, std::span<const double> depth_mm,
-                            const ImplicitSurface& surface, const ImplicitFaceOptions& options,
-                            const RunContext& context, double& cell_mm) {
+// In a grid that is made larger until the surface fits into it.
+void PolygonizeOutermost(const TriMesh& shell, std::span<const double> depth_mm,
+                         const ImplicitSurface& surface, const ImplicitFaceOptions& options,
+                         const RunContext& context, ImplicitFace& face) {
   const ScalarField field = [&surface](const Vec3& p) { return surface.Flattened(p); };
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
-    const SampleGrid grid = MakeGrid(shell, surface.MaxDepth_mm(), options.resolution, margin);
+    const SampleGrid grid = GridAround(shell, surface.MaxDepth_mm(), options.resolution, margin);
     std::vector<StartCell> starts;
     if (!FindStartCells(shell, depth_mm, field, grid, starts)) {
       continue;
     }
-    PolygonizeResult result =
+    const PolygonizeResult found =
         PolygonizeSurface(options.polygonizer, surface, grid, starts, options.edges, context);
-    cell_mm = grid.cell_mm.x();
-    if (!result.touches_border && !result.mesh.triangles.empty()) {
-      return result;
+    if (found.touches_border || found.mesh.triangles.empty()) {
+      continue;
     }
+    face.cell_mm = grid.cell_mm.x();
+    face.counts = found.summary;
+    face.dense = KeepOutermost(found.mesh, face.dropped_components);
+    return;
   }
   throw InputError(
       "implicit face: no closed surface was found around the shell; is it outward, and is the "
@@ -142,55 +77,7 @@ void AppendNotes(const ImplicitFaceOptions& options, std::span<const double> dep
   }
 }
 
-// The crossing nearest to `p` along `normal`, within reach; p itself if there is none.
-Vec3 OnSurface(const ImplicitSurface& surface, const Vec3& p, const Vec3& normal, double reach_mm) {
-  constexpr int kSteps = 8;
-  const EdgeSearchOptions search{.method = EdgeSearch::kRegulaFalsi, .tolerance = 1e-3};
-  double from = surface.Flattened(p);
-  const Vec3 step = (from > 0 ? 1 : -1) * reach_mm / kSteps * normal;
-  for (int n = 0; n < kSteps; ++n) {
-    const Vec3 start = p + n * step;
-    const double to = surface.Flattened(start + step);
-    if ((from > 0) != (to > 0)) {
-      std::int64_t evaluations = 0;
-      return start + SearchCrossing(
-                         from, to, search,
-                         [&](double t) { return surface.Flattened(start + t * step); },
-                         evaluations) *
-                         step;
-    }
-    from = to;
-  }
-  return p;
-}
-
-// Puts back the corners of triangles that have turned by a right angle or more, until none has.
-void Unturn(const TriMesh& before, TriMesh& mesh) {
-  bool turned = true;
-  while (turned) {
-    turned = false;
-    for (const Triangle& t : mesh.triangles) {
-      if (TriangleAreaVector(mesh, t).dot(TriangleAreaVector(before, t)) <= 0) {
-        for (const std::int32_t v : t) {
-          turned |= mesh.points[v] != before.points[v];
-          mesh.points[v] = before.points[v];
-        }
-      }
-    }
-  }
-}
-
 }  // namespace
-
-void ProjectOnto(const ImplicitSurface& surface, double reach_mm, const RunContext& context,
-                 TriMesh& mesh) {
-  const TriMesh before = mesh;
-  const std::vector<Vec3> normals = VertexNormals(before);
-  ParallelFor(mesh.points.size(), context.threads, 64, [&](std::size_t v) {
-    mesh.points[v] = OnSurface(surface, before.points[v], normals[v], reach_mm);
-  });
-  Unturn(before, mesh);
-}
 
 TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
   if (mesh.triangles.empty()) {
@@ -215,14 +102,11 @@ TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
 
 ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> depth_mm,
                                const ImplicitFaceOptions& options, const RunContext& context) {
-  ImplicitFace face;
   const ImplicitSurface surface(shell, depth_mm, options.field);
+  ImplicitFace face;
   face.emitters = surface.EmitterCount();
   face.emitters_per_square_depth = surface.EmittersPerSquareDepth();
-  const PolygonizeResult polygonized =
-      Polygonize(shell, depth_mm, surface, options, context, face.cell_mm);
-  face.counts = polygonized.summary;
-  face.dense = KeepOutermost(polygonized.mesh, face.dropped_components);
+  PolygonizeOutermost(shell, depth_mm, surface, options, context, face);
   if (options.ends == FaceEnds::kOpen) {
     face.dense = TrimToSkull(face.dense, shell, depth_mm, context);
   }

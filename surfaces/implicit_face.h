@@ -81,19 +81,14 @@ struct ImplicitFace {
   int dropped_components = -1;
   PolygonizeSummary counts;
   DecimateSummary decimation;      // before `project`
-  std::vector<std::string> notes;  // what a reader should know, a line each
+  std::vector<std::string> notes;  // what a reader should know, one per line
 };
 
-// shell: outward. depth_mm: one a vertex, NaN where it does not emit. Only the outermost surface is
-// followed: it is found by going outward from the shell's extreme points, and of what is connected
-// there the component with the largest volume is kept. Throws InputError as ImplicitSurface does.
+// shell: outward. depth_mm: one per vertex, NaN where it does not emit. Only the outermost surface
+// is followed: it is found by going outward from the shell's extreme points, and of the components
+// found so the one with the largest volume is kept. Throws InputError as ImplicitSurface does.
 ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> depth_mm,
                                const ImplicitFaceOptions& options, const RunContext& context);
-
-// Moves each vertex along its normal onto the surface, by at most reach_mm: where it is not within
-// that, and where a triangle would turn by a right angle or more, vertices stay.
-void ProjectOnto(const ImplicitSurface& surface, double reach_mm, const RunContext& context,
-                 TriMesh& mesh);
 
 // The component with the largest enclosed volume; `dropped` counts the others. Throws InputError
 // for an empty mesh.

@@ -57,8 +57,9 @@ HeightRange HeightsOver(const EmitterTriangle& t, const BoxView& box) {
 
 }  // namespace
 
-// In front of the moved triangle emission falls with the distance alone. Below it only its prism
-// emits; the least is taken as 0 unless the whole box lies beyond it.
+// In front of the moved triangle emission falls with the distance alone, a convex function, whose
+// greatest value in a box is at a corner. Below it only its prism emits; the least is taken as 0
+// unless the whole box lies beyond it.
 EmissionBounds BoundsOn(const DistanceKernel& kernel, const EmitterTriangle& t,
                         const BoxView& box) {
   const HeightRange height = HeightsOver(t, box);
@@ -72,6 +73,7 @@ EmissionBounds BoundsOn(const DistanceKernel& kernel, const EmitterTriangle& t,
     bounds.most = kernel.AtDistance(t, LeastDistance(t, shift, box, d));
     const bool beyond = height.least >= shift && height.least > 0;
     bounds.least = beyond ? kernel.AtDistance(t, d + box.radius_mm) : 0;
+    bounds.least_at_corner = beyond;
   }
   if (shift > 0 && height.least < shift) {
     const double beside2 = SquaredDistance(t, box.center - height.center * t.normal);
@@ -81,6 +83,9 @@ EmissionBounds BoundsOn(const DistanceKernel& kernel, const EmitterTriangle& t,
   return bounds;
 }
 
+// In front of the triangle the emission is quasi-concave, so that its least value in a box is at a
+// corner: that of a point of it is h R^-m with m = k + 3, and (h R^-m)^(-1/(m-1)) is convex; the
+// integral over the triangle keeps that (Borell 1975, Brascamp & Lieb 1976).
 // At height h and distance R >= max(h, nearest) the integrand is at most h / max(h, nearest)^(k+3),
 // which grows up to h = nearest and falls from there.
 EmissionBounds BoundsOn(const FlatKernel& kernel, const EmitterTriangle& t, const BoxView& box) {
@@ -99,6 +104,7 @@ EmissionBounds BoundsOn(const FlatKernel& kernel, const EmitterTriangle& t, cons
     const double furthest =
         (box.center - t.centroid).norm() + box.radius_mm + std::sqrt(t.longest2_mm2);
     bounds.least = kernel.Above(t, t.least_share, above, kernel.Lowered(t, furthest));
+    bounds.least_at_corner = above >= kernel.Lowest(t, furthest * furthest);
   }
   return bounds;
 }

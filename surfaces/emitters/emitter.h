@@ -48,6 +48,8 @@ struct FlatEmitter {
 // What an emitter gives in a box: nowhere less than `least`, nowhere more than `most`.
 struct EmissionBounds {
   double least = 0, most = 0;
+  // Nowhere in the box does it give less than at one of the corners (within SumShare).
+  bool least_at_corner = false;
 };
 
 using Emitter = std::variant<FlatEmitter, SplitEmitter, ThesisEmitter>;

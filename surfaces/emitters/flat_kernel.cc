@@ -278,9 +278,7 @@ double FlatKernel::Emission(const EmitterTriangle& t, const Vec3& p, double heig
   if (closed_ < 0) {
     return std::min(t.gain * height * Mean(t, p, t.a, t.b, t.c, t.longest2_mm2), kMostEmission);
   }
-  // Lower than that, right on the triangle or flat beside it, the integral is taken as from there.
-  const double lowest = std::sqrt(std::max(t.Floor2(1), flat_share_ * r2));
-  const double integral = ClosedForm(t, p, std::max(height, lowest));
+  const double integral = ClosedForm(t, p, std::max(height, Lowest(t, r2)));
   return std::min(t.gain * height * integral / t.area_mm2, kMostEmission);
 }
 
@@ -288,6 +286,10 @@ double FlatKernel::Above(const EmitterTriangle& t, double depth_share, double he
                          double distance) const {
   const double gain = depth_share == 1 ? t.gain : t.gain * std::pow(depth_share, decay_);
   return std::min(gain * height * falloff_.InversePower(distance * distance), kMostEmission);
+}
+
+double FlatKernel::Lowest(const EmitterTriangle& t, double squared) const {
+  return std::sqrt(std::max(t.Floor2(1), flat_share_ * squared));
 }
 
 double FlatKernel::Lowered(const EmitterTriangle& t, double distance) const {

@@ -95,6 +95,9 @@ class FlatKernel {
   // What the triangle would emit if all of it were this far and had this share of its depth, at
   // most kMostEmission.
   double Above(const EmitterTriangle& t, double depth_share, double height, double distance) const;
+  // Lower than that the emission is taken as from there, right on the triangle or flat beside it;
+  // squared: of the distance from its centroid.
+  double Lowest(const EmitterTriangle& t, double squared) const;
   // A distance that is not less than what `distance` counts as low over the triangle.
   double Lowered(const EmitterTriangle& t, double distance) const;
 

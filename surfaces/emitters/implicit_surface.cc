@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <type_traits>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -104,11 +105,14 @@ struct ImplicitSurface::Impl {
     return neighbours.Find(p, [&](const Box3& box) {
       double left_out = 0;
       NeighbourList near = search.InBox(box, FarField::kMultipole, left_out);
-      if (!reach_balls.empty()) {
-        near.reaches = Gather(reach_balls, near.runs);
-      }
+      GatherReaches(near);
       return near;
     });
+  }
+  void GatherReaches(NeighbourList& list) const {
+    if (!reach_balls.empty()) {
+      list.reaches = semblance::Gather(reach_balls, list.runs);
+    }
   }
 
   double Emission(const FlatKernel& k, int e, const Vec3& p) const {
@@ -154,8 +158,10 @@ struct ImplicitSurface::Impl {
 
   // Of all emitters at p, within the tail error.
   double Sum(const Vec3& p, std::int64_t& evaluations) const {
-    const NeighbourListCache::List near = Near(p);
-    return std::visit([&](const auto& k) { return SumOf(k, *near, p, evaluations); }, kernel);
+    return Sum(*Near(p), p, evaluations);
+  }
+  double Sum(const NeighbourList& list, const Vec3& p, std::int64_t& evaluations) const {
+    return std::visit([&](const auto& k) { return SumOf(k, list, p, evaluations); }, kernel);
   }
 
   int RunLength() const {
@@ -210,6 +216,35 @@ double ImplicitSurface::SumOf(std::span<const std::int32_t> emitters, const Vec3
       impl_->kernel);
 }
 
+void ImplicitSurface::EmissionsAt(const Vec3& p, std::span<const std::int32_t> emitters,
+                                  std::span<double> emissions) const {
+  std::visit(
+      [&](const auto& kernel) {
+        for (std::size_t n = 0; n < emitters.size(); ++n) {
+          emissions[n] = impl_->Emission(kernel, emitters[n], p);
+        }
+      },
+      impl_->kernel);
+}
+
+std::shared_ptr<const NeighbourList> ImplicitSurface::Gather(
+    std::span<const std::int32_t> emitters) const {
+  NeighbourList list;
+  for (const std::int32_t e : emitters) {
+    const int run = e / impl_->RunLength();
+    if (list.runs.empty() || list.runs.back() != run) {
+      list.runs.push_back(run);
+    }
+  }
+  impl_->GatherReaches(list);
+  return std::make_shared<const NeighbourList>(std::move(list));
+}
+
+double ImplicitSurface::SumOf(const NeighbourList& gathered, const Vec3& p,
+                              std::int64_t& evaluations) const {
+  return impl_->Sum(gathered, p, evaluations);
+}
+
 double ImplicitSurface::SumShare() const {
   return std::holds_alternative<FlatKernel>(impl_->kernel) ? kFlatShare : 0;
 }
@@ -222,7 +257,7 @@ void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> em
       [&](const auto& kernel) {
         for (std::size_t n = 0; n < emitters.size(); ++n) {
           const EmissionBounds exact = BoundsOn(kernel, impl_->emitters[emitters[n]], view);
-          bounds[n] = {(1 - share) * exact.least, (1 + share) * exact.most};
+          bounds[n] = {(1 - share) * exact.least, (1 + share) * exact.most, exact.least_at_corner};
         }
       },
       impl_->kernel);

@@ -12,6 +12,8 @@
 
 namespace semblance {
 
+struct NeighbourList;  // neighbour_list_cache.h
+
 struct ImplicitOptions {
   Emitter emitter = FlatEmitter{};
   double tail_error = 1e-3;
@@ -53,8 +55,14 @@ class ImplicitSurface {
 
   // One emitter at a time, for a polygonizer that sums them itself (thesis 3.2). Emitters are
   // numbered from 0 to EmitterCount() - 1.
+  void EmissionsAt(const Vec3& p, std::span<const std::int32_t> emitters,
+                   std::span<double> emissions) const;
   // The sum of some emissions.
   double SumOf(std::span<const std::int32_t> emitters, const Vec3& p) const;
+  // The same, several at once: gathered from some emitters, given in ascending order. Neighbours in
+  // the same lanes are summed too. Adds to `evaluations` how many emitters it took.
+  std::shared_ptr<const NeighbourList> Gather(std::span<const std::int32_t> emitters) const;
+  double SumOf(const NeighbourList& gathered, const Vec3& p, std::int64_t& evaluations) const;
   // SumOf and what Value sums may differ by this share: near emitters of `flat` are integrated
   // numerically in two ways.
   double SumShare() const;

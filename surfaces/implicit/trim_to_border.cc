@@ -26,48 +26,48 @@ TriMesh WithDepths(const TriMesh& shell, std::span<const double> depth_mm) {
 
 using VertexPair = std::pair<std::int32_t, std::int32_t>;  // the lower vertex first
 
-VertexPair SideOf(const Triangle& t, int side) { return std::minmax(t[side], t[(side + 1) % 3]); }
+VertexPair EdgeOf(const Triangle& t, int e) { return std::minmax(t[e], t[(e + 1) % 3]); }
 
-// Where a point is that has the border of a mesh nearest to it, or the inside.
-enum class OverBorder { kOver, kBehind, kPastBorder };
+// What of a mesh with a border is nearest to a point.
+enum class Nearest { kFront, kBack, kBorder };
 
-// A mesh with a border, and what is nearest to a point on it.
 class BorderedMesh {
  public:
   explicit BorderedMesh(const TriMesh& mesh)
       : mesh_(mesh), query_(mesh), on_border_(mesh.points.size(), false) {
     for (const Triangle& t : mesh.triangles) {
-      for (int side = 0; side < 3; ++side) {
-        ++sides_[SideOf(t, side)];
+      for (int e = 0; e < 3; ++e) {
+        ++triangles_at_[EdgeOf(t, e)];
       }
     }
-    for (const auto& [edge, count] : sides_) {
+    for (const auto& [edge, count] : triangles_at_) {
       if (count == 1) {
         on_border_[edge.first] = on_border_[edge.second] = true;
       }
     }
   }
 
-  OverBorder FindPlace(const Vec3& p) const {
+  Nearest NearestTo(const Vec3& p) const {
     const MeshPoint nearest = query_.Closest(p);
     const Triangle& t = mesh_.triangles[nearest.triangle];
     if (IsAtBorder(t, nearest.position)) {
-      return OverBorder::kPastBorder;
+      return Nearest::kBorder;
     }
-    return (p - nearest.position).dot(TriangleAreaVector(mesh_, t)) > 0 ? OverBorder::kOver
-                                                                        : OverBorder::kBehind;
+    const bool in_front = (p - nearest.position).dot(TriangleAreaVector(mesh_, t)) > 0;
+    return in_front ? Nearest::kFront : Nearest::kBack;
   }
 
  private:
   bool IsAtBorder(const Triangle& t, const Vec3& p) const {
     constexpr double kClose_mm = 1e-6;
-    for (int side = 0; side < 3; ++side) {
-      const Vec3 &a = mesh_.points[t[side]], &b = mesh_.points[t[(side + 1) % 3]];
-      if (on_border_[t[side]] && (p - a).norm() < kClose_mm) {
+    for (int e = 0; e < 3; ++e) {
+      const Vec3 &a = mesh_.points[t[e]], &b = mesh_.points[t[(e + 1) % 3]];
+      if (on_border_[t[e]] && (p - a).norm() < kClose_mm) {
         return true;
       }
       const Vec3 along = (b - a).normalized(), from = p - a;
-      if (sides_.at(SideOf(t, side)) == 1 && (from - from.dot(along) * along).norm() < kClose_mm) {
+      const bool is_border = triangles_at_.at(EdgeOf(t, e)) == 1;
+      if (is_border && (from - from.dot(along) * along).norm() < kClose_mm) {
         return true;
       }
     }
@@ -76,94 +76,108 @@ class BorderedMesh {
 
   const TriMesh& mesh_;
   MeshQuery query_;
-  std::map<VertexPair, int> sides_;  // triangles of each
+  std::map<VertexPair, int> triangles_at_;  // of each edge, how many
   std::vector<bool> on_border_;
 };
 
-std::vector<OverBorder> PlacesOf(const TriMesh& face, const BorderedMesh& mesh,
-                                 const RunContext& context) {
-  std::vector<OverBorder> places(face.points.size());
+std::vector<Nearest> NearestToVertices(const TriMesh& face, const BorderedMesh& mesh,
+                                       const RunContext& context) {
+  std::vector<Nearest> nearest(face.points.size());
   ParallelFor(face.points.size(), context.threads, 256,
-              [&](std::size_t v) { places[v] = mesh.FindPlace(face.points[v]); });
-  return places;
+              [&](std::size_t v) { nearest[v] = mesh.NearestTo(face.points[v]); });
+  return nearest;
 }
 
-bool HasCorner(const Triangle& t, const std::vector<OverBorder>& places, OverBorder place) {
-  return std::any_of(t.begin(), t.end(), [&](std::int32_t v) { return places[v] == place; });
+bool HasCorner(const Triangle& t, const std::vector<Nearest>& nearest, Nearest kind) {
+  return std::any_of(t.begin(), t.end(), [&](std::int32_t v) { return nearest[v] == kind; });
 }
 
-// Triangles that are not past the border: neither with a corner there nor, on the far side, joined
-// to such. What seems to be behind elsewhere is beside a sharp edge.
-std::vector<bool> TrianglesOver(const TriMesh& face, const std::vector<OverBorder>& places) {
+// The triangles of the face over the mesh: those with no corner past the border, and not joined to
+// such through corners behind the mesh. Corners that seem to be behind elsewhere are beside a sharp
+// edge.
+std::vector<bool> TrianglesOver(const TriMesh& face, const std::vector<Nearest>& nearest) {
   std::vector<bool> doubtful;
   for (const Triangle& t : face.triangles) {
-    doubtful.push_back(HasCorner(t, places, OverBorder::kPastBorder) ||
-                       HasCorner(t, places, OverBorder::kBehind));
+    doubtful.push_back(HasCorner(t, nearest, Nearest::kBorder) ||
+                       HasCorner(t, nearest, Nearest::kBack));
   }
-  const Components pieces = ConnectedComponents(Submesh(face, doubtful));
-  std::vector<bool> past(pieces.count, false);
+  const Components parts = ConnectedComponents(Submesh(face, doubtful));
+  std::vector<bool> past(parts.count, false);
   std::size_t n = 0;  // of the doubtful ones
   for (std::size_t t = 0; t < doubtful.size(); ++t) {
     if (doubtful[t]) {
-      const int piece = pieces.of_triangle[n++];
-      past[piece] = past[piece] || HasCorner(face.triangles[t], places, OverBorder::kPastBorder);
+      const int part = parts.of_triangle[n++];
+      past[part] = past[part] || HasCorner(face.triangles[t], nearest, Nearest::kBorder);
     }
   }
   std::vector<bool> over;
   n = 0;
   for (const bool doubt : doubtful) {
-    over.push_back(!doubt || !past[pieces.of_triangle[n]]);
+    over.push_back(!doubt || !past[parts.of_triangle[n]]);
     n += doubt ? 1 : 0;
   }
   return over;
 }
 
-TriMesh LargestPiece(const TriMesh& mesh) {
-  const Components pieces = ConnectedComponents(mesh);
-  std::vector<double> area(pieces.count, 0);
+TriMesh LargestPart(const TriMesh& mesh) {
+  const Components parts = ConnectedComponents(mesh);
+  std::vector<double> area(parts.count, 0);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    area[pieces.of_triangle[t]] += TriangleAreaVector(mesh, mesh.triangles[t]).norm();
+    area[parts.of_triangle[t]] += TriangleAreaVector(mesh, mesh.triangles[t]).norm();
   }
   const auto largest = std::max_element(area.begin(), area.end()) - area.begin();
   std::vector<bool> keep;
-  for (const int piece : pieces.of_triangle) {
-    keep.push_back(piece == largest);
+  for (const int part : parts.of_triangle) {
+    keep.push_back(part == largest);
   }
   return Submesh(mesh, keep);
 }
 
-// Gives each fan of triangles at a vertex, but for the first, a vertex of its own: fans that touch
-// in one point are no manifold.
-void SplitFans(TriMesh& mesh) {
-  // Corners of triangles, 3 t + i, are joined where the triangles share a side.
-  std::vector<std::int32_t> root(3 * mesh.triangles.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&root](std::int32_t corner) {
-    while (root[corner] != corner) {
-      corner = root[corner] = root[root[corner]];
-    }
-    return corner;
-  };
-  std::map<VertexPair, std::array<std::int32_t, 2>> first;  // of each edge, the corners at its ends
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (int side = 0; side < 3; ++side) {
-      const auto here = static_cast<std::int32_t>(3 * t + side),
-                 next = static_cast<std::int32_t>(3 * t + (side + 1) % 3);
-      const Triangle& corners = mesh.triangles[t];
-      const bool lower = corners[side] < corners[(side + 1) % 3];
-      const std::array<std::int32_t, 2> ends = {lower ? here : next, lower ? next : here};
-      const auto [found, is_new] = first.try_emplace(SideOf(corners, side), ends);
-      if (!is_new) {
-        root[find(ends[0])] = find(found->second[0]);
-        root[find(ends[1])] = find(found->second[1]);
+// The fans of triangles around each vertex, as sets of corners 3 t + i of triangles: corners at one
+// vertex are of one fan where their triangles share an edge there.
+class CornerFans {
+ public:
+  explicit CornerFans(const TriMesh& mesh) : parent_(3 * mesh.triangles.size()) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+    std::map<VertexPair, std::array<std::int32_t, 2>> first;  // the corners at an edge's ends
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      for (int e = 0; e < 3; ++e) {
+        const Triangle& corners = mesh.triangles[t];
+        std::array<std::int32_t, 2> ends = {static_cast<std::int32_t>(3 * t + e),
+                                            static_cast<std::int32_t>(3 * t + (e + 1) % 3)};
+        if (corners[e] > corners[(e + 1) % 3]) {
+          std::swap(ends[0], ends[1]);
+        }
+        const auto [found, is_new] = first.try_emplace(EdgeOf(corners, e), ends);
+        if (!is_new) {
+          parent_[Of(ends[0])] = Of(found->second[0]);
+          parent_[Of(ends[1])] = Of(found->second[1]);
+        }
       }
     }
   }
+
+  std::int32_t Of(std::int32_t corner) {
+    while (parent_[corner] != corner) {
+      corner = parent_[corner] = parent_[parent_[corner]];
+    }
+    return corner;
+  }
+
+ private:
+  std::vector<std::int32_t> parent_;
+};
+
+// Gives each fan of triangles at a vertex, but for the first, a vertex of its own: fans that touch
+// in one point are no manifold.
+void SplitFans(TriMesh& mesh) {
+  CornerFans fans(mesh);
   std::vector<std::int32_t> fan_of(mesh.points.size(), -1);  // that keeps the vertex
   std::map<std::int32_t, std::int32_t> own;                  // vertex of a further fan
-  for (std::size_t corner = 0; corner < root.size(); ++corner) {
+  const auto corner_count = static_cast<std::int32_t>(3 * mesh.triangles.size());
+  for (std::int32_t corner = 0; corner < corner_count; ++corner) {
     std::int32_t& v = mesh.triangles[corner / 3][corner % 3];
-    const std::int32_t fan = find(static_cast<std::int32_t>(corner));
+    const std::int32_t fan = fans.Of(corner);
     if (fan_of[v] < 0) {
       fan_of[v] = fan;
     }
@@ -184,15 +198,15 @@ void SplitFans(TriMesh& mesh) {
 TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
                     const RunContext& context) {
   const TriMesh with_depths = WithDepths(shell, depth_mm);
-  TriMesh over =
-      Submesh(face, TrianglesOver(face, PlacesOf(face, BorderedMesh(with_depths), context)));
+  const std::vector<Nearest> nearest = NearestToVertices(face, BorderedMesh(with_depths), context);
+  TriMesh over = Submesh(face, TrianglesOver(face, nearest));
   if (over.triangles.empty()) {
     throw InputError(
         "implicit face: nothing of it lies over a part of the shell that has a depth; with "
         "'ends: closed' the whole face is kept");
   }
   SplitFans(over);
-  return LargestPiece(over);
+  return LargestPart(over);
 }
 
 }  // namespace semblance

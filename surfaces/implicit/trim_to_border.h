@@ -9,11 +9,11 @@
 
 namespace semblance {
 
-// Of a face, the triangles that lie over the shell where it has a depth (finite; one a vertex):
-// what has the border of its triangles with depths nearest to it goes, and what is behind them and
-// joined to that. Of the pieces that leaves, the one with the most area; a manifold if the face is,
-// with the same orientation. All of the face where the shell is closed and has a depth everywhere.
-// Throws InputError if nothing is left.
+// The triangles of a face that lie over the shell's triangles with depths (finite; one per vertex).
+// Dropped is what is nearest to the border of these triangles, and what lies behind them and is
+// joined to that. Of the parts that are left the one with the most area is returned: a manifold if
+// the face is, with the same orientation; the whole face where the shell is closed and has a depth
+// everywhere. Throws InputError if nothing is left.
 TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
                     const RunContext& context);
 

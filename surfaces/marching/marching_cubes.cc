@@ -121,7 +121,7 @@ std::array<EdgeBits, 12> JoinedEdgesOfCase(int mask) {
   return joined;
 }
 
-// One entry a case.
+// One entry per case.
 template <class OfCase>
 auto AllCases(const OfCase& of_case) {
   std::array<decltype(of_case(0)), 256> cases;

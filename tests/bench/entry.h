@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One line of JSON a measurement, and the processor's time.
+// One line of JSON per measurement, and the processor's time.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,6 +18,7 @@ struct Entry {
   double goal = NAN;   // of the ratio; of ours where there is no peer
   std::string unit = "s";
   bool at_most = false;  // met where ours is at most the goal
+  bool busy = false;     // other programs kept the machine too busy to measure: no figures
 };
 
 inline void Print(const Entry& e, const std::string& command) {
@@ -26,11 +27,13 @@ inline void Print(const Entry& e, const std::string& command) {
   const auto number = [](double x) {
     return std::isnan(x) ? std::string("null") : fmt::format("{:.5g}", x);
   };
+  const auto figure = [&](double x) { return number(e.busy ? NAN : x); };
   fmt::print(
       "{{\"name\": \"{}\", \"ours\": {}, \"peer\": {}, \"ratio\": {}, \"goal\": {}, \"met\": {}, "
-      "\"unit\": \"{}\", \"command\": \"{}\"}}\n",
-      e.name, number(e.ours), number(e.peer), number(e.ratio), number(e.goal),
-      std::isnan(e.goal) ? "null" : (met ? "true" : "false"), e.unit, command);
+      "\"unit\": \"{}\", \"command\": \"{}\"{}}}\n",
+      e.name, figure(e.ours), figure(e.peer), figure(e.ratio), number(e.goal),
+      std::isnan(e.goal) || e.busy ? "null" : (met ? "true" : "false"), e.unit, command,
+      e.busy ? ", \"busy\": true" : "");
   std::fflush(stdout);
 }
 

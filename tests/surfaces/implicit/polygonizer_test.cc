@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "surfaces/implicit_face.h"
@@ -55,9 +57,15 @@ const std::vector<Emitter> kEmitters = {FlatEmitter{},
                                         ThesisEmitter{},
                                         ThesisEmitter{.cut_below = 0.002},
                                         SplitEmitter{.cut_below = 0.002}};
-const std::vector<Polygonizer> kFaster = {NarrowBand{}, NarrowBand{FollowedComponents::kAll},
-                                          McOctree{}, MinMaxOctree{},
-                                          MinMaxOctree{.least_emission = 0.05}};
+const std::vector<Polygonizer> kFaster = {
+    NarrowBand{},
+    NarrowBand{FollowedComponents::kAll},
+    McOctree{},
+    McOctree{.sums = ListSums::kLanes},
+    MinMaxOctree{},
+    MinMaxOctree{.least_emission = 0.05},
+    MinMaxOctree{.minimum = EmitterMinimum::kCachedCorners},
+    MinMaxOctree{.minimum = EmitterMinimum::kCorners, .sums = ListSums::kLanes}};
 
 class Agreement : public ::testing::TestWithParam<Emitter> {};
 INSTANTIATE_TEST_SUITE_P(All, Agreement, ::testing::ValuesIn(kEmitters));
@@ -89,6 +97,26 @@ TEST(Polygonizer, EachOptimisationOfTheThesisSavesEvaluations) {
   EXPECT_LT(band.corner_evaluations, bounds.corner_evaluations);
   EXPECT_EQ(brute.bound_evaluations, 0);
   EXPECT_GT(bounds.bound_evaluations, 0);
+}
+
+// Thesis 3.2.3. The corners' least is never below the ball's, so that no more boxes are looked at.
+TEST(Polygonizer, TheThesissEmitterCacheSavesEvaluationsAndChangesNoBit) {
+  const auto face = [](EmitterMinimum minimum) {
+    const MinMaxOctree octree{.least_emission = 0.002, .minimum = minimum};
+    ImplicitFaceOptions options =
+        Options(SplitEmitter{.cut_below = 0.002}, octree, EdgeSearch::kBisection, 0);
+    options.edges.tolerance = 0.5;  // corners, not edges, are counted
+    return Face(options);
+  };
+  const ImplicitFace ball = face(EmitterMinimum::kBall), corners = face(EmitterMinimum::kCorners),
+                     cached = face(EmitterMinimum::kCachedCorners);
+  EXPECT_EQ(cached.dense.points, ball.dense.points);
+  EXPECT_EQ(cached.dense.triangles, ball.dense.triangles);
+  EXPECT_EQ(cached.dense.points, corners.dense.points);
+  EXPECT_EQ(cached.counts.bound_evaluations, corners.counts.bound_evaluations);
+  EXPECT_LE(cached.counts.bound_evaluations, ball.counts.bound_evaluations);
+  EXPECT_EQ(cached.counts.corner_evaluations, corners.counts.corner_evaluations);
+  EXPECT_LT(cached.counts.emitter_evaluations, 0.8 * double(corners.counts.emitter_evaluations));
 }
 
 TEST(Polygonizer, RefusesAGridThatIsNone) {
@@ -127,21 +155,32 @@ TEST_P(Agreement, NoComponentIsMissedWhereAllAreAsked) {
 class Bounds : public ::testing::TestWithParam<Emitter> {
  protected:
   // A triangle with a depth, and boxes of all sizes around it.
-  void Check(const TriMesh& triangle, double depth_mm, const Box3& box, Random& random) const {
+  void Check(const TriMesh& triangle, double depth_mm, const Box3& box, Random& random) {
     const std::vector<double> depths = {0.97 * depth_mm, depth_mm, 1.03 * depth_mm};
     const ImplicitSurface surface(triangle, depths, {GetParam(), 0});
     ASSERT_EQ(surface.EmitterCount(), 1);
     const std::int32_t only = 0;
     EmissionBounds bounds;
     surface.BoundsIn(box, {&only, 1}, {&bounds, 1});
+    at_corner_ += bounds.least_at_corner ? 1 : 0;
+    double least_at_corner = std::numeric_limits<double>::infinity();
+    for (int c = 0; c < 8; ++c) {
+      const Vec3 corner = box.corner(static_cast<Box3::CornerType>(c));
+      least_at_corner = std::min(least_at_corner, surface.SumOf({&only, 1}, corner));
+    }
     for (int n = 0; n < 200; ++n) {
       const Vec3 share = random.InBox(-0.2, 1.2).cwiseMax(0).cwiseMin(1);  // corners and faces too
       const Vec3 p = box.min() + share.cwiseProduct(box.sizes());
       const double emission = surface.SumOf({&only, 1}, p);
       EXPECT_LE(bounds.least, emission) << p.transpose();
       EXPECT_GE(bounds.most, emission) << p.transpose();
+      if (bounds.least_at_corner) {
+        EXPECT_LE((1 - surface.SumShare() - 1e-9) * least_at_corner, emission) << p.transpose();
+      }
     }
   }
+
+  int at_corner_ = 0;  // boxes whose least is at a corner
 };
 INSTANTIATE_TEST_SUITE_P(All, Bounds, ::testing::ValuesIn(kEmitters));
 INSTANTIATE_TEST_SUITE_P(Broken, Bounds, ::testing::Values(Emitter(FlatEmitter{4.5})));
@@ -158,6 +197,7 @@ TEST_P(Bounds, HoldEverywhereInABox) {
     Check(triangle, random.Uniform(2, 9),
           {low, low + size * (Vec3::Ones() + 0.5 * random.InBox(0, 1))}, random);
   }
+  EXPECT_GT(at_corner_, 20);
 }
 
 // The thesis's maximum at the closest point of the box is 0 here.
