@@ -16,6 +16,7 @@
 //
 // Overrides ("a.b[0].c=v", v in YAML) come last and name themselves in errors: `--set a.b=c: ...`.
 // Paths in them are relative to the current folder. They reach into default lists and variants too.
+// "a.type=b" replaces a variant of another type wholly, but for what other overrides say of it.
 //
 // A variant is written as a map with `type`, or as the bare name of a type for its defaults. A map
 // without `type` sets options of the field's default type; in a list, `type` must be there.
@@ -121,13 +122,13 @@ std::string WriteConfig(const T& value) {
 // For people: each path with its type, default, range, unit and meaning.
 template <class T>
 std::string OptionsReference() {
-  return ReferenceText(config_internal::DescribeType<T>());
+  return ReferenceText(config_internal::DescribeType(T{}));
 }
 
 // For editors: a JSON Schema (draft 2020-12).
 template <class T>
 std::string OptionsSchema() {
-  return SchemaText(config_internal::DescribeType<T>());
+  return SchemaText(config_internal::DescribeType(T{}));
 }
 
 }  // namespace semblance

@@ -111,7 +111,7 @@ void ReadVariant(ConfigErrors& errors, const ConfigItem& item, T& out,
   if (!index) {
     return;
   }
-  if (item.node.IsScalar() || item.node.Find("type")) {
+  if (*index != out.index()) {
     out = MakeAlternative(no_value, *index);
   }
   if (item.node.IsMap()) {

@@ -66,26 +66,32 @@ ConfigNode ToTree(const T& value) {
   }
 }
 
+// The type with the defaults that `value` holds: those of the struct around it, which may differ
+// from the type's own.
 template <class T>
-ConfigType DescribeType();
+ConfigType DescribeType(const T& value);
 
 template <class T>
-std::vector<ConfigField> DescribeFields() {
+std::vector<ConfigField> DescribeFields(const T& value) {
   std::vector<ConfigField> fields;
   const auto visit = [&](const FieldInfo& info, const auto& field) {
     if (info.name == "type") {
       throw std::logic_error("a field may not be named `type`: that is the key of variants");
     }
-    fields.push_back({info, DescribeType<std::remove_cvref_t<decltype(field)>>(), ToTree(field)});
+    fields.push_back({info, DescribeType(field), ToTree(field)});
   };
-  T defaults{};
-  Fields(visit, defaults);
+  T copy = value;  // Fields takes a value that it may write to
+  Fields(visit, copy);
   return fields;
 }
 
+// The chosen alternative has the options of `value`, the others their own defaults.
 template <class... Types>
-std::vector<ConfigAlternative> DescribeAlternatives(const std::variant<Types...>*) {
-  return {ConfigAlternative{std::string(Types::kName), DescribeFields<Types>()}...};
+std::vector<ConfigAlternative> DescribeAlternatives(const std::variant<Types...>& value) {
+  const auto describe = [&]<class T>(const T* chosen) {
+    return ConfigAlternative{std::string(T::kName), DescribeFields(chosen ? *chosen : T{})};
+  };
+  return {describe(std::get_if<Types>(&value))...};
 }
 
 template <class T>
@@ -110,28 +116,31 @@ constexpr ConfigType::Kind ScalarKind() {
 }
 
 template <class T>
-ConfigType DescribeType() {
+ConfigType DescribeType(const T& value) {
   using Kind = ConfigType::Kind;
   ConfigType type;
-  if constexpr (kIs<T, std::optional> || kIs<T, std::vector>) {
-    type.kind = kIs<T, std::optional> ? Kind::kOptional : Kind::kList;
-    type.inner = {DescribeType<typename T::value_type>()};
+  if constexpr (kIs<T, std::optional>) {
+    type.kind = Kind::kOptional;
+    type.inner = {DescribeType(value.value_or(typename T::value_type{}))};
+  } else if constexpr (kIs<T, std::vector>) {
+    type.kind = Kind::kList;
+    type.inner = {DescribeType(typename T::value_type{})};
   } else if constexpr (kIsArray<T>) {
     type.kind = Kind::kArray;
     type.size = std::tuple_size_v<T>;
-    type.inner = {DescribeType<typename T::value_type>()};
+    type.inner = {DescribeType(typename T::value_type{})};
   } else if constexpr (kIs<T, std::map>) {
     type.kind = Kind::kMap;
-    type.inner = {DescribeType<typename T::mapped_type>()};
+    type.inner = {DescribeType(typename T::mapped_type{})};
   } else if constexpr (kIs<T, std::variant>) {
     type.kind = Kind::kVariant;
-    type.alternatives = DescribeAlternatives(static_cast<const T*>(nullptr));
+    type.alternatives = DescribeAlternatives(value);
   } else if constexpr (std::is_enum_v<T>) {
     type.kind = Kind::kWord;
     type.words = WordsOf<T>();
   } else if constexpr (HasFields<T>) {
     type.kind = Kind::kStruct;
-    type.fields = DescribeFields<T>();
+    type.fields = DescribeFields(value);
   } else {
     type.kind = ScalarKind<T>();
   }

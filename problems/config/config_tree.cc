@@ -86,6 +86,34 @@ const ConfigNode* MatchingDefaults(const ConfigNode& node, const ConfigNode* def
   return defaults && type && IsAnotherType(*defaults, node) ? nullptr : defaults;
 }
 
+// Whether two entries were said together: in one file, or both by overrides.
+bool IsSameLayer(const ConfigPlace& a, const ConfigPlace& b) {
+  const bool are_overrides = a.source && b.source && !a.source->has_lines && !b.source->has_lines;
+  return a.source && (a.source == b.source || are_overrides);
+}
+
+// Leaves of `node` what stands in the layer of `place`. Returns whether anything does.
+bool KeepLayer(ConfigNode& node, const ConfigPlace& place) {
+  bool keeps_part = IsSameLayer(node.place, place);
+  for (ConfigNode& item : node.items) {
+    keeps_part |= KeepLayer(item, place);
+  }
+  std::erase_if(node.entries,
+                [&](ConfigNode::Entry& entry) { return !KeepLayer(entry.value, place); });
+  return keeps_part || !node.entries.empty();
+}
+
+// A variant that is about to get the type that `type` names. Where that is another one, it replaces
+// what lower layers say of the variant, as in MergeTrees. Options given beside it stay: if the type
+// does not have them, the reader refuses them.
+void ForgetFormerType(ConfigNode& variant, const ConfigNode& type, const ConfigNode* defaults) {
+  const ConfigNode* named = variant.Find("type");
+  const ConfigNode* former = named || !defaults ? named : defaults->Find("type");
+  if (former && former->text != type.text) {
+    KeepLayer(variant, type.place);
+  }
+}
+
 // The entry that `step` names; made, as written at `place`, where it is missing.
 ConfigNode& StepIntoMap(ConfigNode& node, const Step& step, const ConfigNode*& defaults,
                         bool is_last, const ConfigPlace& place) {
@@ -208,6 +236,9 @@ void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
   ConfigNode* node = &edited;
   for (const Step& step : steps) {
     const bool is_last = &step == &steps.back();
+    if (is_last && step.key == "type" && node->IsMap()) {
+      ForgetFormerType(*node, value, defaults);
+    }
     node = step.index ? &StepIntoList(*node, step, defaults)
                       : &StepIntoMap(*node, step, defaults, is_last, value.place);
   }

@@ -80,6 +80,7 @@ ConfigPlace PlaceOf(const ConfigNode& tree, std::string_view path);
 
 // Sets the entry at `path` ("a.b[0].c"; an index counts from 0) to `value`, merging as MergeTrees
 // does. Maps on the way are made where they are missing; a list must have the item already.
+// A new `type` of a variant drops what other layers (files, all overrides together) say of it.
 // `defaults`, where given, is the tree of the default values: an entry that the path goes through
 // and `tree` lacks starts as a copy of the default, so that an item of a default list can be set.
 // Throws ConfigError ("a.b: what") if the path is malformed or leads nowhere.

@@ -129,6 +129,25 @@ TEST(ConfigSet, ReachesMapsListsAndVariants) {
   EXPECT_EQ(Set("", {"count=5", "count=6"}).count, 6);
 }
 
+TEST(ConfigSet, AnotherTypeDropsWhatLowerLayersSayOfTheFormerOne) {
+  const auto thesis = [](double decay) { return decltype(Options::emitter)(Thesis{decay}); };
+  EXPECT_EQ(Set("", {"emitter.type=thesis"}).emitter, thesis(6));  // the default is flat
+  EXPECT_EQ(Set("emitter: {type: flat, rings: 7}", {"emitter.type=thesis"}).emitter, thesis(6));
+  EXPECT_EQ(Set("emitter: {rings: 7}", {"emitter.type=thesis"}).emitter, thesis(6));
+  EXPECT_EQ(Set("emitter: flat", {"emitter.type=thesis", "emitter.decay=4"}).emitter, thesis(4));
+  EXPECT_EQ(std::get<Flat>(Set("emitter: {rings: 7}", {"emitter.type=flat"}).emitter).rings, 7);
+  const Options mixed = Set("", {"emitter=mixed", "emitter.rest={type: flat, rings: 4}",
+                                 "emitter.type=thesis", "emitter.decay=3"});
+  EXPECT_EQ(mixed.emitter, thesis(3));
+}
+
+TEST(ConfigSet, AnotherTypeRefusesWhatIsGivenBesideItForTheFormerOne) {
+  EXPECT_EQ(SetErrors("", {"emitter.rings=4", "emitter.type=thesis"}),
+            "--set emitter.rings=4: emitter.rings: unknown key");
+  EXPECT_EQ(SetErrors("emitter: {rings: 7}", {"emitter.type=thesis", "emitter.rings=4"}),
+            "--set emitter.rings=4: emitter.rings: unknown key");
+}
+
 TEST(ConfigSet, PathsAreRelativeToTheCurrentFolder) {
   EXPECT_EQ(
       ReadConfigText<Options>("", "/far/x.yaml", std::vector<std::string>{"skull=s.ply"}).skull,
@@ -246,6 +265,26 @@ TEST(OptionsReference, TellsTypeDefaultRangeUnitAndMeaning) {
   EXPECT_THAT(text, HasSubstr("schedule[].level: whole number, default 0, 0 to 6\n"));
   EXPECT_THAT(text, HasSubstr("values: map by name: number or null, default {}, at least 0 mm\n"));
   EXPECT_THAT(text, HasSubstr("emitter.parts[].rings (type: mixed) (type: flat): whole number"));
+}
+
+// A struct that gives its parts other defaults than their own.
+struct Outer {
+  testing::Step step = {.level = 3};
+  testing::Emitter emitter = Thesis{.decay = 9};
+};
+template <class Visitor>
+void Fields(Visitor& visit, Outer& o) {
+  visit(FieldInfo{.name = "step"}, o.step);
+  visit(FieldInfo{.name = "emitter"}, o.emitter);
+}
+
+TEST(OptionsReference, StatesTheDefaultsOfTheStructAround) {
+  const std::string text = OptionsReference<Outer>();
+  EXPECT_THAT(text, HasSubstr("step.level: whole number, default 3, 0 to 6\n"));
+  EXPECT_THAT(text, HasSubstr("emitter.decay (type: thesis): number, default 9, 0.5 to 50\n"));
+  EXPECT_THAT(text, HasSubstr("emitter.rings (type: flat): whole number, default 2, at least 1\n"));
+  const auto read = ReadConfigText<Outer>("emitter: thesis", "x.yaml").emitter;
+  EXPECT_EQ(std::get<Thesis>(read).decay, 9);
 }
 
 // Every path of a schema, written as the reference writes it.

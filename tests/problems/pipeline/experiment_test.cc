@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
 #include "problems/pipeline/experiment_config.h"
 #include "tests/testing/scratch_file.h"
 
@@ -16,6 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 using testing::WordsOf;
+using Json = nlohmann::json;
 
 std::string Faults(const std::string& text) {
   return WordsOf<ConfigError>([&] { ReadConfigText<Experiment>(text, "a.yaml"); });
@@ -45,6 +49,76 @@ TEST(Experiment, AFaultOfADefaultIsToldWhereTheFileComesNearest) {
   EXPECT_THAT(Faults("template: {max_level: 1}\n"),
               AllOf(StartsWith("a.yaml:1:1: fit.schedule[2].level: level 2"),
                     HasSubstr("fit.schedule[5].level")));
+}
+
+// Checks each default that the reference and the schema state against `node`, a part of the tree
+// that resolved.yaml is written from.
+class StatedDefaults {
+ public:
+  void Check(const ConfigNode& node, const Json& schema, const std::string& path,
+             const std::string& condition) {
+    const ConfigNode* type = node.Find("type");
+    if (type) {
+      ExpectLine(path + condition, *type);
+    }
+    const std::string inside = type ? condition + " (type: " + type->text + ")" : condition;
+    const Json& properties = type ? Alternative(schema, type->text) : schema["properties"];
+    for (const ConfigNode::Entry& entry : node.entries) {
+      const std::string entry_path = path.empty() ? entry.key : path + "." + entry.key;
+      if (entry.value.IsMap() && !entry.value.entries.empty()) {
+        Check(entry.value, properties[entry.key], entry_path, inside);
+      } else if (entry.key != "type") {
+        ++checked;
+        ExpectLine(entry_path + inside, entry.value);
+        ExpectJson(properties[entry.key]["default"], entry.value, entry_path);
+      }
+    }
+  }
+  int checked = 0;
+
+ private:
+  static const Json& Alternative(const Json& schema, const std::string& type) {
+    for (const Json& alternative : schema["anyOf"]) {
+      if (alternative.contains("properties") &&
+          alternative["properties"]["type"]["const"] == type) {
+        return alternative["properties"];
+      }
+    }
+    throw std::logic_error("the schema has no type " + type);
+  }
+  void ExpectLine(const std::string& path, const ConfigNode& node) const {
+    const std::size_t begin = reference_.find("\n" + path + ": ");
+    ASSERT_NE(begin, std::string::npos) << path;
+    const std::string line =
+        reference_.substr(begin + 1, reference_.find('\n', begin + 1) - begin - 1) + ",";
+    EXPECT_THAT(line, HasSubstr(", default " + ToFlowYaml(node) + ","));
+  }
+  static void ExpectJson(const Json& stated, const ConfigNode& node, const std::string& path) {
+    ASSERT_EQ(stated.size(), node.IsList() ? node.items.size() : stated.size()) << path;
+    if (node.IsScalar()) {
+      EXPECT_EQ(stated, stated.is_string() ? Json(node.text) : Json::parse(node.text)) << path;
+    } else if (node.IsNull()) {
+      EXPECT_TRUE(stated.is_null()) << path;
+    }
+  }
+
+  const std::string reference_ = "\n" + OptionsReference<Experiment>();
+};
+
+TEST(Experiment, TheReferenceAndTheSchemaStateTheDefaultsThatResolvedYamlHas) {
+  StatedDefaults defaults;
+  defaults.Check(ConfigTreeOf(Experiment{}), Json::parse(OptionsSchema<Experiment>()), "", "");
+  EXPECT_GT(defaults.checked, 100);
+  EXPECT_THAT(OptionsReference<Experiment>(), HasSubstr("\nseeds.weight: number, default 0.1,"));
+}
+
+TEST(Experiment, ASchemeCanBeSetByItsTypeAlone) {
+  const auto set = [](const std::string& text, const std::vector<std::string>& overrides) {
+    return ReadConfigText<Experiment>(text, "a.yaml", overrides).interp;
+  };
+  EXPECT_TRUE(std::holds_alternative<NaturalNeighbour>(set("", {"interp.type=natural_neighbour"})));
+  EXPECT_TRUE(std::holds_alternative<NaturalNeighbour>(
+      set("interp: {type: kriging}", {"interp.type=natural_neighbour"})));
 }
 
 }  // namespace
