@@ -5,11 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <sstream>
 #include <vector>
 
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_io.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -19,54 +18,14 @@
 namespace semblance {
 namespace {
 
-// At least one; a cell may be empty.
-std::vector<std::string> CellsOf(std::string line) {
-  if (line.ends_with('\r')) {
-    line.pop_back();
-  }
-  std::vector<std::string> cells(1);
-  for (const char c : line) {
-    if (c == ',') {
-      cells.emplace_back();
-    } else {
-      cells.back() += c;
-    }
-  }
-  return cells;
-}
-
-// NaN for an empty cell.
-double NumberOf(const std::string& cell, const std::string& where, std::size_t line) {
-  if (cell.empty()) {
-    return kNaN;
-  }
-  char* end = nullptr;
-  const double value = std::strtod(cell.c_str(), &end);
-  if (end == cell.c_str() || *end != 0) {
-    throw InputError(fmt::format("{}:{}: '{}' is no number", where, line, cell));
-  }
-  return value;
-}
-
+// NaN where the cell is empty.
 std::vector<double> CsvColumn(const std::string& text, const std::string& name,
                               const std::string& where) {
-  std::istringstream lines(text);
-  std::string line;
-  std::getline(lines, line);
-  const std::vector<std::string> header = CellsOf(line);
-  const auto column = std::ranges::find(header, name) - header.begin();
-  if (column == static_cast<std::ptrdiff_t>(header.size())) {
-    throw InputError(fmt::format("{}:1: there is no column '{}'; there are {}", where, name,
-                                 fmt::join(header, ", ")));
-  }
+  CsvReader csv(text, where);
+  const std::size_t column = csv.ColumnOf(name);
   std::vector<double> values;
-  for (std::size_t number = 2; std::getline(lines, line); ++number) {
-    const std::vector<std::string> cells = CellsOf(line);
-    if (cells.size() != header.size()) {
-      throw InputError(fmt::format("{}:{}: {} cells, but the first line names {}", where, number,
-                                   cells.size(), header.size()));
-    }
-    values.push_back(NumberOf(cells[column], where, number));
+  while (csv.NextRow()) {
+    values.push_back(csv.NumberOrNan(column));
   }
   return values;
 }

@@ -10,6 +10,8 @@
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
 #include "problems/report/fit_json.h"
+#include "problems/report/timing_json.h"
+#include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
@@ -98,13 +100,11 @@ Json ResultJsonOf(const PointFitOptions& options, const std::filesystem::path& p
 }
 
 std::string ResidualsCsv(const FitResult& fit) {
-  fmt::memory_buffer csv;
-  fmt::format_to(std::back_inserter(csv), "point,u,v,residual_mm\n");
+  CsvWriter csv({"point", "u", "v", "residual_mm"});
   for (std::size_t k = 0; k < fit.uv.size(); ++k) {
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{}\n", k, fit.uv[k].x(), fit.uv[k].y(),
-                   fit.residual_mm[k]);
+    csv.Row(k, fit.uv[k].x(), fit.uv[k].y(), fit.residual_mm[k]);
   }
-  return fmt::to_string(csv);
+  return csv.Text();
 }
 
 std::string SurfacePly(const HSplineSurface& surface, double chord_mm, int threads) {
@@ -140,11 +140,7 @@ void WritePointFit(const PointFitOptions& options, const std::filesystem::path& 
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
   folder.Write("surface.ply", SurfacePly(result.fit.surface, options.chord_mm, context.threads));
   folder.Write("residuals.csv", ResidualsCsv(result.fit));
-  Json timing = {{"steps", Json::array()}};
-  for (const StepTime& time : result.times) {
-    timing["steps"].push_back({{"step", time.step}, {"wall_s", time.wall_s}});
-  }
-  folder.Write("timing.json", timing.dump(2) + "\n");
+  folder.Write("timing.json", TimingJson(result.times));
   folder.Write("result.json", ResultJsonOf(options, points, result).dump(2) + "\n");
 }
 

@@ -16,6 +16,8 @@
 #include "problems/report/fit_json.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/scene_json.h"
+#include "problems/report/timing_json.h"
+#include "surfaces/base/csv.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/mesh/mesh_io.h"
@@ -100,37 +102,31 @@ int TargetIndex(const FitTarget& target, const std::string& site) {
   return found == target.points.end() ? -1 : static_cast<int>(found - target.points.begin());
 }
 
-// A number of a table, empty where there is none.
-std::string Cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
-
 std::string DowelsCsv(const RunResult& result) {
-  std::string csv =
-      "site,base_x_mm,base_y_mm,base_z_mm,direction_x,direction_y,direction_z,depth_mm,sd_mm,tip_x_"
-      "mm,tip_y_mm,tip_z_mm,u,v,fit_residual_mm\n";
+  CsvWriter csv({"site", "base_x_mm", "base_y_mm", "base_z_mm", "direction_x", "direction_y",
+                 "direction_z", "depth_mm", "sd_mm", "tip_x_mm", "tip_y_mm", "tip_z_mm", "u", "v",
+                 "fit_residual_mm"});
   for (const Dowel& d : result.subject.dowels) {
     const int index = TargetIndex(result.target, d.site);
+    const Vec2 uv = index < 0 ? Vec2(kNaN, kNaN) : result.fit.uv[index];
     const Vec3 tip = d.Tip();
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", d.site, d.base.x(),
-                       d.base.y(), d.base.z(), d.direction.x(), d.direction.y(), d.direction.z(),
-                       d.depth_mm, Cell(d.sd_mm), tip.x(), tip.y(), tip.z(),
-                       index < 0 ? "" : Cell(result.fit.uv[index].x()),
-                       index < 0 ? "" : Cell(result.fit.uv[index].y()),
-                       index < 0 ? "" : Cell(result.fit.residual_mm[index]));
+    csv.Row(d.site, d.base.x(), d.base.y(), d.base.z(), d.direction.x(), d.direction.y(),
+            d.direction.z(), d.depth_mm, d.sd_mm, tip.x(), tip.y(), tip.z(), uv.x(), uv.y(),
+            index < 0 ? kNaN : result.fit.residual_mm[index]);
   }
-  return csv;
+  return csv.Text();
 }
 
 std::string SeedsCsv(const RunResult& result) {
-  std::string csv = "seed,x_mm,y_mm,z_mm,u,v,weight,fit_residual_mm\n";
+  CsvWriter csv({"seed", "x_mm", "y_mm", "z_mm", "u", "v", "weight", "fit_residual_mm"});
   for (std::size_t k = 0; k < result.target.points.size(); ++k) {
     const FitPoint& p = result.target.points[k];
     if (p.role == PointRole::kSeed) {
-      csv += fmt::format("{},{},{},{},{},{},{},{}\n", p.label, p.position.x(), p.position.y(),
-                         p.position.z(), result.fit.uv[k].x(), result.fit.uv[k].y(), p.weight,
-                         Cell(result.fit.residual_mm[k]));
+      csv.Row(p.label, p.position.x(), p.position.y(), p.position.z(), result.fit.uv[k].x(),
+              result.fit.uv[k].y(), p.weight, result.fit.residual_mm[k]);
     }
   }
-  return csv;
+  return csv.Text();
 }
 
 std::vector<std::array<std::uint8_t, 3>> Bytes(const std::vector<Colour>& colours) {
@@ -193,17 +189,6 @@ void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext
   }
   folder.Write("depth.ply",
                MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthColours()));
-}
-
-std::string TimingJson(const std::vector<StepTime>& times) {
-  Json json = {{"steps", Json::array()}};
-  double total = 0;
-  for (const StepTime& time : times) {
-    json["steps"].push_back({{"step", time.step}, {"wall_s", time.wall_s}});
-    total += time.wall_s;
-  }
-  json["total_wall_s"] = total;
-  return json.dump(2) + "\n";
 }
 
 // What went in, and what it was made with.

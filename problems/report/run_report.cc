@@ -2,13 +2,16 @@
 // report.html of a run, from the files of its folder alone.
 #include <fmt/format.h>
 
+#include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "problems/report/report.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/scene_json.h"
 #include "problems/report/svg_plot.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -163,23 +166,18 @@ ReportTable LevelsTable(const Json& fit) {
 }
 
 // Some columns of dowels.csv, rounded for reading.
-ReportTable DowelsTable(const std::string& csv) {
+ReportTable DowelsTable(const std::filesystem::path& file) {
   ReportTable table{"Dowels", {"site", "depth (mm)", "SD (mm)", "u", "v", "fit residual (mm)"}, {}};
-  std::istringstream lines(csv);
-  std::string line;
-  std::getline(lines, line);  // the header
-  while (std::getline(lines, line)) {
-    std::vector<std::string> cells;
-    std::istringstream parts(line + ",");
-    for (std::string cell; std::getline(parts, cell, ',');) {
-      cells.push_back(cell);
+  const std::string text = ReadFileBytes(file);
+  CsvReader csv(text, file.string());
+  const std::size_t site = csv.ColumnOf("site");
+  while (csv.NextRow()) {
+    std::vector<std::string> row = {std::string(csv.Cell(site))};
+    for (const char* column : {"depth_mm", "sd_mm", "u", "v", "fit_residual_mm"}) {
+      const double value = csv.NumberOrNan(csv.ColumnOf(column));
+      row.push_back(std::isnan(value) ? "" : fmt::format("{:.2f}", value));
     }
-    const auto rounded = [&](std::size_t c) {
-      return c >= cells.size() || cells[c].empty() ? ""
-                                                   : fmt::format("{:.2f}", std::stod(cells[c]));
-    };
-    table.rows.push_back(
-        {cells.at(0), rounded(7), rounded(8), rounded(12), rounded(13), rounded(14)});
+    table.rows.push_back(std::move(row));
   }
   return table;
 }
@@ -288,7 +286,7 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
        .tables = Filled({LevelsTable(result.at("fit")), RelaxationTable(result.at("fit")),
                          FeaturesTable(result.at("fit")),
                          CountsTable("Counts of the fit", result.at("fit")),
-                         DowelsTable(ReadFileBytes(folder.Root() / "dowels.csv"))})});
+                         DowelsTable(folder.Root() / "dowels.csv")})});
   if (HasSigma(result)) {
     report.sections.push_back(UncertaintySection(result, folder));
   }

@@ -2,10 +2,9 @@
 // The files of a measured depth.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "problems/pictures/pictures.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/report/timing_json.h"
 #include "problems/study/depth_study.h"
 #include "surfaces/mesh/mesh_io.h"
 
@@ -43,14 +42,6 @@ std::string TipsPly(const DepthResult& result) {
     keep.push_back(std::isfinite(depth_mm[t[0]] + depth_mm[t[1]] + depth_mm[t[2]]));
   }
   return EncodeMesh(Submesh(tips, keep), ".ply");
-}
-
-std::string TimingJson(const std::vector<StepTime>& times) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const StepTime& time : times) {
-    json[time.step] = time.wall_s;
-  }
-  return json.dump(2) + "\n";
 }
 
 }  // namespace

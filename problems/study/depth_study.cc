@@ -9,6 +9,7 @@
 
 #include "problems/report/depth_json.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/csv.h"
 
 namespace semblance {
 namespace {
@@ -38,8 +39,6 @@ std::vector<std::pair<std::string, CrossValidation>> LeaveOut(const Experiment& 
   }
   return left_out;
 }
-
-std::string Cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
 const char* InWords(DepthStatus status) {
   return status == DepthStatus::kAssigned  ? "assigned"
@@ -107,17 +106,16 @@ std::string DepthResultJson(const Experiment& experiment, const DepthResult& res
 }
 
 std::string LeftOutCsv(const DepthResult& result) {
-  std::string csv =
-      "kind,site,landmark,region,depth_mm,predicted_mm,error_mm,sd_mm,within_90,status\n";
+  CsvWriter csv({"kind", "site", "landmark", "region", "depth_mm", "predicted_mm", "error_mm",
+                 "sd_mm", "within_90", "status"});
   for (const auto& [kind, left_out] : result.left_out) {
     for (const LeftOut& out : left_out.left_out) {
-      csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", kind, out.site, WithoutSide(out.site),
-                         kFaceParts[FacePartOfSite(out.site)], out.depth_mm, Cell(out.predicted_mm),
-                         Cell(out.error_mm), Cell(out.sd_mm),
-                         out.within_90 ? (*out.within_90 ? "1" : "0") : "", InWords(out.status));
+      csv.Row(kind, out.site, WithoutSide(out.site), kFaceParts[FacePartOfSite(out.site)],
+              out.depth_mm, out.predicted_mm, out.error_mm, out.sd_mm, out.within_90,
+              InWords(out.status));
     }
   }
-  return csv;
+  return csv.Text();
 }
 
 std::string DepthText(const DepthResult& result) {

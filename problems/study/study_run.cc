@@ -17,6 +17,7 @@
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/scene_json.h"
+#include "problems/report/timing_json.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/study_tables.h"
 #include "surfaces/base/atomic_file.h"
@@ -73,15 +74,6 @@ double ThreadCpu_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-// Wall time of each step and, of the whole, the processor's; what others made for it is not in it.
-std::string TimingJson(const std::vector<StepTime>& times, double cpu_s) {
-  Json json = {{"cpu_s", cpu_s}};
-  for (const StepTime& time : times) {
-    json[time.step] = time.wall_s;
-  }
-  return json.dump(2) + "\n";
 }
 
 std::shared_ptr<const DiskCache> CacheOnDisk(const StudyRunOptions& options) {
@@ -203,7 +195,6 @@ class StudyRunner {
       const RunContext quiet;
       if (plan_.keep == TrialFiles::kRun) {
         WriteRun(trial.experiment, *result, output, quiet);
-        return;
       }
       output.Write("timing.json", TimingJson(result->times, cpu_s), Durability::kUnsynced);
       if (plan_.keep == TrialFiles::kView) {

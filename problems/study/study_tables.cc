@@ -9,6 +9,7 @@
 #include <set>
 
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -73,28 +74,6 @@ void ReadTrial(const fs::path& folder, TrialRow& row) {
   }
 }
 
-// A cell as RFC 4180 wants it.
-std::string Cell(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) {
-    return text;
-  }
-  std::string quoted = "\"";
-  for (const char c : text) {
-    quoted += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return quoted + "\"";
-}
-
-std::string Cells(const std::vector<std::string>& texts) {
-  std::string line;
-  for (const std::string& text : texts) {
-    line += Cell(text) + ",";
-  }
-  return line;
-}
-
-std::string CsvNumber(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
-
 std::map<std::string, double> BySubject(const StudyResults& results, const Treatment& treatment,
                                         const std::string& metric) {
   std::map<std::string, double> values;
@@ -105,6 +84,17 @@ std::map<std::string, double> BySubject(const StudyResults& results, const Treat
     }
   }
   return values;
+}
+
+// The names of all metrics that a trial has, sorted.
+std::set<std::string> MetricsOf(const StudyResults& results) {
+  std::set<std::string> metrics;
+  for (const TrialRow& row : results.trials) {
+    for (const auto& [metric, value] : row.metrics) {
+      metrics.insert(metric);
+    }
+  }
+  return metrics;
 }
 
 }  // namespace
@@ -170,43 +160,39 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
 }
 
 std::string TrialsCsv(const StudyResults& results) {
-  std::string csv = "trial,subject," + Cells(results.axes) + "status,reason,metric,value\n";
+  std::vector<std::string> columns = {"trial", "subject"};
+  columns.insert(columns.end(), results.axes.begin(), results.axes.end());
+  columns.insert(columns.end(), {"status", "reason", "metric", "value"});
+  CsvWriter csv(columns);
   for (const TrialRow& row : results.trials) {
-    const std::string head = fmt::format("{},{},{}{},{},", row.id, Cell(row.subject),
-                                         Cells(row.values), row.status, Cell(row.reason));
     if (row.metrics.empty()) {
-      csv += head + ",\n";
+      csv.Row(row.id, row.subject, row.values, row.status, row.reason, "", "");
     }
     for (const auto& [metric, value] : row.metrics) {
-      csv += fmt::format("{}{},{}\n", head, metric, value);
+      csv.Row(row.id, row.subject, row.values, row.status, row.reason, metric, value);
     }
   }
-  return csv;
+  return csv.Text();
 }
 
 std::string SummaryCsv(const StudyResults& results) {
-  std::set<std::string> metrics;
-  for (const TrialRow& row : results.trials) {
-    for (const auto& [metric, value] : row.metrics) {
-      metrics.insert(metric);
-    }
-  }
-  std::string csv =
-      Cells(results.axes) + "metric,n,mean,sd,median,min,max,mean_low_95,mean_high_95\n";
+  std::vector<std::string> columns = results.axes;
+  columns.insert(columns.end(), {"metric", "n", "mean", "sd", "median", "min", "max", "mean_low_95",
+                                 "mean_high_95"});
+  CsvWriter csv(columns);
   const std::vector<Treatment> treatments = Treatments(results, results.metric);
-  for (const std::string& metric : metrics) {
+  for (const std::string& metric : MetricsOf(results)) {
     for (const Treatment& treatment : treatments) {
       std::vector<double> values;
       for (const auto& [subject, value] : BySubject(results, treatment, metric)) {
         values.push_back(value);
       }
       const SampleSummary s = Summarize(values);
-      csv += fmt::format("{}{},{},{},{},{},{},{},{},{}\n", Cells(treatment.values), metric, s.n,
-                         CsvNumber(s.mean), CsvNumber(s.sd), CsvNumber(s.median), CsvNumber(s.min),
-                         CsvNumber(s.max), CsvNumber(s.mean_95.low), CsvNumber(s.mean_95.high));
+      csv.Row(treatment.values, metric, s.n, s.mean, s.sd, s.median, s.min, s.max, s.mean_95.low,
+              s.mean_95.high);
     }
   }
-  return csv;
+  return csv.Text();
 }
 
 }  // namespace semblance

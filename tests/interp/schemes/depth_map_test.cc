@@ -128,9 +128,9 @@ TEST_F(DepthMapTest, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(ErrorOf({.file = WriteCsv("depth\n1\n")}),
               HasSubstr("map.csv:1: there is no column 'scalar_depth_mm'; there are depth"));
   EXPECT_THAT(ErrorOf({.file = WriteCsv("scalar_depth_mm\n1\ntwo\n")}),
-              HasSubstr("map.csv:3: 'two' is no number"));
+              HasSubstr("map.csv:3: column 'scalar_depth_mm': 'two' is not a finite"));
   EXPECT_THAT(ErrorOf({.file = WriteCsv("a,scalar_depth_mm\n1,2,3\n")}),
-              HasSubstr("map.csv:2: 3 cells, but the first line names 2"));
+              HasSubstr("map.csv:2: 3 entries for 2 columns"));
 }
 
 TEST_F(DepthMapTest, ReadsPlyNumbersOfEveryTypeAndOrder) {
