@@ -223,7 +223,7 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
     return ConfigNode::Map();
   };
   if (!base.IsScalar() || base.text.empty()) {
-    return fail("the path of a file is due");
+    return fail("expected the path of a file");
   }
   const std::filesystem::path base_file = (file.parent_path() / base.text).lexically_normal();
   const auto canonical = std::filesystem::weakly_canonical(base_file);
@@ -249,7 +249,7 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
     tree.kind = ConfigNode::Kind::kMap;
   } else if (!tree.IsMap()) {
     loading.errors.Add(tree.place, "",
-                       fmt::format("a map of options is due at the top, but here is {}",
+                       fmt::format("expected a map of options at the top, found {}",
                                    tree.IsList() ? "a list" : "a scalar"));
     return ConfigNode::Map();
   }

@@ -165,6 +165,19 @@ void ReadMap(ConfigErrors& errors, const ConfigItem& item, T& out) {
 }
 
 template <class T>
+void ReadMap(ConfigErrors& errors, const ConfigItem& item, ConfigMap<T>& out) {
+  if (!RequireMap(errors, item)) {
+    return;
+  }
+  out.entries.clear();
+  for (const ConfigNode::Entry& entry : item.node.entries) {
+    out.entries.push_back({entry.key, entry.key_place, T{}});
+    ReadElement(errors, {entry.value, JoinPath(item.path, entry.key), item.info},
+                out.entries.back().value);
+  }
+}
+
+template <class T>
 void ReadValue(ConfigErrors& errors, const ConfigItem& item, T& out) {
   if constexpr (kIs<T, std::optional>) {
     if (item.node.IsNull()) {
@@ -176,7 +189,7 @@ void ReadValue(ConfigErrors& errors, const ConfigItem& item, T& out) {
     }
   } else if constexpr (kIs<T, std::vector> || kIsArray<T>) {
     ReadList(errors, item, out);
-  } else if constexpr (kIs<T, std::map>) {
+  } else if constexpr (kIs<T, std::map> || kIs<T, ConfigMap>) {
     ReadMap(errors, item, out);
   } else if constexpr (kIs<T, std::variant>) {
     ReadVariant(errors, item, out, out.index());

@@ -17,6 +17,7 @@ ConfigNode ScalarToTree(double value);
 ConfigNode ScalarToTree(const AutoOr<double>& value);
 ConfigNode ScalarToTree(const std::string& value);
 ConfigNode ScalarToTree(const std::filesystem::path& value);
+inline ConfigNode ScalarToTree(const ConfigNode& value) { return value; }
 
 template <class T>
 ConfigNode ToTree(const T& value);
@@ -45,10 +46,20 @@ ConfigNode ItemsToTree(const T& value) {
 }
 
 template <class T>
+ConfigNode ItemsToTree(const ConfigMap<T>& value) {
+  ConfigNode node = ConfigNode::Map();
+  for (const auto& entry : value.entries) {
+    node.Set(entry.key, ToTree(entry.value));
+  }
+  return node;
+}
+
+template <class T>
 ConfigNode ToTree(const T& value) {
   if constexpr (kIs<T, std::optional>) {
     return value ? ToTree(*value) : ConfigNode{};
-  } else if constexpr (kIs<T, std::vector> || kIsArray<T> || kIs<T, std::map>) {
+  } else if constexpr (kIs<T, std::vector> || kIsArray<T> || kIs<T, std::map> ||
+                       kIs<T, ConfigMap>) {
     return ItemsToTree(value);
   } else if constexpr (kIs<T, std::variant>) {
     ConfigNode map = ConfigNode::Map();
@@ -109,6 +120,8 @@ constexpr ConfigType::Kind ScalarKind() {
     return Kind::kAutoNumber;
   } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
     return Kind::kPath;
+  } else if constexpr (std::is_same_v<T, ConfigNode>) {
+    return Kind::kAny;
   } else {
     static_assert(std::is_same_v<T, std::string>, "a field of this type cannot be configured");
     return Kind::kText;
@@ -132,6 +145,9 @@ ConfigType DescribeType(const T& value) {
   } else if constexpr (kIs<T, std::map>) {
     type.kind = Kind::kMap;
     type.inner = {DescribeType(typename T::mapped_type{})};
+  } else if constexpr (kIs<T, ConfigMap>) {
+    type.kind = Kind::kMap;
+    type.inner = {DescribeType(decltype(T::Entry::value){})};
   } else if constexpr (kIs<T, std::variant>) {
     type.kind = Kind::kVariant;
     type.alternatives = DescribeAlternatives(value);

@@ -19,7 +19,7 @@ void AddError(ConfigErrors& errors, const ConfigItem& item, std::string_view wha
   errors.Add(item.node.place, item.path, what);
 }
 
-// What stands there, for "a number is due, but here is ...".
+// What stands there, for "expected a number, found ...".
 std::string Describe(const ConfigNode& node) {
   switch (node.kind) {
     case ConfigNode::Kind::kNull:
@@ -34,13 +34,13 @@ std::string Describe(const ConfigNode& node) {
   }
 }
 
-void AddKindError(ConfigErrors& errors, const ConfigItem& item, std::string_view due) {
-  AddError(errors, item, fmt::format("{} is due, but here is {}", due, Describe(item.node)));
+void AddKindError(ConfigErrors& errors, const ConfigItem& item, std::string_view expected) {
+  AddError(errors, item, fmt::format("expected {}, found {}", expected, Describe(item.node)));
 }
 
-bool RequireScalar(ConfigErrors& errors, const ConfigItem& item, std::string_view due) {
+bool RequireScalar(ConfigErrors& errors, const ConfigItem& item, std::string_view expected) {
   if (!item.node.IsScalar()) {
-    AddKindError(errors, item, due);
+    AddKindError(errors, item, expected);
   }
   return item.node.IsScalar();
 }
@@ -86,8 +86,8 @@ std::optional<double> ToDouble(std::string_view text, std::errc& error) {
 }
 
 // Complaints that whole and other numbers share. False if one was made.
-bool RequireNumberLike(ConfigErrors& errors, const ConfigItem& item, std::string_view due) {
-  if (!RequireScalar(errors, item, due)) {
+bool RequireNumberLike(ConfigErrors& errors, const ConfigItem& item, std::string_view expected) {
+  if (!RequireScalar(errors, item, expected)) {
     return false;
   }
   const std::string& text = item.node.text;
@@ -95,12 +95,13 @@ bool RequireNumberLike(ConfigErrors& errors, const ConfigItem& item, std::string
   if (item.node.quoted) {
     const std::string remedy = ToDouble(text, error) ? "; remove the quotes" : "";
     AddError(errors, item,
-             fmt::format("{} is due, but here is {}{}", due, Describe(item.node), remedy));
+             fmt::format("expected {}, found {}{}", expected, Describe(item.node), remedy));
   } else if (LooksNonFinite(text)) {
-    AddError(errors, item, fmt::format("'{}' is not finite; {} is due", text, due));
+    AddError(errors, item, fmt::format("'{}' is not finite; expected {}", text, expected));
   } else if (LooksLikeOtherBase(text)) {
-    AddError(errors, item,
-             fmt::format("'{}' is not plainly decimal; write {} without a leading 0", text, due));
+    AddError(
+        errors, item,
+        fmt::format("'{}' is not plainly decimal; write {} without a leading 0", text, expected));
   } else {
     return true;
   }
@@ -120,8 +121,8 @@ bool RequireInRange(ConfigErrors& errors, const ConfigItem& item, Number value) 
 
 template <class Integer>
 void ReadInteger(ConfigErrors& errors, const ConfigItem& item, Integer& out) {
-  constexpr std::string_view kDue = "a whole number";
-  if (!RequireNumberLike(errors, item, kDue)) {
+  constexpr std::string_view kExpected = "a whole number";
+  if (!RequireNumberLike(errors, item, kExpected)) {
     return;
   }
   const std::string_view bare = ForFromChars(item.node.text);
@@ -135,11 +136,11 @@ void ReadInteger(ConfigErrors& errors, const ConfigItem& item, Integer& out) {
              fmt::format("{} does not fit; allowed is {} to {}", item.node.text,
                          std::numeric_limits<Integer>::min(), std::numeric_limits<Integer>::max()));
   } else if (!is_whole && ToDouble(item.node.text, as_double)) {
-    AddError(errors, item,
-             fmt::format("a whole number is due, but here is {}; write it in digits alone",
-                         item.node.text));
+    AddError(
+        errors, item,
+        fmt::format("expected a whole number, found {}; write it in digits alone", item.node.text));
   } else if (!is_whole) {
-    AddKindError(errors, item, kDue);
+    AddKindError(errors, item, kExpected);
   } else if (RequireInRange(errors, item, value)) {
     out = value;
   }
@@ -173,11 +174,11 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, double& out) {
   if (!value) {
     const bool has_comma = item.node.text.find(',') != std::string::npos;
     AddError(errors, item,
-             fmt::format("a number is due, but here is {}{}", Describe(item.node),
+             fmt::format("expected a number, found {}{}", Describe(item.node),
                          has_comma ? "; the decimal sign is a point" : ""));
   } else if (error == std::errc::result_out_of_range || !std::isfinite(*value)) {
     AddError(errors, item,
-             fmt::format("{} does not fit; a number between 1e-308 and 1e308 in size is due",
+             fmt::format("{} does not fit; expected a number between 1e-308 and 1e308 in size",
                          item.node.text));
   } else if (RequireInRange(errors, item, *value)) {
     out = *value;
@@ -216,11 +217,13 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::p
   }
 }
 
+void ReadScalar(ConfigErrors&, const ConfigItem& item, ConfigNode& out) { out = item.node; }
+
 std::optional<std::size_t> ReadWord(ConfigErrors& errors, const ConfigItem& item,
                                     std::string_view what, std::span<const std::string> words) {
   if (!item.node.IsScalar()) {
     AddError(errors, item,
-             fmt::format("a {} is due, but here is {}; known are: {}", what, Describe(item.node),
+             fmt::format("expected a {}, found {}; known are: {}", what, Describe(item.node),
                          fmt::join(words, ", ")));
     return std::nullopt;
   }
@@ -270,9 +273,9 @@ bool RequireSize(ConfigErrors& errors, const ConfigItem& item, std::optional<std
   const std::size_t found = item.node.items.size();
   const bool fits = size ? found == *size : static_cast<double>(found) >= item.info.min;
   if (!fits) {
-    const std::string due =
+    const std::string expected =
         size ? fmt::format("{}", *size) : fmt::format("at least {:g}", item.info.min);
-    AddError(errors, item, fmt::format("a list of {} is due, but here are {}", due, found));
+    AddError(errors, item, fmt::format("expected a list of {}, found {}", expected, found));
   }
   return fits;
 }

@@ -29,6 +29,7 @@ struct ConfigItem {
 //   integer  decimal digits with an optional sign; 1e3, 1.0, 010 and 0x10 are errors
 //   number   decimal, `.` and exponent allowed; nan and inf are errors, also as too large a number
 //   text     any scalar, plain or quoted, other than null
+//   any      whatever stands there, for who knows later what it is
 //   path     a text; relative ones are relative to the folder of the file it stands in (or to the
 //            current folder, in an override); absolute and normal when read; empty stays empty
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, bool& out);
@@ -38,6 +39,7 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, double& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoOr<double>& out);  // or `auto`
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::string& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::path& out);
+void ReadScalar(ConfigErrors& errors, const ConfigItem& item, ConfigNode& out);
 
 // The index of the scalar in `words`, or nothing and an error. `what` is "word" or "type".
 std::optional<std::size_t> ReadWord(ConfigErrors& errors, const ConfigItem& item,

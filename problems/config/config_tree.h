@@ -69,6 +69,18 @@ struct ConfigNode::Entry {
   ConfigNode value;
 };
 
+// A map in the order of the file that remembers where its keys stand: a field for option paths and
+// other keys whose order or place matters.
+template <class T>
+struct ConfigMap {
+  struct Entry {
+    std::string key;
+    ConfigPlace key_place;
+    T value;
+  };
+  std::vector<Entry> entries;
+};
+
 // `over` laid over `base`: maps merge key by key, all else replaces. A map whose `type` differs
 // from the one in `base` replaces it wholly; a map without `type` over the bare name of a type
 // gives options to that type.

@@ -22,6 +22,7 @@ struct ConfigType {
     kUnsigned,
     kNumber,
     kAutoNumber,  // a number or the word auto
+    kAny,         // any part of a tree
     kText,
     kPath,
     kWord,      // an enum; words

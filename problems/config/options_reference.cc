@@ -32,6 +32,8 @@ std::string TypeText(const ConfigType& type) {
       return "number";
     case Kind::kAutoNumber:
       return "number or auto";
+    case Kind::kAny:
+      return "any value";
     case Kind::kText:
       return "text";
     case Kind::kPath:
@@ -65,11 +67,13 @@ std::string DefaultText(const ConfigField& field) {
 }
 
 std::string LimitText(const ConfigField& field) {
-  const bool is_list = field.type.kind == Kind::kList;
+  const ConfigType& inner = field.type.kind == Kind::kMap ? field.type.inner.front() : field.type;
+  const bool is_list = inner.kind == Kind::kList;
   FieldInfo info = field.info;
   std::string text;
   if (is_list && info.min > 0) {
-    text = fmt::format(", at least {} of them", info.min);
+    text = fmt::format(", at least {} of them{}", info.min,
+                       field.type.kind == Kind::kMap ? " each" : "");
   }
   if (is_list) {
     info.min = FieldInfo{}.min;

@@ -142,6 +142,8 @@ Json TypeSchema(const ConfigType& type, const FieldInfo& info) {
       return NumberSchema("number", info);
     case Kind::kAutoNumber:
       return {{"anyOf", {NumberSchema("number", info), {{"const", "auto"}}}}};
+    case Kind::kAny:
+      return Json::object();
     case Kind::kWord:
       return {{"enum", type.words}};
     case Kind::kOptional:
@@ -165,7 +167,7 @@ Json TypeSchema(const ConfigType& type, const FieldInfo& info) {
 std::string SchemaText(const ConfigType& type) {
   Json schema{{"$schema", "https://json-schema.org/draft/2020-12/schema"}};
   schema.update(TypeSchema(type, FieldInfo{}));
-  if (type.kind == Kind::kStruct) {
+  if (type.kind == Kind::kStruct && !schema["properties"].contains("base")) {
     schema["properties"]["base"] = {
         {"type", "string"},
         {"description", "file that this one is laid over, relative to this file"}};

@@ -3,29 +3,27 @@
 // other.
 #pragma once
 
-#include <string>
-#include <utility>
+#include <cstdint>
 #include <vector>
 
 #include "problems/config/config_errors.h"
-#include "problems/config/config_tree.h"
+#include "problems/study/study_file.h"
 
 namespace semblance {
 
-struct StudySetting {
-  std::string path;
-  ConfigPlace path_place;
-  ConfigNode value;
-};
-using StudyRow = std::vector<StudySetting>;
+using OptionSetting = OptionValues::Entry;
+using StudyRow = std::vector<OptionSetting>;
 
 // The rows of the whole file: every combination of one row of grid, zip, list and sample each; one
 // empty row if there is none of them. Faults go to `errors`.
-std::vector<StudyRow> StudyRows(const ConfigNode& study, ConfigErrors& errors);
+std::vector<StudyRow> StudyRows(const StudyFile& study, ConfigErrors& errors);
 
-// n points of [0,1]^dimensions, one a line. lhs: one in each of n equal slices of each axis (McKay
-// et al. 1979); sobol: the first n of the sequence after its origin.
-enum class SampleMethod { kLhs, kSobol };
+// Sets the option in an experiment's tree; `defaults` as for SetPath. A path that leads nowhere is
+// an error at its place.
+void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, ConfigNode& tree,
+                  ConfigErrors& errors);
+
+// n points of [0,1]^dimensions. random_seed: of kLhs.
 std::vector<std::vector<double>> UnitSamples(SampleMethod method, int n, int dimensions,
                                              std::uint64_t random_seed);
 

@@ -104,11 +104,11 @@ TEST_F(ConfigFiles, BadBasesAreErrorsWithTheirPlace) {
                                 ":1:8: count: 0 is out of range; allowed is 1 to 100\n" +
                                 lost.string() + ":2:7: base: " + (folder_ / "none.yaml").string() +
                                 ": no such file; paths are relative to this file");
-  EXPECT_THAT(ErrorsOf(Write("list.yaml", "base: [a]\n")), HasSubstr("the path of a file is due"));
+  EXPECT_THAT(ErrorsOf(Write("list.yaml", "base: [a]\n")),
+              HasSubstr("expected the path of a file"));
   Write("wrong.yaml", "count: x\n");
-  EXPECT_EQ(
-      ErrorsOf(Write("over.yaml", "base: wrong.yaml\n")),
-      (folder_ / "wrong.yaml").string() + ":1:8: count: a whole number is due, but here is 'x'");
+  EXPECT_EQ(ErrorsOf(Write("over.yaml", "base: wrong.yaml\n")),
+            (folder_ / "wrong.yaml").string() + ":1:8: count: expected a whole number, found 'x'");
 }
 
 TEST(ConfigSet, ReachesMapsListsAndVariants) {
@@ -161,7 +161,7 @@ TEST(ConfigSet, ErrorsNameTheOverride) {
       {"lst.level=2", "--set lst.level=2: lst: unknown key; did you mean 'last'?"},
       {"last.levl=2", "--set last.levl=2: last.levl: unknown key; did you mean 'level'?"},
       {"count", "--set count: an override is written path=value"},
-      {"count=", "--set count=: count: a whole number is due, but here is nothing (null)"},
+      {"count=", "--set count=: count: expected a whole number, found nothing (null)"},
       {"=3", "--set =3: : not a path; write it like a.b[0].c"},
       {"a..b=3", "--set a..b=3: a..b: not a path; write it like a.b[0].c"},
       {"schedule[x]=3", "--set schedule[x]=3: schedule[x]: not a path; write it like a.b[0].c"},
@@ -180,7 +180,7 @@ TEST(ConfigSet, ErrorsNameTheOverride) {
     EXPECT_EQ(SetErrors("", {text}), error);
   }
   EXPECT_EQ(SetErrors("label: [1]", {"count=0"}),
-            "x.yaml:1:8: label: a text is due, but here is a list\n"
+            "x.yaml:1:8: label: expected a text, found a list\n"
             "--set count=0: count: 0 is out of range; allowed is 1 to 100");
 }
 

@@ -119,7 +119,7 @@ TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   refused("line.csv plain.yaml", "lie on a line");
   refused("good.csv cylinder.yaml", "closure: periodic_u");
   refused("good.csv plain.yaml --set parameters=given", "columns u and v");
-  refused("good.csv plain.yaml --set fit.terms[1].weight=some", "a number is due");
+  refused("good.csv plain.yaml --set fit.terms[1].weight=some", "expected a number");
 }
 
 // A height field that is turned in space, without (u,v): the plane is found.

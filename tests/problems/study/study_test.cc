@@ -122,14 +122,14 @@ TEST_F(StudyTest, EveryFaultIsSaidOnceAtItsLine) {
       "grid: {rounds: [1, 2000]}\n");
   EXPECT_EQ(std::count(twice.begin(), twice.end(), '\n'), 0) << twice;
   EXPECT_THAT(Faults("grids: {}\n"), HasSubstr("did you mean 'grid'?"));
-  EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("a list of one or more values"));
+  EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("grid.interp: expected a list"));
   EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("go side by side"));
   EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"), HasSubstr("must be the lower"));
-  EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"), HasSubstr("a name of its own"));
+  EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"), HasSubstr("the name 'a' stands twice"));
   EXPECT_THAT(Faults("grid: {rounds: [2, 2]}\n"), HasSubstr("are the same experiment"));
   EXPECT_THAT(Faults("grid: {no.such: [2]}\n"), HasSubstr("no"));
   EXPECT_THAT(WordsOf<ConfigError>([&] { ReadStudy(Write("grid: {rounds: [1]}\n")); }),
-              HasSubstr("base: the file of an experiment is due"));
+              HasSubstr("base: the file of an experiment is missing"));
 }
 
 TEST_F(StudyTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorIfNot) {
