@@ -306,6 +306,12 @@ ConfigNode LoadConfigTree(const std::filesystem::path& file, std::span<const std
   return LoadConfigTextTree(ReadFileBytes(file), file, overrides, defaults, errors);
 }
 
+int CommonKeys(const ConfigNode& a, const ConfigNode& b) {
+  return static_cast<int>(
+      std::count_if(a.entries.begin(), a.entries.end(),
+                    [&](const ConfigNode::Entry& entry) { return b.Find(entry.key) != nullptr; }));
+}
+
 void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
                    ConfigNode& tree, ConfigErrors& errors) {
   const ConfigSource source{.name = fmt::format("--set {}", override_text),

@@ -33,6 +33,7 @@
 #include "problems/config/config_tree.h"
 #include "problems/config/config_writer.h"
 #include "problems/config/options_reference.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -49,6 +50,9 @@ ConfigNode LoadConfigTree(const std::filesystem::path& file, std::span<const std
 ConfigNode LoadConfigTextTree(std::string_view text, const std::filesystem::path& pretend_file,
                               std::span<const std::string> overrides, const ConfigNode& defaults,
                               ConfigErrors& errors);
+
+// How many keys the two maps share.
+int CommonKeys(const ConfigNode& a, const ConfigNode& b);
 
 // One override laid over `tree`. `order` places its errors among those of other sources.
 void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
@@ -87,17 +91,23 @@ T ReadConfig(const std::filesystem::path& file, std::span<const std::string> ove
   return value;
 }
 
-// How many of the keys at the top of a file (and its bases) are fields of T: tells what a file is
+// How many of the keys at the top of a file and its bases are fields of T: tells what a file is
 // for. 0 for a file that cannot be read as YAML. Throws IoError if it cannot be read at all.
 template <class T>
 int KnownKeys(const std::filesystem::path& file) {
   ConfigErrors errors;
-  const ConfigNode fields = ConfigTreeOf(T{}), tree = LoadConfigTree(file, {}, fields, errors);
-  int known = 0;
-  for (const ConfigNode::Entry& entry : tree.entries) {
-    known += fields.Find(entry.key) != nullptr ? 1 : 0;
-  }
-  return known;
+  const ConfigNode fields = ConfigTreeOf(T{});
+  return CommonKeys(LoadConfigTree(file, {}, fields, errors), fields);
+}
+
+// The same without its bases, and without the key `base`, which every kind of file may have.
+template <class T>
+int OwnKeys(const std::filesystem::path& file) {
+  ConfigErrors errors;
+  const ConfigNode tree = ParseConfigText(ReadFileBytes(file), {.name = file.string()}, errors);
+  ConfigNode fields = ConfigTreeOf(T{});
+  std::erase_if(fields.entries, [](const auto& entry) { return entry.key == "base"; });
+  return CommonKeys(tree, fields);
 }
 
 // The same as ReadConfig for a text, as if it stood in `pretend_file`, which need not exist.

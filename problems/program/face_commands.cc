@@ -5,7 +5,6 @@
 
 #include <array>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -123,96 +122,101 @@ int ListCommand(const FaceArguments& a) {
   return kDone;
 }
 
-using FaceCommand = int (*)(const FaceArguments&);
+void AddForce(CLI::App& command, FaceArguments& a) {
+  command.add_flag("--force", a.force, "replace a file of the same name");
+}
 
-// Declares commands that share one set of arguments.
-class Declarer {
- public:
-  explicit Declarer(std::function<int()>& chosen) : chosen_(chosen) {}
+void AddFace(CLI::App& command, FaceArguments& a) {
+  command.add_option("FACE", a.face, "H-spline (.json)")->required();
+}
 
-  CLI::App* Add(CLI::App& app, const char* name, const char* help, FaceCommand command) {
-    CLI::App* sub = app.add_subcommand(name, help);
-    sub->callback(
-        [chosen = &chosen_, a = a_, command] { *chosen = [a, command] { return command(*a); }; });
-    return sub;
-  }
-  void AddForce(CLI::App* sub) {
-    sub->add_flag("--force", a_->force, "replace a file of the same name");
-  }
-  void AddFace(CLI::App* sub) { sub->add_option("FACE", a_->face, "H-spline (.json)")->required(); }
-  void AddStore(CLI::App* sub) {
-    sub->add_option("--name", a_->name, "of the new feature: letters, digits, '-' and '_'")
-        ->required();
-    sub->add_option("--library", a_->library, "folder to store it in")->required();
-    AddForce(sub);
-  }
-  FaceArguments& arguments() { return *a_; }
+// Where a new feature goes.
+void AddStore(CLI::App& command, FaceArguments& a) {
+  command.add_option("--name", a.name, "of the new feature: letters, digits, '-' and '_'")
+      ->required();
+  command.add_option("--library", a.library, "folder to store it in")->required();
+  AddForce(command, a);
+}
 
- private:
-  std::function<int()>& chosen_;
-  std::shared_ptr<FaceArguments> a_ = std::make_shared<FaceArguments>();
+void DeclareEdit(CLI::App& edit, CommandLine& line) {
+  FaceArguments& a = *Bind(edit, line, &Edit);
+  AddFace(edit, a);
+  edit.add_option("SCRIPT", a.script, "what to reset and to move (.yaml)")->required();
+  edit.add_option("--out", a.out, "file for the edited face")->required();
+  edit.add_option("--inverse", a.inverse, "file for the script that takes the edits back");
+  AddForce(edit, a);
+}
+
+void DeclareExport(CLI::App& to, CommandLine& line) {
+  FaceArguments& a = *Bind(to, line, &Export);
+  AddFace(to, a);
+  to.add_option("--to", a.out, "file; exact: .vtu .step .iges, triangles: .glb .ply .obj .off .stl")
+      ->required();
+  to.add_option("--chord_mm", a.chord_mm, "how far a triangle may be from the surface [0.1]");
+  to.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  AddForce(to, a);
+}
+
+void DeclareExtract(CLI::App& extract, CommandLine& line) {
+  FaceArguments& a = *Bind(extract, line, &ExtractCommand);
+  AddFace(extract, a);
+  extract.add_option("--u", a.u, "lowest and highest u; lowest > highest runs across the seam")
+      ->check(CLI::Range(0.0, 1.0));
+  extract.add_option("--v", a.v, "lowest and highest v")->check(CLI::Range(0.0, 1.0));
+  extract.add_option("--levels", a.levels, "first and last level")->check(CLI::Range(1, 8));
+  AddStore(extract, a);
+}
+
+void DeclareApply(CLI::App& apply, CommandLine& line) {
+  FaceArguments& a = *Bind(apply, line, &ApplyCommand);
+  AddFace(apply, a);
+  apply.add_option("FEATURE", a.features, "files of a library; later ones win")->required();
+  apply.add_option("--out", a.out, "file for the new face")->required();
+  AddForce(apply, a);
+}
+
+void DeclareBlend(CLI::App& blend, CommandLine& line) {
+  FaceArguments& a = *Bind(blend, line, &BlendCommand);
+  blend.add_option("FEATURE", a.features, "files of a library")->required();
+  blend.add_option("--weights", a.weights, "one per feature; outside 0..1 it extrapolates")
+      ->required();
+  AddStore(blend, a);
+}
+
+void DeclareMirror(CLI::App& mirror, CommandLine& line) {
+  FaceArguments& a = *Bind(mirror, line, &MirrorCommand);
+  mirror.add_option("FEATURE", a.features, "file of a library")->required()->expected(1);
+  AddStore(mirror, a);
+}
+
+void DeclareList(CLI::App& list, CommandLine& line) {
+  FaceArguments& a = *Bind(list, line, &ListCommand);
+  list.add_option("LIBRARY", a.library, "folder")->required();
+}
+
+constexpr std::array kFeatureCommands = {
+    ProgramCommand{"extract", "take detail from a face", &DeclareExtract},
+    ProgramCommand{"apply", "give features to a face", &DeclareApply},
+    ProgramCommand{"blend", "make a weighted sum of features", &DeclareBlend},
+    ProgramCommand{"mirror", "make a feature for the other side", &DeclareMirror},
+    ProgramCommand{"list", "say what a library holds", &DeclareList},
 };
 
-void DeclareEdit(CLI::App& app, Declarer& declarer) {
-  FaceArguments& a = declarer.arguments();
-  CLI::App* edit =
-      declarer.Add(app, "edit", "move vertices of an H-spline face, as a script says", &Edit);
-  declarer.AddFace(edit);
-  edit->add_option("SCRIPT", a.script, "what to reset and to move (.yaml)")->required();
-  edit->add_option("--out", a.out, "file for the edited face")->required();
-  edit->add_option("--inverse", a.inverse, "file for the script that takes the edits back");
-  declarer.AddForce(edit);
+void DeclareFeature(CLI::App& feature, CommandLine& line) {
+  feature.require_subcommand(1);
+  Declare(kFeatureCommands, feature, line);
 }
 
-void DeclareExport(CLI::App& app, Declarer& declarer) {
-  FaceArguments& a = declarer.arguments();
-  CLI::App* to = declarer.Add(app, "export", "an H-spline face for other programs", &Export);
-  declarer.AddFace(to);
-  to->add_option("--to", a.out,
-                 "file; exact: .vtu .step .iges, triangles: .glb .ply .obj .off .stl")
-      ->required();
-  to->add_option("--chord_mm", a.chord_mm, "how far a triangle may be from the surface [0.1]");
-  to->add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
-  declarer.AddForce(to);
-}
-
-void DeclareFeature(CLI::App& app, Declarer& declarer) {
-  FaceArguments& a = declarer.arguments();
-  CLI::App* feature = app.add_subcommand("feature", "detail of one face for another (thesis 4.3)");
-  feature->require_subcommand(1);
-  CLI::App* extract = declarer.Add(*feature, "extract", "take detail from a face", &ExtractCommand);
-  declarer.AddFace(extract);
-  extract->add_option("--u", a.u, "lowest and highest u; lowest > highest runs across the seam")
-      ->check(CLI::Range(0.0, 1.0));
-  extract->add_option("--v", a.v, "lowest and highest v")->check(CLI::Range(0.0, 1.0));
-  extract->add_option("--levels", a.levels, "first and last level")->check(CLI::Range(1, 8));
-  declarer.AddStore(extract);
-  CLI::App* apply = declarer.Add(*feature, "apply", "give a face features", &ApplyCommand);
-  declarer.AddFace(apply);
-  apply->add_option("FEATURE", a.features, "files of a library; later ones win")->required();
-  apply->add_option("--out", a.out, "file for the new face")->required();
-  declarer.AddForce(apply);
-  CLI::App* blend = declarer.Add(*feature, "blend", "a weighted sum of features", &BlendCommand);
-  blend->add_option("FEATURE", a.features, "files of a library")->required();
-  blend->add_option("--weights", a.weights, "one a feature; outside 0..1 it extrapolates")
-      ->required();
-  declarer.AddStore(blend);
-  CLI::App* mirror =
-      declarer.Add(*feature, "mirror", "a feature for the other side", &MirrorCommand);
-  mirror->add_option("FEATURE", a.features, "file of a library")->required()->expected(1);
-  declarer.AddStore(mirror);
-  CLI::App* list = declarer.Add(*feature, "list", "what a library holds", &ListCommand);
-  list->add_option("LIBRARY", a.library, "folder")->required();
-}
+constexpr std::array kCommands = {
+    ProgramCommand{"edit", "move vertices of an H-spline face as a script says", &DeclareEdit},
+    ProgramCommand{"export", "write an H-spline face for other programs", &DeclareExport},
+    ProgramCommand{"feature", "carry detail from one face to another (thesis 4.3)",
+                   &DeclareFeature},
+};
 
 }  // namespace
 
-void DeclareFaceCommands(CLI::App& app, std::function<int()>& chosen) {
-  Declarer declarer(chosen);
-  DeclareEdit(app, declarer);
-  DeclareExport(app, declarer);
-  DeclareFeature(app, declarer);
-}
+std::span<const ProgramCommand> FaceCommands() { return kCommands; }
 
 }  // namespace semblance

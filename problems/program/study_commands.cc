@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -136,65 +136,67 @@ int SubmitCommand(const StudyArguments& a) {
   return kDone;
 }
 
-using StudyCommandFunction = int (*)(const StudyArguments&);
-
-void AddStudyOptions(CLI::App* study, StudyArguments& a) {
-  study->add_option("CONFIG", a.files, "YAML file of the study; `plan` before it is --list")
+void DeclareStudy(CLI::App& study, CommandLine& line) {
+  StudyArguments& a = *Bind(study, line, &StudyCommand);
+  a.stop = line.stop;
+  study.add_option("CONFIG", a.files, "YAML file of the study; `plan` before it is --list")
       ->required()
       ->expected(1, 2);
-  study->add_option("--out", a.out, "folder for the trials; a study there goes on");
-  study->add_option("--jobs", a.run.jobs, "trials at a time")->check(CLI::Range(1, 1024));
-  study->add_option("--shard", a.shard, "I/N: every N-th trial from the I-th (from 0) alone");
-  study->add_option("--cache", a.run.cache, "folder for implicit faces that other calls can take");
-  study->add_option("--cache-limit-mb", a.run.cache_limit_mb, "above it the oldest go")
+  study.add_option("--out", a.out, "folder for the trials; a study there goes on");
+  study.add_option("--jobs", a.run.jobs, "trials at a time")->check(CLI::Range(1, 1024));
+  study.add_option("--shard", a.shard, "I/N: only every N-th trial from the I-th (from 0)");
+  study.add_option("--cache", a.run.cache, "folder for implicit faces that other calls can take");
+  study
+      .add_option("--cache-limit-mb", a.run.cache_limit_mb,
+                  "size above which the oldest files of the cache are deleted")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  study->add_flag("--list", a.list, "print the plan and run nothing");
-  study->add_flag("--retry-failed", a.run.retry_failed, "run again what failed before");
-  study->add_flag("--quiet", a.quiet, "no progress");
+  study.add_flag("--list", a.list, "print the plan and run nothing");
+  study.add_flag("--retry-failed", a.run.retry_failed, "run again what failed before");
+  study.add_flag("--quiet", a.quiet, "no progress");
 }
 
-void AddSubmitOptions(CLI::App* submit, StudyArguments& a) {
-  submit->add_option("CONFIG", a.files, "YAML file of the study")->required()->expected(1);
-  submit->add_flag("--slurm", a.slurm, "the engine; the only one so far")->required();
-  submit->add_option("--out", a.out, "folder for the trials, which every node must see");
+void DeclareSubmit(CLI::App& submit, CommandLine& line) {
+  StudyArguments& a = *Bind(submit, line, &SubmitCommand);
+  submit.add_option("CONFIG", a.files, "YAML file of the study")->required()->expected(1);
+  submit.add_flag("--slurm", a.slurm, "the cluster's engine; the only one so far")->required();
+  submit.add_option("--out", a.out, "folder for the trials, which every node must see");
   submit
-      ->add_option("--shards", a.submit.shards,
-                   "elements of the array; each should have work for 30 s or more")
+      .add_option("--shards", a.submit.shards,
+                  "elements of the array; each should have work for 30 s or more")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  submit->add_option("--jobs", a.submit.jobs, "trials at a time in each")
+  submit.add_option("--jobs", a.submit.jobs, "trials at a time in each")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   submit
-      ->add_option("--sbatch", a.submit.sbatch,
-                   "an option for sbatch, e.g. --sbatch=--partition=long; may be repeated")
+      .add_option("--sbatch", a.submit.sbatch,
+                  "an option for sbatch, e.g. --sbatch=--partition=long; may be repeated")
       ->allow_extra_args(false);
 }
 
+void DeclareMerge(CLI::App& merge, CommandLine& line) {
+  StudyArguments& a = *Bind(merge, line, &MergeCommand);
+  merge.add_option("DIR", a.files, "folder of the study, then folders to take trials from")
+      ->required();
+}
+
+void DeclareStatus(CLI::App& status, CommandLine& line) {
+  StudyArguments& a = *Bind(status, line, &StatusCommand);
+  status.add_option("DIR", a.files, "folder of the study")->required()->expected(1);
+}
+
+constexpr std::array kCommands = {
+    ProgramCommand{"study", "run every trial of a study that is not done yet", &DeclareStudy},
+    ProgramCommand{"submit", "run a study on a cluster: an array of shards, then the merge",
+                   &DeclareSubmit},
+    ProgramCommand{"merge", "make the tables and the report of a study from its shards",
+                   &DeclareMerge},
+    ProgramCommand{"status", "say how far a study has come", &DeclareStatus},
+};
+
 }  // namespace
 
-void DeclareStudyCommands(CLI::App& app, std::stop_token stop, std::function<int()>& chosen) {
-  const auto arguments = std::make_shared<StudyArguments>();
-  arguments->stop = std::move(stop);
-  const auto add = [&](const char* name, const char* help, StudyCommandFunction command) {
-    CLI::App* sub = app.add_subcommand(name, help);
-    sub->callback([&chosen, command, arguments] {
-      chosen = [command, arguments] { return command(*arguments); };
-    });
-    return sub;
-  };
-  StudyArguments& a = *arguments;
-  AddStudyOptions(add("study", "run every trial of a study that is not done yet", &StudyCommand),
-                  a);
-  AddSubmitOptions(
-      add("submit", "run a study on a cluster: an array of shards, then the merge", &SubmitCommand),
-      a);
-  CLI::App* merge = add("merge", "the tables and report of a study from its shards", &MergeCommand);
-  merge->add_option("DIR", a.files, "folder of the study, then folders to take trials from")
-      ->required();
-  CLI::App* status = add("status", "how far a study has come", &StatusCommand);
-  status->add_option("DIR", a.files, "folder of the study")->required()->expected(1);
-}
+std::span<const ProgramCommand> StudyCommands() { return kCommands; }
 
 }  // namespace semblance

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands that work on a study: study, merge, status, submit.
+// The commands that work on a study: study, submit, merge, status.
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <functional>
-#include <stop_token>
+#include <span>
+
+#include "problems/program/commands.h"
 
 namespace semblance {
 
-// Adds them to the program; the one that is named on the line sets `chosen`, which returns the exit
-// code. stop: ends a study after the trials at hand.
-void DeclareStudyCommands(CLI::App& app, std::stop_token stop, std::function<int()>& chosen);
+std::span<const ProgramCommand> StudyCommands();
 
 }  // namespace semblance

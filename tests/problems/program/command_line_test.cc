@@ -11,7 +11,11 @@
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_io.h"
@@ -159,7 +163,7 @@ TEST_F(CommandLine, ASkullWithTooFewLandmarksIsRefused) {
 
 TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
   std::string files;
-  for (const std::string& folder : {kConfigs, kConfigs + "/fit"}) {
+  for (const std::string& folder : {kConfigs, kConfigs + "/fit", kConfigs + "/studies"}) {
     for (const auto& entry : fs::directory_iterator(folder)) {
       files += entry.path().extension() == ".yaml" ? fmt::format(" {}", entry.path().string()) : "";
     }
@@ -178,12 +182,58 @@ TEST_F(CommandLine, CheckTellsAFitFromAnExperimentAndRefusesTheFaultsOfEither) {
   ExpectRefused("check both.yaml", "patches_u");
 }
 
+TEST_F(CommandLine, CheckTakesAStudyAndNamesItsFaults) {
+  Write("study.yaml", fmt::format("base: {}/phantom.yaml\ngrid: {{rounds: [1, 2]}}\n", kConfigs));
+  EXPECT_EQ(Call("check study.yaml").out, "study.yaml: no fault found\n");
+  ExpectRefused("check study.yaml --set rounds=2", "write it into the study");
+  Write("study.yaml", fmt::format("base: {}/phantom.yaml\ngird: {{}}\nkeep: all\n", kConfigs));
+  const Outcome outcome = Call("check study.yaml");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err,
+              AllOf(HasSubstr("study.yaml:2:1: gird: unknown key; did you mean 'grid'?"),
+                    HasSubstr("study.yaml:3:7: keep: unknown word 'all'")));
+}
+
+// The names in `semblance --help`.
+std::vector<std::string> CommandsIn(const std::string& help) {
+  std::vector<std::string> names;
+  std::istringstream lines(help.substr(help.find("Subcommands:")));
+  std::string line;
+  for (std::getline(lines, line); std::getline(lines, line);) {
+    const std::size_t begin = line.find_first_not_of(' ');
+    if (begin == 2) {
+      names.push_back(line.substr(begin, line.find(' ', begin) - begin));
+    }
+  }
+  return names;
+}
+
+TEST_F(CommandLine, TheReadmeHasEveryCommandAndNoOther) {
+  const std::vector<std::string> commands = CommandsIn(Call("--help").out);
+  EXPECT_THAT(commands, AllOf(::testing::Contains("run"), ::testing::Contains("feature")));
+  const std::string readme = ReadFileBytes(SEMBLANCE_SOURCE_DIR "/README.md");
+  for (const std::string& command : commands) {
+    EXPECT_THAT(readme, HasSubstr("\n    semblance " + command + " ")) << command;
+  }
+  const std::regex entry("\n    semblance ([a-z-]+)");
+  for (std::sregex_iterator it(readme.begin(), readme.end(), entry), end; it != end; ++it) {
+    EXPECT_THAT(commands, ::testing::Contains((*it)[1].str()));
+  }
+}
+
 TEST_F(CommandLine, OptionsNameEveryKeyAndTheSchemaIsJson) {
   const std::string options = Call("options").out;
   for (const char* key : {"subject", "emitter", "fraction", "tail_error", "random_seed"}) {
     EXPECT_THAT(options, HasSubstr(key));
   }
   EXPECT_TRUE(nlohmann::json::accept(Call("options --schema").out));
+  EXPECT_THAT(Call("options study").out,
+              AllOf(HasSubstr("grid: map by name: list: any value, default {}, at least 1 of them "
+                              "each\n"),
+                    HasSubstr("sample.n: whole number"), HasSubstr("subjects[].optional:")));
+  const auto schema = nlohmann::json::parse(Call("options study --schema").out);
+  EXPECT_EQ(schema["properties"]["keep"]["enum"], nlohmann::json({"summary", "view", "run"}));
+  EXPECT_THAT(Call("options fit").out, HasSubstr("patches_u:"));
 }
 
 TEST_F(CommandLine, EvaluateMeasuresAnyTwoMeshes) {

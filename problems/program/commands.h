@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands of the program as data: each room of commands has one table, and main.cc declares
+// what the tables say. `semblance --help` lists them in this order.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <memory>
+#include <span>
+#include <stop_token>
+#include <utility>
+
+namespace semblance {
+
+// What a declared command has to do with the rest of the program.
+struct CommandLine {
+  std::stop_token stop;         // set by Ctrl-C; a long command ends early then
+  std::function<int()> chosen;  // set by the command that stands on the line; returns the exit code
+};
+
+struct ProgramCommand {
+  const char* name;
+  const char* purpose;  // one line, for --help
+  // Adds the options, and sees to it that `line.chosen` is set.
+  void (*declare)(CLI::App& command, CommandLine& line);
+};
+
+// What the user types goes into the Arguments returned; `run` gets them once all are parsed.
+template <class Arguments>
+std::shared_ptr<Arguments> Bind(CLI::App& command, CommandLine& line,
+                                int (*run)(const Arguments&)) {
+  auto arguments = std::make_shared<Arguments>();
+  command.callback(
+      [&line, arguments, run] { line.chosen = [arguments, run] { return run(*arguments); }; });
+  return arguments;
+}
+
+inline void Declare(std::span<const ProgramCommand> commands, CLI::App& app, CommandLine& line) {
+  for (const ProgramCommand& command : commands) {
+    command.declare(*app.add_subcommand(command.name, command.purpose), line);
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/program/run_commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "problems/metrics/face_metrics_json.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/points/point_fit.h"
+#include "problems/program/exit_code.h"
+#include "problems/program/progress.h"
+#include "problems/report/run_folder.h"
+#include "problems/study/depth_study.h"
+#include "problems/study/study_plan.h"
+#include "problems/study/study_report.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_check.h"
+#include "surfaces/mesh/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+// What the user typed; each command reads its part.
+struct Arguments {
+  std::vector<std::string> files;
+  std::vector<std::string> overrides;
+  std::string out;
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  bool force = false, quiet = false, schema = false;
+  std::string options_of = "experiment";
+  CtImportOptions ct;
+  std::string ct_edges = "threshold";
+  std::stop_token stop;
+};
+
+RunContext MakeContext(const Arguments& arguments) {
+  RunContext context;
+  context.threads = arguments.threads;
+  context.stop_token = arguments.stop;
+  if (!arguments.quiet) {
+    context.on_event = ProgressPrinter(stderr);
+  }
+  return context;
+}
+
+OutputFolder MakeFolder(const Arguments& arguments, const std::string& default_out) {
+  return {arguments.out.empty() ? default_out : arguments.out,
+          arguments.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
+}
+
+void PrintFaceError(const char* what, const FaceMetrics& m) {
+  const DistanceSummary& s = m.truth_to_face;
+  fmt::print(
+      "{}: mean {:.2f} mm, RMS {:.2f} mm, median {:.2f} mm, p95 {:.2f} mm, within 2.5 mm {:.1f} % "
+      "of {:.0f} cm² of true skin\n",
+      what, s.mean_abs_mm, s.rms_mm, s.median_mm, s.p95_mm, 100 * s.within_2_5mm, s.area_cm2);
+}
+
+int RunCommand(const Arguments& arguments) {
+  const std::filesystem::path config = arguments.files.at(0);
+  const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
+  OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
+  const RunContext context = MakeContext(arguments);
+  const RunResult result = Run(experiment, context);
+  WriteRun(experiment, result, folder, context);
+  for (const std::string& note : result.subject.notes) {
+    fmt::print("note: {}\n", note);
+  }
+  if (result.truth) {
+    fmt::print(
+        "scored: the skin in front of the dowel network, without excluded zones; closest-point "
+        "distances\n");
+    PrintFaceError("implicit face", result.truth->implicit);
+    PrintFaceError("H-spline face", result.truth->face);
+  }
+  fmt::print("report: {}\n",
+             std::filesystem::absolute(folder.Root() / "report.html").lexically_normal().string());
+  return result.usable() ? kDone : kNotUsable;
+}
+
+int DepthCommand(const Arguments& arguments) {
+  const std::filesystem::path config = arguments.files.at(0);
+  const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
+  OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string() + "_depth");
+  const RunContext context = MakeContext(arguments);
+  const DepthResult result = MeasureDepth(experiment, context);
+  WriteDepth(experiment, result, folder, context);
+  fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
+  return result.usable() ? kDone : kNotUsable;
+}
+
+int FitCommand(const Arguments& arguments) {
+  const std::filesystem::path points = arguments.files.at(0), config = arguments.files.at(1);
+  const auto options = ReadConfig<PointFitOptions>(config, arguments.overrides);
+  const PointTable table = ReadPointTable(points);
+  OutputFolder folder = MakeFolder(arguments, fmt::format("out/{}", points.stem().string()));
+  const RunContext context = MakeContext(arguments);
+  const PointFit result = FitPoints(table, options, context);
+  WritePointFit(options, points, result, folder, context);
+  fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
+             table.positions.size(), result.parameters,
+             result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
+             result.fit.point_rms_mm,
+             *std::max_element(result.fit.residual_mm.begin(), result.fit.residual_mm.end()));
+  fmt::print("folder: {}\n", std::filesystem::absolute(folder.Root()).lexically_normal().string());
+  return result.fit.usable ? kDone : kNotUsable;
+}
+
+void CheckStudy(const std::string& file, std::span<const std::string> overrides) {
+  if (!overrides.empty()) {
+    throw InputError(fmt::format(
+        "{}: --set is for experiments and fits; write it into the study, under set:", file));
+  }
+  ReadStudy(file);
+}
+
+// The keys at the top tell what a file is for: an experiment, where no other fits better.
+void CheckConfig(const std::string& file, std::span<const std::string> overrides) {
+  if (OwnKeys<StudyFile>(file) > OwnKeys<Experiment>(file)) {
+    CheckStudy(file, overrides);
+  } else if (KnownKeys<PointFitOptions>(file) > KnownKeys<Experiment>(file)) {
+    ReadConfig<PointFitOptions>(file, overrides);
+  } else {
+    ReadConfig<Experiment>(file, overrides);
+  }
+}
+
+int CheckCommand(const Arguments& arguments) {
+  bool sound = true;
+  for (const std::string& file : arguments.files) {
+    try {
+      CheckConfig(file, arguments.overrides);
+      fmt::print("{}: no fault found\n", file);
+    } catch (const Error& e) {
+      fmt::print(stderr, "{}\n", e.what());
+      sound = false;
+    }
+  }
+  return sound ? kDone : kBadInput;
+}
+
+template <class Options>
+std::string OptionsText(bool schema) {
+  return schema ? OptionsSchema<Options>() : OptionsReference<Options>();
+}
+
+int OptionsCommand(const Arguments& arguments) {
+  const bool schema = arguments.schema;
+  fmt::print("{}", arguments.options_of == "study" ? OptionsText<StudyFile>(schema)
+                   : arguments.options_of == "fit" ? OptionsText<PointFitOptions>(schema)
+                                                   : OptionsText<Experiment>(schema));
+  return kDone;
+}
+
+int ImportCtCommand(const Arguments& arguments) {
+  const std::filesystem::path volume = arguments.files.at(0);
+  CtImportOptions options = arguments.ct;
+  options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
+  OutputFolder folder = MakeFolder(arguments, "out/" + volume.stem().string());
+  const CtImport import = ImportCt(ReadInvesalius(volume), options, MakeContext(arguments));
+  folder.Write("skull.ply", EncodeMesh(import.skull, ".ply"));
+  folder.Write("skin.ply", EncodeMesh(import.skin, ".ply"));
+  fmt::print("skull.ply: {} triangles; {} pieces below {} cm^2 dropped\n",
+             import.skull.triangles.size(), import.dropped_bone, options.smallest_bone_cm2);
+  fmt::print("skin.ply: {} triangles; {} pieces apart from the largest dropped\n",
+             import.skin.triangles.size(), import.dropped_skin);
+  for (const std::string& note : import.notes) {
+    fmt::print("note: {}\n", note);
+  }
+  fmt::print("folder: {}\n", std::filesystem::absolute(folder.Root()).lexically_normal().string());
+  return kDone;
+}
+
+int EvaluateCommand(const Arguments& arguments) {
+  const TriMesh face = ReadMesh(arguments.files.at(0)), truth = ReadMesh(arguments.files.at(1));
+  CheckHeadMesh(face, arguments.files.at(0));
+  CheckHeadMesh(truth, arguments.files.at(1));
+  fmt::print("{}\n",
+             MetricsToJson(CompareFaces(truth, WholeSurface(truth), face, MakeContext(arguments)))
+                 .dump(2));
+  return kDone;
+}
+
+int ReportCommand(const Arguments& arguments) {
+  const std::filesystem::path root = arguments.files.at(0);
+  if (!std::filesystem::is_directory(root)) {
+    throw IoError(
+        fmt::format("{}: no such folder; name the folder of a run or a study", root.string()));
+  }
+  OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
+  if (std::filesystem::exists(root / "plan.json")) {
+    WriteStudyTables(folder);
+  } else {
+    WriteReport(folder);
+  }
+  fmt::print("report: {}\n", (root / "report.html").string());
+  return kDone;
+}
+
+using CommandFunction = int (*)(const Arguments&);
+
+void AddSet(CLI::App& command, Arguments& a) {
+  command
+      .add_option("--set", a.overrides, "path=value, laid over the configuration; may be repeated")
+      ->allow_extra_args(false);
+}
+
+void AddOutput(CLI::App& command, Arguments& a) {
+  command.add_option("--out", a.out, "folder for the results");
+  command.add_flag("--force", a.force,
+                   "replace files of the same name in a folder that is not empty");
+}
+
+void AddWork(CLI::App& command, CommandLine& line, Arguments& a) {
+  a.stop = line.stop;
+  command.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  command.add_flag("--quiet", a.quiet, "no progress");
+}
+
+// A command that reads a configuration and writes a folder.
+Arguments& DeclareJob(CLI::App& command, CommandLine& line, CommandFunction run) {
+  Arguments& a = *Bind(command, line, run);
+  AddSet(command, a);
+  AddOutput(command, a);
+  AddWork(command, line, a);
+  return a;
+}
+
+void DeclareRun(CLI::App& command, CommandLine& line) {
+  Arguments& a = DeclareJob(command, line, &RunCommand);
+  command.add_option("CONFIG", a.files, "YAML file of the experiment")->required()->expected(1);
+}
+
+void DeclareDepth(CLI::App& command, CommandLine& line) {
+  Arguments& a = DeclareJob(command, line, &DepthCommand);
+  command.add_option("CONFIG", a.files, "YAML file of the experiment")->required()->expected(1);
+}
+
+void DeclareFit(CLI::App& command, CommandLine& line) {
+  Arguments& a = DeclareJob(command, line, &FitCommand);
+  command
+      .add_option(
+          "POINTS CONFIG", a.files,
+          "CSV file with the columns x,y,z and, if known, u,v, weight; YAML file of the fit")
+      ->required()
+      ->expected(2);
+}
+
+void DeclareImportCt(CLI::App& command, CommandLine& line) {
+  Arguments& a = *Bind(command, line, &ImportCtCommand);
+  command.add_option("VOLUME", a.files, "InVesalius project (.inv3)")->required()->expected(1);
+  command.add_option("--bone-hu", a.ct.bone_hu, "Hounsfield value of the skull's surface")
+      ->check(CLI::Range(50.0, 3000.0))
+      ->capture_default_str();
+  command.add_option("--skin-hu", a.ct.skin_hu, "Hounsfield value of the skin's surface")
+      ->check(CLI::Range(-900.0, 0.0))
+      ->capture_default_str();
+  command.add_option("--edges", a.ct_edges, "threshold, or half_maximum, which thins tissue less")
+      ->check(CLI::IsMember({"threshold", "half_maximum"}))
+      ->capture_default_str();
+  AddOutput(command, a);
+  AddWork(command, line, a);
+}
+
+void DeclareCheck(CLI::App& command, CommandLine& line) {
+  Arguments& a = *Bind(command, line, &CheckCommand);
+  command.add_option("CONFIG", a.files, "YAML files")->required();
+  AddSet(command, a);
+}
+
+void DeclareOptions(CLI::App& command, CommandLine& line) {
+  Arguments& a = *Bind(command, line, &OptionsCommand);
+  command.add_option("KIND", a.options_of, "the kind of file: experiment, study or fit")
+      ->check(CLI::IsMember({"experiment", "study", "fit"}))
+      ->capture_default_str();
+  command.add_flag("--schema", a.schema, "as a JSON Schema for editors");
+}
+
+void DeclareEvaluate(CLI::App& command, CommandLine& line) {
+  Arguments& a = *Bind(command, line, &EvaluateCommand);
+  command.add_option("FACE TRUTH", a.files, "the reconstructed mesh and the true one")
+      ->required()
+      ->expected(2);
+  AddWork(command, line, a);
+}
+
+void DeclareReport(CLI::App& command, CommandLine& line) {
+  Arguments& a = *Bind(command, line, &ReportCommand);
+  command.add_option("DIR", a.files, "folder of a run or a study")->required()->expected(1);
+}
+
+constexpr std::array kCommands = {
+    ProgramCommand{"run", "reconstruct a face as a configuration says", &DeclareRun},
+    ProgramCommand{"depth",
+                   "interpolate depth alone: against the true skin, and with dowels left out",
+                   &DeclareDepth},
+    ProgramCommand{"fit", "fit an H-spline surface to any scattered points", &DeclareFit},
+    ProgramCommand{"import-ct", "make meshes of skull and skin from a CT volume, in mm",
+                   &DeclareImportCt},
+    ProgramCommand{"check", "check configurations of experiments, studies and fits; run nothing",
+                   &DeclareCheck},
+    ProgramCommand{"options", "list every option: default, unit, range, meaning", &DeclareOptions},
+    ProgramCommand{"evaluate", "measure how far a face is from the true one, as JSON",
+                   &DeclareEvaluate},
+    ProgramCommand{"report", "build the report of a run or a study anew", &DeclareReport},
+};
+
+}  // namespace
+
+std::span<const ProgramCommand> RunCommands() { return kCommands; }
+
+}  // namespace semblance

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands that work on one subject, set of points or folder: run, depth, fit, import-ct,
+// check, options, evaluate, report.
+#pragma once
+
+#include <span>
+
+#include "problems/program/commands.h"
+
+namespace semblance {
+
+std::span<const ProgramCommand> RunCommands();
+
+}  // namespace semblance
