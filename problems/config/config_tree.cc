@@ -125,8 +125,11 @@ ConfigNode& StepIntoMap(ConfigNode& node, const Step& step, const ConfigNode*& d
   node.kind = ConfigNode::Kind::kMap;
   const ConfigNode* matching = MatchingDefaults(node, defaults);
   defaults = matching ? matching->Find(step.key) : nullptr;
-  if (ConfigNode* child = node.Find(step.key)) {
-    return *child;
+  const auto entry = std::find_if(node.entries.begin(), node.entries.end(),
+                                  [&](const auto& candidate) { return candidate.key == step.key; });
+  if (entry != node.entries.end()) {
+    entry->key_place = is_last ? place : entry->key_place;
+    return entry->value;
   }
   node.entries.push_back({std::string(step.key), place, {}});
   ConfigNode& child = node.entries.back().value;

@@ -108,7 +108,7 @@ class StatedDefaults {
 TEST(Experiment, TheReferenceAndTheSchemaStateTheDefaultsThatResolvedYamlHas) {
   StatedDefaults defaults;
   defaults.Check(ConfigTreeOf(Experiment{}), Json::parse(OptionsSchema<Experiment>()), "", "");
-  EXPECT_GT(defaults.checked, 100);
+  EXPECT_GT(defaults.checked, 60);
   EXPECT_THAT(OptionsReference<Experiment>(), HasSubstr("\nseeds.weight: number, default 0.1,"));
 }
 

@@ -5,12 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <map>
-#include <set>
 
 #include "problems/config/config.h"
 #include "problems/run.h"
 #include "problems/study/study_report.h"
-#include "problems/study/study_rows.h"
 #include "problems/study/study_run.h"
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_file.h"
@@ -20,8 +18,6 @@ namespace semblance {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ScratchFolder;
@@ -41,9 +37,6 @@ class StudyTest : public ::testing::Test {
     return file;
   }
   StudyPlan Plan(const std::string& text) { return ReadStudy(Write(kBase + text)); }
-  std::string Faults(const std::string& text) {
-    return WordsOf<ConfigError>([&] { Plan(text); });
-  }
   // The tables of a finished folder; the trials' timing apart.
   std::map<std::string, std::string> Tables(const fs::path& root) {
     OutputFolder output(root, WhenNotEmpty::kReplaceFiles);
@@ -65,82 +58,6 @@ const char* const kSmall =
     "  - {name: b, set: {subject.random_seed: 2}}\n"
     "grid: {interp: [nearest, {type: mean}], fit.features: [restore]}\nmetric: "
     "implicit_face.rms_mm\n";
-
-TEST_F(StudyTest, EveryCombinationIsOneTrial) {
-  const StudyPlan plan = Plan(
-      "subjects: [{name: a}, {name: b, set: {subject.random_seed: 7}}]\n"
-      "grid: {interp: [nearest, mean], rounds: [1, 2, 3]}\n"
-      "zip: {seeds.weight: [0.5, 1.5], title: [x, y]}\n"
-      "list: [{seeds.level: 0}, {fit.features: free}]\n");
-  EXPECT_EQ(plan.trials.size(), 2u * 6 * 2 * 2);
-  EXPECT_THAT(plan.axes, ElementsAre("interp", "rounds", "seeds.weight", "title", "seeds.level",
-                                     "fit.features"));
-  std::set<std::string> ids;
-  for (const StudyTrial& trial : plan.trials) {
-    ids.insert(trial.id);
-    EXPECT_EQ(trial.experiment.seeds.weight == 0.5, trial.experiment.title == "x");
-  }
-  EXPECT_EQ(ids.size(), plan.trials.size());
-  EXPECT_THAT(plan.trials[0].values, ElementsAre("nearest", "1", "0.5", "x", "0", ""));
-  EXPECT_EQ(plan.hash, Plan("subjects: [{name: a}, {name: b, set: {subject.random_seed: 7}}]\n"
-                            "grid: {interp: [nearest, mean], rounds: [1, 2, 3]}\n"
-                            "zip: {seeds.weight: [0.5, 1.5], title: [x, y]}\n"
-                            "list: [{seeds.level: 0}, {fit.features: free}]\n")
-                           .hash);
-}
-
-TEST_F(StudyTest, SamplesStayInTheirRangesAndFillThem) {
-  const StudyPlan plan = Plan(
-      "sample: {method: lhs, n: 10, random_seed: 3, ranges: {seeds.weight: [1.0, 2.0], rounds: [1, "
-      "5]}}\n");
-  ASSERT_EQ(plan.trials.size(), 10u);
-  std::set<int> slices;
-  for (const StudyTrial& trial : plan.trials) {
-    slices.insert(static_cast<int>(10 * (trial.experiment.seeds.weight - 1)));
-    EXPECT_GE(trial.experiment.rounds, 1);
-    EXPECT_LE(trial.experiment.rounds, 5);
-  }
-  EXPECT_EQ(slices.size(), 10u);  // one in each tenth
-}
-
-TEST(StudySamples, SobolPointsAreEvenInEachHalf) {
-  const auto points = UnitSamples(SampleMethod::kSobol, 15, 2, 0);
-  int low = 0;
-  for (const auto& p : points) {
-    low += p[0] < 0.5 ? 1 : 0;
-  }
-  EXPECT_EQ(low, 7);
-  EXPECT_NEAR(points[0][0], 0.5, 1e-12);
-  EXPECT_NEAR(points[0][1], 0.5, 1e-12);
-}
-
-TEST_F(StudyTest, EveryFaultIsSaidOnceAtItsLine) {
-  EXPECT_THAT(Faults("subjects: [{name: a}, {name: b}]\ngrid:\n  interp: [nearest, krigging]\n"),
-              AllOf(HasSubstr("study.yaml:6:21: interp"), HasSubstr("krigging")));
-  const std::string twice = Faults(
-      "subjects: [{name: a}, {name: b, set: {subject.random_seed: 2}}]\n"
-      "grid: {rounds: [1, 2000]}\n");
-  EXPECT_EQ(std::count(twice.begin(), twice.end(), '\n'), 0) << twice;
-  EXPECT_THAT(Faults("grids: {}\n"), HasSubstr("did you mean 'grid'?"));
-  EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("grid.interp: expected a list"));
-  EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("go side by side"));
-  EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"), HasSubstr("must be the lower"));
-  EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"), HasSubstr("the name 'a' stands twice"));
-  EXPECT_THAT(Faults("grid: {rounds: [2, 2]}\n"), HasSubstr("are the same experiment"));
-  EXPECT_THAT(Faults("grid: {no.such: [2]}\n"), HasSubstr("no"));
-  EXPECT_THAT(WordsOf<ConfigError>([&] { ReadStudy(Write("grid: {rounds: [1]}\n")); }),
-              HasSubstr("base: the file of an experiment is missing"));
-}
-
-TEST_F(StudyTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorIfNot) {
-  const std::string missing =
-      "subjects: [{name: a}, {name: b, set: {subject: {type: files, skull: none.ply, landmarks: "
-      "none.yaml}}";
-  const StudyPlan plan = Plan(missing + ", optional: true}]\n");
-  EXPECT_EQ(plan.trials.size(), 1u);
-  EXPECT_THAT(plan.notes, ElementsAre(HasSubstr("subject b: skipped")));
-  EXPECT_THAT(Faults(missing + "}]\n"), HasSubstr("subject b: no such file"));
-}
 
 TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
   const StudyPlan plan = Plan(kSmall);

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study/study_plan.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include "problems/study/study_rows.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+using testing::WordsOf;
+
+const std::string kBase = fmt::format(
+    "base: {}/configs/phantom.yaml\n"
+    "set: {{subject.rings: 40, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
+    "      fit.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
+    SEMBLANCE_SOURCE_DIR);
+
+class StudyPlanTest : public ::testing::Test {
+ protected:
+  fs::path Write(const std::string& text) {
+    const fs::path file = folder_ / "study.yaml";
+    WriteFileAtomically(file, text);
+    return file;
+  }
+  StudyPlan Plan(const std::string& text) { return ReadStudy(Write(kBase + text)); }
+  std::string Faults(const std::string& text) {
+    return WordsOf<ConfigError>([&] { Plan(text); });
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(StudyPlanTest, EveryCombinationIsOneTrial) {
+  const StudyPlan plan = Plan(
+      "subjects: [{name: a}, {name: b, set: {subject.random_seed: 7}}]\n"
+      "grid: {interp: [nearest, mean], rounds: [1, 2, 3]}\n"
+      "zip: {seeds.weight: [0.5, 1.5], title: [x, y]}\n"
+      "list: [{seeds.level: 0}, {fit.features: free}]\n");
+  EXPECT_EQ(plan.trials.size(), 2u * 6 * 2 * 2);
+  EXPECT_THAT(plan.axes, ElementsAre("interp", "rounds", "seeds.weight", "title", "seeds.level",
+                                     "fit.features"));
+  std::set<std::string> ids;
+  for (const StudyTrial& trial : plan.trials) {
+    ids.insert(trial.id);
+    EXPECT_EQ(trial.experiment.seeds.weight == 0.5, trial.experiment.title == "x");
+  }
+  EXPECT_EQ(ids.size(), plan.trials.size());
+  EXPECT_THAT(plan.trials[0].values, ElementsAre("nearest", "1", "0.5", "x", "0", ""));
+  EXPECT_EQ(plan.hash, Plan("subjects: [{name: a}, {name: b, set: {subject.random_seed: 7}}]\n"
+                            "grid: {interp: [nearest, mean], rounds: [1, 2, 3]}\n"
+                            "zip: {seeds.weight: [0.5, 1.5], title: [x, y]}\n"
+                            "list: [{seeds.level: 0}, {fit.features: free}]\n")
+                           .hash);
+}
+
+TEST_F(StudyPlanTest, SamplesStayInTheirRangesAndFillThem) {
+  const StudyPlan plan = Plan(
+      "sample: {method: lhs, n: 10, random_seed: 3, ranges: {seeds.weight: [1.0, 2.0], rounds: [1, "
+      "5]}}\n");
+  ASSERT_EQ(plan.trials.size(), 10u);
+  std::set<int> slices;
+  for (const StudyTrial& trial : plan.trials) {
+    slices.insert(static_cast<int>(10 * (trial.experiment.seeds.weight - 1)));
+    EXPECT_GE(trial.experiment.rounds, 1);
+    EXPECT_LE(trial.experiment.rounds, 5);
+  }
+  EXPECT_EQ(slices.size(), 10u);  // one in each tenth
+}
+
+TEST(StudySamples, SobolPointsAreEvenInEachHalf) {
+  const auto points = UnitSamples(SampleMethod::kSobol, 15, 2, 0);
+  int low = 0;
+  for (const auto& p : points) {
+    low += p[0] < 0.5 ? 1 : 0;
+  }
+  EXPECT_EQ(low, 7);
+  EXPECT_NEAR(points[0][0], 0.5, 1e-12);
+  EXPECT_NEAR(points[0][1], 0.5, 1e-12);
+}
+
+TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
+  EXPECT_THAT(Faults("subjects: [{name: a}, {name: b}]\ngrid:\n  interp: [nearest, krigging]\n"),
+              AllOf(HasSubstr("study.yaml:6:21: interp"), HasSubstr("krigging")));
+  const std::string twice = Faults(
+      "subjects: [{name: a}, {name: b, set: {subject.random_seed: 2}}]\n"
+      "grid: {rounds: [1, 2000]}\n");
+  EXPECT_EQ(std::count(twice.begin(), twice.end(), '\n'), 0) << twice;
+  EXPECT_THAT(Faults("grids: {}\n"), HasSubstr("did you mean 'grid'?"));
+  EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("grid.interp: expected a list"));
+  EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("go side by side"));
+  EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"), HasSubstr("must be the lower"));
+  EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"), HasSubstr("the name 'a' stands twice"));
+  EXPECT_THAT(Faults("grid: {rounds: [2, 2]}\n"), HasSubstr("are the same experiment"));
+  EXPECT_THAT(Faults("grid: {no.such: [2]}\n"), HasSubstr("no"));
+  EXPECT_THAT(WordsOf<ConfigError>([&] { ReadStudy(Write("grid: {rounds: [1]}\n")); }),
+              HasSubstr("base: the file of an experiment is missing"));
+}
+
+TEST_F(StudyPlanTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorIfNot) {
+  const std::string missing =
+      "subjects: [{name: a}, {name: b, set: {subject: {type: files, skull: none.ply, landmarks: "
+      "none.yaml}}";
+  const StudyPlan plan = Plan(missing + ", optional: true}]\n");
+  EXPECT_EQ(plan.trials.size(), 1u);
+  EXPECT_THAT(plan.notes, ElementsAre(HasSubstr("subject b: skipped")));
+  EXPECT_THAT(Faults(missing + "}]\n"), HasSubstr("subject b: no such file"));
+}
+
+TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
+  EXPECT_THAT(
+      Faults("keep: everything\njob: [face]\n"),
+      AllOf(HasSubstr("study.yaml:4:7: keep: unknown word 'everything'; known are: summary, "
+                      "view, run"),
+            HasSubstr("study.yaml:5:6: job: expected a word, found a list")));
+  EXPECT_THAT(Faults("subjects: [{nam: a}]\n"),
+              HasSubstr("study.yaml:4:13: subjects[0].nam: unknown key; did you mean 'name'?"));
+  EXPECT_THAT(Faults("subjects: []\n"), HasSubstr("subjects: expected a list of at least 1"));
+  EXPECT_THAT(Faults("sample: {method: halton, n: 0, ranges: {rounds: [1, 5, 9]}}\n"),
+              AllOf(HasSubstr("sample.method: unknown word 'halton'"),
+                    HasSubstr("sample.n: 0 is out of range; allowed is 1 to 100000"),
+                    HasSubstr("sample.ranges.rounds: expected a list of 2, found 3")));
+  EXPECT_THAT(Faults("sample: {method: lhs}\n"),
+              AllOf(HasSubstr("sample.n: the number of samples is missing"),
+                    HasSubstr("sample.ranges: there is no range")));
+  EXPECT_THAT(Faults("set: {rounds: 2}\n"), HasSubstr("study.yaml:4:1: set: the key stands twice"));
+}
+
+TEST_F(StudyPlanTest, AnAxisOfTypesTakesEachWithItsOwnDefaults) {
+  const StudyPlan plan = Plan("grid: {interp.type: [network_spline, natural_neighbour]}\n");
+  ASSERT_EQ(plan.trials.size(), 2u);
+  EXPECT_TRUE(std::holds_alternative<NaturalNeighbour>(plan.trials[1].experiment.interp));
+  EXPECT_THAT(Faults("grid: {interp.type: [natural_neighbour], interp.distance: [geodesic]}\n"),
+              HasSubstr("interp.distance: unknown key"));
+}
+
+}  // namespace
+}  // namespace semblance
