@@ -17,7 +17,7 @@ namespace semblance {
 // share a skull can share its bytes. The same run gives the same text.
 std::string SceneJson(const RunResult& result, const RunContext& context);
 
-// Several scenes as one {scenes, blobs}, each blob once; labels: one a scene, shown where one is
+// Several scenes as one {scenes, blobs}, each blob once; labels: one per scene, shown where one is
 // chosen. Scenes are taken in order while the whole stays below `limit_bytes`; at least one is.
 // Throws IoError for a text that is no scene.
 struct SceneText {

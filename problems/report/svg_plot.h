@@ -25,14 +25,14 @@ struct RankedLabel {
 };
 std::string RankPlotSvg(std::vector<RankedLabel> treatments, double critical_difference);
 
-// The cumulative share of values below each, one line a row.
+// The cumulative share of values below each, one line per row.
 std::string CumulativePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
 
 // The same for rows of quantiles at even shares from 0 to 1, as lines from one to the next. The
 // axis ends at the last but one (95 % of 21): the very largest values would dwarf the rest.
 std::string QuantilePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
 
-// How a number falls step by step, one line a row: its values are those before the first step,
+// How a number falls step by step, one line per row: its values are those before the first step,
 // after it, after the second ...; the vertical axis starts at 0.
 std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
 

@@ -18,7 +18,7 @@ namespace semblance {
 
 struct DepthResult {
   std::shared_ptr<const DepthStage> stage;
-  std::vector<Vec3> directions;          // one a vertex of the shell
+  std::vector<Vec3> directions;          // one per vertex of the shell
   std::optional<DepthComparison> truth;  // where the true skin is known
   // What was left out together: "landmark" (both its sides), "side", "k_fold" (random parts).
   // A kind for which there are not enough dowels is missing; all are of a depth_map.
@@ -37,7 +37,7 @@ DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context
 // null where there is no number.
 std::string DepthResultJson(const Experiment& experiment, const DepthResult& result);
 
-// One line a left-out dowel: kind, site, landmark, region, depth_mm, predicted_mm, error_mm, sd_mm,
+// One line per left-out dowel: kind, site, landmark, region, depth_mm, predicted_mm, error_mm, sd_mm,
 // within_90, status; an empty cell where there is none.
 std::string LeftOutCsv(const DepthResult& result);
 
@@ -45,7 +45,7 @@ std::string LeftOutCsv(const DepthResult& result);
 // along the direction; as PNG.
 std::string DepthPicture(const DepthResult& result, const std::string& title, int threads);
 
-// resolved.yaml, result.json, left_out.csv, depth.ply (depth, sd, true depths and errors a vertex),
+// resolved.yaml, result.json, left_out.csv, depth.ply (depth, sd, true depths and errors per vertex),
 // tips.ply (the shell moved by its depth), depth.png, timing.json.
 void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputFolder& folder,
                 const RunContext& context);

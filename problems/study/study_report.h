@@ -19,7 +19,7 @@ StudyResults WriteStudyTables(OutputFolder& folder);
 // Ranks the treatments by the study's metric, shows their spread, and compares each with the best
 // over the subjects that have both: effect first, p-values last, and none below 6 subjects. scenes:
 // of the trials that the 3-D view offers side by side (CollectScenes); may be empty.
-// maps: pictures of the first subject's depth, one a treatment; may be empty.
+// maps: pictures of the first subject's depth, one per treatment; may be empty.
 std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes = {},
                             const std::vector<ReportImage>& maps = {});
 

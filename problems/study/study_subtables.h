@@ -10,13 +10,13 @@
 
 namespace semblance {
 
-// One row a treatment, in the order given; means over subjects. A table without a number is left
+// One row per treatment, in the order given; means over subjects. A table without a number is left
 // out:
 // - the metric's siblings (RMS, mean, p95, ... of the same distances);
 // - the metric in each part of the face (`regions` beside it);
 // - cross-validation: RMS of what was left out by landmark, side and random part, and the share
 //   within the stated 90 %;
-// - the RMS over subjects of each landmark's error when it was left out, one row a site.
+// - the RMS over subjects of each landmark's error when it was left out, one row per site.
 std::vector<ReportTable> BreakdownTables(const StudyResults& results,
                                          const std::vector<Treatment>& ranked);
 

@@ -13,7 +13,7 @@ namespace semblance {
 
 struct TrialRow {
   std::string id, subject;
-  std::vector<std::string> values;        // one an axis
+  std::vector<std::string> values;        // one per axis
   std::string status;                     // done, unusable, failed, missing
   std::string reason;                     // of a failure
   std::map<std::string, double> metrics;  // by dotted path in result.json; finite ones only
@@ -38,7 +38,7 @@ StudyResults ReadStudyResults(const std::filesystem::path& folder);
 
 // One treatment: the trials that differ in the subject only.
 struct Treatment {
-  std::vector<std::string> values;           // one an axis
+  std::vector<std::string> values;           // one per axis
   std::string label;                         // TreatmentLabel of them
   std::vector<std::size_t> trials;           // those that are done, in the order of the plan
   std::map<std::string, double> by_subject;  // the metric, of these

@@ -62,8 +62,8 @@ TEST(Config, SaysExactlyWhatIsWrong) {
       {"radius_mm: -.Inf", "x.yaml:1:12: radius_mm: '-.Inf' is not finite; expected a number"},
       {"radius_mm: NaN", "x.yaml:1:12: radius_mm: 'NaN' is not finite; expected a number"},
       {"radius_mm: 1e999",
-       "x.yaml:1:12: radius_mm: 1e999 does not fit; a number between 1e-308 and 1e308 in size is "
-       "due"},
+       "x.yaml:1:12: radius_mm: 1e999 does not fit; expected a number between 1e-308 and 1e308 "
+       "in size"},
       {"radius_mm: 010.5",
        "x.yaml:1:12: radius_mm: '010.5' is not plainly decimal; write a number without a leading "
        "0"},
