@@ -12,8 +12,8 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_io.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "surfaces/mesh/ply_layout.h"
 #include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/read_ply.h"
 
 namespace semblance {
 namespace {

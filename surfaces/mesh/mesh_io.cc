@@ -4,18 +4,20 @@
 #include <fmt/format.h>
 
 #include <OpenMesh/Core/IO/MeshIO.hh>
-#include <OpenMesh/Core/IO/importer/ImporterT.hh>
 #include <OpenMesh/Core/Mesh/PolyMesh_ArrayKernelT.hh>
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <map>
 #include <set>
 #include <sstream>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/ply_layout.h"
+#include "surfaces/mesh/read_obj.h"
+#include "surfaces/mesh/read_off.h"
+#include "surfaces/mesh/read_parts.h"
+#include "surfaces/mesh/read_ply.h"
+#include "surfaces/mesh/read_stl.h"
 
 namespace semblance {
 namespace {
@@ -24,52 +26,6 @@ struct Traits : OpenMesh::DefaultTraits {
   using Point = OpenMesh::Vec3d;
 };
 using HalfedgeMesh = OpenMesh::PolyMesh_ArrayKernelT<Traits>;
-
-// Takes what OpenMesh's readers find before it would become a halfedge mesh, which cannot hold
-// non-manifold faces.
-class ArrayImporter : public OpenMesh::IO::ImporterT<HalfedgeMesh> {
- public:
-  explicit ArrayImporter(HalfedgeMesh& mesh) : ImporterT(mesh), points_(mesh) {}
-
-  OpenMesh::FaceHandle add_face(const VHandles& corners) override {
-    for (std::size_t c = 2; c < corners.size(); ++c) {
-      triangles_.push_back({corners[0].idx(), corners[c - 1].idx(), corners[c].idx()});
-    }
-    return OpenMesh::FaceHandle(static_cast<int>(faces_++));
-  }
-  std::size_t n_faces() const override { return faces_; }
-
-  // What a file may say of its faces beside their corners is not kept; the base would look the
-  // faces up in the halfedge mesh.
-  using ImporterT::set_color;
-  using ImporterT::set_normal;
-  void add_face_texcoords(OpenMesh::FaceHandle, OpenMesh::VertexHandle,
-                          const std::vector<OpenMesh::Vec2f>&) override {}
-  void add_face_texcoords(OpenMesh::FaceHandle, OpenMesh::VertexHandle,
-                          const std::vector<OpenMesh::Vec3f>&) override {}
-  void set_face_texindex(OpenMesh::FaceHandle, int) override {}
-  void set_color(OpenMesh::FaceHandle, const OpenMesh::Vec3uc&) override {}
-  void set_color(OpenMesh::FaceHandle, const OpenMesh::Vec4uc&) override {}
-  void set_color(OpenMesh::FaceHandle, const OpenMesh::Vec3f&) override {}
-  void set_color(OpenMesh::FaceHandle, const OpenMesh::Vec4f&) override {}
-  void set_normal(OpenMesh::FaceHandle, const OpenMesh::Vec3f&) override {}
-  void set_normal(OpenMesh::FaceHandle, const OpenMesh::Vec3d&) override {}
-
-  TriMesh Take() {
-    TriMesh mesh;
-    for (const auto v : points_.vertices()) {
-      const auto& p = points_.point(v);
-      mesh.points.emplace_back(p[0], p[1], p[2]);
-    }
-    mesh.triangles = std::move(triangles_);
-    return mesh;
-  }
-
- private:
-  HalfedgeMesh& points_;
-  std::vector<Triangle> triangles_;
-  std::size_t faces_ = 0;
-};
 
 // OpenMesh reports to std::cerr through streams of its own; libraries do not print.
 class QuietOpenMesh {
@@ -93,31 +49,6 @@ std::string LowerExtension(const std::filesystem::path& path) {
   return extension;
 }
 
-std::string StlDefect(std::string_view bytes) {
-  if (bytes.starts_with("solid") && bytes.find("facet") != std::string_view::npos) {
-    return bytes.find("endsolid") == std::string_view::npos ? "is truncated: it has no 'endsolid'"
-                                                            : "";
-  }
-  if (bytes.size() < 84) {
-    return fmt::format("is truncated: a binary STL has at least 84 bytes, it has {}", bytes.size());
-  }
-  std::uint32_t triangles = 0;
-  std::memcpy(&triangles, bytes.data() + 80, sizeof triangles);
-  const std::size_t expected = 84 + std::size_t{50} * triangles;
-  return bytes.size() >= expected
-             ? ""
-             : fmt::format(
-                   "is truncated: its header says {} triangles, that is {} bytes; it has {}",
-                   triangles, expected, bytes.size());
-}
-
-std::string Defect(const std::string& extension, std::string_view bytes) {
-  if (extension == ".ply") {
-    return PlyDefect(bytes);
-  }
-  return extension == ".stl" ? StlDefect(bytes) : "";
-}
-
 void CheckExtension(const std::string& extension, const std::string& where) {
   static const std::set<std::string> kKnown = {".ply", ".obj", ".stl", ".off"};
   if (!kKnown.contains(extension)) {
@@ -127,43 +58,11 @@ void CheckExtension(const std::string& extension, const std::string& where) {
   }
 }
 
-void CheckMeshContents(const TriMesh& mesh, const std::string& name) {
-  if (mesh.triangles.empty()) {
-    throw InputError(fmt::format("{}: the mesh has no triangles", name));
-  }
-  for (std::size_t v = 0; v < mesh.points.size(); ++v) {
-    if (!mesh.points[v].allFinite()) {
-      throw InputError(fmt::format("{}: vertex {} is not finite; repair the mesh", name, v));
-    }
-  }
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const std::int32_t v : mesh.triangles[t]) {
-      if (v < 0 || v >= static_cast<std::int32_t>(mesh.points.size())) {
-        throw InputError(fmt::format("{}: face {} names vertex {}; there are {}", name, t, v,
-                                     mesh.points.size()));
-      }
-    }
-  }
-}
-
-// An STL repeats the corners of its triangles; equal ones become one point, in the order of their
-// first use.
-TriMesh MergeEqualPoints(const TriMesh& soup) {
-  std::map<std::array<double, 3>, std::int32_t> index;
-  TriMesh mesh;
-  std::vector<std::int32_t> renumbered;
-  for (const Vec3& p : soup.points) {
-    const auto [it, is_new] =
-        index.try_emplace({p.x(), p.y(), p.z()}, static_cast<std::int32_t>(mesh.points.size()));
-    if (is_new) {
-      mesh.points.push_back(p);
-    }
-    renumbered.push_back(it->second);
-  }
-  for (const Triangle& t : soup.triangles) {
-    mesh.triangles.push_back({renumbered[t[0]], renumbered[t[1]], renumbered[t[2]]});
-  }
-  return mesh;
+TriMesh Decode(std::string_view bytes, const std::string& extension, const std::string& name) {
+  return extension == ".ply"   ? ReadPly(bytes, name)
+         : extension == ".obj" ? ReadObj(bytes, name)
+         : extension == ".off" ? ReadOff(bytes, name)
+                               : ReadStl(bytes, name);
 }
 
 template <class T>
@@ -270,20 +169,15 @@ TriMesh ReadMesh(const std::filesystem::path& path) {
   if (bytes.empty()) {
     throw IoError(fmt::format("{}: the file is empty", name));
   }
-  const std::string defect = Defect(extension, bytes);
-  if (!defect.empty()) {
-    throw IoError(fmt::format("{} {}", name, defect));
+  TriMesh mesh = Decode(bytes, extension, name);
+  if (mesh.triangles.empty()) {
+    throw InputError(fmt::format("{}: the mesh has no triangles; give a surface", name));
   }
-  const QuietOpenMesh quiet;
-  HalfedgeMesh points;
-  ArrayImporter importer(points);
-  OpenMesh::IO::Options options;
-  if (!OpenMesh::IO::IOManager().read(name, importer, options)) {
-    throw IoError(fmt::format("{}: it is no {} mesh that can be read", name, extension));
+  if (mesh.triangles.size() > kMostElements) {
+    throw InputError(fmt::format("{}: the mesh has {} triangles; at most {} are allowed", name,
+                                 mesh.triangles.size(), kMostElements));
   }
-  TriMesh mesh = importer.Take();
-  CheckMeshContents(mesh, name);
-  return extension == ".stl" ? MergeEqualPoints(mesh) : mesh;
+  return mesh;
 }
 
 std::string EncodeMesh(const TriMesh& mesh, const std::string& extension,

@@ -12,10 +12,12 @@
 
 namespace semblance {
 
-// Reads a mesh, all its faces kept as they stand (also where edges are non-manifold), polygons
-// fanned into triangles, equal corners of an STL merged. The format follows the extension (.ply
-// .obj .stl .off). Throws IoError (no such file, unknown extension, truncated, not of that format)
-// or InputError (no triangles, a coordinate that is not finite), naming the file.
+// Reads a mesh. All faces are kept as they are (also where edges are non-manifold), polygons fanned
+// into triangles, equal corners of an STL merged. The format follows the extension (.ply .obj .stl
+// .off); read_ply.h and its fellows say what is kept of it. Coordinates are single precision, but
+// for PLY's doubles and whole numbers. Nothing wrong is skipped: throws IoError (no such file,
+// unknown extension, empty) or InputError (no triangles, or anything in the file that is not of its
+// format), naming the file and the line or byte. Memory follows the file's size, not its claims.
 TriMesh ReadMesh(const std::filesystem::path& path);
 
 // What a PLY may carry beside the shape; each vector is empty or has one entry a vertex.

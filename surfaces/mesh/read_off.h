@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Geomview's Object File Format.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// The vertices (in single precision) and polygons of a text OFF, polygons fanned into triangles.
+// Each vertex and each face is a line; comments begin with '#'. The header may be OFF with any of
+// ST (texture), C (colours), N (normals) before it; these are not kept, neither are colours of
+// faces. name: the file, for messages.
+// Throws InputError with the line for anything else: OFF BINARY, four or n dimensions, counts that
+// do not fit the file, fewer than 3 corners, an index out of range, a coordinate that is not
+// finite.
+TriMesh ReadOff(std::string_view bytes, const std::string& name);
+
+}  // namespace semblance
