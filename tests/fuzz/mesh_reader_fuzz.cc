@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fuzzes the readers of meshes: a mesh that is read is sound, anything else an InputError. The
+// input is the file itself; its first byte tells which reader: 'p' PLY, 'O', 'C' or 'N' OFF, 's' or
+// one that cannot be printed STL, any other OBJ.
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/read_obj.h"
+#include "surfaces/mesh/read_off.h"
+#include "surfaces/mesh/read_ply.h"
+#include "surfaces/mesh/read_stl.h"
+
+namespace {
+
+using semblance::TriMesh;
+
+TriMesh Read(std::string_view bytes) {
+  const char first = bytes.empty() ? 'p' : bytes.front();
+  if (first == 'p') {
+    const TriMesh mesh = semblance::ReadPly(bytes, "fuzz.ply");
+    if (semblance::PlyVertexScalar(bytes, "x", "fuzz.ply").size() != mesh.points.size()) {
+      std::abort();
+    }
+    return mesh;
+  }
+  if (first == 'O' || first == 'C' || first == 'N') {
+    return semblance::ReadOff(bytes, "fuzz.off");
+  }
+  const bool printable = first >= ' ' && first <= '~';
+  return first == 's' || !printable ? semblance::ReadStl(bytes, "fuzz.stl")
+                                    : semblance::ReadObj(bytes, "fuzz.obj");
+}
+
+void AbortUnlessSound(const TriMesh& mesh) {
+  for (const semblance::Vec3& p : mesh.points) {
+    if (!p.allFinite()) {
+      std::abort();
+    }
+  }
+  for (const semblance::Triangle& t : mesh.triangles) {
+    for (const std::int32_t v : t) {
+      if (v < 0 || static_cast<std::size_t>(v) >= mesh.points.size()) {
+        std::abort();
+      }
+    }
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    AbortUnlessSound(Read({reinterpret_cast<const char*>(data), size}));
+  } catch (const semblance::InputError&) {
+  }
+  return 0;
+}
