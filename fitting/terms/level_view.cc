@@ -28,7 +28,7 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
   const HSplineShape& shape = surface.shape();
   if (level < 0 || level > shape.max_level || !(shape == rest.shape())) {
     throw InputError(fmt::format(
-        "posterior: level {} of a surface with levels 0..{}; give one of them, and a template of "
+        "uncertainty: level {} of a surface with levels 0..{}; give one of them, and a template of "
         "the same shape",
         level, shape.max_level));
   }

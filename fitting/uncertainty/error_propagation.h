@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the errors of the points that a surface was fitted to, which may hang together, spread over
-// it. Where posterior.h asks what a fit with the best weights would know, this asks how far the fit
-// that was made may be off.
+// How far a fit may be off: how the errors of its points, which may be correlated, propagate to the
+// surface.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,7 +17,7 @@
 namespace semblance {
 
 struct PointErrors {
-  std::vector<Vec3> directions;  // unit, one a point: along which it may be off
+  std::vector<Vec3> directions;  // unit, one per point: along which it may be off
   Eigen::MatrixXd root;          // points x any number; root root^T is the covariance, mm^2
 };
 
@@ -27,7 +26,7 @@ struct PointErrors {
 // Peters & Schneider 2012).
 Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd covariance, double share = 1e-3);
 
-// The surface's error is linear in three that do not hang together. With the level's normal matrix
+// The surface's error is a sum of three, taken as independent. With the level's normal matrix
 // M = A'WA + P, of points and other terms at the weights of the fit:
 //   M^-1 A'W e, the points' errors e as given;
 //   M^-1 P (c - c0), what the other terms hold back: the true net is off the one that they draw to
@@ -44,15 +43,15 @@ class ErrorPropagation {
  public:
   // surface: fitted to `target`, whose (u,v) are where the fit left them. level: the finest that
   // was fitted; finer detail is taken as known. rest: the placed template. Throws InputError for a
-  // level that is not there, errors that are not one a point, or terms of which none with a weight
-  // is of the points; and where `weight: auto` cannot be.
+  // level that is not there, errors that are not one per point, or terms of which none with a
+  // weight is of the points; and where `weight: auto` cannot be.
   ErrorPropagation(const HSplineSurface& surface, const HSplineSurface& rest,
                    const FitTarget& target, int level, std::span<const Term> terms,
                    const PointErrors& errors);
   ~ErrorPropagation();
   ErrorPropagation(ErrorPropagation&&) noexcept;
 
-  // Standard deviations in mm along `normals` (unit, one a uv) of the surface's points at uv; NaN
+  // Standard deviations in mm along `normals` (unit, one per uv) of the surface's points at uv; NaN
   // where no term says anything.
   std::vector<double> Sigma(std::span<const Vec2> uv, std::span<const Vec3> normals) const;
 
@@ -61,7 +60,7 @@ class ErrorPropagation {
   std::vector<HSplineSurface> Samples(int count, std::uint64_t random_seed) const;
 
   double prior_sd() const;                         // see above
-  double determined() const;                       // trace(M^-1 A'WA): parameters, a coordinate
+  double determined() const;                       // trace(M^-1 A'WA): parameters per coordinate
   std::vector<std::string_view> left_out() const;  // names of the terms that were
 
  private:

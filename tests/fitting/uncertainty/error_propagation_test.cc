@@ -4,8 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <cmath>
-#include <numbers>
+#include <vector>
 
 #include "fitting/fit.h"
 #include "surfaces/base/error.h"
@@ -19,7 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 // Points of the template on the part with u < 0.7, which may be off along its normals by errors
-// that hang together.
+// that are correlated.
 struct Scene {
   HSplineSurface rest = testing::SmoothSurface({.patches_u = 4, .patches_v = 3, .max_level = 1}, 1);
   FitTarget target;
@@ -116,11 +117,63 @@ TEST(ErrorPropagation, SamplesSpreadAsSigmaSays) {
     EXPECT_NEAR(std::sqrt(squares), sigma[k], 0.1 * sigma[k]) << k;
   }
   EXPECT_EQ(spread.Samples(2, 1)[1].Net(1).vertices, samples[1].Net(1).vertices);
-  EXPECT_NE(spread.Samples(1, 2)[0].Net(1).vertices, samples[0].Net(1).vertices);
+  // Draws of another random_seed are other draws: their difference has twice the variance.
+  const std::vector<HSplineSurface> others = spread.Samples(kDraws, 2);
+  double squares = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Vec3 apart = others[draw].Point(scene.uv[1]) - samples[draw].Point(scene.uv[1]);
+    squares += std::pow(apart.dot(scene.normals[1]), 2) / kDraws;
+  }
+  EXPECT_NEAR(std::sqrt(squares / 2), sigma[1], 0.1 * sigma[1]);
+}
+
+// Gauss and Markov's variance, dense: s' (A' C^-1 A)^-1 s, with s the stencil at a place, A those
+// of the points and C the diagonal of their variances.
+double GaussMarkovSigma(const HSplineSurface& surface, const FitTarget& target,
+                        const Eigen::VectorXd& sd_mm, const Vec2& uv) {
+  const auto row = [&](const Vec2& at) {
+    Eigen::VectorXd dense = Eigen::VectorXd::Zero(surface.Columns(0) * surface.Rows(0));
+    const Stencil stencil = surface.StencilAt(0, at);
+    for (int k = 0; k < 16; ++k) {
+      dense[stencil.index[k]] += stencil.weight[k];
+    }
+    return dense;
+  };
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(row(uv).size(), row(uv).size());
+  for (std::size_t k = 0; k < target.points.size(); ++k) {
+    const Eigen::VectorXd a = row(target.points[k].uv) / sd_mm[static_cast<Eigen::Index>(k)];
+    normal += a * a.transpose();
+  }
+  return std::sqrt(row(uv).dot(normal.ldlt().solve(row(uv))));
+}
+
+// Points alone, whose errors are independent and whose weights match them: nothing else can be off.
+TEST(ErrorPropagation, OfIndependentPointsIsGaussAndMarkovs) {
+  const HSplineSurface rest = testing::SmoothSurface({.patches_u = 4, .patches_v = 3}, 1);
+  Random random(6);
+  FitTarget target;
+  Eigen::VectorXd sd_mm(200);
+  PointErrors errors;
+  for (double& sd : sd_mm) {
+    sd = random.Uniform(0.5, 2);
+    const Vec2 at(random.Uniform(0, 1), random.Uniform(0, 1));
+    target.points.push_back(
+        {.label = {}, .position = rest.Point(at), .uv = at, .weight = 7 / (sd * sd)});
+    errors.directions.push_back(Vec3::UnitZ());
+  }
+  errors.root = sd_mm.asDiagonal();
+  const std::vector<Term> terms = {PointTerm{}};
+  const std::vector<Vec2> uv = {{0.1, 0.2}, {0.35, 0.5}, {0.6, 0.8}, {0.95, 0.5}};
+  const std::vector<double> sigma = ErrorPropagation(rest, rest, target, 0, terms, errors)
+                                        .Sigma(uv, std::vector<Vec3>(4, Vec3::UnitZ()));
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    const double expected = GaussMarkovSigma(rest, target, sd_mm, uv[k]);
+    EXPECT_NEAR(sigma[k], expected, 1e-4 * expected);  // the factor has a small ridge
+  }
 }
 
 // Neighbours that are off together are not averaged away; those off by themselves are.
-TEST(ErrorPropagation, ErrorsThatHangTogetherCountInFull) {
+TEST(ErrorPropagation, CorrelatedErrorsCountInFull) {
   Scene scene;
   scene.uv.pop_back();  // where there are points
   scene.normals.pop_back();

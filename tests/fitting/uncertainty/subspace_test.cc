@@ -42,7 +42,7 @@ Eigen::VectorXd MovedX(const HSplineSurface& before, const HSplineSurface& after
 
 // Whatever vertex moves, and with it the detail on it: the finest net stays within the space; and
 // there are as many independent moves as it has columns.
-TEST(SurfaceSpace, HoldsWhatTheSurfaceCanDo) {
+TEST(Subspace, HoldsWhatTheSurfaceCanDo) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     const HSplineSurface surface = FinerInPlaces(closure);
     const Eigen::MatrixXd space = SubspaceBasis(surface, 2);
@@ -68,7 +68,7 @@ TEST(SurfaceSpace, HoldsWhatTheSurfaceCanDo) {
   }
 }
 
-TEST(SurfaceSpace, IsAllNetsWhereEveryVertexIsEditedOrNone) {
+TEST(Subspace, IsAllNetsWhereEveryVertexIsEditedOrNone) {
   const HSplineSurface plain =
       testing::PlainStart({.patches_u = 4, .patches_v = 4, .max_level = 1});
   EXPECT_EQ(SubspaceBasis(plain, 0).rows(), 0);
@@ -83,7 +83,7 @@ TEST(SurfaceSpace, IsAllNetsWhereEveryVertexIsEditedOrNone) {
 }
 
 // Dense linear algebra.
-TEST(SurfaceSpace, SolvesWithinTheSpace) {
+TEST(Subspace, SolvesWithinTheSpace) {
   const HSplineSurface surface = FinerInPlaces(Closure::kOpen);
   const SparseMatrix space = SubspaceBasis(surface, 2);
   const Eigen::Index n = space.rows();
