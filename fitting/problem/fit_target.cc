@@ -14,6 +14,25 @@ bool InDomain(const Vec2& uv) { return (uv.array() >= 0).all() && (uv.array() <=
 
 }  // namespace
 
+FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
+                   std::span<const double> weights) {
+  if (uv.size() != positions.size() || (!weights.empty() && weights.size() != positions.size())) {
+    throw InputError(fmt::format(
+        "fit target: {} points with {} pairs (u,v) and {} weights; give (u,v) for each point, and "
+        "a weight for each or for none",
+        positions.size(), uv.size(), weights.size()));
+  }
+  FitTarget target;
+  target.points.reserve(positions.size());
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    target.points.push_back({.label = {},
+                             .position = positions[k],
+                             .uv = uv[k],
+                             .weight = weights.empty() ? 1 : weights[k]});
+  }
+  return target;
+}
+
 void CheckTarget(const FitTarget& target) {
   if (!target.anchors.empty() && target.anchors.size() != target.points.size()) {
     throw InputError(fmt::format("fit target: {} anchors on bone for {} points; give one per point",

@@ -30,6 +30,11 @@ struct FitTarget {
   std::vector<BoneAnchor> anchors = {};  // one per point, or none
 };
 
+// Scattered points, without labels. weights: one per point, or none for equal ones. Throws
+// InputError if the sizes differ.
+FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
+                   std::span<const double> weights = {});
+
 // Throws InputError, naming the point, if one has a position that is not finite, a (u,v) outside
 // the domain, a weight that is not positive and finite, or a foot without a unit direction; or if
 // there are anchors, but not one per point.

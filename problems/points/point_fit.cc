@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
 #include "problems/report/fit_json.h"
@@ -43,25 +44,17 @@ HSplineShape ShapeOf(const PointFitOptions& options) {
           .closure = options.closure};
 }
 
-void CheckClosure(const std::string& kind, Closure closure) {
-  if (kind == "cylinder" && closure == Closure::kOpen) {
-    throw InputError("closure: parameters on a cylinder go round; write closure: periodic_u");
-  }
-  if (kind == "plane" && closure == Closure::kPeriodicU) {
-    throw InputError("closure: parameters on a plane do not go round; write closure: open");
-  }
+std::string_view NameOf(ParameterSource source) {
+  return EnumNames(source)[static_cast<std::size_t>(source)];
 }
 
-FitTarget TargetOf(const PointTable& table, const std::vector<Vec2>& uv) {
-  FitTarget target;
-  target.points.reserve(uv.size());
-  for (std::size_t k = 0; k < uv.size(); ++k) {
-    target.points.push_back({.label = {},
-                             .position = table.positions[k],
-                             .uv = uv[k],
-                             .weight = table.weights.empty() ? 1 : table.weights[k]});
+void CheckClosure(ParameterSource source, Closure closure) {
+  if (source == ParameterSource::kCylinder && closure == Closure::kOpen) {
+    throw InputError("closure: parameters on a cylinder go round; write closure: periodic_u");
   }
-  return target;
+  if (source == ParameterSource::kPlane && closure == Closure::kPeriodicU) {
+    throw InputError("closure: parameters on a plane do not go round; write closure: open");
+  }
 }
 
 double Quantile(std::vector<double> values, double part) {
@@ -118,14 +111,15 @@ PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
                    const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
   StepClock step(context);
-  const Parametrisation parameters =
-      step("parameters", [&] { return Parametrise(table, options.parameters); });
-  CheckClosure(parameters.kind, options.closure);
+  const Parametrisation parameters = step(
+      "parameters", [&] { return Parametrise(table.positions, options.parameters, table.uv); });
+  CheckClosure(parameters.source, options.closure);
   const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
-  PointFit result{.parameters = parameters.kind,
+  PointFit result{.parameters = std::string(NameOf(parameters.source)),
                   .fit = step("fit",
                               [&] {
-                                const FitTarget target = TargetOf(table, parameters.uv);
+                                const FitTarget target =
+                                    TargetOf(table.positions, parameters.uv, table.weights);
                                 return Fit(start, target, {}, options.fit, context);
                               }),
                   .times = {}};

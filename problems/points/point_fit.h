@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "fitting/problem/parametrise.h"
 #include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
-#include "problems/points/parametrise.h"
 #include "problems/points/point_table.h"
 
 namespace semblance {

@@ -12,12 +12,12 @@ namespace semblance {
 
 struct PointTable {
   std::vector<Vec3> positions;  // mm
-  std::vector<Vec2> uv;         // one a point, or none
-  std::vector<double> weights;  // > 0; one a point, or none
+  std::vector<Vec2> uv;         // one per point, or none
+  std::vector<double> weights;  // > 0; one per point, or none
 };
 
 // The first line names the columns, in any order: x, y and z, and, if wanted, u and v together and
-// weight. Each further line has one decimal number a column, separated by commas. Nothing else is
+// weight. Each further line has one decimal number per column, separated by commas. Nothing else is
 // let pass: `name:line: what` as IoError for another column or one twice, a line with more or fewer
 // entries, an empty line before the end, what is not a finite number, a weight that is not
 // positive, or no point at all.

@@ -90,17 +90,6 @@ TEST_F(PointFitCommand, AHeightFieldKeepsItsNoise) {
   EXPECT_LT(json["rms_mm"], 1.05 * noise);
 }
 
-// Steep heights, whose least spread is not upward, over the plane that is said.
-TEST(PointFit, APlaneAcrossANormalHasItsHeights) {
-  const PointTable table = TableOf(Scattered(FrankePoint, 2000, 0, 1));
-  const Parametrisation p = Parametrise(table, PlaneParameters{.normal = {0, 0, 2}});
-  EXPECT_EQ(p.kind, "plane");
-  for (std::size_t k = 0; k < p.uv.size(); ++k) {
-    EXPECT_NEAR(p.uv[k].x(), table.positions[k].x(), 2e-3);  // the points nearly fill the square
-    EXPECT_NEAR(p.uv[k].y(), table.positions[k].y(), 2e-3);
-  }
-}
-
 TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
   Write("bad.csv", "x,y,z\n0,0,zero\n");
@@ -154,15 +143,6 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
     const Vec2 left(1 - 1e-9, v), right(1e-9, v);
     EXPECT_LT((result.fit.surface.Point(left) - result.fit.surface.Point(right)).norm(), 1e-6);
   }
-}
-
-TEST(PointFit, TheRangeOfGivenParametersIsMapped) {
-  PointTable table{.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
-                   .uv = {{0, 0}, {9, 0}, {4.5, 9}},
-                   .weights = {}};
-  const GivenParameters given{.u_range = {0, 9}, .v_range = {0, 9}};
-  EXPECT_EQ(Parametrise(table, given).uv[2], Vec2(0.5, 1));
-  EXPECT_THROW(Parametrise(table, GivenParameters{}), InputError);
 }
 
 TEST(PointFit, ConfigurationRoundTrips) {

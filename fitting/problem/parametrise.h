@@ -1,27 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// (u,v) for scattered points that have none, or have others than [0,1] x [0,1].
+// (u,v) in [0,1] x [0,1] for scattered points.
 #pragma once
 
 #include <array>
 #include <span>
-#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
-#include "problems/points/point_table.h"
 #include "surfaces/base/fields.h"
-#include "surfaces/hspline/hspline_surface.h"
+#include "surfaces/base/geometry.h"
 
 namespace semblance {
 
-// Those of the table where it has some, else the plane's.
+// Those that are given, if there are any, else the plane's.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
 template <class Visitor>
 void Fields(Visitor&, AutoParameters&) {}
 
+// Those that are given, with the ranges mapped to [0,1].
 struct GivenParameters {
   static constexpr std::string_view kName = "given";
   std::array<double, 2> u_range = {0, 1};
@@ -33,9 +32,9 @@ void Fields(Visitor& visit, GivenParameters& o) {
   visit(FieldInfo{.name = "v_range", .doc = "what of the column v becomes 0 and 1"}, o.v_range);
 }
 
-// Orthogonal projection on the plane of least squares, u along its longest direction; or on that
-// across a normal, u along the coordinate axis nearest to it, the first of equals. For points that
-// do not fold over it.
+// Orthogonal projection on a plane, for points that do not fold over it: on the plane of least
+// squares, u along its longest direction; or on the plane across `normal`, u along the coordinate
+// axis nearest to the plane (the first of equals).
 struct PlaneParameters {
   static constexpr std::string_view kName = "plane";
   std::array<double, 3> normal = {0, 0, 0};
@@ -64,18 +63,21 @@ void Fields(Visitor& visit, CylinderParameters& o) {
 using Parameters =
     std::variant<AutoParameters, GivenParameters, PlaneParameters, CylinderParameters>;
 
+enum class ParameterSource { kGiven, kPlane, kCylinder };
+constexpr auto EnumNames(ParameterSource) {
+  return std::to_array<std::string_view>({"given", "plane", "cylinder"});
+}
+
 struct Parametrisation {
-  std::vector<Vec2> uv;  // one a point, in [0,1] x [0,1]
-  std::string kind;      // given, plane or cylinder
+  std::vector<Vec2> uv;  // one per point, in [0,1] x [0,1]
+  ParameterSource source = ParameterSource::kGiven;
 };
 
-// Throws InputError for `given` without columns u and v, an empty range, (u,v) outside of it, or
-// points that span no plane or have no extent along the axis.
-Parametrisation Parametrise(const PointTable& table, const Parameters& parameters);
-
-// A smooth surface near the points to start from: of all affine maps of (u,v) (open), or of all
-// sums of 1, cos, sin of 2 pi u, each with and without v (periodic), that of least squares.
-HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
-                            std::span<const Vec2> uv);
+// positions: mm. given_uv: one per point, or none. Throws InputError for no points, `given` without
+// given_uv, a number of given_uv that is not that of the points, an empty range, given_uv outside
+// of it, and points that span no plane or have no extent along the axis.
+Parametrisation Parametrise(std::span<const Vec3> positions,
+                            const Parameters& parameters = AutoParameters{},
+                            std::span<const Vec2> given_uv = {});
 
 }  // namespace semblance

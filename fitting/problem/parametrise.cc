@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/points/parametrise.h"
+#include "fitting/problem/parametrise.h"
 
 #include <fmt/format.h>
 
@@ -14,6 +14,11 @@ namespace semblance {
 namespace {
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("parameters: " + what); }
+
+struct Scattered {
+  std::span<const Vec3> positions;
+  std::span<const Vec2> given_uv;
+};
 
 Vec3 MeanOf(std::span<const Vec3> points) {
   Vec3 sum = Vec3::Zero();
@@ -63,9 +68,11 @@ void Normalise(int coordinate, const std::string& what, std::vector<Vec2>& uv) {
   }
 }
 
-Parametrisation ParametersOf(const PointTable& table, const GivenParameters& given) {
-  if (table.uv.empty()) {
-    Fail("type 'given' needs the columns u and v; add them, or take 'plane' or 'cylinder'");
+Parametrisation ParametersOf(const Scattered& points, const GivenParameters& given) {
+  if (points.given_uv.empty()) {
+    Fail(
+        "type 'given' needs each point's (u,v) (of a table, the columns u and v); give them, or "
+        "take 'plane' or 'cylinder'");
   }
   const std::array<std::array<double, 2>, 2> ranges = {given.u_range, given.v_range};
   for (const auto& [low, high] : ranges) {
@@ -73,18 +80,18 @@ Parametrisation ParametersOf(const PointTable& table, const GivenParameters& giv
       Fail(fmt::format("the range [{}, {}] is empty; give the lower bound first", low, high));
     }
   }
-  Parametrisation result{.uv = {}, .kind = "given"};
-  for (std::size_t k = 0; k < table.uv.size(); ++k) {
+  Parametrisation result{.uv = {}, .source = ParameterSource::kGiven};
+  for (std::size_t k = 0; k < points.given_uv.size(); ++k) {
     Vec2 uv;
     for (const int c : {0, 1}) {
-      uv[c] = (table.uv[k][c] - ranges[c][0]) / (ranges[c][1] - ranges[c][0]);
+      uv[c] = (points.given_uv[k][c] - ranges[c][0]) / (ranges[c][1] - ranges[c][0]);
     }
     if (!(uv.minCoeff() >= 0 && uv.maxCoeff() <= 1)) {
       Fail(
           fmt::format("point {} has (u,v) = ({}, {}) outside [{}, {}] x [{}, {}]; widen u_range "
                       "and v_range",
-                      k, table.uv[k].x(), table.uv[k].y(), ranges[0][0], ranges[0][1], ranges[1][0],
-                      ranges[1][1]));
+                      k, points.given_uv[k].x(), points.given_uv[k].y(), ranges[0][0], ranges[0][1],
+                      ranges[1][0], ranges[1][1]));
     }
     result.uv.push_back(uv);
   }
@@ -113,12 +120,12 @@ PlaneAxes PlaneAcross(const Vec3& normal) {
   return {u, unit.cross(u)};
 }
 
-Parametrisation ParametersOf(const PointTable& table, const PlaneParameters& plane) {
+Parametrisation ParametersOf(const Scattered& points, const PlaneParameters& plane) {
   const Vec3 normal(plane.normal[0], plane.normal[1], plane.normal[2]);
-  const auto [u, v] = normal.isZero(0) ? LeastSquaresPlane(table.positions) : PlaneAcross(normal);
-  const Vec3 mean = MeanOf(table.positions);
-  Parametrisation result{.uv = {}, .kind = "plane"};
-  for (const Vec3& p : table.positions) {
+  const auto [u, v] = normal.isZero(0) ? LeastSquaresPlane(points.positions) : PlaneAcross(normal);
+  const Vec3 mean = MeanOf(points.positions);
+  Parametrisation result{.uv = {}, .source = ParameterSource::kPlane};
+  for (const Vec3& p : points.positions) {
     result.uv.emplace_back((p - mean).dot(u), (p - mean).dot(v));
   }
   Normalise(0, "the plane's u", result.uv);
@@ -126,14 +133,14 @@ Parametrisation ParametersOf(const PointTable& table, const PlaneParameters& pla
   return result;
 }
 
-struct Axis {
+struct CylinderAxis {
   Vec3 direction, across, third, centre;
   double unevenness = kNaN;  // variance of the distances from the axis over their mean square
 };
 
 // The circle of least squares (Kasa) through the points as seen along the direction is its centre.
-Axis AxisAlong(const Vec3& direction, std::span<const Vec3> points) {
-  Axis axis{.direction = direction.normalized(), .across = {}, .third = {}, .centre = {}};
+CylinderAxis AxisAlong(const Vec3& direction, std::span<const Vec3> points) {
+  CylinderAxis axis{.direction = direction.normalized(), .across = {}, .third = {}, .centre = {}};
   Eigen::Index least = 0;
   axis.direction.cwiseAbs().minCoeff(&least);
   axis.across = axis.direction.cross(Vec3::Unit(least)).normalized();
@@ -164,24 +171,24 @@ Axis AxisAlong(const Vec3& direction, std::span<const Vec3> points) {
   return axis;
 }
 
-Axis BestAxis(const CylinderParameters& cylinder, std::span<const Vec3> points) {
+CylinderAxis BestAxis(const CylinderParameters& cylinder, std::span<const Vec3> points) {
   const Vec3 given(cylinder.axis[0], cylinder.axis[1], cylinder.axis[2]);
   if (given.norm() > 0) {
     return AxisAlong(given, points);
   }
   const Principal principal = PrincipalOf(points);
-  Axis best = AxisAlong(principal.axes.col(2), points);
+  CylinderAxis best = AxisAlong(principal.axes.col(2), points);
   for (const int k : {1, 0}) {
-    const Axis axis = AxisAlong(principal.axes.col(k), points);
+    const CylinderAxis axis = AxisAlong(principal.axes.col(k), points);
     best = axis.unevenness < best.unevenness ? axis : best;
   }
   return best;
 }
 
-Parametrisation ParametersOf(const PointTable& table, const CylinderParameters& cylinder) {
-  const Axis axis = BestAxis(cylinder, table.positions);
-  Parametrisation result{.uv = {}, .kind = "cylinder"};
-  for (const Vec3& p : table.positions) {
+Parametrisation ParametersOf(const Scattered& points, const CylinderParameters& cylinder) {
+  const CylinderAxis axis = BestAxis(cylinder, points.positions);
+  Parametrisation result{.uv = {}, .source = ParameterSource::kCylinder};
+  for (const Vec3& p : points.positions) {
     const Vec3 x = p - axis.centre;
     const double turn = std::atan2(x.dot(axis.third), x.dot(axis.across)) / (2 * std::numbers::pi);
     result.uv.emplace_back(turn < 0 ? turn + 1 : turn, x.dot(axis.direction));
@@ -193,47 +200,24 @@ Parametrisation ParametersOf(const PointTable& table, const CylinderParameters& 
   return result;
 }
 
-Parametrisation ParametersOf(const PointTable& table, const AutoParameters&) {
-  return table.uv.empty() ? ParametersOf(table, PlaneParameters{})
-                          : ParametersOf(table, GivenParameters{});
-}
-
-Eigen::VectorXd Functions(const HSplineShape& shape, const Vec2& uv) {
-  if (shape.closure == Closure::kOpen) {
-    return Vec3(1, uv.x(), uv.y());
-  }
-  const double angle = 2 * std::numbers::pi * uv.x(), c = std::cos(angle), s = std::sin(angle);
-  Eigen::VectorXd f(6);
-  f << 1, c, s, uv.y(), uv.y() * c, uv.y() * s;
-  return f;
+Parametrisation ParametersOf(const Scattered& points, const AutoParameters&) {
+  return points.given_uv.empty() ? ParametersOf(points, PlaneParameters{})
+                                 : ParametersOf(points, GivenParameters{});
 }
 
 }  // namespace
 
-Parametrisation Parametrise(const PointTable& table, const Parameters& parameters) {
-  return std::visit([&](const auto& p) { return ParametersOf(table, p); }, parameters);
-}
-
-HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
-                            std::span<const Vec2> uv) {
-  CheckShape(shape);
-  const Eigen::Index n = Functions(shape, Vec2::Zero()).size();
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n), right = Eigen::MatrixXd::Zero(n, 3);
-  const Vec3 mean = MeanOf(positions);
-  for (std::size_t k = 0; k < positions.size(); ++k) {
-    const Eigen::VectorXd f = Functions(shape, uv[k]);
-    normal += f * f.transpose();
-    right += f * (positions[k] - mean).transpose();
+Parametrisation Parametrise(std::span<const Vec3> positions, const Parameters& parameters,
+                            std::span<const Vec2> given_uv) {
+  if (positions.empty()) {
+    Fail("there is no point; give some");
   }
-  const Eigen::MatrixXd x = normal.completeOrthogonalDecomposition().solve(right);
-  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
-  for (int j = 0; j < net.rows; ++j) {
-    for (int i = 0; i < net.columns; ++i) {
-      const Vec2 place((i - 1.0) / shape.patches_u, (j - 1.0) / shape.patches_v);
-      net.vertices.push_back(mean + x.transpose() * Functions(shape, place));
-    }
+  if (!given_uv.empty() && given_uv.size() != positions.size()) {
+    Fail(fmt::format("{} pairs (u,v) for {} points; give one per point, or none", given_uv.size(),
+                     positions.size()));
   }
-  return HSplineSurface(shape, net);
+  const Scattered points{positions, given_uv};
+  return std::visit([&](const auto& p) { return ParametersOf(points, p); }, parameters);
 }
 
 }  // namespace semblance
