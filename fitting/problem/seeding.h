@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Extra dowels for the fit, taken from the implicit face (thesis 4.2 asks for a point a patch of
-// the finest fitted level, and 5.3 for points of the implicit surface with the features masked).
+// Extra dowels for the fit, taken from the implicit face: thesis 4.2 asks for one point per patch
+// of the finest fitted level, and 5.3 for points of the implicit surface with the features masked.
 #pragma once
 
 #include <array>

@@ -19,13 +19,14 @@ struct JointLevel {
   std::function<double(const FitTarget&)> cost;  // of the terms, after a fit of the level to it
 };
 
-// The points' terms as functions of (u,v) and of the level's control vertices, the other terms, and
-// the penalties of relaxation.h with each point's neighbours held, relative to the points' weight,
-// in one ceres::Problem: Schur's complement eliminates the (u,v), a block of two for each corner of
-// the mesh, and Levenberg-Marquardt takes a few steps, in which a point stays in its patch or
-// little beyond. Then (u,v) move, each as far as no triangle turns over, and all less far, or not
-// at all, until the terms, fitted there, and the penalties cost less than before. The vertices are
-// the caller's to fit. Throws InputError without a term `points`.
+// Moves (u,v) and the level's control vertices in one ceres::Problem: the points' terms as
+// functions of both, the other terms, and the penalties of relaxation.h relative to the points'
+// weight, with each point's neighbours held. The Schur complement eliminates the (u,v), one block
+// of two per corner of the mesh. Levenberg-Marquardt takes a few steps, in which a point stays in
+// its patch or little beyond it. Then each (u,v) moves as far as no triangle turns over. While the
+// terms, fitted there, and the penalties do not cost less than before, all moves are halved, and at
+// last dropped. The vertices are left for the caller to fit. Throws InputError without a term
+// `points`.
 RelaxationSummary RelaxJointly(const HSplineSurface& surface, const HSplineSurface& rest,
                                const DowelMesh& mesh, const NetworkMoves& moves,
                                const JointLevel& level, FitTarget& target);

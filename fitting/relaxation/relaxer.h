@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What holds the (u,v) of a fit's points, and their moves against it; of every mode in
-// relaxation.h.
+// The penalties that hold the (u,v) of a fit's points, and the moves against them: for every
+// relaxation of relaxation.h.
 #pragma once
 
 #include <vector>
@@ -38,7 +38,7 @@ class Relaxer {
   void Round(RelaxationSummary& summary);
   RelaxationPenalties Penalties() const;
   const std::vector<Vec2>& uv() const { return uv_; }
-  void SetUv(const std::vector<Vec2>& uv);  // one a point, equal for the points of a corner
+  void SetUv(const std::vector<Vec2>& uv);  // one per point, equal for the points of a corner
 
   // For fits that move vertices too. The corners in the network's own order, and their points.
   const std::vector<int>& order() const { return order_; }
