@@ -350,7 +350,7 @@ TEST(Architecture, PlantedBackArrowsBetweenRoomsAreFound) {
   };
   EXPECT_THAT(check("surfaces/mesh/a.cc", "surfaces/decimate/decimate.h"),
               ElementsAre(HasSubstr("surfaces/mesh stands no higher than surfaces/decimate")));
-  EXPECT_THAT(check("surfaces/mesh/a.cc", "surfaces/hspline/overlay.h"),
+  EXPECT_THAT(check("surfaces/mesh/a.cc", "surfaces/hspline/sparse_net.h"),
               ElementsAre(HasSubstr("no higher")));
   EXPECT_THAT(check("problems/pipeline/case.cc", "problems/run.h"),
               ElementsAre(HasSubstr("no higher than the front door of problems")));

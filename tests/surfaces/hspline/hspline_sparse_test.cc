@@ -7,7 +7,6 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "surfaces/hspline/overlay.h"
 #include "surfaces/hspline/patch_tree.h"
 #include "tests/testing/splines.h"
 
