@@ -6,11 +6,15 @@
 #include <algorithm>
 #include <cctype>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/parallel.h"
 #include "surfaces/hspline_files/cad_export.h"
 #include "surfaces/hspline_files/surface_export.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/hspline_query/curvature.h"
 #include "surfaces/mesh/mesh_io.h"
 
 namespace semblance {
@@ -30,14 +34,33 @@ std::string ExactBytes(const HSplineSurface& surface, const std::string& extensi
                                                      : SurfaceToIges(surface);
 }
 
-std::string TriangleBytes(Tessellation tessellation, const std::string& extension) {
+// The curvatures of the surface itself at each vertex; NaN where it has none.
+std::vector<VertexScalar> CurvatureScalars(const HSplineSurface& surface,
+                                           const std::vector<Vec2>& uv, int threads) {
+  std::vector<double> mean(uv.size(), kNaN), gaussian(uv.size(), kNaN);
+  ParallelFor(uv.size(), threads, 256, [&](std::size_t v) {
+    if (const std::optional<SurfaceCurvature> curvature = CurvatureAt(surface, uv[v])) {
+      mean[v] = curvature->MeanPerMm();
+      gaussian[v] = curvature->GaussianPerMm2();
+    }
+  });
+  return {{"quality", mean},
+          {"scalar_mean_curvature_per_mm", mean},
+          {"scalar_gaussian_curvature_per_mm2", gaussian}};
+}
+
+std::string TriangleBytes(const HSplineSurface& surface, const std::string& extension,
+                          double chord_mm, int threads) {
+  Tessellation tessellation = TessellateToChord(surface, chord_mm, threads);
   if (extension == ".glb") {
     return TessellationToGlb(tessellation);
   }
-  const bool has_normals = extension == ".ply";
-  return EncodeMesh(
-      tessellation.mesh, extension,
-      has_normals ? MeshAttributes{std::move(tessellation.normals), {}, {}} : MeshAttributes{});
+  MeshAttributes attributes;
+  if (extension == ".ply") {
+    attributes.scalars = CurvatureScalars(surface, tessellation.uv, threads);
+    attributes.normals = std::move(tessellation.normals);
+  }
+  return EncodeMesh(tessellation.mesh, extension, attributes);
 }
 
 }  // namespace
@@ -62,8 +85,7 @@ std::string EncodeFace(const HSplineSurface& surface, const std::string& given,
                     given));
   }
   constexpr double kChord_mm = 0.1;
-  return TriangleBytes(TessellateToChord(surface, chord_mm.value_or(kChord_mm), threads),
-                       extension);
+  return TriangleBytes(surface, extension, chord_mm.value_or(kChord_mm), threads);
 }
 
 }  // namespace semblance

@@ -9,7 +9,10 @@
 #include "surfaces/hspline_files/feature.h"
 #include "surfaces/hspline_files/hspline_io.h"
 #include "surfaces/hspline_files/surface_export.h"
+#include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/hspline_query/curvature.h"
 #include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh/ply_layout.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/splines.h"
 
@@ -84,6 +87,24 @@ TEST_F(FaceCommands, ExportsExactAndTriangulatedFaces) {
   ExpectDone("export face.json --to face.obj");
   EXPECT_LT(3 * ReadMesh(folder_ / "coarse.ply").triangles.size(),
             ReadMesh(folder_ / "face.obj").triangles.size());
+}
+
+TEST_F(FaceCommands, APlyBearsTheCurvaturesOfTheSurface) {
+  ExpectDone("export face.json --to coarse.ply --chord_mm 2");
+  const auto scalar = [&](const char* name) {
+    return PlyVertexScalar(Bytes("coarse.ply"), name, "coarse.ply");
+  };
+  const std::vector<double> mean = scalar("scalar_mean_curvature_per_mm"),
+                            gaussian = scalar("scalar_gaussian_curvature_per_mm2");
+  const std::vector<Vec2> uv = TessellateToChord(face_, 2).uv;
+  ASSERT_EQ(mean.size(), uv.size());
+  for (std::size_t v = 0; v < uv.size(); ++v) {
+    const std::optional<SurfaceCurvature> curvature = CurvatureAt(face_, uv[v]);
+    ASSERT_TRUE(curvature);
+    EXPECT_FLOAT_EQ(mean[v], curvature->MeanPerMm());
+    EXPECT_FLOAT_EQ(gaussian[v], curvature->GaussianPerMm2());
+  }
+  EXPECT_EQ(scalar("quality"), mean);
 }
 
 TEST_F(FaceCommands, ExportsToCadOrSaysWhatIsMissing) {
