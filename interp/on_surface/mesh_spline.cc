@@ -9,7 +9,6 @@
 #include "interp/on_surface/mesh_solver.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "surfaces/mesh/point_triangle.h"
 
 namespace semblance {
 namespace {
@@ -43,10 +42,9 @@ Place PlaceOf(const Vec3& base, double radius_mm, const TriMesh& skull, const Me
     weight.second /= sum;
   }
   if (place.weights.empty()) {
-    const Vec3 corners = ClosestPointOnTriangle(closest.position, skull.points[t[0]],
-                                                skull.points[t[1]], skull.points[t[2]])
-                             .weights;
-    place.weights = {{t[0], corners[0]}, {t[1], corners[1]}, {t[2], corners[2]}};
+    for (int corner = 0; corner < 3; ++corner) {
+      place.weights.emplace_back(t[corner], closest.weights[corner]);
+    }
   }
   return place;
 }

@@ -12,7 +12,6 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_io.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "surfaces/mesh/point_triangle.h"
 #include "surfaces/mesh/read_ply.h"
 
 namespace semblance {
@@ -78,15 +77,12 @@ void CheckMap(const MappedDepth& map, const DepthMap& options) {
 }
 
 // NaN where a corner that counts has none.
-double DepthOn(const MappedDepth& map, int triangle, const Vec3& p) {
+double DepthOn(const MappedDepth& map, const MeshPoint& at) {
   constexpr double kNothing = 1e-9;
-  const Triangle& t = map.mesh.triangles[triangle];
-  const Vec3 weights =
-      ClosestPointOnTriangle(p, map.mesh.points[t[0]], map.mesh.points[t[1]], map.mesh.points[t[2]])
-          .weights;
+  const Triangle& t = map.mesh.triangles[at.triangle];
   double depth = 0;
   for (int k = 0; k < 3; ++k) {
-    depth += weights[k] > kNothing ? weights[k] * map.depth_mm[t[k]] : 0;
+    depth += at.weights[k] > kNothing ? at.weights[k] * map.depth_mm[t[k]] : 0;
   }
   return depth;
 }
@@ -105,10 +101,8 @@ DepthField InterpolateDepth(const DepthMap& options, const DepthInput& input,
   DepthField field = EmptyDepthField(input.skull.points.size());
   const MeshQuery query(map.mesh);
   ForEachVertex(input, run, [&](std::size_t i) {
-    const Vec3& p = input.skull.points[i];
-    const MeshPoint nearest = query.Closest(p);
-    const double depth =
-        nearest.distance_mm <= options.reach_mm ? DepthOn(map, nearest.triangle, p) : kNaN;
+    const MeshPoint nearest = query.Closest(input.skull.points[i]);
+    const double depth = nearest.distance_mm <= options.reach_mm ? DepthOn(map, nearest) : kNaN;
     field.depth_mm[i] = depth;
     field.status[i] = std::isnan(depth) ? DepthStatus::kOutside : DepthStatus::kAssigned;
   });

@@ -32,18 +32,6 @@ struct KrigingScene {
   }
 };
 
-// What each corner of its triangle counts at a point: barycentric, so none is below 0.
-Vec3 CornerShares(const TriMesh& mesh, const MeshPoint& at) {
-  const Triangle& triangle = mesh.triangles[at.triangle];
-  Vec3 area;
-  for (int corner = 0; corner < 3; ++corner) {
-    const Vec3 b = mesh.points[triangle[(corner + 1) % 3]] - at.position;
-    const Vec3 c = mesh.points[triangle[(corner + 2) % 3]] - at.position;
-    area[corner] = b.cross(c).norm();
-  }
-  return area.sum() > 0 ? Vec3(area / area.sum()) : Vec3(1, 0, 0);
-}
-
 // To the surface's points at the dowels' bases, by what is known at the corners around them.
 void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samples,
                    const RunContext& run, KrigingScene& scene) {
@@ -58,12 +46,12 @@ void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samp
   const MeshQuery query(input.skull);
   for (Eigen::Index j = 0; j < n; ++j) {
     const MeshPoint at = query.Closest(samples[j].base);
-    const Vec3 share = CornerShares(input.skull, at);
     scene.data.distance_mm.row(j).setZero();
     for (int corner = 0; corner < 3; ++corner) {
-      if (share[corner] > 0) {  // none of an infinite way
+      if (at.weights[corner] > 0) {  // none of an infinite way
         const int vertex = input.skull.triangles[at.triangle][corner];
-        scene.data.distance_mm.row(j) += share[corner] * scene.to_vertex_mm.col(vertex).transpose();
+        scene.data.distance_mm.row(j) +=
+            at.weights[corner] * scene.to_vertex_mm.col(vertex).transpose();
       }
     }
     scene.data.distance_mm(j, j) = 0;

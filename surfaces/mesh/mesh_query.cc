@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "surfaces/base/error.h"
+#include "surfaces/mesh/point_triangle.h"
 
 namespace semblance {
 namespace {
@@ -49,8 +50,14 @@ struct MeshQuery::Tree {
     tree.accelerate_distance_queries();  // here, so that const queries from several threads never
                                          // build it
   }
-  int IndexOf(const Triangles::const_iterator& it) const {
-    return static_cast<int>(it - triangles.cbegin());
+  MeshPoint PointAt(const Vec3& position, const Triangles::const_iterator& triangle,
+                    const Vec3& from) const {
+    const Vec3 weights =
+        ClosestPointOnTriangle(position, ToVec(triangle->vertex(0)), ToVec(triangle->vertex(1)),
+                               ToVec(triangle->vertex(2)))
+            .weights;
+    return {position, static_cast<int>(triangle - triangles.cbegin()), (position - from).norm(),
+            weights};
   }
 
   Triangles triangles;
@@ -64,11 +71,7 @@ MeshQuery& MeshQuery::operator=(MeshQuery&&) noexcept = default;
 
 MeshPoint MeshQuery::Closest(const Vec3& p) const {
   const auto found = tree_->tree.closest_point_and_primitive(ToCgal(p));
-  MeshPoint result;
-  result.position = ToVec(found.first);
-  result.triangle = tree_->IndexOf(found.second);
-  result.distance_mm = (result.position - p).norm();
-  return result;
+  return tree_->PointAt(ToVec(found.first), found.second, p);
 }
 
 std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direction,
@@ -82,8 +85,7 @@ std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direct
     // A ray that runs inside a triangle's plane meets it in a segment: its neighbours, met in
     // points, stand for it.
     if (const QueryKernel::Point_3* point = boost::get<QueryKernel::Point_3>(&hit.first)) {
-      const Vec3 position = ToVec(*point);
-      hits.push_back({position, tree_->IndexOf(hit.second), (position - origin).norm()});
+      hits.push_back(tree_->PointAt(ToVec(*point), hit.second, origin));
     }
   }
   std::sort(hits.begin(), hits.end(), [](const MeshPoint& a, const MeshPoint& b) {

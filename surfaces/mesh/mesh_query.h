@@ -10,13 +10,16 @@
 
 namespace semblance {
 
+// A point on a mesh: barycentric in one of its triangles.
 struct MeshPoint {
-  Vec3 position = Vec3::Constant(kNaN);  // on the mesh, mm
+  Vec3 position = Vec3::Constant(kNaN);  // mm
   int triangle = -1;
-  double distance_mm = kNaN;  // from the question's point; for a ray, along the ray
+  double distance_mm = kNaN;  // from the point asked about; for a ray, along the ray
+  // Of the triangle's corners: position is their weighted sum; >= 0, sum 1.
+  Vec3 weights = Vec3::Constant(kNaN);
 };
 
-// Keeps a reference-free copy of what it needs; const calls are safe from several threads at once.
+// Keeps its own copy of what it needs; const calls are safe from several threads at once.
 class MeshQuery {
  public:
   // Throws InputError if the mesh has no triangle or a point that is not finite.

@@ -44,6 +44,27 @@ TEST(MeshQuery, ClosestPointAgreesWithDenseSampling) {
   }
 }
 
+TEST(MeshQuery, APointIsTheWeightedSumOfItsTrianglesCorners) {
+  const TriMesh sphere = SphereMesh({3, -2, 5}, 10, 8);
+  const MeshQuery query(sphere);
+  Random random(8);
+  const auto check = [&](const MeshPoint& at) {
+    const Triangle& t = sphere.triangles[at.triangle];
+    const Vec3 sum = at.weights[0] * sphere.points[t[0]] + at.weights[1] * sphere.points[t[1]] +
+                     at.weights[2] * sphere.points[t[2]];
+    EXPECT_LT((sum - at.position).norm(), 1e-12);
+    EXPECT_GE(at.weights.minCoeff(), 0);
+    EXPECT_NEAR(at.weights.sum(), 1, 1e-14);
+  };
+  for (int i = 0; i < 50; ++i) {
+    check(query.Closest(random.InBox(-15, 15)));
+    for (const MeshPoint& hit : query.AllHits({3, -2, 5}, random.Direction(), 100)) {
+      check(hit);
+    }
+  }
+  check(query.Closest(2 * sphere.points[7] - Vec3(3, -2, 5)));  // a corner, straight above it
+}
+
 TEST(MeshQuery, RayThroughAPlateHitsItOnce) {
   const MeshQuery query(Plate(10, 3));
   const auto hit = query.FirstHit({4.1, 2.3, 5}, {0, 0, -2}, 100);
