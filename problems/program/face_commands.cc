@@ -16,7 +16,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/feature.h"
-#include "surfaces/hspline_files/hspline_io.h"
+#include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {
 namespace {

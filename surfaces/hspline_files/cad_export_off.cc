@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The build without OpenCASCADE.
+// The build without OpenCASCADE: CMake compiles this file or cad_export.cc, so that neither needs
+// conditional code.
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/cad_export.h"
 

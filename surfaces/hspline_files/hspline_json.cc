@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/json_parts.h"
 
@@ -59,6 +60,14 @@ HSplineSurface HSplineFromJson(std::string_view text, const std::string& name) {
   } catch (const Error& e) {
     throw IoError(fmt::format("{}: not an H-spline that can be read: {}", name, e.what()));
   }
+}
+
+void WriteHSpline(const std::filesystem::path& path, const HSplineSurface& surface) {
+  WriteFileAtomically(path, HSplineToJson(surface));
+}
+
+HSplineSurface ReadHSpline(const std::filesystem::path& path) {
+  return HSplineFromJson(ReadFileBytes(path), path.string());
 }
 
 }  // namespace semblance

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/config/config.h"
-#include "surfaces/hspline_files/hspline_io.h"
+#include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh/mesh_io.h"
 #include "tests/testing/program_call.h"

@@ -7,7 +7,7 @@
 
 #include "surfaces/hspline_files/cad_export.h"
 #include "surfaces/hspline_files/feature.h"
-#include "surfaces/hspline_files/hspline_io.h"
+#include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_files/surface_export.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/curvature.h"
