@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which patches and vertices of each level the offsets of an H-spline call for.
+// Which patches and vertices of each level the offsets of an H-spline need.
 #pragma once
 
 #include <map>
@@ -14,7 +14,7 @@ struct LevelLayout {
   ColumnSpans needed;   // those, and the patches that hold needed ones of the next finer level
 };
 
-// One a level, 0..max_level; each offset reaches 4 x 4 patches of its level, clipped at open
+// Per level, 0..max_level. Each offset reaches 4 x 4 patches of its level, clipped at open
 // borders. All patches of level 0 are reached.
 std::vector<LevelLayout> LayoutOf(const HSplineShape& shape,
                                   const std::map<VertexId, Vec3>& offsets);

@@ -2,17 +2,19 @@
 #include "surfaces/hspline/patch_regions.h"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <set>
 
 namespace semblance {
 namespace {
 
-// (level, j, i): row by row.
-using Cell = std::array<int, 3>;
+// (level, j, i), which sorts patches row by row.
+using PatchKey = std::array<int, 3>;
 
-bool HasRow(const std::set<Cell>& cells, const PatchRegion& region, int j) {
+bool HasRow(const std::set<PatchKey>& patches, const PatchRegion& region, int j) {
   for (int i = region.i; i < region.i + region.columns; ++i) {
-    if (!cells.contains({region.level, j, i})) {
+    if (!patches.contains({region.level, j, i})) {
       return false;
     }
   }
@@ -22,23 +24,23 @@ bool HasRow(const std::set<Cell>& cells, const PatchRegion& region, int j) {
 }  // namespace
 
 std::vector<PatchRegion> UniformRegions(const PatchTree& tree) {
-  std::set<Cell> cells;
+  std::set<PatchKey> patches;
   for (const PatchId& leaf : tree.leaves()) {
-    cells.insert({leaf.level, leaf.j, leaf.i});
+    patches.insert({leaf.level, leaf.j, leaf.i});
   }
   std::vector<PatchRegion> regions;
-  while (!cells.empty()) {
-    const auto [level, j, i] = *cells.begin();
+  while (!patches.empty()) {
+    const auto [level, j, i] = *patches.begin();
     PatchRegion region{level, i, j, 1, 1};
-    while (cells.contains({level, j, i + region.columns})) {
+    while (patches.contains({level, j, i + region.columns})) {
       ++region.columns;
     }
-    while (HasRow(cells, region, j + region.rows)) {
+    while (HasRow(patches, region, j + region.rows)) {
       ++region.rows;
     }
     for (int row = j; row < j + region.rows; ++row) {
-      cells.erase(cells.find({level, row, i}),
-                  std::next(cells.find({level, row, i + region.columns - 1})));
+      patches.erase(patches.find({level, row, i}),
+                    std::next(patches.find({level, row, i + region.columns - 1})));
     }
     regions.push_back(region);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An H-spline cut into few plain B-spline surfaces.
+// An H-spline as few plain B-spline surfaces.
 #pragma once
 
 #include <vector>

@@ -15,7 +15,7 @@ PatchTree::PatchTree(const HSplineSurface& surface) : shape_(surface.shape()) {
     split.emplace_back(Parents(layout[level + 1].needed), shape_.PatchesV(level));
   }
   split.emplace_back();
-  std::vector<PatchId> patches;  // one a node
+  std::vector<PatchId> patches;  // one per node
   for (int j = 0; j < shape_.patches_v; ++j) {
     for (int i = 0; i < shape_.patches_u; ++i) {
       patches.push_back({0, i, j});
@@ -39,13 +39,13 @@ PatchTree::PatchTree(const HSplineSurface& surface) : shape_(surface.shape()) {
 // Memory of the shortcut: at most eight entries a leaf, so that it too grows with the detail.
 void PatchTree::MakeGrid() {
   const std::size_t most = 8 * leaves_.size();
-  const auto cells = [&](int level) {
+  const auto count = [&](int level) {
     return static_cast<std::size_t>(shape_.PatchesU(level)) * shape_.PatchesV(level);
   };
-  while (grid_level_ < shape_.max_level && cells(grid_level_ + 1) <= most) {
+  while (grid_level_ < shape_.max_level && count(grid_level_ + 1) <= most) {
     ++grid_level_;
   }
-  grid_.reserve(cells(grid_level_));
+  grid_.reserve(count(grid_level_));
   for (int j = 0; j < shape_.PatchesV(grid_level_); ++j) {
     for (int i = 0; i < shape_.PatchesU(grid_level_); ++i) {
       std::int32_t node = nodes_[(i >> grid_level_) + shape_.patches_u * (j >> grid_level_)];

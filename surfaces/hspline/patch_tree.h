@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The fewest polynomial patches that make up an H-spline: fine where there is detail, coarse
+// The fewest polynomial patches that make up an H-spline: small where there is detail, large
 // elsewhere.
 #pragma once
 

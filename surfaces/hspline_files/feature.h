@@ -28,8 +28,7 @@ struct FeatureRegion {
   int first_level = 1, last_level = 8;
 };
 
-// The offsets of the surface's vertices in the region. Throws InputError for a name that is no
-// name.
+// The offsets of the surface's vertices in the region. Throws InputError for an invalid name.
 Feature ExtractFeature(const HSplineSurface& surface, std::string name,
                        const FeatureRegion& region = {});
 
@@ -37,13 +36,13 @@ Feature ExtractFeature(const HSplineSurface& surface, std::string name,
 Feature ExtractFeature(const HSplineSurface& surface, std::string name,
                        std::span<const VertexId> vertices);
 
-// Gives the feature's vertices its offsets; all others keep theirs. Throws InputError if the
+// Gives the feature's offsets to its vertices; all others keep theirs. Throws InputError if the
 // feature was taken from a surface of other patches, closure or offset reference, or has vertices
 // of a level that the surface has not; the surface is then as before.
 void ApplyFeature(const Feature& feature, HSplineSurface& surface);
 
-// The same, and those of `vertices` that the feature has not lose their offsets: what a fit did to
-// them is undone (thesis 4.3).
+// The same; also, those of `vertices` that are not in the feature lose their offsets: what a fit
+// did to them is undone (thesis 4.3).
 void RestoreFeature(const Feature& feature, std::span<const VertexId> vertices,
                     HSplineSurface& surface);
 
@@ -52,16 +51,16 @@ Feature ReadFeature(const std::filesystem::path& path);
 
 struct FeatureBlend {
   Feature feature;
-  std::vector<std::string> warnings;  // one a weight outside 0..1: it extrapolates
+  std::vector<std::string> warnings;  // one per weight outside 0..1: it extrapolates
 };
 
-// The weighted sum of the features' offsets; a vertex that a feature has not counts as offset 0
-// there, and a feature of weight 0 as absent. weights: one a feature, finite. Throws InputError if
-// there is no feature or they do not fit each other.
+// The weighted sum of the features' offsets. A vertex that is not in a feature counts as offset 0
+// there; a feature of weight 0 counts as absent. weights: one per feature, finite. Throws
+// InputError if there is no feature or they do not fit each other.
 FeatureBlend BlendFeatures(std::string name, std::span<const Feature> features,
                            std::span<const double> weights);
 
-// The feature on the other side: at (1 - u, v), with x turned round. Exact for surfaces whose
+// The feature on the other side: at (1 - u, v), with x negated. Exact for surfaces whose
 // coarser levels are symmetric about x = 0.
 Feature MirrorFeature(const Feature& feature);
 

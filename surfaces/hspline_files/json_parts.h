@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the JSON files of H-splines and of their features have in common. All throw IoError with the
-// end of a sentence; the caller names the file.
+// end of a sentence, to which the caller adds the name of the file.
 #pragma once
 
 #include <map>

@@ -32,8 +32,8 @@ constexpr std::size_t kBlock = 256;    // (u,v) whose leaves are looked up toget
 
 // A batch of the questions, and where its answers go.
 struct Batch {
-  const Polynomial* polynomials;  // one a leaf
-  const std::int32_t* leaves;     // one a (u,v)
+  const Polynomial* polynomials;  // one per leaf
+  const std::int32_t* leaves;     // one per (u,v)
   const Vec2* uv;                 // in the domain
   std::size_t count;
   Vec3* points;

@@ -16,18 +16,18 @@ struct SurfaceSamples {
   std::int64_t degenerate = 0;  // how many normals are zero
 };
 
-// Keeps the polynomials of the surface's patches, as it is now: it does not see later changes.
+// Keeps the polynomials of the surface's patches as they are now; it does not see later changes.
 // Memory grows with the detail, not with the finest level.
 class HSplineBatch {
  public:
   explicit HSplineBatch(const HSplineSurface& surface);
 
-  // One a (u,v), clamped or wrapped as in StencilAt. Equal to HSplineSurface::Point and Normal but
-  // for rounding; no byte depends on `threads` (>= 1). Throws InputError for a (u,v) that is not
-  // finite.
+  // One per (u,v), which is clamped or wrapped as in StencilAt. Equal to HSplineSurface::Point and
+  // Normal up to rounding; no byte depends on `threads` (>= 1). Throws InputError for a (u,v) that
+  // is not finite.
   std::vector<Vec3> Points(std::span<const Vec2> uv, int threads = 1) const;
   SurfaceSamples PointsAndNormals(std::span<const Vec2> uv, int threads = 1) const;
-  // The same into `samples`, whose memory is used again.
+  // The same into `samples`, reusing its memory.
   void PointsAndNormals(std::span<const Vec2> uv, int threads, SurfaceSamples& samples) const;
 
   std::size_t Bytes() const;  // of memory held
@@ -44,7 +44,7 @@ class HSplineBatch {
               std::int64_t* degenerate) const;
 
   PatchTree tree_;
-  std::vector<Polynomial> polynomials_;  // one a leaf
+  std::vector<Polynomial> polynomials_;  // one per leaf
 };
 
 }  // namespace semblance

@@ -31,10 +31,10 @@ struct SurfaceProjection {
 SurfaceProjection ProjectFrom(const HSplineSurface& surface, const Vec3& point, const Vec2& start,
                               const ProjectOptions& options = {});
 
-// Keeps a grid of samples of a surface, to project many points: ProjectFrom from the samples that
-// are nearest among their neighbours, and from the nearest of those patches that are finer than the
-// grid; the closest result counts. It does not see later changes of the surface, which must outlive
-// it.
+// Projects many points onto one surface, of which it keeps a grid of samples: ProjectFrom starts at
+// the samples that are nearer than their neighbours, and at the nearest of the patches that are
+// finer than the grid; the closest result counts. The surface must outlive the projector, which
+// does not see later changes.
 class SurfaceProjector {
  public:
   explicit SurfaceProjector(const HSplineSurface& surface, const ProjectOptions& options = {});

@@ -11,8 +11,8 @@ namespace semblance {
 
 struct Tessellation {
   TriMesh mesh;               // triangles counter-clockwise seen from the side of du x dv
-  std::vector<Vec2> uv;       // one a vertex
-  std::vector<Vec3> normals;  // unit, of the surface itself; one a vertex
+  std::vector<Vec2> uv;       // per vertex
+  std::vector<Vec3> normals;  // per vertex: unit, of the surface itself
 };
 
 // Uniform: `per_patch` (>= 1) quads along each side of each patch of the finest level, two

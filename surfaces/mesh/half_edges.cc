@@ -83,8 +83,8 @@ void HalfEdges::FindTwins(const TriMesh& mesh, const char* who) {
   }
 }
 
-// Each fan is walked once, from its first half-edge or, where it has none, from any: a vertex that
-// is met twice has two.
+// Walks each fan once, from its first half-edge or, if it has none, from any: a vertex that is met
+// twice has two fans.
 void HalfEdges::CheckFans(const TriMesh& mesh, const char* who) const {
   std::vector<bool> seen(sides_.size()), has_fan(mesh.points.size());
   const auto walk = [&](HalfEdgeIndex first) {
@@ -113,13 +113,13 @@ void HalfEdges::Collapse(HalfEdgeIndex h, const std::vector<HalfEdgeIndex>& of_e
   for (const HalfEdgeIndex k : of_end) {
     sides_[k].from = From(h);
   }
-  TakeOut(h);
+  Remove(h);
   if (twin >= 0) {
-    TakeOut(twin);
+    Remove(twin);
   }
 }
 
-void HalfEdges::TakeOut(HalfEdgeIndex h) {
+void HalfEdges::Remove(HalfEdgeIndex h) {
   const HalfEdgeIndex a = Twin(Next(h)), b = Twin(Previous(h));
   if (a >= 0) {
     sides_[a].twin = b;

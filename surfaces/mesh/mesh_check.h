@@ -9,10 +9,10 @@
 
 namespace semblance {
 
-// Throws InputError, naming the mesh, if it is empty or not finite, if its bounding box is no
-// head's in mm (saying which unit it looks like), or if it is turned inside out: of rays sent from
-// far outside, most meet a triangle's back first. It is never turned silently. Returns a line for
-// each lesser defect that real scans have: non-manifold, inconsistent or open edges, triangles
+// Throws InputError, naming the mesh, if it is empty or not finite, if its bounding box is not
+// that of a head in mm (saying which unit it looks like), or if it is inside out: of rays sent from
+// far outside, most hit a triangle's back first. The mesh is never turned silently. Returns a line
+// for each lesser defect that real scans have: non-manifold, inconsistent or open edges, triangles
 // without area.
 std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& name);
 

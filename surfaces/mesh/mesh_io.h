@@ -20,7 +20,7 @@ namespace semblance {
 // format), naming the file and the line or byte. Memory follows the file's size, not its claims.
 TriMesh ReadMesh(const std::filesystem::path& path);
 
-// What a PLY may carry beside the shape; each vector is empty or has one entry a vertex.
+// What a PLY may carry beside the shape; each vector is empty or has one entry per vertex.
 struct VertexScalar {
   std::string name;            // MeshLab shows "quality"; CloudCompare any "scalar_..."
   std::vector<double> values;  // NaN where there is no data
