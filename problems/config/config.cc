@@ -264,6 +264,31 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
   return MergeTrees(LoadBase(base, file, loading), tree);
 }
 
+// One override laid over `tree`. `order` places its errors among those of other sources.
+void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
+                   ConfigNode& tree, ConfigErrors& errors) {
+  const ConfigSource source{.name = fmt::format("--set {}", override_text),
+                            .folder = std::filesystem::current_path(),
+                            .order = order,
+                            .has_lines = false};
+  const std::size_t equals = override_text.find('=');
+  const std::size_t errors_before = errors.size();
+  const ConfigPlace place{std::make_shared<const ConfigSource>(source)};
+  if (equals == override_text.npos) {
+    errors.Add(place, "", "an override is written path=value");
+    return;
+  }
+  const ConfigNode value = ParseConfigText(override_text.substr(equals + 1), source, errors);
+  if (errors.size() > errors_before) {
+    return;
+  }
+  try {
+    SetPath(tree, override_text.substr(0, equals), value, &defaults);
+  } catch (const ConfigError& error) {
+    errors.Add(place, "", error.what());
+  }
+}
+
 }  // namespace
 
 ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
@@ -310,30 +335,6 @@ int CommonKeys(const ConfigNode& a, const ConfigNode& b) {
   return static_cast<int>(
       std::count_if(a.entries.begin(), a.entries.end(),
                     [&](const ConfigNode::Entry& entry) { return b.Find(entry.key) != nullptr; }));
-}
-
-void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
-                   ConfigNode& tree, ConfigErrors& errors) {
-  const ConfigSource source{.name = fmt::format("--set {}", override_text),
-                            .folder = std::filesystem::current_path(),
-                            .order = order,
-                            .has_lines = false};
-  const std::size_t equals = override_text.find('=');
-  const std::size_t errors_before = errors.size();
-  const ConfigPlace place{std::make_shared<const ConfigSource>(source)};
-  if (equals == override_text.npos) {
-    errors.Add(place, "", "an override is written path=value");
-    return;
-  }
-  const ConfigNode value = ParseConfigText(override_text.substr(equals + 1), source, errors);
-  if (errors.size() > errors_before) {
-    return;
-  }
-  try {
-    SetPath(tree, override_text.substr(0, equals), value, &defaults);
-  } catch (const ConfigError& error) {
-    errors.Add(place, "", error.what());
-  }
 }
 
 }  // namespace semblance

@@ -33,6 +33,7 @@
 #include "problems/config/config_tree.h"
 #include "problems/config/config_writer.h"
 #include "problems/config/options_reference.h"
+#include "problems/config/options_schema.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
@@ -53,10 +54,6 @@ ConfigNode LoadConfigTextTree(std::string_view text, const std::filesystem::path
 
 // How many keys the two maps share.
 int CommonKeys(const ConfigNode& a, const ConfigNode& b);
-
-// One override laid over `tree`. `order` places its errors among those of other sources.
-void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
-                   ConfigNode& tree, ConfigErrors& errors);
 
 // The tree of all fields, defaults for a default value.
 template <class T>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The description of all options, as text for people and as JSON Schema for editors.
+// The description of all options, as text for people.
 #pragma once
 
 #include <string>
@@ -11,8 +11,5 @@ namespace semblance {
 // One paragraph a path: "emitter.decay (type: split): number, default 6, 0.5 to 50", then its
 // meaning, indented. An item of a list is `path[]`, an entry of a map `path.<name>`.
 std::string ReferenceText(const ConfigType& type);
-
-// A JSON Schema, draft 2020-12, of a file with these options.
-std::string SchemaText(const ConfigType& type);
 
 }  // namespace semblance

@@ -20,6 +20,7 @@
 #include "problems/program/exit_code.h"
 #include "problems/program/progress.h"
 #include "problems/report/run_folder.h"
+#include "problems/report/run_report.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/study_plan.h"
 #include "problems/study/study_report.h"

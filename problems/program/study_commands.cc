@@ -92,14 +92,14 @@ int StudyCommand(const StudyArguments& a) {
   }
   const fs::path root = a.out.empty() ? "out/" + file.stem().string() : a.out;
   if (!a.quiet) {
-    options.on_pace = StudyProgress(stderr);
+    options.on_progress = StudyProgress(stderr);
   }
   RunContext context;
   context.stop_token = a.stop;
   const StudySummary summary = RunStudy(plan, root, options, context);
   if (options.shards > 1) {
     fmt::print(
-        "shard {} of {}: {} trials, {} were there, {} done, {} failed; gather with "
+        "shard {} of {}: {} trials, {} already there, {} done, {} failed; gather with "
         "semblance merge\n",
         options.shard, options.shards, summary.trials, summary.skipped, summary.done,
         summary.failed);

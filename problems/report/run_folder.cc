@@ -15,6 +15,7 @@
 #include "problems/report/depth_json.h"
 #include "problems/report/fit_json.h"
 #include "problems/report/run_pictures.h"
+#include "problems/report/run_report.h"
 #include "problems/report/scene_json.h"
 #include "problems/report/timing_json.h"
 #include "surfaces/base/csv.h"

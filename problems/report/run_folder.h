@@ -20,8 +20,4 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
 // result.json: the metrics and counts; null where there is no number.
 std::string ResultJson(const Experiment& experiment, const RunResult& result);
 
-// Builds report.html anew from result.json, resolved.yaml, dowels.csv, the pictures and, where it
-// is there, scene.json of a run's folder. Throws IoError if one is missing or cannot be read.
-void WriteReport(OutputFolder& folder);
-
 }  // namespace semblance

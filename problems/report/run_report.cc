@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// report.html of a run, from the files of its folder alone.
+#include "problems/report/run_report.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -7,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/report/report.h"
-#include "problems/report/run_folder.h"
 #include "problems/report/scene_json.h"
 #include "problems/report/svg_plot.h"
 #include "surfaces/base/atomic_file.h"
@@ -262,6 +262,45 @@ ReportSection NotesSection(const Json& result) {
   return section;
 }
 
+ReportSection FitSection(const Json& fit, const OutputFolder& folder) {
+  return {.heading = "The fit",
+          .images = {ConvergencePlot(fit)},
+          .tables = Filled({LevelsTable(fit), RelaxationTable(fit), FeaturesTable(fit),
+                            CountsTable("Counts of the fit", fit),
+                            DowelsTable(folder.Root() / "dowels.csv")})};
+}
+
+ReportSection ProvenanceSection(const std::filesystem::path& file) {
+  return {
+      .heading = "Provenance",
+      .paragraphs = {"What went in, by content, and what it was made with. manifest.json beside "
+                     "this page has the hash of every output too."},
+      .preformatted = ReadFileBytes(file)};
+}
+
+std::vector<ReportSection> Sections(const Json& result, const OutputFolder& folder) {
+  std::vector<ReportSection> sections;
+  if (!result.at("face").is_null()) {
+    sections.push_back(ErrorSection(result, folder));
+  }
+  sections.push_back(PictureSection(folder));
+  sections.push_back(FitSection(result.at("fit"), folder));
+  if (HasSigma(result)) {
+    sections.push_back(UncertaintySection(result, folder));
+  }
+  sections.push_back({.heading = "Depth and implicit surface",
+                      .tables = {CountsTable("Depth field", result.at("depth")),
+                                 CountsTable("Implicit surface", result.at("implicit"))}});
+  sections.push_back(NotesSection(result));
+  sections.push_back(
+      {.heading = "Configuration", .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml")});
+  const std::filesystem::path provenance = folder.Root() / "provenance.json";
+  if (std::filesystem::exists(provenance)) {
+    sections.push_back(ProvenanceSection(provenance));
+  }
+  return sections;
+}
+
 Report BuildReport(const Json& result, const OutputFolder& folder) {
   Report report;
   report.title = result.at("title").get<std::string>();
@@ -272,38 +311,11 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
       folder.Root() / "pictures/overview.png", "",
       fmt::format("skull and dowels, implicit face, H-spline face{}, from the front",
                   result.at("face").is_null() ? "" : " and true skin"))};
-  if (!result.at("face").is_null()) {
-    report.sections.push_back(ErrorSection(result, folder));
-  }
   const std::filesystem::path scene = folder.Root() / "scene.json";
   if (std::filesystem::exists(scene)) {  // runs of older versions have none
     report.scenes = CollectScenes({{result.at("subject"), ReadFileBytes(scene)}}, 0).json;
   }
-  report.sections.push_back(PictureSection(folder));
-  report.sections.push_back(
-      {.heading = "The fit",
-       .images = {ConvergencePlot(result.at("fit"))},
-       .tables = Filled({LevelsTable(result.at("fit")), RelaxationTable(result.at("fit")),
-                         FeaturesTable(result.at("fit")),
-                         CountsTable("Counts of the fit", result.at("fit")),
-                         DowelsTable(folder.Root() / "dowels.csv")})});
-  if (HasSigma(result)) {
-    report.sections.push_back(UncertaintySection(result, folder));
-  }
-  report.sections.push_back({.heading = "Depth and implicit surface",
-                             .tables = {CountsTable("Depth field", result.at("depth")),
-                                        CountsTable("Implicit surface", result.at("implicit"))}});
-  report.sections.push_back(NotesSection(result));
-  report.sections.push_back(
-      {.heading = "Configuration", .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml")});
-  const std::filesystem::path provenance = folder.Root() / "provenance.json";
-  if (std::filesystem::exists(provenance)) {
-    report.sections.push_back(
-        {.heading = "Provenance",
-         .paragraphs = {"What went in, by content, and what it was made with. manifest.json beside "
-                        "this page has the hash of every output too."},
-         .preformatted = ReadFileBytes(provenance)});
-  }
+  report.sections = Sections(result, folder);
   report.footer = "semblance " SEMBLANCE_VERSION;
   return report;
 }

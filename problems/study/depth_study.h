@@ -37,16 +37,16 @@ DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context
 // null where there is no number.
 std::string DepthResultJson(const Experiment& experiment, const DepthResult& result);
 
-// One line per left-out dowel: kind, site, landmark, region, depth_mm, predicted_mm, error_mm, sd_mm,
-// within_90, status; an empty cell where there is none.
+// One line per left-out dowel: kind, site, landmark, region, depth_mm, predicted_mm, error_mm,
+// sd_mm, within_90, status; an empty cell where there is none.
 std::string LeftOutCsv(const DepthResult& result);
 
 // The depth on the skull's shell from two sides and, where the truth is known, the error against it
 // along the direction; as PNG.
 std::string DepthPicture(const DepthResult& result, const std::string& title, int threads);
 
-// resolved.yaml, result.json, left_out.csv, depth.ply (depth, sd, true depths and errors per vertex),
-// tips.ply (the shell moved by its depth), depth.png, timing.json.
+// resolved.yaml, result.json, left_out.csv, depth.ply (depth, sd, true depths and errors per
+// vertex), tips.ply (the shell moved by its depth), depth.png, timing.json.
 void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputFolder& folder,
                 const RunContext& context);
 

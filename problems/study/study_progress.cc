@@ -19,48 +19,48 @@ std::string Duration(double seconds) {
 
 }  // namespace
 
-std::string PaceText(const StudyEta& pace) {
-  std::string text = fmt::format("{} of {} trials", pace.finished, pace.trials);
-  const int here = pace.finished - pace.finished_before;
-  if (here == 0 && pace.elapsed_s >= 1) {
-    text += fmt::format(", {} so far", Duration(pace.elapsed_s));
+std::string EtaText(const StudyEta& eta) {
+  std::string text = fmt::format("{} of {} trials", eta.finished, eta.trials);
+  const int here = eta.finished - eta.finished_before;
+  if (here == 0 && eta.elapsed_s >= 1) {
+    text += fmt::format(", {} so far", Duration(eta.elapsed_s));
   }
-  if (here > 0 && pace.elapsed_s > 0) {
-    const double each_s = pace.elapsed_s / here;
+  if (here > 0 && eta.elapsed_s > 0) {
+    const double each_s = eta.elapsed_s / here;
     text += each_s >= 1 ? fmt::format(", {:.1f} s each", each_s)
                         : fmt::format(", {:.1f} a second", 1 / each_s);
-    if (pace.finished < pace.trials) {
-      text += fmt::format(", about {} left", Duration(each_s * (pace.trials - pace.finished)));
+    if (eta.finished < eta.trials) {
+      text += fmt::format(", about {} left", Duration(each_s * (eta.trials - eta.finished)));
     }
   }
-  return text + (pace.failed > 0 ? fmt::format("; {} failed", pace.failed) : "");
+  return text + (eta.failed > 0 ? fmt::format("; {} failed", eta.failed) : "");
 }
 
-std::string BarText(const StudyEta& pace, int width) {
-  const int full = pace.trials > 0 ? width * pace.finished / pace.trials : width;
+std::string BarText(const StudyEta& eta, int width) {
+  const int full = eta.trials > 0 ? width * eta.finished / eta.trials : width;
   return fmt::format("[{:#<{}}{:.<{}}]", "", full, "", width - full);
 }
 
 StudyProgress::StudyProgress(std::FILE* stream, std::chrono::milliseconds interval)
     : stream_(stream), is_terminal_(isatty(fileno(stream)) == 1), interval_(interval) {}
 
-void StudyProgress::operator()(const StudyEta& pace, const std::string& trial) {
+void StudyProgress::operator()(const StudyEta& eta, const std::string& trial) {
   constexpr const char* kClearLine = "\r\033[K";
-  const bool is_last = pace.finished == pace.trials;
+  const bool is_last = eta.finished == eta.trials;
   if (is_over_) {
     return;
   }
   is_over_ = is_last;
-  if (pace.failed > failed_) {
-    failed_ = pace.failed;
+  if (eta.failed > failed_) {
+    failed_ = eta.failed;
     fmt::print(stream_, "{}{}\n", is_terminal_ ? kClearLine : "", trial);
   }
   if (is_terminal_) {
-    fmt::print(stream_, "{}{} {}{}", kClearLine, BarText(pace, 30), PaceText(pace),
+    fmt::print(stream_, "{}{} {}{}", kClearLine, BarText(eta, 30), EtaText(eta),
                is_last ? "\n" : "");
   } else if (is_last || Clock::now() - last_ >= interval_) {
     last_ = Clock::now();
-    fmt::print(stream_, "{}\n", PaceText(pace));
+    fmt::print(stream_, "{}\n", EtaText(eta));
   }
   std::fflush(stream_);
 }

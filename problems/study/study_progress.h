@@ -18,12 +18,12 @@ struct StudyEta {
 };
 
 // "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without what is not known yet.
-std::string PaceText(const StudyEta& pace);
+std::string EtaText(const StudyEta& eta);
 
 // "[######......]", `width` characters between the brackets.
-std::string BarText(const StudyEta& pace, int width);
+std::string BarText(const StudyEta& eta, int width);
 
-// Shows a study's pace: on a terminal as a bar that is drawn over, otherwise as a line every
+// Shows how far a study is: on a terminal as a bar that is drawn over, otherwise as a line every
 // `interval`, and at the end. A trial that failed has a line of its own.
 class StudyProgress {
  public:
@@ -31,7 +31,7 @@ class StudyProgress {
                          std::chrono::milliseconds interval = std::chrono::seconds(5));
 
   // Any time. trial: the one that ended, subject, values and status; said alone where it failed.
-  void operator()(const StudyEta& pace, const std::string& trial);
+  void operator()(const StudyEta& eta, const std::string& trial);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "problems/report/report.h"
+#include "problems/report/scene_json.h"
 #include "problems/report/svg_plot.h"
 #include "problems/study/results_sqlite.h"
 #include "problems/study/study_subtables.h"
@@ -159,7 +162,7 @@ ReportSection TrialsSection(const StudyResults& results) {
   return section;
 }
 
-// The mean of one curve of the trials over subjects, point by point, one row a treatment; of
+// The mean of one curve of the trials over subjects, point by point, one row per treatment; of
 // subjects whose curve is as long as the first one's.
 std::vector<BoxRow> MeanCurves(const StudyResults& results, const std::vector<Treatment>& ranked,
                                std::vector<double> TrialRow::*curve) {
@@ -201,7 +204,7 @@ std::vector<ReportImage> CalibrationPlots(const StudyResults& results,
                        "hold, averaged over subjects. On the grey line it is right; below, too "
                        "bold; above, too cautious.",
                        of_what),
-           fmt::format("observed against stated share of {}, one line a treatment", of_what)});
+           fmt::format("observed against stated share of {}, one line per treatment", of_what)});
     }
   };
   add(&TrialRow::depth_coverage, "the true depths over the scored bone");
@@ -218,13 +221,13 @@ ReportSection CurvesSection(const StudyResults& results, const std::vector<Treat
         {QuantilePlotSvg(errors, "distance of the H-spline face from the true skin (mm)"),
          "Share of the scored skin within each distance, quantiles averaged over subjects, up to "
          "95 %.",
-         "cumulative distribution of the face's error, one line a treatment"});
+         "cumulative distribution of the face's error, one line per treatment"});
   }
   if (!steps.empty()) {
     section.images.push_back(
         {ConvergencePlotSvg(steps, "RMS distance of the fitted points (mm)"),
          "Convergence: after each step of the last round's schedule, averaged over subjects.",
-         "root mean square distance by step of the schedule, one line a treatment"});
+         "root mean square distance by step of the schedule, one line per treatment"});
   }
   std::ranges::move(CalibrationPlots(results, ranked), std::back_inserter(section.images));
   return section;
@@ -291,52 +294,68 @@ std::string SceneNote(const StudyResults& results, const SceneCollection& scenes
                    scenes.count, results.Count("done"));
 }
 
-}  // namespace
+std::vector<ReportTile> Tiles(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  std::vector<ReportTile> tiles = {
+      {"trials done", std::to_string(results.Count("done")), "",
+       fmt::format("of {}", results.trials.size())},
+      {"failed", std::to_string(results.Count("failed")), "", ""},
+      {"missing", std::to_string(results.Count("missing")), "", "not run yet"}};
+  if (!ranked.empty() && !ranked[0].by_subject.empty()) {
+    tiles.push_back(
+        {"best mean", TableNumber(Summarize(ValuesOf(ranked[0])).mean), "", ranked[0].label});
+  }
+  return tiles;
+}
 
-std::string StudyReportHtml(const StudyResults& results, const SceneCollection& scenes,
-                            const std::vector<ReportImage>& maps) {
+ReportSection TreatmentsSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  ReportSection section{.heading = "Treatments"};
+  section.tables = {RankingTable(ranked, results.metric)};
+  if (ranked.size() > 1) {
+    section.tables.push_back(PairsTable(ranked));
+    section.images = {{CumulativePlotSvg(Boxes(ranked), results.metric),
+                       "Share of subjects below each value.",
+                       "cumulative distribution of the metric, one line per treatment"}};
+  }
+  return section;
+}
+
+// What the metric says of the treatments; sections with nothing in them are left out.
+std::vector<ReportSection> MetricSections(const StudyResults& results,
+                                          const std::vector<Treatment>& ranked,
+                                          const std::vector<ReportImage>& maps) {
+  if (ranked.empty() || ranked[0].by_subject.empty()) {
+    return {
+        {.heading = "No value",
+         .paragraphs = {fmt::format("No finished trial has a value of '{}'.", results.metric)}}};
+  }
+  std::vector<ReportSection> sections = {TreatmentsSection(results, ranked)};
+  if (ranked.size() > 1) {
+    sections.push_back(RankSection(ranked));
+  }
+  sections.push_back({.heading = "Behind the metric", .tables = Subtables(results, ranked)});
+  sections.push_back(CurvesSection(results, ranked));
+  sections.push_back({.heading = "Depth maps", .images = maps});
+  std::erase_if(sections, [](const ReportSection& section) {
+    return section.paragraphs.empty() && section.images.empty() && section.tables.empty();
+  });
+  return sections;
+}
+
+std::string ReportOf(const StudyResults& results, const SceneCollection& scenes,
+                     const std::vector<ReportImage>& maps) {
   const std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
   Report report;
   report.title = results.title;
   report.subtitle = fmt::format(
       "Study {} over {}", results.hash,
       results.axes.empty() ? "subjects alone" : fmt::format("{}", fmt::join(results.axes, ", ")));
-  report.tiles = {{"trials done", std::to_string(results.Count("done")), "",
-                   fmt::format("of {}", results.trials.size())},
-                  {"failed", std::to_string(results.Count("failed")), "", ""},
-                  {"missing", std::to_string(results.Count("missing")), "", "not run yet"}};
-  if (ranked.empty() || ranked[0].by_subject.empty()) {
-    report.sections.push_back({.heading = "No value",
-                               .paragraphs = {fmt::format(
-                                   "No trial that is done has a value of '{}'.", results.metric)}});
-  } else {
-    report.tiles.push_back(
-        {"best mean", TableNumber(Summarize(ValuesOf(ranked[0])).mean), "", ranked[0].label});
+  report.tiles = Tiles(results, ranked);
+  if (!ranked.empty() && !ranked[0].by_subject.empty()) {
     report.main_images = {{BoxPlotSvg(Boxes(ranked), results.metric),
-                           "One dot a subject; box: quartiles and median.",
-                           "box plot of the metric, one row a treatment"}};
-    ReportSection treatments{.heading = "Treatments"};
-    treatments.tables = {RankingTable(ranked, results.metric)};
-    if (ranked.size() > 1) {
-      treatments.tables.push_back(PairsTable(ranked));
-      treatments.images = {{CumulativePlotSvg(Boxes(ranked), results.metric),
-                            "Share of subjects below each value.",
-                            "cumulative distribution of the metric, one line a treatment"}};
-    }
-    report.sections.push_back(treatments);
-    if (ranked.size() > 1) {
-      report.sections.push_back(RankSection(ranked));
-    }
-    report.sections.push_back({.heading = "Behind the metric",
-                               .paragraphs = {},
-                               .images = {},
-                               .tables = BreakdownTables(results, ranked)});
-    report.sections.push_back(CurvesSection(results, ranked));
-    report.sections.push_back({.heading = "Depth maps", .paragraphs = {}, .images = maps});
-    std::erase_if(report.sections, [](const ReportSection& section) {
-      return section.paragraphs.empty() && section.images.empty() && section.tables.empty();
-    });
+                           "One dot per subject; box: quartiles and median.",
+                           "box plot of the metric, one row per treatment"}};
   }
+  report.sections = MetricSections(results, ranked, maps);
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
   report.sections.push_back(TrialsSection(results));
@@ -344,13 +363,15 @@ std::string StudyReportHtml(const StudyResults& results, const SceneCollection& 
   return ReportHtml(report);
 }
 
+}  // namespace
+
 StudyResults WriteStudyTables(OutputFolder& folder) {
   StudyResults results = ReadStudyResults(folder.Root());
   folder.Write("trials.csv", TrialsCsv(results));
   folder.Write("summary.csv", SummaryCsv(results));
   folder.Write("results.sqlite", ResultsSqlite(results));
-  folder.Write("report.html", StudyReportHtml(results, Scenes(results, folder.Root()),
-                                              DepthMaps(results, folder.Root())));
+  folder.Write("report.html", ReportOf(results, Scenes(results, folder.Root()),
+                                       DepthMaps(results, folder.Root())));
   return results;
 }
 

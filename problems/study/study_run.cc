@@ -132,7 +132,7 @@ class StudyRunner {
   void WatchUntilEnded(std::size_t threads) {
     std::unique_lock lock(mutex_);
     while (ended_ < threads) {
-      TellPace("");
+      TellProgress("");
       thread_ended_.wait_for(lock, std::chrono::seconds(1), [&] { return ended_ == threads; });
     }
   }
@@ -227,20 +227,20 @@ class StudyRunner {
     ++(json["status"] == "failed" ? summary_.failed : summary_.done);
     const std::string reason =
         json.contains("reason") ? ": " + json["reason"].get<std::string>() : "";
-    TellPace(fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
-                         fmt::join(trial.values, " "), reason));
+    TellProgress(fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
+                             fmt::join(trial.values, " "), reason));
   }
 
   // With mutex_ held.
-  void TellPace(const std::string& trial) {
-    if (options_.on_pace) {
+  void TellProgress(const std::string& trial) {
+    if (options_.on_progress) {
       const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
-      options_.on_pace({.trials = summary_.trials,
-                        .finished = summary_.done + summary_.failed + summary_.skipped,
-                        .finished_before = summary_.skipped,
-                        .failed = summary_.failed,
-                        .elapsed_s = elapsed_s},
-                       trial);
+      options_.on_progress({.trials = summary_.trials,
+                            .finished = summary_.done + summary_.failed + summary_.skipped,
+                            .finished_before = summary_.skipped,
+                            .failed = summary_.failed,
+                            .elapsed_s = elapsed_s},
+                           trial);
     }
   }
 
@@ -270,8 +270,7 @@ std::string PlanHashOf(const fs::path& folder) {
   return Json::parse(ReadFileBytes(file), nullptr, false).value("hash", "");
 }
 
-}  // namespace
-
+// plan.json as text.
 std::string PlanJson(const StudyPlan& plan) {
   Json json = {{"title", plan.title}, {"hash", plan.hash},       {"metric", plan.metric},
                {"axes", plan.axes},   {"trials", Json::array()}, {"notes", plan.notes}};
@@ -281,6 +280,8 @@ std::string PlanJson(const StudyPlan& plan) {
   }
   return json.dump(1) + "\n";
 }
+
+}  // namespace
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {

@@ -23,7 +23,7 @@ struct StudyRunOptions {
   int cache_limit_mb = 2000;
   // May be empty. Called from one thread at a time: each second, and after each trial with its
   // subject, values and status.
-  std::function<void(const StudyEta&, const std::string& trial)> on_pace = {};
+  std::function<void(const StudyEta&, const std::string& trial)> on_progress = {};
 };
 
 struct StudySummary {
@@ -47,8 +47,5 @@ StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder
 // Throws IoError if a folder is of another plan.
 void GatherTrials(const std::filesystem::path& folder,
                   const std::vector<std::filesystem::path>& others);
-
-// plan.json as text.
-std::string PlanJson(const StudyPlan& plan);
 
 }  // namespace semblance

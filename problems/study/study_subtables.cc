@@ -134,8 +134,8 @@ ReportTable SitesTable(const StudyResults& results, const std::vector<Treatment>
 
 }  // namespace
 
-std::vector<ReportTable> BreakdownTables(const StudyResults& results,
-                                         const std::vector<Treatment>& ranked) {
+std::vector<ReportTable> Subtables(const StudyResults& results,
+                                   const std::vector<Treatment>& ranked) {
   const std::size_t dot = results.metric.rfind('.');
   const std::string parent = dot == std::string::npos ? "" : results.metric.substr(0, dot + 1);
   const std::string leaf = results.metric.substr(parent.size());

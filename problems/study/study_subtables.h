@@ -17,7 +17,7 @@ namespace semblance {
 // - cross-validation: RMS of what was left out by landmark, side and random part, and the share
 //   within the stated 90 %;
 // - the RMS over subjects of each landmark's error when it was left out, one row per site.
-std::vector<ReportTable> BreakdownTables(const StudyResults& results,
-                                         const std::vector<Treatment>& ranked);
+std::vector<ReportTable> Subtables(const StudyResults& results,
+                                   const std::vector<Treatment>& ranked);
 
 }  // namespace semblance

@@ -17,6 +17,7 @@
 #include "fitting/terms/metric_distortion.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
+#include "problems/report/run_report.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"

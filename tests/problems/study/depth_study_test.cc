@@ -170,7 +170,7 @@ TEST(DepthStudy, AsAStudyItRanksBreaksDownAndShowsTheFirstSubjectsMaps) {
   ASSERT_EQ(results.Count("done"), 4);
   const auto treatments = Treatments(results, results.metric);
   ASSERT_EQ(treatments.size(), 2u);
-  const auto tables = BreakdownTables(results, treatments);
+  const auto tables = Subtables(results, treatments);
   ASSERT_EQ(tables.size(), 4u);
   EXPECT_THAT(tables[0].header, Contains("p95 (mm)"));
   EXPECT_THAT(tables[1].header, Contains("cheeks"));

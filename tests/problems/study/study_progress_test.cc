@@ -17,14 +17,14 @@ using ::testing::Not;
 using testing::ScratchFolder;
 
 TEST(StudyEta, SaysRateAndTimeLeftOfWhatWasDoneHere) {
-  EXPECT_EQ(PaceText({.trials = 80, .finished = 30, .finished_before = 20, .elapsed_s = 40}),
+  EXPECT_EQ(EtaText({.trials = 80, .finished = 30, .finished_before = 20, .elapsed_s = 40}),
             "30 of 80 trials, 4.0 s each, about 3 min left");
-  EXPECT_EQ(PaceText({.trials = 80, .finished = 21, .finished_before = 1, .elapsed_s = 4}),
+  EXPECT_EQ(EtaText({.trials = 80, .finished = 21, .finished_before = 1, .elapsed_s = 4}),
             "21 of 80 trials, 5.0 a second, about 12 s left");
-  EXPECT_EQ(PaceText({.trials = 8, .finished = 8, .failed = 2, .elapsed_s = 16}),
+  EXPECT_EQ(EtaText({.trials = 8, .finished = 8, .failed = 2, .elapsed_s = 16}),
             "8 of 8 trials, 2.0 s each; 2 failed");
-  EXPECT_EQ(PaceText({.trials = 8, .finished = 3, .finished_before = 3}), "3 of 8 trials");
-  EXPECT_EQ(PaceText({.trials = 8, .finished = 3, .finished_before = 3, .elapsed_s = 75}),
+  EXPECT_EQ(EtaText({.trials = 8, .finished = 3, .finished_before = 3}), "3 of 8 trials");
+  EXPECT_EQ(EtaText({.trials = 8, .finished = 3, .finished_before = 3, .elapsed_s = 75}),
             "3 of 8 trials, 75 s so far");
 }
 
