@@ -100,9 +100,7 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
   HSplineSurface surface = placed.surface;
   if (!experiment.first_fit.empty()) {
     FitOptions first = experiment.fit;
-    first.schedule = experiment.first_fit;
-    first.plan = ListedPlan{};
-    first.sweeps = 0;
+    first.plan = ListedPlan{.schedule = experiment.first_fit, .aim = AimOf(experiment.fit.plan)};
     first.relaxation = NoRelaxation{};
     surface = Fit(surface, placed.surface, dowels, features, first, context).surface;
   }

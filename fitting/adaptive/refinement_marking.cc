@@ -11,8 +11,9 @@ namespace {
 
 // Vertices of the next level on the knots of a patch (and beyond, at a border or by the margin)
 // that are not edited.
-std::vector<VertexId> MissingOver(const OffsetTree& tree, const PatchId& patch, int margin) {
-  const HSplineShape& shape = tree.shape();
+std::vector<VertexId> MissingOver(const HierarchicalSplineSpace& space, const PatchId& patch,
+                                  int margin) {
+  const HSplineShape& shape = space.shape();
   const int level = patch.level + 1, columns = shape.Columns(level), rows = shape.Rows(level);
   const bool periodic = shape.closure == Closure::kPeriodicU;
   const auto first = [&](int k) { return k == 0 ? 0 : 2 * k + 1; };
@@ -28,7 +29,7 @@ std::vector<VertexId> MissingOver(const OffsetTree& tree, const PatchId& patch, 
         continue;
       }
       const VertexId vertex{level, ((i % columns) + columns) % columns, j};
-      if (!tree.IsEdited(vertex)) {
+      if (!space.IsEdited(vertex)) {
         missing.push_back(vertex);
       }
     }
@@ -36,11 +37,11 @@ std::vector<VertexId> MissingOver(const OffsetTree& tree, const PatchId& patch, 
   return missing;
 }
 
-// How many points the patches of a tree hold.
+// How many points the patches of a space hold.
 class PatchCounts {
  public:
-  explicit PatchCounts(const OffsetTree& tree) : shape_(tree.shape()) {
-    for (const TreeNode& node : tree.nodes()) {
+  explicit PatchCounts(const HierarchicalSplineSpace& space) : shape_(space.shape()) {
+    for (const QuadtreeNode& node : space.nodes()) {
       counts_.emplace(KeyOf(node.patch), node.range.size());
     }
   }
@@ -74,11 +75,12 @@ class PatchCounts {
 
 }  // namespace
 
-std::vector<VertexId> MarkForRefinement(const OffsetTree& tree, const AdaptivePlan& plan) {
+std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
+                                        const AdaptivePlan& plan) {
   const double most = plan.tolerance_mm * plan.tolerance_mm;
-  const PatchCounts counts(tree);
+  const PatchCounts counts(space);
   std::set<VertexId> finer;
-  for (const TreeNode& leaf : tree.nodes()) {
+  for (const QuadtreeNode& leaf : space.nodes()) {
     if (leaf.children >= 0 || !(leaf.sums.largest > most) ||
         leaf.range.size() < static_cast<std::size_t>(plan.min_points)) {
       continue;
@@ -86,13 +88,13 @@ std::vector<VertexId> MarkForRefinement(const OffsetTree& tree, const AdaptivePl
     for (int level = 0; level <= leaf.patch.level && level < plan.finest; ++level) {
       const int shift = leaf.patch.level - level;
       const PatchId patch{level, leaf.patch.i >> shift, leaf.patch.j >> shift};
-      const std::vector<VertexId> missing = MissingOver(tree, patch, plan.margin);
+      const std::vector<VertexId> missing = MissingOver(space, patch, plan.margin);
       if (missing.empty()) {
         continue;
       }
       finer.insert(missing.begin(), missing.end());
       for (const PatchId& gap : counts.EmptierAround(patch)) {
-        const std::vector<VertexId> into = MissingOver(tree, gap, plan.margin);
+        const std::vector<VertexId> into = MissingOver(space, gap, plan.margin);
         finer.insert(into.begin(), into.end());
       }
       break;

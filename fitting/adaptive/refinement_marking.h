@@ -4,15 +4,16 @@
 
 #include <vector>
 
-#include "fitting/adaptive/offset_tree.h"
 #include "fitting/problem/fit_schedule.h"
+#include "fitting/space/hierarchical_spline_space.h"
 
 namespace semblance {
 
-// Where a leaf of the measured tree has a point farther off than the plan's tolerance: the vertices
-// over its coarsest ancestor (or itself) that is not wholly overlaid yet; and over the patches
-// beside that one which hold plainly fewer points, for where detail ends at the edge of a gap,
-// coarse vertices take its place and swing. Sorted; none are edited.
-std::vector<VertexId> MarkForRefinement(const OffsetTree& tree, const AdaptivePlan& plan);
+// Where a leaf of the measured space has a point farther off than the plan's tolerance: the
+// vertices over its coarsest ancestor (or itself) that is not wholly overlaid yet; and over the
+// patches beside that one which hold plainly fewer points, for where detail ends at the edge of a
+// gap, coarse vertices take its place and swing. Sorted; none are edited.
+std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
+                                        const AdaptivePlan& plan);
 
 }  // namespace semblance

@@ -9,30 +9,30 @@
 namespace semblance {
 namespace {
 
-double RmsOf(const OffsetTree& tree, const PointCloud& cloud) {
-  return std::sqrt(tree.Squares() / cloud.weight_sum());
+double RmsOf(const HierarchicalSplineSpace& space, const PointCloud& cloud) {
+  return std::sqrt(space.Squares() / cloud.weight_sum());
 }
 
 }  // namespace
 
 void RobustPointResiduals::Measure() {
   if (!HasLoss()) {
-    tree_.Measure({}, threads_, nullptr);
+    space_.Measure({}, threads_, nullptr);
     return;
   }
-  tree_.Measure({}, threads_, &squares_);
-  rms_mm_ = RmsOf(tree_, cloud_);
+  space_.Measure({}, threads_, &squares_);
+  rms_mm_ = RmsOf(space_, cloud_);
   PointTerm loss = term_;
-  loss.loss_width_mm = std::max(loss.loss_width_mm, LeastWidth());
+  loss.loss_width_mm = std::max(loss.loss_width_mm, LeastLossWidth_mm());
   factors_.resize(squares_.size());
   for (std::size_t k = 0; k < squares_.size(); ++k) {
     factors_[k] = RhoSlope(loss, squares_[k]);
   }
-  tree_.Measure(factors_, threads_, nullptr);
+  space_.Measure(factors_, threads_, nullptr);
 }
 
-double RobustPointResiduals::LeastWidth() const {
-  if (settled_) {
+double RobustPointResiduals::LeastLossWidth_mm() const {
+  if (settled_ || !HasLoss()) {
     return 0;
   }
   std::vector<double> squares = squares_;
@@ -41,11 +41,11 @@ double RobustPointResiduals::LeastWidth() const {
   return 3 * std::sqrt(*middle);
 }
 
-double RobustPointResiduals::Rms() const { return HasLoss() ? rms_mm_ : RmsOf(tree_, cloud_); }
+double RobustPointResiduals::Rms() const { return HasLoss() ? rms_mm_ : RmsOf(space_, cloud_); }
 
 double RobustPointResiduals::Cost() const {
   if (!HasLoss()) {
-    return Scale() * tree_.Squares();
+    return Scale() * space_.Squares();
   }
   double sum = 0;
   for (std::size_t k = 0; k < squares_.size(); ++k) {

@@ -43,10 +43,10 @@ Gram SegmentGram(int order) {
 }
 
 // Integral over the patch of (d^k/ds^k d^l/dt^l f)^2.
-PatchForm DerivativeForm(int k, int l, double size_s, double size_t) {
+ElementStiffness DerivativeStiffness(int k, int l, double size_s, double size_t) {
   const Gram s = SegmentGram(k) * std::pow(size_s, 1 - 2 * k);
   const Gram t = SegmentGram(l) * std::pow(size_t, 1 - 2 * l);
-  PatchForm form;
+  ElementStiffness form;
   for (int row = 0; row < 16; ++row) {
     for (int col = 0; col < 16; ++col) {
       form(row, col) = s(row % 4, col % 4) * t(row / 4, col / 4);
@@ -65,25 +65,28 @@ std::array<int, 16> PatchGrid::PatchVertices(int i, int j) const {
   return vertices;
 }
 
+HSplineShape PatchGrid::Shape() const {
+  return {.patches_u = patches_u,
+          .patches_v = patches_v,
+          .max_level = 0,
+          .closure = periodic_u ? Closure::kPeriodicU : Closure::kOpen};
+}
+
 Stencil PatchGrid::StencilAt(const Vec2& uv, DerivativeOrder order) const {
-  const HSplineShape shape{.patches_u = patches_u,
-                           .patches_v = patches_v,
-                           .max_level = 0,
-                           .closure = periodic_u ? Closure::kPeriodicU : Closure::kOpen};
-  return semblance::StencilAt(shape, 0, uv, order);
+  return semblance::StencilAt(Shape(), 0, uv, order);
 }
 
-PatchForm ThinPlateForm(double size_s, double size_t) {
-  return DerivativeForm(2, 0, size_s, size_t) + 2 * DerivativeForm(1, 1, size_s, size_t) +
-         DerivativeForm(0, 2, size_s, size_t);
+ElementStiffness ThinPlateStiffness(double size_s, double size_t) {
+  return DerivativeStiffness(2, 0, size_s, size_t) + 2 * DerivativeStiffness(1, 1, size_s, size_t) +
+         DerivativeStiffness(0, 2, size_s, size_t);
 }
 
-PatchForm MembraneForm(double size_s, double size_t) {
-  return DerivativeForm(1, 0, size_s, size_t) + DerivativeForm(0, 1, size_s, size_t);
+ElementStiffness MembraneStiffness(double size_s, double size_t) {
+  return DerivativeStiffness(1, 0, size_s, size_t) + DerivativeStiffness(0, 1, size_s, size_t);
 }
 
-Eigen::MatrixXd FormRoot(const PatchForm& form) {
-  const Eigen::SelfAdjointEigenSolver<PatchForm> eigen(form);
+Eigen::MatrixXd StiffnessRoot(const ElementStiffness& form) {
+  const Eigen::SelfAdjointEigenSolver<ElementStiffness> eigen(form);
   const auto& values = eigen.eigenvalues();  // ascending
   int null = 0;
   while (null < 16 && values[null] <= 1e-13 * values[15]) {
@@ -94,7 +97,7 @@ Eigen::MatrixXd FormRoot(const PatchForm& form) {
          eigen.eigenvectors().rightCols(rank).transpose();
 }
 
-double FormEnergy(const PatchForm& form, const PatchGrid& grid, const ControlNet& net) {
+double StiffnessEnergy(const ElementStiffness& form, const PatchGrid& grid, const ControlNet& net) {
   double energy = 0;
   for (int j = 0; j < grid.patches_v; ++j) {
     for (int i = 0; i < grid.patches_u; ++i) {
@@ -111,8 +114,8 @@ double FormEnergy(const PatchForm& form, const PatchGrid& grid, const ControlNet
 
 Vec2 MeanLengths(const PatchGrid& grid, const ControlNet& net) {
   const double size_u = 1.0 / grid.patches_u, size_v = 1.0 / grid.patches_v;
-  return {std::sqrt(FormEnergy(DerivativeForm(1, 0, size_u, size_v), grid, net)),
-          std::sqrt(FormEnergy(DerivativeForm(0, 1, size_u, size_v), grid, net))};
+  return {std::sqrt(StiffnessEnergy(DerivativeStiffness(1, 0, size_u, size_v), grid, net)),
+          std::sqrt(StiffnessEnergy(DerivativeStiffness(0, 1, size_u, size_v), grid, net))};
 }
 
 }  // namespace semblance

@@ -18,6 +18,7 @@ struct PatchGrid {
 
   int Columns() const { return periodic_u ? patches_u : patches_u + 3; }
   int Rows() const { return patches_v + 3; }
+  HSplineShape Shape() const;  // with this as level 0, and no other
   // The sixteen vertices of patch (i, j), the one at column a, row b of its 4 x 4 at a + 4 b. With
   // periodic u a column stands at several a if patches_u < 4.
   std::array<int, 16> PatchVertices(int i, int j) const;
@@ -25,19 +26,20 @@ struct PatchGrid {
   Stencil StencilAt(const Vec2& uv, DerivativeOrder order = {}) const;
 };
 
-// x^T form x is the energy of one patch for one coordinate x (16) of its vertices.
-using PatchForm = Eigen::Matrix<double, 16, 16>;
+using Matrix16 = Eigen::Matrix<double, 16, 16>;
+// x^T stiffness x is the energy of one patch for one coordinate x (16) of its vertices.
+using ElementStiffness = Matrix16;
 
 // Integral over a patch of size_s x size_t (mm) of f_ss^2 + 2 f_st^2 + f_tt^2; rank 13.
-PatchForm ThinPlateForm(double size_s, double size_t);
+ElementStiffness ThinPlateStiffness(double size_s, double size_t);
 // Integral over a patch of size_s x size_t (mm) of f_s^2 + f_t^2; rank 15.
-PatchForm MembraneForm(double size_s, double size_t);
+ElementStiffness MembraneStiffness(double size_s, double size_t);
 
 // R (rank x 16) with R^T R = form, which must be positive semidefinite.
-Eigen::MatrixXd FormRoot(const PatchForm& form);
+Eigen::MatrixXd StiffnessRoot(const ElementStiffness& form);
 
 // Sum over all patches and the three coordinates of x^T form x.
-double FormEnergy(const PatchForm& form, const PatchGrid& grid, const ControlNet& net);
+double StiffnessEnergy(const ElementStiffness& form, const PatchGrid& grid, const ControlNet& net);
 
 // The lengths in mm that [0,1] stands for along u and v: root mean square over the domain of |S_u|
 // and of |S_v|. The same whatever level the surface is written at.

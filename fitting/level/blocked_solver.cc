@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -24,11 +25,41 @@ constexpr int kSide = 3, kTile = kSide * kSide;
 constexpr double kScale = 1e4;
 
 struct Slot {
-  int tile = -1;   // of the net; in a block of rows: which of its tiles
+  int tile = -1;   // of all; in a block of rows: which of its tiles
   int place = -1;  // in the tile
 };
 
-// A X - B over some vertices of the net; its tiles and where each column is in them.
+// The tiles of 3 x 3 vertices of one level that hold the dofs. Places of vertices that are none
+// stay empty.
+class Tiles {
+ public:
+  explicit Tiles(const LevelView& view) {
+    std::map<std::array<int, 3>, int> known;
+    for (int dof = 0; dof < static_cast<int>(view.start.vertices.size()); ++dof) {
+      const VertexId v = VertexOf(view, dof);
+      const int next = static_cast<int>(known.size());
+      const int tile = known.try_emplace({v.level, v.j / kSide, v.i / kSide}, next).first->second;
+      slots_.push_back({tile, v.i % kSide + kSide * (v.j % kSide)});
+    }
+    count_ = static_cast<int>(known.size());
+  }
+
+  int count() const { return count_; }
+  const Slot& At(int dof) const { return slots_[dof]; }
+  const std::vector<Slot>& slots() const { return slots_; }
+
+ private:
+  static VertexId VertexOf(const LevelView& view, int dof) {
+    const int columns = view.grid.Columns();
+    return view.space != nullptr ? view.space->Vertex(dof)
+                                 : VertexId{0, dof % columns, dof / columns};
+  }
+
+  std::vector<Slot> slots_;  // of each dof
+  int count_ = 0;
+};
+
+// A X - B over some dofs; their tiles and where each column is in them.
 struct TileRows {
   std::shared_ptr<const Eigen::MatrixXd> a;
   Rows3 b;
@@ -74,8 +105,7 @@ class BlockedLinearCost final : public ceres::CostFunction {
 // Keeps the rows of all terms, those of a patch reduced to at most sixteen.
 class BlockedRowSink final : public RowSink {
  public:
-  explicit BlockedRowSink(const PatchGrid& grid)
-      : grid_(grid), touched_(grid.Columns() * grid.Rows()) {}
+  explicit BlockedRowSink(const Tiles& tiles) : tiles_(tiles), touched_(tiles.slots().size()) {}
 
   void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
            std::span<const int> vertices) override {
@@ -89,7 +119,7 @@ class BlockedRowSink final : public RowSink {
                   .tiles = {},
                   .columns = {}};
     for (std::size_t k = 0; k < vertices.size(); ++k) {
-      const Slot slot = SlotOf(vertices[k]);
+      const Slot& slot = tiles_.At(vertices[k]);
       const auto at = std::find(rows.tiles.begin(), rows.tiles.end(), slot.tile);
       rows.columns.push_back({static_cast<int>(at - rows.tiles.begin()), slot.place});
       if (at == rows.tiles.end()) {
@@ -102,43 +132,37 @@ class BlockedRowSink final : public RowSink {
     rows_.push_back(std::make_shared<const TileRows>(std::move(rows)));
   }
 
-  int Tiles() const { return TilesAcross() * ((grid_.Rows() + kSide - 1) / kSide); }
-  Slot SlotOf(int vertex) const {
-    const int i = vertex % grid_.Columns(), j = vertex / grid_.Columns();
-    return {i / kSide + TilesAcross() * (j / kSide), i % kSide + kSide * (j % kSide)};
-  }
   int Touched() const { return static_cast<int>(std::count(touched_.begin(), touched_.end(), 1)); }
   const std::vector<std::shared_ptr<const TileRows>>& rows() const { return rows_; }
 
  private:
-  int TilesAcross() const { return (grid_.Columns() + kSide - 1) / kSide; }
-
-  PatchGrid grid_;
-  std::vector<char> touched_;  // vertices
+  const Tiles& tiles_;
+  std::vector<char> touched_;  // dofs
   std::vector<std::shared_ptr<const TileRows>> rows_;
 };
 
 // Solves for one coordinate of the net.
-ceres::Solver::Summary SolveCoordinate(const BlockedRowSink& sink, int coordinate,
-                                       const ceres::Solver::Options& options, ControlNet& net) {
-  std::vector<std::array<double, kTile>> tiles(sink.Tiles());
+ceres::Solver::Summary SolveCoordinate(const BlockedRowSink& sink, const Tiles& tiles,
+                                       int coordinate, const ceres::Solver::Options& options,
+                                       ControlNet& net) {
+  std::vector<std::array<double, kTile>> values(tiles.count());
   for (std::size_t k = 0; k < net.vertices.size(); ++k) {
-    const Slot slot = sink.SlotOf(static_cast<int>(k));
-    tiles[slot.tile][slot.place] = net.vertices[k][coordinate];
+    const Slot& slot = tiles.slots()[k];
+    values[slot.tile][slot.place] = net.vertices[k][coordinate];
   }
   ceres::Problem problem;
   for (const auto& rows : sink.rows()) {
     std::vector<double*> blocks;
     for (const int tile : rows->tiles) {
-      blocks.push_back(tiles[tile].data());
+      blocks.push_back(values[tile].data());
     }
     problem.AddResidualBlock(new BlockedLinearCost(rows, coordinate), nullptr, blocks);
   }
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   for (std::size_t k = 0; summary.IsSolutionUsable() && k < net.vertices.size(); ++k) {
-    const Slot slot = sink.SlotOf(static_cast<int>(k));
-    net.vertices[k][coordinate] = tiles[slot.tile][slot.place];
+    const Slot& slot = tiles.slots()[k];
+    net.vertices[k][coordinate] = values[slot.tile][slot.place];
   }
   return summary;
 }
@@ -146,7 +170,8 @@ ceres::Solver::Summary SolveCoordinate(const BlockedRowSink& sink, int coordinat
 }  // namespace
 
 SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
-  BlockedRowSink sink(view.grid);
+  const Tiles tiles(view);
+  BlockedRowSink sink(tiles);
   AddAllRows(view, terms, sink);
   SolverOutcome outcome{.free_vertices = sink.Touched()};
   if (outcome.free_vertices == 0) {
@@ -157,7 +182,7 @@ SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, C
   options.initial_trust_region_radius /= kScale * kScale;
   options.max_trust_region_radius /= kScale * kScale;
   for (int coordinate = 0; coordinate < 3; ++coordinate) {
-    const ceres::Solver::Summary summary = SolveCoordinate(sink, coordinate, options, net);
+    const ceres::Solver::Summary summary = SolveCoordinate(sink, tiles, coordinate, options, net);
     const int steps = static_cast<int>(summary.iterations.size()) - 1;
     if (coordinate == 0 || steps >= outcome.iterations) {
       outcome.iterations = steps;

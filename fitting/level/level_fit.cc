@@ -29,7 +29,7 @@ bool NeedsExtent(const Term& term) {
                                 std::holds_alternative<MembraneTerm>(term));
 }
 
-void CheckView(const LevelView& view, std::span<const Term> terms) {
+void CheckSizes(const LevelView& view) {
   const std::size_t count = static_cast<std::size_t>(view.grid.Columns()) * view.grid.Rows();
   if (view.start.vertices.size() != count || view.rest.vertices.size() != count) {
     throw InputError(fmt::format(
@@ -37,28 +37,6 @@ void CheckView(const LevelView& view, std::span<const Term> terms) {
         "nets of the same level of the same shape",
         view.start.vertices.size(), view.rest.vertices.size(), view.grid.Columns(),
         view.grid.Rows()));
-  }
-  const bool extent = view.lengths_mm.allFinite() && view.lengths_mm.minCoeff() > 0;
-  if (!extent && std::any_of(terms.begin(), terms.end(), NeedsExtent)) {
-    throw InputError(fmt::format(
-        "level fit: the template's mean lengths along u and v are {} and {} mm; the smoothness and "
-        "membrane terms need a template that is more than a point or a line",
-        view.lengths_mm.x(), view.lengths_mm.y()));
-  }
-  const auto bone = std::find_if(terms.begin(), terms.end(), NeedsFeet);
-  if (bone != terms.end() && view.bone.empty()) {
-    throw InputError(fmt::format(
-        "level fit: the term '{}' looks at bone, and no point has a foot on bone; leave it out, or "
-        "fit a face to a skull",
-        TermName(*bone)));
-  }
-  const bool landmarks = std::any_of(terms.begin(), terms.end(), [](const Term& term) {
-    return WeightOf(term) > 0 && std::holds_alternative<LandmarkTerm>(term);
-  });
-  if (landmarks && !(view.LandmarkWeightSum() > 0)) {
-    throw InputError(
-        "level fit: the term 'landmarks' looks at standard landmarks, and no point is one; leave "
-        "it out, or fit a face to dowels at sites");
   }
 }
 
@@ -127,7 +105,8 @@ void SortBone(std::vector<BoneObservation>& bone) {
 }  // namespace
 
 LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver solver) {
-  CheckView(view, given);
+  CheckSizes(view);
+  CheckTerms(view, given);
   SortObservations(view.grid, view.observations);
   SortBone(view.bone);
   LevelSolution solution{.net = view.start, .summary = {}};
@@ -145,6 +124,31 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver 
   solution.summary.usable = outcome.usable;
   Measure(view, terms, outcome.points.rows() > 0 ? outcome.points : PointNormal(view), solution);
   return solution;
+}
+
+void CheckTerms(const LevelView& view, std::span<const Term> terms) {
+  const bool extent = view.lengths_mm.allFinite() && view.lengths_mm.minCoeff() > 0;
+  if (!extent && std::any_of(terms.begin(), terms.end(), NeedsExtent)) {
+    throw InputError(fmt::format(
+        "fit: the template's mean lengths along u and v are {} and {} mm; the smoothness and "
+        "membrane terms need a template that is more than a point or a line",
+        view.lengths_mm.x(), view.lengths_mm.y()));
+  }
+  const auto bone = std::find_if(terms.begin(), terms.end(), NeedsFeet);
+  if (bone != terms.end() && view.bone.empty()) {
+    throw InputError(fmt::format(
+        "fit: the term '{}' looks at bone, and no point has a foot on bone; leave it out, or "
+        "fit a face to a skull",
+        TermName(*bone)));
+  }
+  const bool landmarks = std::any_of(terms.begin(), terms.end(), [](const Term& term) {
+    return WeightOf(term) > 0 && std::holds_alternative<LandmarkTerm>(term);
+  });
+  if (landmarks && !(view.LandmarkWeightSum() > 0)) {
+    throw InputError(
+        "fit: the term 'landmarks' looks at standard landmarks, and no point is one; leave "
+        "it out, or fit a face to dowels at sites");
+  }
 }
 
 PatchCoverage CoverageOf(std::vector<int> counts) {
@@ -184,7 +188,7 @@ void SortObservations(const PatchGrid& grid, std::vector<Observation>& observati
 double ObservationRms(const LevelView& view, const ControlNet& net) {
   double sum = 0, weights = 0;
   for (const Observation& o : view.observations) {
-    sum += o.weight * (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm();
+    sum += o.weight * (view.PointAt(o.uv, net) - o.position).squaredNorm();
     weights += o.weight;
   }
   return weights > 0 ? std::sqrt(sum / weights) : kNaN;

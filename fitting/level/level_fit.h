@@ -76,6 +76,10 @@ constexpr auto EnumNames(LevelSolver) {
 LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
                        LevelSolver solver = LevelSolver::kCeres);
 
+// Throws InputError for a term that has nothing to look at: no extent of the template, no foot on
+// bone, no landmark.
+void CheckTerms(const LevelView& view, std::span<const Term> terms);
+
 // The canonical order, patch by patch.
 void SortObservations(const PatchGrid& grid, std::vector<Observation>& observations);
 

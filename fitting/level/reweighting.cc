@@ -12,7 +12,6 @@ namespace semblance {
 namespace {
 
 constexpr int kMostSteps = 300;
-constexpr double kStill = 1e-12;  // of the norm of all vertices
 
 // Plain least squares with the weights that the losses give at `net`: one term of the points, in
 // place of all, and the others.
@@ -59,7 +58,7 @@ std::vector<double> CostWeights(const LevelView& view, std::span<const Term> ter
   const double sum = view.WeightSum(), landmarks = view.LandmarkWeightSum();
   std::vector<double> weights;
   for (const Observation& o : view.observations) {
-    const double squared = (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm();
+    const double squared = (view.PointAt(o.uv, net) - o.position).squaredNorm();
     double factor = 0;  // over the points' weights
     for (const Term& term : terms) {
       if (const auto* const points = std::get_if<PointTerm>(&term)) {
@@ -82,7 +81,7 @@ bool SeparableButForLoss(std::span<const Term> terms) {
 }
 
 SolverOutcome SolveReweighted(const LevelView& view, std::span<const Term> terms,
-                              const SeparableSolver& solve, ControlNet& net) {
+                              const SeparableSolver& solve, ControlNet& net, double least_move) {
   const ControlNet before = net;
   Reweighted problem(view, terms);
   SolverOutcome outcome{.termination = "no_convergence"};
@@ -93,7 +92,7 @@ SolverOutcome SolveReweighted(const LevelView& view, std::span<const Term> terms
     ++outcome.iterations;
     outcome.usable = step.usable;
     outcome.free_vertices = std::max(outcome.free_vertices, step.free_vertices);
-    if (step.free_vertices == 0 || Move(last, net) <= kStill) {
+    if (step.free_vertices == 0 || Move(last, net) <= least_move) {
       outcome.termination = "convergence";
       break;
     }

@@ -27,7 +27,9 @@ using SeparableSolver = std::function<SolverOutcome(const LevelView& view,
 // surface as it stands, the points of a patch reduced anew, until the surface stands still. As
 // rho(s) is concave for each loss, the cost falls with every step (majorisation; Hunter & Lange
 // 2004). The reference is SolveByCeres, which looks at each point by itself.
+// least_move: of the norm of all vertices; a step that moves them no more is the last.
 SolverOutcome SolveReweighted(const LevelView& view, std::span<const Term> terms,
-                              const SeparableSolver& solve, ControlNet& net);
+                              const SeparableSolver& solve, ControlNet& net,
+                              double least_move = 1e-12);
 
 }  // namespace semblance

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// In which order the levels of an H-spline are fitted, and how much of each solve is kept.
+// Plans: in which order the levels of an H-spline are fitted, and how much of each solve is kept.
+// Each plan owns its options.
 #pragma once
 
+#include <array>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -37,48 +39,91 @@ inline std::vector<ScheduleStep> PublishedSchedule() {
   return {{0, 0.4}, {1, 0.35}, {2, 0.35}, {0, 0.35}, {1, 0.3}, {2, 0.3}};
 }
 
-// The steps of the list, once.
+enum class FitAim { kSurface, kLevel };
+constexpr auto EnumNames(FitAim) { return std::to_array<std::string_view>({"surface", "level"}); }
+
+template <class Visitor>
+void ScheduleField(Visitor& visit, std::vector<ScheduleStep>& schedule) {
+  visit(FieldInfo{.name = "schedule",
+                  .min = 1,
+                  .doc = "levels in the order in which they are fitted, each with the fraction of "
+                         "its solution to take (thesis 4.4)"},
+        schedule);
+}
+
+// What every plan that goes level by level has.
+template <class Visitor>
+void LevelwiseFields(Visitor& visit, int& sweeps, FitAim& aim) {
+  visit(
+      FieldInfo{.name = "sweeps",
+                .min = 0,
+                .max = 100,
+                .doc = "how often all levels that were fitted are fitted again at the end, coarse "
+                       "to fine and whole (back-fitting)"},
+      sweeps);
+  visit(FieldInfo{.name = "aim",
+                  .doc = "surface: a level moves so that the whole surface, with the detail of its "
+                         "finer levels as it stands, meets the points; level: so that the level "
+                         "alone does, as the thesis may be read, which lets detail overshoot"},
+        aim);
+}
+
+// The steps of the schedule, once.
 struct ListedPlan {
   static constexpr std::string_view kName = "listed";
+  std::vector<ScheduleStep> schedule = PublishedSchedule();
+  int sweeps = 0;
+  FitAim aim = FitAim::kSurface;
 };
 template <class Visitor>
-void Fields(Visitor&, ListedPlan&) {}
+void Fields(Visitor& visit, ListedPlan& o) {
+  ScheduleField(visit, o.schedule);
+  LevelwiseFields(visit, o.sweeps, o.aim);
+}
 
-// Levels 0, 1, .. finest, in place of the list.
+// Levels 0, 1, .. finest.
 struct CoarseToFinePlan {
   static constexpr std::string_view kName = "coarse_to_fine";
   int finest = 2;
   double fraction = 1;
+  int sweeps = 0;
+  FitAim aim = FitAim::kSurface;
 };
 template <class Visitor>
 void Fields(Visitor& visit, CoarseToFinePlan& o) {
-  visit(FieldInfo{.name = "finest",
+  visit(FieldInfo{.name = "finest", .min = 0, .max = 12, .doc = "last level to fit"}, o.finest);
+  visit(FieldInfo{.name = "fraction",
                   .min = 0,
-                  .max = 12,
-                  .doc = "last level to fit; the list of steps is not used"},
-        o.finest);
-  visit(FieldInfo{.name = "fraction", .min = 0, .max = 1, .doc = "as that of a step of the list"},
+                  .max = 1,
+                  .doc = "part of the way that each level goes to its solution"},
         o.fraction);
+  LevelwiseFields(visit, o.sweeps, o.aim);
 }
 
-// The steps of the list again and again, while the points' root mean square distance falls.
+// The steps of the schedule again and again, while the points' root mean square distance falls.
 struct UntilPlan {
   static constexpr std::string_view kName = "until";
+  std::vector<ScheduleStep> schedule = PublishedSchedule();
   double tolerance_mm = 0.01;
   int max_passes = 20;
+  int sweeps = 0;
+  FitAim aim = FitAim::kSurface;
 };
 template <class Visitor>
 void Fields(Visitor& visit, UntilPlan& o) {
+  ScheduleField(visit, o.schedule);
   visit(FieldInfo{.name = "tolerance_mm",
                   .unit = "mm",
                   .min = 0,
                   .max = 10,
-                  .doc = "a pass over the list that lowers the points' root mean square distance "
-                         "by no more than this is the last"},
+                  .doc = "a pass over the schedule that lowers the points' root mean square "
+                         "distance by no more than this is the last"},
         o.tolerance_mm);
   visit(
-      FieldInfo{.name = "max_passes", .min = 1, .max = 1000, .doc = "passes over the list at most"},
+      FieldInfo{
+          .name = "max_passes", .min = 1, .max = 1000, .doc = "passes over the schedule at most"},
       o.max_passes);
+  LevelwiseFields(visit, o.sweeps, o.aim);
 }
 
 // All levels at once, and finer ones only where they are needed: the surface is solved for as one
@@ -104,7 +149,7 @@ void Fields(Visitor& visit, AdaptivePlan& o) {
   visit(FieldInfo{.name = "finest",
                   .min = 0,
                   .max = 8,
-                  .doc = "finest level that may be overlaid; the list of steps is not used"},
+                  .doc = "finest level that may be overlaid; at most that of the surface"},
         o.finest);
   visit(FieldInfo{.name = "margin",
                   .min = 0,
@@ -120,5 +165,12 @@ void Fields(Visitor& visit, AdaptivePlan& o) {
 }
 
 using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan, AdaptivePlan>;
+
+// The steps of one pass of a plan that goes level by level; none of the adaptive plan.
+std::vector<ScheduleStep> StepsOf(const SchedulePlan& plan);
+// What the levels of a plan aim at; the adaptive plan solves for the surface.
+FitAim AimOf(const SchedulePlan& plan);
+// The finest level that a plan names.
+int FinestLevelOf(const SchedulePlan& plan);
 
 }  // namespace semblance

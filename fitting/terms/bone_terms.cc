@@ -41,21 +41,21 @@ double WeightOfFeet(const LevelView& view) {
 template <class T>
 class BoneCost final : public ceres::CostFunction {
  public:
-  BoneCost(const T& term, const BoneObservation& o, const Stencil& stencil, double factor)
+  BoneCost(const T& term, const BoneObservation& o, const DofStencil& stencil, double factor)
       : term_(term), observation_(o), stencil_(stencil), factor_(factor) {
-    mutable_parameter_block_sizes()->assign(16, 3);
+    mutable_parameter_block_sizes()->assign(stencil.count, 3);
     set_num_residuals(1);
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
-    Vec3 point = Vec3::Zero();
-    for (int k = 0; k < 16; ++k) {
+    Vec3 point = stencil_.fixed;
+    for (int k = 0; k < stencil_.count; ++k) {
       point += stencil_.weight[k] * Eigen::Map<const Vec3>(parameters[k]);
     }
     const Misfit misfit = MisfitOf(term_, observation_, point);
     residuals[0] = factor_ * misfit.value;
-    for (int k = 0; jacobians != nullptr && k < 16; ++k) {
+    for (int k = 0; jacobians != nullptr && k < stencil_.count; ++k) {
       if (jacobians[k] != nullptr) {
         Eigen::Map<Vec3>(jacobians[k], 3) = factor_ * stencil_.weight[k] * misfit.slope;
       }
@@ -66,7 +66,7 @@ class BoneCost final : public ceres::CostFunction {
  private:
   T term_;
   BoneObservation observation_;
-  Stencil stencil_;
+  DofStencil stencil_;
   double factor_;
 };
 
@@ -74,9 +74,9 @@ template <class T>
 void AddBone(const T& term, const LevelView& view, ControlNet& net, ceres::Problem& problem) {
   const double scale = term.weight / WeightOfFeet(view);
   for (const BoneObservation& o : view.bone) {
-    const Stencil stencil = view.grid.StencilAt(o.point.uv);
+    const DofStencil stencil = view.StencilAt(o.point.uv);
     std::vector<double*> blocks;
-    for (const int vertex : stencil.index) {
+    for (const int vertex : stencil.dofs()) {
       blocks.push_back(net.vertices[vertex].data());
     }
     problem.AddResidualBlock(new BoneCost<T>(term, o, stencil, std::sqrt(scale * o.point.weight)),
@@ -88,7 +88,7 @@ template <class T>
 double BoneSum(const T& term, const LevelView& view, const ControlNet& net) {
   double sum = 0;
   for (const BoneObservation& o : view.bone) {
-    const double misfit = MisfitOf(term, o, view.grid.StencilAt(o.point.uv).Apply(net)).value;
+    const double misfit = MisfitOf(term, o, view.PointAt(o.point.uv, net)).value;
     sum += o.point.weight * misfit * misfit;
   }
   return sum > 0 ? term.weight * sum / WeightOfFeet(view) : 0;

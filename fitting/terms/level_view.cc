@@ -3,9 +3,39 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <utility>
+
+#include "fitting/least_squares/qr_compression.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
+
+Observation Observe(const FitPoint& point) {
+  return {.uv = point.uv,
+          .position = point.position,
+          .weight = point.weight,
+          .landmark = point.role == PointRole::kLandmark};
+}
+
+namespace {
+
+PatchGrid GridOf(const HSplineShape& shape, int level) {
+  return {.patches_u = shape.PatchesU(level),
+          .patches_v = shape.PatchesV(level),
+          .periodic_u = shape.closure == Closure::kPeriodicU};
+}
+
+// The detail that finer levels add at uv is taken off the point that the level aims at.
+Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
+  Observation o = Observe(point);
+  if (aim == FitAim::kSurface && level < surface.shape().max_level) {
+    o.position -= surface.Point(point.uv) - surface.LevelDerivative(level, point.uv);
+  }
+  return o;
+}
+
+}  // namespace
 
 double LevelView::WeightSum() const {
   double sum = 0;
@@ -23,33 +53,102 @@ double LevelView::LandmarkWeightSum() const {
   return sum;
 }
 
+int LevelView::elements() const {
+  return space != nullptr ? space->size() : grid.patches_u * grid.patches_v;
+}
+
+SplineElement LevelView::Element(int element) const {
+  if (space != nullptr) {
+    return (*space)[element];
+  }
+  const int i = element % grid.patches_u, j = element / grid.patches_u;
+  const std::array<int, 16> vertices = grid.PatchVertices(i, j);
+  SplineElement result{.patch = {0, i, j},
+                       .patches_u = grid.patches_u,
+                       .patches_v = grid.patches_v,
+                       .dofs = {vertices.begin(), vertices.end()}};
+  for (int k = 0; k < 16; ++k) {
+    result.rest.row(k) = rest.vertices[vertices[k]];
+  }
+  return result;
+}
+
+LocalStencil LevelView::LocalAt(const Vec2& uv, DerivativeOrder order) const {
+  if (space != nullptr) {
+    const int element = space->At(uv);
+    const PatchPlace place = Locate(space->shape(), (*space)[element].patch.level, uv);
+    return {element, PatchWeights(space->shape(), place, order)};
+  }
+  const HSplineShape shape = grid.Shape();
+  CheckPlace(shape, 0, uv);
+  const PatchPlace place = Locate(shape, 0, uv);
+  return {place.patch.i + grid.patches_u * place.patch.j, PatchWeights(shape, place, order)};
+}
+
+DofStencil LevelView::StencilAt(const Vec2& uv, DerivativeOrder order) const {
+  DofStencil stencil;
+  if (space == nullptr) {
+    const Stencil plain = grid.StencilAt(uv, order);
+    stencil.count = 16;
+    std::copy(plain.index.begin(), plain.index.end(), stencil.index.begin());
+    std::copy(plain.weight.begin(), plain.weight.end(), stencil.weight.begin());
+    return stencil;
+  }
+  const LocalStencil local = LocalAt(uv, order);
+  const SplineElement& element = (*space)[local.element];
+  const Eigen::Map<const Eigen::Matrix<double, 1, 16>> weights(local.weight.data());
+  stencil.count = static_cast<int>(element.dofs.size());
+  std::copy(element.dofs.begin(), element.dofs.end(), stencil.index.begin());
+  Eigen::Map<Eigen::RowVectorXd>(stencil.weight.data(), stencil.count) =
+      weights * element.extraction;
+  stencil.fixed = (weights * element.fixed).transpose();
+  return stencil;
+}
+
+Vec3 LevelView::PointAt(const Vec2& uv, const ControlNet& net) const {
+  return space == nullptr ? grid.StencilAt(uv).Apply(net) : StencilAt(uv).Apply(net);
+}
+
+void AddElementRows(const SplineElement& element, std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
+                    RowSink& sink) {
+  if (element.IsIdentity()) {
+    sink.Add(std::move(a), std::move(b), element.dofs);
+    return;
+  }
+  LinearRows rows = CompressRows(*a, b - *a * element.fixed);
+  sink.Add(std::make_shared<const Eigen::MatrixXd>(rows.a * element.extraction), std::move(rows.b),
+           element.dofs);
+}
+
 LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
-                      const FitTarget& target, int level) {
+                      const FitTarget& target, int level, const ViewOptions& options) {
   const HSplineShape& shape = surface.shape();
   if (level < 0 || level > shape.max_level || !(shape == rest.shape())) {
     throw InputError(fmt::format(
-        "uncertainty: level {} of a surface with levels 0..{}; give one of them, and a template of "
-        "the same shape",
+        "level {} of a surface with levels 0..{}; give one of them, and a template of the same "
+        "shape",
         level, shape.max_level));
   }
-  CheckTarget(target);
-  const bool periodic = shape.closure == Closure::kPeriodicU;
-  LevelView view{
-      .grid = {.patches_u = shape.PatchesU(level),
-               .patches_v = shape.PatchesV(level),
-               .periodic_u = periodic},
-      .start = surface.Net(level),
-      .rest = rest.Net(level),
-      .lengths_mm = MeanLengths(
-          {.patches_u = shape.patches_u, .patches_v = shape.patches_v, .periodic_u = periodic},
-          rest.Net(0)),
-      .observations = {}};
-  for (const FitPoint& p : target.points) {
-    const Vec3 finer = surface.Point(p.uv) - surface.LevelDerivative(level, p.uv);
-    view.observations.push_back({.uv = p.uv,
-                                 .position = p.position - finer,
-                                 .weight = p.weight,
-                                 .landmark = p.role == PointRole::kLandmark});
+  LevelView view{.grid = GridOf(shape, level),
+                 .start = surface.Net(level),
+                 .rest = rest.Net(level),
+                 .lengths_mm = MeanLengths(GridOf(shape, 0), rest.Net(0)),
+                 .observations = {}};
+  view.observations.reserve(target.points.size());
+  for (const FitPoint& point : target.points) {
+    view.observations.push_back(Observe(point, surface, level, options.aim));
+  }
+  for (std::size_t k = 0; k < target.anchors.size(); ++k) {
+    const Observation& o = view.observations[k];
+    const Vec3 detail = target.points[k].position - o.position;
+    if (target.anchors[k].foot.allFinite()) {
+      view.bone.push_back({o, target.anchors[k].foot - detail, target.anchors[k].direction});
+    }
+  }
+  for (const VertexId& vertex : options.held) {
+    if (vertex.level == level) {
+      view.held.push_back(view.start.Index(vertex.i, vertex.j));
+    }
   }
   return view;
 }

@@ -14,29 +14,28 @@
 namespace semblance {
 namespace {
 
-using Indices = std::array<int, 16>;
-
 // A loss looks at each point by itself, so robust points are not reduced.
 void AddByPoint(const PointTerm& term, const LevelView& view, ControlNet& net,
                 ceres::Problem& problem) {
   const double scale = term.weight / view.WeightSum();
   for (const Observation& o : view.observations) {
-    const Stencil s = view.grid.StencilAt(o.uv);
-    const Eigen::Map<const Eigen::Matrix<double, 1, 16>> row(s.weight.data());
-    AddLinearResidual(std::make_shared<const Eigen::MatrixXd>(row), o.position.transpose(), s.index,
+    const DofStencil s = view.StencilAt(o.uv);
+    const Eigen::Map<const Eigen::RowVectorXd> row(s.weight.data(), s.count);
+    AddLinearResidual(std::make_shared<const Eigen::MatrixXd>(row),
+                      (o.position - s.fixed).transpose(), s.dofs(),
                       MakeLoss(term, scale * o.weight), net, problem);
   }
 }
 
-// Rows of one patch are given on when another begins, or when they become many.
-class PatchBuffer {
+// Rows of one element are given on when another begins, or when they become many.
+class ElementBuffer {
  public:
-  explicit PatchBuffer(RowSink& sink) : sink_(sink) {}
+  ElementBuffer(const LevelView& view, RowSink& sink) : view_(view), sink_(sink) {}
 
-  void Add(const Stencil& stencil, const Vec3& position, double factor) {
-    if (stencil.index != indices_ || rows_.size() == kMost) {
+  void Add(const LocalStencil& stencil, const Vec3& position, double factor) {
+    if (stencil.element != element_ || rows_.size() == kMost) {
       Flush();
-      indices_ = stencil.index;
+      element_ = stencil.element;
     }
     Row& row = rows_.emplace_back();
     for (int k = 0; k < 16; ++k) {
@@ -51,8 +50,9 @@ class PatchBuffer {
     }
     const Eigen::Map<const Eigen::Matrix<double, 19, Eigen::Dynamic>> all(rows_.front().data(), 19,
                                                                           rows_.size());
-    sink_.Add(std::make_shared<const Eigen::MatrixXd>(all.topRows<16>().transpose()),
-              all.bottomRows<3>().transpose(), indices_);
+    AddElementRows(view_.Element(element_),
+                   std::make_shared<const Eigen::MatrixXd>(all.topRows<16>().transpose()),
+                   all.bottomRows<3>().transpose(), sink_);
     rows_.clear();
   }
 
@@ -60,18 +60,19 @@ class PatchBuffer {
   using Row = Eigen::Matrix<double, 19, 1>;
   static constexpr std::size_t kMost = 65536;  // rows; 10 MB
 
+  const LevelView& view_;
   RowSink& sink_;
-  Indices indices_{};
+  int element_ = -1;
   std::vector<Row> rows_;
 };
 
 // The rows of those observations that are taken.
 template <class Taken>
 void AddWeighted(const LevelView& view, double scale, const Taken& taken, RowSink& sink) {
-  PatchBuffer buffer(sink);
+  ElementBuffer buffer(view, sink);
   for (const Observation& o : view.observations) {
     if (taken(o)) {
-      buffer.Add(view.grid.StencilAt(o.uv), o.position, std::sqrt(scale * o.weight));
+      buffer.Add(view.LocalAt(o.uv), o.position, std::sqrt(scale * o.weight));
     }
   }
   buffer.Flush();
@@ -115,7 +116,7 @@ void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
 double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net) {
   double sum = 0;
   for (const Observation& o : view.observations) {
-    sum += o.weight * Rho(term, (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm());
+    sum += o.weight * Rho(term, (view.PointAt(o.uv, net) - o.position).squaredNorm());
   }
   return view.observations.empty() ? 0 : term.weight * sum / view.WeightSum();
 }
@@ -123,8 +124,7 @@ double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& 
 double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNet& net) {
   double sum = 0;
   for (const Observation& o : view.observations) {
-    sum += o.landmark ? o.weight * (view.grid.StencilAt(o.uv).Apply(net) - o.position).squaredNorm()
-                      : 0;
+    sum += o.landmark ? o.weight * (view.PointAt(o.uv, net) - o.position).squaredNorm() : 0;
   }
   return sum > 0 ? term.weight * sum / view.LandmarkWeightSum() : 0;
 }

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <variant>
+#include <utility>
+
+#include "fitting/plan/fit_check.h"
 
 namespace semblance {
 namespace {
@@ -14,10 +16,10 @@ class LevelCheck {
 
   void At(std::string path, int level) {
     if (level > finest_) {
-      faults_.push_back({std::move(path),
-                         fmt::format("level {} is finer than the generic face, whose finest level "
-                                     "is {}; give a level up to that, or raise template.max_level",
-                                     level, finest_)});
+      faults_.push_back(
+          {std::move(path), fmt::format("level {} is finer than the surface, whose finest level is "
+                                        "{}; give a level up to that, or raise template.max_level",
+                                        level, finest_)});
     }
   }
   void Steps(const std::string& path, const std::vector<ScheduleStep>& steps) {
@@ -37,13 +39,13 @@ class LevelCheck {
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) {
   LevelCheck check(experiment.face_template.max_level);
   check.Steps("first_fit", experiment.first_fit);
-  if (const auto* plan = std::get_if<CoarseToFinePlan>(&experiment.fit.plan)) {
-    check.At("fit.plan.finest", plan->finest);
-  } else {
-    check.Steps("fit.schedule", experiment.fit.schedule);
-  }
   check.At("seeds.direction_level", experiment.seeds.direction_level);
-  return check.Take();
+  std::vector<OptionFault> faults = check.Take();
+  for (const FitFault& fault : FaultsOf(experiment.fit, experiment.face_template.max_level)) {
+    faults.push_back({"fit." + fault.path,
+                      fault.too_fine ? fault.what + ", or raise template.max_level" : fault.what});
+  }
+  return faults;
 }
 
 }  // namespace semblance

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
@@ -23,24 +24,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-int FinestLevel(const FitOptions& fit) {
-  if (const auto* const plan = std::get_if<AdaptivePlan>(&fit.plan)) {
-    return plan->finest;
-  }
-  if (const auto* const plan = std::get_if<CoarseToFinePlan>(&fit.plan)) {
-    return plan->finest;
-  }
-  int finest = 0;
-  for (const ScheduleStep& step : fit.schedule) {
-    finest = std::max(finest, step.level);
-  }
-  return finest;
-}
-
 HSplineShape ShapeOf(const PointFitOptions& options) {
   return {.patches_u = options.patches_u,
           .patches_v = options.patches_v,
-          .max_level = FinestLevel(options.fit),
+          .max_level = FinestLevelOf(options.fit.plan),
           .closure = options.closure};
 }
 
@@ -106,6 +93,14 @@ std::string SurfacePly(const HSplineSurface& surface, double chord_mm, int threa
 }
 
 }  // namespace
+
+std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
+  std::vector<OptionFault> faults;
+  for (const FitFault& fault : FaultsOf(options.fit, ShapeOf(options).max_level)) {
+    faults.push_back({"fit." + fault.path, fault.what});
+  }
+  return faults;
+}
 
 PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
                    const RunContext& context) {

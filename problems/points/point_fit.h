@@ -8,6 +8,7 @@
 
 #include "fitting/fit.h"
 #include "fitting/problem/parametrise.h"
+#include "problems/config/config_errors.h"
 #include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
 #include "problems/points/point_table.h"
@@ -21,8 +22,8 @@ struct PointFitOptions {
   Closure closure = Closure::kOpen;
   Parameters parameters;
   FitOptions fit = {
-      .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .plan = AdaptivePlan{},
+      .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = LevelSolver::kFastest};
   double chord_mm = 0.05;
 };
@@ -46,6 +47,10 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                   .doc = "how far a triangle of surface.ply may be from the surface"},
         o.chord_mm);
 }
+
+// What the fit's plan, terms and solver cannot do together. Told with the other faults when a
+// configuration is read.
+std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
   std::string parameters;  // given, plane or cylinder

@@ -15,7 +15,7 @@ Measured MeasureHead(int count, double tolerance) {
   const double begin = CpuSecondsSoFar();
   const FitResult result = Fit(
       start, target, {},
-      {.terms = {PointTerm{}}, .plan = AdaptivePlan{.tolerance_mm = tolerance, .finest = 5}}, {});
+      {.plan = AdaptivePlan{.tolerance_mm = tolerance, .finest = 5}, .terms = {PointTerm{}}}, {});
   Measured measured;
   measured.seconds = CpuSecondsSoFar() - begin;
   measured.peak_mb = PeakMb();

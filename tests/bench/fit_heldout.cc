@@ -83,14 +83,12 @@ Measured Score(const Scene& scene, double begin, const Height& height) {
 
 // Nothing tuned: smoothness of the surface, its weight chosen by cross-validation, down to the
 // level that has about as many vertices as there are points.
-Measured FitScene(const Scene& scene, const SchedulePlan& plan, int finest) {
-  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = finest};
+Measured FitScene(const Scene& scene, const SchedulePlan& plan) {
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = FinestLevelOf(plan)};
   const SmoothnessTerm smooth{
       .weight = AutoOr<double>::Auto(), .of = SmoothnessOf::kSurface, .length_mm = 1};
-  const FitOptions options{.schedule = {{finest, 1}},
-                           .terms = {PointTerm{}, smooth},
-                           .plan = plan,
-                           .solver = LevelSolver::kFastest};
+  const FitOptions options{
+      .plan = plan, .terms = {PointTerm{}, smooth}, .solver = LevelSolver::kFastest};
   const double begin = CpuSecondsSoFar();
   const FitResult result = Fit(testing::PlainStart(shape), scene.fitted, {}, options, {});
   return Score(scene, begin, [&](const Vec2& uv) { return result.surface.Point(uv).z(); });
@@ -135,18 +133,20 @@ void PrintScene(const std::string& name, const Measured& ours, double peer_rms, 
   Print(name + "_seconds", ours.seconds, kNaN, kNaN, "s");
 }
 
+const ListedPlan kLevel5{.schedule = {{5, 1}}};
+
 // The adaptive plan leaves patches with few points as they are, so that it cannot follow each point
 // of a rough terrain without noise: no goal.
 void RunTerrain() {
   const Scene scene = Split(testing::Scattered(testing::Terrain(7), 60000, 0, 5));
   const Measured mba = BestMba(scene), fitpack = BestFitpack(scene);
-  const Measured level = MeasureApart([&] { return FitScene(scene, ListedPlan{}, 5); });
+  const Measured level = MeasureApart([&] { return FitScene(scene, kLevel5); });
   PrintScene("fit.terrain_heldout_rms_vs_mba", level, mba.rms_mm, 1);
   if (!std::isnan(fitpack.rms_mm)) {
     Print("fit.terrain_heldout_rms_vs_fitpack", level.rms_mm, fitpack.rms_mm, 1, "mm");
   }
   const Measured adaptive = MeasureApart(
-      [&] { return FitScene(scene, AdaptivePlan{.tolerance_mm = 1e-3, .finest = 5}, 5); });
+      [&] { return FitScene(scene, AdaptivePlan{.tolerance_mm = 1e-3, .finest = 5}); });
   PrintScene("fit.terrain_heldout_adaptive_rms_vs_mba", adaptive, mba.rms_mm, kNaN);
 }
 
@@ -156,9 +156,9 @@ void RunSheet() {
   const Scene scene = SheetScene();
   const Measured mba = BestMba(scene), fitpack = BestFitpack(scene);
   const double best = std::fmin(mba.rms_mm, fitpack.rms_mm);
-  const Measured level = MeasureApart([&] { return FitScene(scene, ListedPlan{}, 5); });
+  const Measured level = MeasureApart([&] { return FitScene(scene, kLevel5); });
   const Measured adaptive = MeasureApart(
-      [&] { return FitScene(scene, AdaptivePlan{.tolerance_mm = 5e-4, .finest = 5}, 5); });
+      [&] { return FitScene(scene, AdaptivePlan{.tolerance_mm = 5e-4, .finest = 5}); });
   PrintScene("fit.sheet_heldout_rms_vs_best", level, best, 1);
   PrintScene("fit.sheet_heldout_adaptive_rms_vs_best", adaptive, best, kNaN);
   Print("fit.sheet_gap_max_vs_range", std::max(level.largest_mm, adaptive.largest_mm), kNaN, 0.1,

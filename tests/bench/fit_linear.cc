@@ -107,7 +107,10 @@ double SolveLevel(const HSplineSurface& sheet, const FitTarget& target, LevelSol
 
 double SolveFit(const HSplineSurface& sheet, const FitTarget& target) {
   return Fit(sheet, target, {},
-             {.schedule = {{0, 1}}, .terms = kPoints, .solver = LevelSolver::kFastest}, {})
+             {.plan = ListedPlan{.schedule = {{0, 1}}},
+              .terms = kPoints,
+              .solver = LevelSolver::kFastest},
+             {})
       .point_rms_mm;
 }
 

@@ -23,7 +23,7 @@ std::string StudyText() {
   return fmt::format(
       "base: {}/configs/phantom.yaml\n"
       "set: {{subject.rings: 24, implicit.resolution: 8, seeds.level: 0, template.max_level: 0,\n"
-      "      first_fit: [], fit.solver: fastest, fit.schedule: [{{level: 0, fraction: 1}}]}}\n"
+      "      first_fit: [], fit.solver: fastest, fit.plan.schedule: [{{level: 0, fraction: 1}}]}}\n"
       "sample: {{method: lhs, n: {}, random_seed: 1, ranges: {{seeds.weight: [0.5, 1.0]}}}}\n",
       SEMBLANCE_SOURCE_DIR, kTrials);
 }

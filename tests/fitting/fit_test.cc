@@ -9,6 +9,7 @@
 #include <cstring>
 #include <map>
 
+#include "fitting/plan/fit_driver.h"
 #include "fitting/problem/placement.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
@@ -83,7 +84,8 @@ TEST(Fit, ReproducesASurfaceOfTheSpace) {
     shape.max_level = 1;
     const HSplineSurface truth = RandomSurface(shape, 1), start = SmoothSurface(shape, 2);
     const FitResult result =
-        Fit(start, TargetOn(truth, 3000), {}, {.schedule = {{1, 1}}, .terms = kPointsOnly}, {});
+        Fit(start, TargetOn(truth, 3000), {},
+            {.plan = ListedPlan{.schedule = {{1, 1}}}, .terms = kPointsOnly}, {});
     EXPECT_LT(NetDistance(result.surface.Net(1), truth.Net(1)), 1e-8);
     EXPECT_LT(LargestDistance(result.surface, truth, {}), 1e-9);
     EXPECT_LT(result.point_rms_mm, 1e-9);
@@ -96,10 +98,12 @@ TEST(Fit, TakesTheFractionOfTheWay) {
   const FitTarget target = TargetOn(truth, 200);
   for (const int level : {0, 1, 2}) {
     const ControlNet whole =
-        Fit(start, target, {}, {.schedule = {{level, 1}}}, {}).surface.Net(level);
+        Fit(start, target, {}, {.plan = ListedPlan{.schedule = {{level, 1}}}}, {})
+            .surface.Net(level);
     for (const double f : {0.0, 0.3, 0.4}) {
       const ControlNet part =
-          Fit(start, target, {}, {.schedule = {{level, f}}}, {}).surface.Net(level);
+          Fit(start, target, {}, {.plan = ListedPlan{.schedule = {{level, f}}}}, {})
+              .surface.Net(level);
       const ControlNet& c = start.Net(level);
       for (std::size_t k = 0; k < c.vertices.size(); ++k) {
         const Vec3 expected = c.vertices[k] + f * (whole.vertices[k] - c.vertices[k]);
@@ -113,11 +117,11 @@ TEST(Fit, ChangesTheLevelsOfTheScheduleAndNoOther) {
   const HSplineSurface truth = RandomSurface(Shape(), 1), start = RandomSurface(Shape(), 2);
   const FitTarget target = TargetOn(truth, 200);
   for (const std::vector<int>& levels : {std::vector<int>{0}, {1}, {2}, {0, 2}, {3, 1}}) {
-    FitOptions options{.schedule = {}};
+    ListedPlan plan{.schedule = {}};
     for (const int level : levels) {
-      options.schedule.push_back({level, 0.5});
+      plan.schedule.push_back({level, 0.5});
     }
-    const HSplineSurface fitted = Fit(start, target, {}, options, {}).surface;
+    const HSplineSurface fitted = Fit(start, target, {}, {.plan = plan}, {}).surface;
     const auto scheduled = [&](int level) {
       return std::find(levels.begin(), levels.end(), level) != levels.end();
     };
@@ -126,6 +130,34 @@ TEST(Fit, ChangesTheLevelsOfTheScheduleAndNoOther) {
       EXPECT_EQ(OffsetsOf(fitted, level) == OffsetsOf(start, level), !scheduled(level)) << level;
     }
   }
+}
+
+// Thesis 4.4, by what a fit does: each step goes its part of the way that the level's whole solve
+// would go from where the steps before have left the surface.
+TEST(Fit, TheScheduleByDefaultIsThePublishedOne) {
+  const std::vector<ScheduleStep> published = {{0, 0.4},  {1, 0.35}, {2, 0.35},
+                                               {0, 0.35}, {1, 0.3},  {2, 0.3}};
+  const HSplineSurface start = RandomSurface(Shape(), 2);
+  const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 200);
+  const FitResult result = Fit(start, target, {}, {}, {});
+  ASSERT_EQ(result.levels.size(), published.size());
+  HSplineSurface by_hand = start;
+  for (std::size_t k = 0; k < published.size(); ++k) {
+    const auto [level, fraction] = published[k];
+    const ListedPlan whole{.schedule = {{level, 1}}};
+    const ControlNet solved =
+        Fit(by_hand, start, target, {}, {.plan = whole}, {}).surface.Net(level);
+    ControlNet net = by_hand.Net(level);
+    for (std::size_t v = 0; v < net.vertices.size(); ++v) {
+      net.vertices[v] += fraction * (solved.vertices[v] - net.vertices[v]);
+    }
+    by_hand.SetNet(level, net);
+    EXPECT_EQ(result.levels[k].level, level);
+    EXPECT_EQ(result.levels[k].fraction, fraction);
+    EXPECT_NEAR(result.levels[k].rms_after_mm, PointRms(by_hand, target, 1), 1e-9);
+  }
+  EXPECT_LT(LargestDistance(result.surface, by_hand, {}), 1e-9);
+  EXPECT_GT(LargestDistance(result.surface, start, {}), 1);
 }
 
 TEST(Fit, ThePublishedScheduleNeverTouchesLevelThree) {
@@ -168,7 +200,7 @@ TEST(Fit, ATemplateThatFitsStays) {
   const HSplineSurface start = RandomSurface(Shape(), 3, 60);
   const FitTarget target = TargetOn(start, 300);
   EXPECT_LT(LargestDistance(Fit(start, target, {}, {}, {}).surface, start, {}), 1e-8);
-  const FitOptions level{.aim = FitAim::kLevel};
+  const FitOptions level{.plan = ListedPlan{.aim = FitAim::kLevel}};
   EXPECT_GT(LargestDistance(Fit(start, target, {}, level, {}).surface, start, {}), 1e-2);
 }
 
@@ -270,7 +302,7 @@ TEST(Fit, AScheduleCanBeFittedInParts) {
   const std::vector<ScheduleStep> published = PublishedSchedule();
   HSplineSurface parts = start;
   for (const ScheduleStep& step : published) {
-    parts = Fit(parts, start, target, {}, {.schedule = {step}}, {}).surface;
+    parts = Fit(parts, start, target, {}, {.plan = ListedPlan{.schedule = {step}}}, {}).surface;
   }
   EXPECT_TRUE(SameBytes(parts.Net(3), whole.Net(3)));
 }
@@ -278,8 +310,9 @@ TEST(Fit, AScheduleCanBeFittedInParts) {
 TEST(Fit, CoarseToFineIsThatList) {
   const HSplineSurface start = RandomSurface(Shape(), 2);
   const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 200);
-  const FitOptions plan{.plan = CoarseToFinePlan{.finest = 2, .fraction = 0.7}, .sweeps = 1};
-  const FitOptions list{.schedule = {{0, 0.7}, {1, 0.7}, {2, 0.7}, {0, 1}, {1, 1}, {2, 1}}};
+  const FitOptions plan{.plan = CoarseToFinePlan{.finest = 2, .fraction = 0.7, .sweeps = 1}};
+  const FitOptions list{
+      .plan = ListedPlan{.schedule = {{0, 0.7}, {1, 0.7}, {2, 0.7}, {0, 1}, {1, 1}, {2, 1}}}};
   const FitResult a = Fit(start, target, {}, plan, {}), b = Fit(start, target, {}, list, {});
   EXPECT_TRUE(SameBytes(a.surface.Net(3), b.surface.Net(3)));
   EXPECT_EQ(a.levels.size(), 6u);
@@ -313,8 +346,7 @@ TEST(Fit, BackFittingSweepsComeNearer) {
   const HSplineSurface start = RandomSurface(Shape(), 2);
   const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 400, Vec3(3, -8, 2));
   const FitOptions without{.plan = CoarseToFinePlan{}};
-  FitOptions with = without;
-  with.sweeps = 2;
+  const FitOptions with{.plan = CoarseToFinePlan{.sweeps = 2}};
   EXPECT_LT(Fit(start, target, {}, with, {}).point_rms_mm,
             Fit(start, target, {}, without, {}).point_rms_mm);
 }
@@ -348,7 +380,7 @@ TEST(Fit, DowelsAndSeedsAreReportedApart) {
   FitTarget target = TargetOn(start, 20, Vec3(0, 0, 3));
   target.points[4].role = PointRole::kSeed;
   target.points[4].position += Vec3(0, 0, 50);
-  const FitResult result = Fit(start, target, {}, {.schedule = {{0, 0}}}, {});
+  const FitResult result = Fit(start, target, {}, {.plan = ListedPlan{.schedule = {{0, 0}}}}, {});
   EXPECT_NEAR(result.dowel_rms_mm, 3, 1e-12);
   EXPECT_GT(result.point_rms_mm, 5);
   EXPECT_NEAR(result.residual_mm[4], 53, 1e-9);
@@ -366,10 +398,14 @@ TEST(Fit, WrongInputIsNamed) {
     }
     return "no error";
   };
-  EXPECT_THAT(message(target, {.schedule = {{0, 1}, {4, 1}}}, {}),
-              HasSubstr("step 1 of the schedule asks for level 4; the surface has levels 0..3"));
-  EXPECT_THAT(message(target, {.schedule = {{0, 1.5}}}, {}), HasSubstr("fraction 1.5"));
-  EXPECT_THAT(message(target, {.schedule = {}}, {}), HasSubstr("schedule is empty"));
+  EXPECT_THAT(
+      message(target, {.plan = ListedPlan{.schedule = {{0, 1}, {4, 1}}}}, {}),
+      HasSubstr("fit: plan.schedule[1].level: level 4 is finer than the surface, whose finest "
+                "level is 3"));
+  EXPECT_THAT(message(target, {.plan = ListedPlan{.schedule = {{0, 1.5}}}}, {}),
+              HasSubstr("fraction 1.5"));
+  EXPECT_THAT(message(target, {.plan = ListedPlan{.schedule = {}}}, {}),
+              HasSubstr("plan.schedule: it is empty"));
   EXPECT_THAT(message({}, {}, {}), HasSubstr("no point"));
   EXPECT_THAT(message(target, {}, {{0, 1, 1}}), HasSubstr("feature vertex (1, 1) is of level 0"));
   EXPECT_THAT(message(target, {}, {{1, 999, 1}}), HasSubstr("999"));

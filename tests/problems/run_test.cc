@@ -110,7 +110,7 @@ TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
 RunResult RunWithTerm(const std::string& term) {
   return semblance::Run(
       SmallPhantom({fmt::format("fit.terms=[points, smoothness, membrane{}]", term),
-                    "fit.schedule=[{level: 0, fraction: 1}]", "fit.relaxation=none"}),
+                    "fit.plan.schedule=[{level: 0, fraction: 1}]", "fit.relaxation=none"}),
       {});
 }
 

@@ -66,16 +66,17 @@ TEST(PatchEnergy, FormsEqualQuadratureOfTheDerivatives) {
                        Integral(net, m, n, 0, 2) / std::pow(lv, 4));
   const double membrane =
       lu * lv * (Integral(net, m, n, 1, 0) / (lu * lu) + Integral(net, m, n, 0, 1) / (lv * lv));
-  EXPECT_NEAR(FormEnergy(ThinPlateForm(lu / m, lv / n), grid, net), thin, 1e-11 * thin);
-  EXPECT_NEAR(FormEnergy(MembraneForm(lu / m, lv / n), grid, net), membrane, 1e-11 * membrane);
+  EXPECT_NEAR(StiffnessEnergy(ThinPlateStiffness(lu / m, lv / n), grid, net), thin, 1e-11 * thin);
+  EXPECT_NEAR(StiffnessEnergy(MembraneStiffness(lu / m, lv / n), grid, net), membrane,
+              1e-11 * membrane);
   const Vec2 lengths = MeanLengths(grid, net);
   EXPECT_NEAR(lengths.x(), std::sqrt(Integral(net, m, n, 1, 0)), 1e-11 * lengths.x());
   EXPECT_NEAR(lengths.y(), std::sqrt(Integral(net, m, n, 0, 1)), 1e-11 * lengths.y());
 }
 
 TEST(PatchEnergy, RootsReproduceTheFormsAndShowTheirNullSpaces) {
-  const PatchForm thin = ThinPlateForm(2, 3), membrane = MembraneForm(2, 3);
-  const Eigen::MatrixXd a = FormRoot(thin), b = FormRoot(membrane);
+  const ElementStiffness thin = ThinPlateStiffness(2, 3), membrane = MembraneStiffness(2, 3);
+  const Eigen::MatrixXd a = StiffnessRoot(thin), b = StiffnessRoot(membrane);
   EXPECT_EQ(a.rows(), 13);  // 1, s and t are free
   EXPECT_EQ(b.rows(), 15);  // 1 is free
   EXPECT_LT((a.transpose() * a - thin).cwiseAbs().maxCoeff(), 1e-13 * thin.maxCoeff());
@@ -96,10 +97,10 @@ TEST(PatchEnergy, PeriodicEnergyKnowsNoSeam) {
       shifted.At((i + 1) % 6, j) = net.At(i, j);
     }
   }
-  const PatchForm form = ThinPlateForm(1, 2);
-  const double energy = FormEnergy(form, grid, net);
+  const ElementStiffness form = ThinPlateStiffness(1, 2);
+  const double energy = StiffnessEnergy(form, grid, net);
   EXPECT_GT(energy, 0);
-  EXPECT_NEAR(FormEnergy(form, grid, shifted), energy, 1e-12 * energy);
+  EXPECT_NEAR(StiffnessEnergy(form, grid, shifted), energy, 1e-12 * energy);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ std::vector<Term> Terms(AutoOr<double> weight) {
 }
 
 FitOptions Options(AutoOr<double> weight, LevelSolver solver = LevelSolver::kFastest) {
-  return {.schedule = {{0, 1}}, .terms = Terms(weight), .solver = solver};
+  return {.plan = ListedPlan{.schedule = {{0, 1}}}, .terms = Terms(weight), .solver = solver};
 }
 
 double CleanRms(const FitTarget& target, AutoOr<double> weight) {
@@ -115,8 +115,8 @@ TEST(AutoWeight, AHoleIsBridgedByTheAdaptiveFitToo) {
   std::erase_if(target.points, [](const FitPoint& p) {
     return (p.uv - Vec2(0.5, 0.5)).cwiseAbs().maxCoeff() < 0.15;
   });
-  const FitOptions options{.terms = Terms(AutoOr<double>::Auto()),
-                           .plan = AdaptivePlan{.tolerance_mm = 6e-3, .finest = 2}};
+  const FitOptions options{.plan = AdaptivePlan{.tolerance_mm = 6e-3, .finest = 2},
+                           .terms = Terms(AutoOr<double>::Auto())};
   const FitResult result = Fit(PlainStart(shape), target, {}, options, {});
   EXPECT_GT(result.levels.back().auto_weight, 0);
   EXPECT_LT(ErrorAgainst(FrankePoint, result.surface, 100).largest, 0.1);
@@ -126,7 +126,8 @@ TEST(AutoWeight, WrongInputIsNamed) {
   const FitTarget target = Scattered(FrankePoint, 100, 0, 9);
   const auto message = [&](std::vector<Term> terms) -> std::string {
     try {
-      Fit(PlainStart(kShape), target, {}, {.schedule = {{0, 1}}, .terms = std::move(terms)}, {});
+      Fit(PlainStart(kShape), target, {},
+          {.plan = ListedPlan{.schedule = {{0, 1}}}, .terms = std::move(terms)}, {});
     } catch (const InputError& e) {
       return e.what();
     }

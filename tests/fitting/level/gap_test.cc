@@ -64,15 +64,12 @@ HSplineSurface FitDrawn(const FitTarget& target, const SchedulePlan& plan, AutoO
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 3};
   const SmoothnessTerm smooth{.weight = weight, .of = SmoothnessOf::kSurface, .length_mm = 1};
   return Fit(testing::PlainStart(shape), target, {},
-             {.schedule = {{3, 1}},
-              .terms = {PointTerm{}, smooth},
-              .plan = plan,
-              .solver = LevelSolver::kFastest},
-             {})
+             {.plan = plan, .terms = {PointTerm{}, smooth}, .solver = LevelSolver::kFastest}, {})
       .surface;
 }
 
-const SchedulePlan kPlans[] = {ListedPlan{}, AdaptivePlan{.tolerance_mm = 5e-3, .finest = 3}};
+const ListedPlan kFinest{.schedule = {{3, 1}}};
+const SchedulePlan kPlans[] = {kFinest, AdaptivePlan{.tolerance_mm = 5e-3, .finest = 3}};
 
 TEST(Gap, TheSurfaceStaysNearTheHeightsAroundIt) {
   for (const double noise : {1e-4, 1e-3}) {
@@ -87,7 +84,7 @@ TEST(Gap, TheSurfaceStaysNearTheHeightsAroundIt) {
 // The law is not empty: this is the trap.
 TEST(Gap, WithHardlyAnySmoothnessItBlowsUp) {
   const FitTarget target = testing::DrawnScan(12000, 1e-3, 3);
-  EXPECT_GT(MostBeyond(target, FitDrawn(target, ListedPlan{}, 1e-18)), 3 * kShare);
+  EXPECT_GT(MostBeyond(target, FitDrawn(target, kFinest, 1e-18)), 3 * kShare);
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ std::string_view NameOf(const Relaxation& relaxation) {
 
 FitOptions Options(const Relaxation& relaxation) {
   FitOptions options;
-  options.schedule = {{0, 0.5}, {0, 0.5}, {0, 0.5}, {0, 1}};
+  options.plan = ListedPlan{.schedule = {{0, 0.5}, {0, 0.5}, {0, 0.5}, {0, 1}}};
   options.terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-3}, MembraneTerm{.weight = 1e-2}};
   options.relaxation = relaxation;
   return options;
@@ -90,7 +90,7 @@ FitOptions ShortOptions(Relaxation relaxation) {
     sliding->tangent_rounds = 1;
   }
   FitOptions options = Options(relaxation);
-  options.schedule = {{0, 0.5}, {0, 1}};
+  options.plan = ListedPlan{.schedule = {{0, 0.5}, {0, 1}}};
   return options;
 }
 
@@ -106,8 +106,9 @@ std::vector<Vec2> Places(const FitTarget& target) {
 double MeanHeldOutRms(double error, const Relaxation& relaxation, int steps) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   FitOptions options = Options(relaxation);
-  options.schedule.assign(steps - 1, {0, 0.5});
-  options.schedule.push_back({0, 1});
+  std::vector<ScheduleStep> schedule(steps - 1, {0, 0.5});
+  schedule.push_back({0, 1});
+  options.plan = ListedPlan{.schedule = schedule};
   double sum = 0;
   for (const std::uint64_t seed : {3, 4, 5}) {
     const FitTarget target = Dowels(subject, error, seed, 0.3);
@@ -134,7 +135,7 @@ TEST(Relaxation, LeavesNoCrease) {
   const FitTarget target = Dowels(subject, 0.05);
   const auto crease_deg = [&](const FitTarget& t, const Relaxation& relaxation) {
     FitOptions options = Options(relaxation);
-    options.schedule = {{0, 0.5}, {0, 1}};
+    options.plan = ListedPlan{.schedule = {{0, 0.5}, {0, 1}}};
     const FitResult result = Fit(rest, t, {}, options, {});
     return SharpestCrease_deg(result.surface, mesh, result.uv);
   };
@@ -243,7 +244,7 @@ TEST(Relaxation, EveryKindBringsThePointsNearer) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   const FitTarget target = Dowels(subject, 0.05);
   FitOptions options = Options(NoRelaxation{});
-  options.schedule = {{0, 1}};
+  options.plan = ListedPlan{.schedule = {{0, 1}}};
   const double without = Fit(rest, target, {}, options, {}).point_rms_mm;
   for (std::size_t k = 0; k < 4; ++k) {
     double before = without;

@@ -63,7 +63,7 @@ struct Scene {
 
   HSplineSurface Fitted(const FitTarget& points) const {
     return Fit(rest, points, {},
-               {.schedule = {{.level = 1, .fraction = 1}},
+               {.plan = ListedPlan{.schedule = {{.level = 1, .fraction = 1}}},
                 .terms = terms,
                 .solver = LevelSolver::kFastest},
                {})

@@ -30,10 +30,11 @@ TEST(Experiment, TheDefaultsFitTogether) { EXPECT_THAT(FaultsBetween(Experiment{
 TEST(Experiment, AStepAtALevelThatTheFaceLacksIsToldAtItsLine) {
   EXPECT_EQ(Faults("template: {max_level: 2}\n"
                    "fit:\n"
-                   "  schedule:\n"
-                   "    - {level: 2, fraction: 1}\n"
-                   "    - {level: 3, fraction: 1}\n"),
-            "a.yaml:5:15: fit.schedule[1].level: level 3 is finer than the generic face, whose "
+                   "  plan:\n"
+                   "    schedule:\n"
+                   "      - {level: 2, fraction: 1}\n"
+                   "      - {level: 3, fraction: 1}\n"),
+            "a.yaml:6:17: fit.plan.schedule[1].level: level 3 is finer than the surface, whose "
             "finest level is 2; give a level up to that, or raise template.max_level");
 }
 
@@ -45,10 +46,33 @@ TEST(Experiment, AllOptionsThatNameALevelAreLookedAt) {
               HasSubstr("1:44: fit.plan.finest: level 6"));
 }
 
+// Before anything runs, not after the implicit face is made.
+TEST(Experiment, WhatAPlanCannotIsToldWhenTheFileIsRead) {
+  EXPECT_THAT(Faults("fit: {plan: adaptive}\n"),
+              HasSubstr("1:13: fit.plan.finest: level 4 is finer than the surface"));
+  EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, terms: [points, symmetry]}\n"),
+              HasSubstr("1:63: fit.terms[1]: the term 'symmetry'"));
+  EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, features: frozen}\n"),
+              HasSubstr("fit.features: features that are weighted or frozen"));
+  EXPECT_NO_THROW(
+      ReadConfigText<Experiment>("fit: {plan: {type: adaptive, finest: 3}}\n", "a.yaml"));
+}
+
+// What a plan does not use is no key of it.
+TEST(Experiment, APlanOwnsItsOptions) {
+  EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 2, sweeps: 1}}\n"),
+              AllOf(StartsWith("a.yaml:1:41: "), HasSubstr("fit.plan.sweeps")));
+  EXPECT_THAT(Faults("fit: {plan: {type: coarse_to_fine, schedule: []}}\n"),
+              HasSubstr("fit.plan.schedule"));
+  EXPECT_THAT(Faults("fit: {schedule: []}\n"), HasSubstr("fit.schedule"));
+  EXPECT_NO_THROW(ReadConfigText<Experiment>(
+      "fit: {plan: {type: until, schedule: [{level: 1}], aim: level, sweeps: 2}}\n", "a.yaml"));
+}
+
 TEST(Experiment, AFaultOfADefaultIsToldWhereTheFileComesNearest) {
   EXPECT_THAT(Faults("template: {max_level: 1}\n"),
-              AllOf(StartsWith("a.yaml:1:1: fit.schedule[2].level: level 2"),
-                    HasSubstr("fit.schedule[5].level")));
+              AllOf(StartsWith("a.yaml:1:1: fit.plan.schedule[2].level: level 2"),
+                    HasSubstr("fit.plan.schedule[5].level")));
 }
 
 // Checks each default that the reference and the schema state against `node`, a part of the tree

@@ -14,6 +14,7 @@
 #include "surfaces/mesh/mesh_io.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/scratch_file.h"
 
 namespace semblance {
 namespace {
@@ -79,7 +80,7 @@ TEST_F(PointFitCommand, FrankesFunctionAndTheHeadComeOut) {
 TEST_F(PointFitCommand, AHeightFieldKeepsItsNoise) {
   Write("franke.csv", Csv(Scattered(FrankePoint, 5000, 1e-3, 1), /*with_uv=*/false));
   const auto outcome = Call(fmt::format(
-      "fit franke.csv {}/height_field.yaml --set \"fit.schedule=[{{level: 3, fraction: 1}}]\" "
+      "fit franke.csv {}/height_field.yaml --set \"fit.plan.schedule=[{{level: 3, fraction: 1}}]\" "
       "--out out --quiet",
       kConfigs));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -134,8 +135,8 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
   const PointFitOptions options{
       .closure = Closure::kPeriodicU,
       .parameters = CylinderParameters{.axis = {0, 0, 1}},
-      .fit = {.terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-9, .length_mm = 1}},
-              .plan = AdaptivePlan{.tolerance_mm = 4e-3, .finest = 3}}};
+      .fit = {.plan = AdaptivePlan{.tolerance_mm = 4e-3, .finest = 3},
+              .terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-9, .length_mm = 1}}}};
   const PointFit result = FitPoints(TableOf(Scattered(HeadPoint, 30000, 1e-4, 3)), options, {});
   EXPECT_EQ(result.parameters, "cylinder");
   EXPECT_LT(result.fit.point_rms_mm, 4e-3);
@@ -143,6 +144,15 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
     const Vec2 left(1 - 1e-9, v), right(1e-9, v);
     EXPECT_LT((result.fit.surface.Point(left) - result.fit.surface.Point(right)).norm(), 1e-6);
   }
+}
+
+TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
+  const auto read = [](const std::string& text) {
+    return testing::WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
+  };
+  EXPECT_THAT(read("fit: {terms: [points, symmetry]}\n"),
+              HasSubstr("x.yaml:1:23: fit.terms[1]: the term 'symmetry'"));
+  EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
 }
 
 TEST(PointFit, ConfigurationRoundTrips) {

@@ -76,7 +76,7 @@ RunResult SmallRun(int random_seed) {
                                               "implicit.resolution=30",
                                               "seeds.level=0",
                                               "template.max_level=1",
-                                              "fit.schedule=[{level: 0, fraction: 1}]"};
+                                              "fit.plan.schedule=[{level: 0, fraction: 1}]"};
   const auto experiment =
       ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides);
   return Run(experiment, {});

@@ -112,7 +112,7 @@ TEST_F(SlurmTest, ALostNodeChangesNoByteOfTheMergedTable) {
       fmt::format(
           "base: {}/configs/phantom.yaml\n"
           "set: {{subject.rings: 40, implicit.resolution: 25, seeds.level: 0, "
-          "template.max_level: 1, fit.schedule: [{{level: 0, fraction: 1}}]}}\n"
+          "template.max_level: 1, fit.plan.schedule: [{{level: 0, fraction: 1}}]}}\n"
           "subjects: [{{name: a}}, {{name: b, set: {{subject.random_seed: 2}}}}]\n"
           "grid: {{interp: [nearest, mean, harmonic, kriging], seeds.weight: [0.5, 1.0, 2.0]}}\n",
           SEMBLANCE_SOURCE_DIR));

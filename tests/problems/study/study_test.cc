@@ -26,7 +26,7 @@ using testing::WordsOf;
 const std::string kBase = fmt::format(
     "base: {}/configs/phantom.yaml\n"
     "set: {{subject.rings: 40, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
-    "      fit.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
+    "      fit.plan.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
     SEMBLANCE_SOURCE_DIR);
 
 class StudyTest : public ::testing::Test {
@@ -131,9 +131,9 @@ TEST_F(StudyTest, ResultsAreThoseOfSingleRuns) {
 }
 
 TEST_F(StudyTest, TwelveFitsOnOneImplicitFaceMakeItOnce) {
-  const StudyPlan one = Plan("list: [{fit.schedule: [{level: 0, fraction: 0.05}]}]\n");
+  const StudyPlan one = Plan("list: [{fit.plan.schedule: [{level: 0, fraction: 0.05}]}]\n");
   const StudyPlan twelve = Plan(
-      "zip: {fit.schedule: [[{level: 0, fraction: 0.1}], [{level: 0, fraction: 0.2}],\n"
+      "zip: {fit.plan.schedule: [[{level: 0, fraction: 0.1}], [{level: 0, fraction: 0.2}],\n"
       "  [{level: 0, fraction: 0.3}], [{level: 0, fraction: 0.4}], [{level: 0, fraction: 0.5}],\n"
       "  [{level: 0, fraction: 0.6}], [{level: 0, fraction: 0.7}], [{level: 0, fraction: 0.8}],\n"
       "  [{level: 0, fraction: 0.9}], [{level: 0, fraction: 1}], [{level: 1, fraction: 0.5}],\n"

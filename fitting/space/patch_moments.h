@@ -6,8 +6,8 @@
 #include <array>
 #include <span>
 
-#include "fitting/adaptive/point_cloud.h"
 #include "fitting/least_squares/patch_energy.h"
+#include "fitting/space/point_cloud.h"
 
 namespace semblance {
 
@@ -34,10 +34,10 @@ void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
                PatchMoments& sums);
 
 // Sum of w N_k N_l, and of w N_k e, N_k being the weight of vertex k.
-PatchForm GramOf(const PatchMoments& sums);
+Matrix16 GramOf(const PatchMoments& sums);
 PatchMatrix ResidualOf(const PatchMoments& sums);
 
-// The vertices of the child (right, upper: 0 or 1) of a patch, 16 x 16: RefinePatch as a matrix.
-const PatchForm& RefinementMatrix(int right, int upper);
+// The vertices of the child (right, upper: 0 or 1) of a patch: RefinePatch as a matrix.
+const Matrix16& RefinementMatrix(int right, int upper);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/adaptive/offset_tree.h"
+#include "fitting/space/hierarchical_spline_space.h"
 
 #include <algorithm>
 #include <map>
@@ -45,13 +45,14 @@ Vec3 PlaceOf(const HSplineSurface& surface, const VertexId& v) {
 
 }  // namespace
 
-OffsetTree::OffsetTree(const HSplineSurface& start, const HSplineSurface& rest,
-                       const PointCloud& cloud)
+HierarchicalSplineSpace::HierarchicalSplineSpace(const HSplineSurface& start,
+                                                 const HSplineSurface& rest,
+                                                 const PointCloud& cloud)
     : shape_(start.shape()), rest_(rest), cloud_(cloud) {
   const ControlNet net = start.Net(0);
   for (int j = 0; j < net.rows; ++j) {
     for (int i = 0; i < net.columns; ++i) {
-      AddUnknown({0, i, j}, net.At(i, j));
+      AddDof({0, i, j}, net.At(i, j));
     }
   }
   for (int j = 0; j < shape_.patches_v; ++j) {
@@ -67,39 +68,40 @@ OffsetTree::OffsetTree(const HSplineSurface& start, const HSplineSurface& rest,
     edits.push_back(vertex);
   }
   Edit(edits);
-  for (TreeUnknown& unknown : unknowns_) {
-    if (unknown.vertex.level > 0) {
-      unknown.value = PlaceOf(start, unknown.vertex) - RefinedPlace(start, unknown.vertex);
+  for (ControlDof& dof : dofs_) {
+    if (dof.vertex.level > 0) {
+      dof.value = PlaceOf(start, dof.vertex) - RefinedPlace(start, dof.vertex);
     }
   }
   Refresh();
 }
 
-int OffsetTree::finest() const {
+int HierarchicalSplineSpace::finest() const {
   int level = 0;
-  for (const TreeUnknown& unknown : unknowns_) {
-    level = std::max(level, unknown.vertex.level);
+  for (const ControlDof& dof : dofs_) {
+    level = std::max(level, dof.vertex.level);
   }
   return level;
 }
 
-int OffsetTree::AddUnknown(const VertexId& vertex, const Vec3& value) {
-  const int next = static_cast<int>(unknowns_.size());
-  const auto [at, added] = unknown_of_.emplace(KeyOf(vertex.level, vertex.i, vertex.j), next);
+int HierarchicalSplineSpace::AddDof(const VertexId& vertex, const Vec3& value) {
+  const int next = static_cast<int>(dofs_.size());
+  const auto [at, added] = dof_of_.emplace(KeyOf(vertex.level, vertex.i, vertex.j), next);
   if (added) {
-    unknowns_.push_back({vertex, value});
+    dofs_.push_back({vertex, value});
   }
   return at->second;
 }
 
-bool OffsetTree::IsEdited(const VertexId& vertex) const {
-  return unknown_of_.contains(KeyOf(vertex.level, vertex.i, vertex.j));
+bool HierarchicalSplineSpace::IsEdited(const VertexId& vertex) const {
+  return dof_of_.contains(KeyOf(vertex.level, vertex.i, vertex.j));
 }
 
-int OffsetTree::AddNode(const PatchId& patch, int parent, const PointCloud::Range& range) {
+int HierarchicalSplineSpace::AddNode(const PatchId& patch, int parent,
+                                     const PointCloud::Range& range) {
   const int index = static_cast<int>(nodes_.size());
   node_of_.emplace(KeyOf(patch.level, patch.i, patch.j), index);
-  TreeNode& node = nodes_.emplace_back();
+  QuadtreeNode& node = nodes_.emplace_back();
   node.patch = patch;
   node.parent = parent;
   node.range = range;
@@ -107,7 +109,7 @@ int OffsetTree::AddNode(const PatchId& patch, int parent, const PointCloud::Rang
   return index;
 }
 
-void OffsetTree::Split(int index) {
+void HierarchicalSplineSpace::Split(int index) {
   const PatchId patch = nodes_[index].patch;
   const PointCloud::Range range = nodes_[index].range;
   nodes_[index].children = static_cast<int>(nodes_.size());
@@ -117,7 +119,7 @@ void OffsetTree::Split(int index) {
   }
 }
 
-int OffsetTree::EnsureNode(const PatchId& patch) {
+int HierarchicalSplineSpace::EnsureNode(const PatchId& patch) {
   const Key key = KeyOf(patch.level, patch.i, patch.j);
   if (const auto found = node_of_.find(key); found != node_of_.end()) {
     return found->second;
@@ -126,14 +128,14 @@ int OffsetTree::EnsureNode(const PatchId& patch) {
   return node_of_.at(key);
 }
 
-void OffsetTree::Edit(std::span<const VertexId> vertices) {
+void HierarchicalSplineSpace::Edit(std::span<const VertexId> vertices) {
   std::vector<VertexId> sorted(vertices.begin(), vertices.end());
   std::sort(sorted.begin(), sorted.end());
   for (const VertexId& v : sorted) {
     if (IsEdited(v)) {
       continue;
     }
-    AddUnknown(v, Vec3::Zero());
+    AddDof(v, Vec3::Zero());
     for (int j = std::max(v.j - 3, 0); j <= std::min(v.j, shape_.PatchesV(v.level) - 1); ++j) {
       for (int a = v.i - 3; a <= v.i; ++a) {
         const int n = shape_.PatchesU(v.level);
@@ -143,12 +145,12 @@ void OffsetTree::Edit(std::span<const VertexId> vertices) {
       }
     }
   }
-  LinkUnknowns();
+  LinkDofs();
   Refresh();
 }
 
 // Vertex i of a level is a sum of 2 i - 3 .. 2 i + 1 of the next.
-bool OffsetTree::IsCovered(const VertexId& v) const {
+bool HierarchicalSplineSpace::IsCovered(const VertexId& v) const {
   const int level = v.level + 1;
   if (level > shape_.max_level) {
     return false;
@@ -165,23 +167,23 @@ bool OffsetTree::IsCovered(const VertexId& v) const {
   return true;
 }
 
-void OffsetTree::LinkUnknowns() {
-  for (TreeUnknown& unknown : unknowns_) {
-    unknown.covered = IsCovered(unknown.vertex);
+void HierarchicalSplineSpace::LinkDofs() {
+  for (ControlDof& dof : dofs_) {
+    dof.covered = IsCovered(dof.vertex);
   }
-  for (TreeNode& node : nodes_) {
+  for (QuadtreeNode& node : nodes_) {
     const PatchId& p = node.patch;
     for (int k = 0; k < 16; ++k) {
       const int i = shape_.Column(p.level, p.i + k % 4);
-      const auto found = unknown_of_.find(KeyOf(p.level, i, p.j + k / 4));
-      node.unknowns[k] = found == unknown_of_.end() ? -1 : found->second;
+      const auto found = dof_of_.find(KeyOf(p.level, i, p.j + k / 4));
+      node.dofs[k] = found == dof_of_.end() ? -1 : found->second;
     }
   }
 }
 
 // Parents stand before their children.
-void OffsetTree::Refresh() {
-  for (TreeNode& node : nodes_) {
+void HierarchicalSplineSpace::Refresh() {
+  for (QuadtreeNode& node : nodes_) {
     const PatchId& p = node.patch;
     const PatchMatrix before = node.vertices;
     if (node.parent < 0) {
@@ -190,26 +192,26 @@ void OffsetTree::Refresh() {
       node.vertices = RefinementMatrix(p.i % 2, p.j % 2) * nodes_[node.parent].vertices;
     }
     for (int k = 0; k < 16; ++k) {
-      if (node.unknowns[k] >= 0) {
-        node.vertices.row(k) += unknowns_[node.unknowns[k]].value.transpose();
+      if (node.dofs[k] >= 0) {
+        node.vertices.row(k) += dofs_[node.dofs[k]].value.transpose();
       }
     }
     node.measured = node.measured && node.vertices == before;
   }
 }
 
-void OffsetTree::Move(const Eigen::MatrixX3d& step) {
-  for (std::size_t k = 0; k < unknowns_.size(); ++k) {
-    unknowns_[k].value += step.row(static_cast<Eigen::Index>(k)).transpose();
+void HierarchicalSplineSpace::Move(const Eigen::MatrixX3d& step) {
+  for (std::size_t k = 0; k < dofs_.size(); ++k) {
+    dofs_[k].value += step.row(static_cast<Eigen::Index>(k)).transpose();
   }
   Refresh();
 }
 
-void OffsetTree::Measure(std::span<const double> factors, int threads,
-                         std::vector<double>* squares) {
+void HierarchicalSplineSpace::Measure(std::span<const double> factors, int threads,
+                                      std::vector<double>* squares) {
   std::vector<int> stale;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    const TreeNode& node = nodes_[k];
+    const QuadtreeNode& node = nodes_[k];
     if (node.children < 0 && (!node.measured || !factors.empty() || squares != nullptr)) {
       stale.push_back(static_cast<int>(k));
     }
@@ -218,7 +220,7 @@ void OffsetTree::Measure(std::span<const double> factors, int threads,
     squares->resize(cloud_.points().size());
   }
   ParallelFor(stale.size(), threads, 1, [&](std::size_t k) {
-    TreeNode& node = nodes_[stale[k]];
+    QuadtreeNode& node = nodes_[stale[k]];
     const bool moments = !node.has_moments || !factors.empty();
     PatchMoments sums;
     if (!moments) {
@@ -233,40 +235,60 @@ void OffsetTree::Measure(std::span<const double> factors, int threads,
   });
 }
 
-void OffsetTree::Rebin() {
-  for (TreeNode& node : nodes_) {
+int HierarchicalSplineSpace::LeafAt(const Vec2& uv) const {
+  const PatchPlace at = Locate(shape_, 0, uv);
+  int node = at.patch.i + shape_.patches_u * at.patch.j;
+  while (nodes_[node].children >= 0) {
+    const PatchId& parent = nodes_[node].patch;
+    const PatchId child = Locate(shape_, parent.level + 1, uv).patch;
+    node = nodes_[node].children + (child.i - 2 * parent.i) + 2 * (child.j - 2 * parent.j);
+  }
+  return node;
+}
+
+std::vector<Vec3> HierarchicalSplineSpace::RestValues() const {
+  std::vector<Vec3> values;
+  for (const ControlDof& dof : dofs_) {
+    const Vec3 place = PlaceOf(rest_, dof.vertex);
+    values.push_back(dof.vertex.level == 0 ? place : Vec3(place - RefinedPlace(rest_, dof.vertex)));
+  }
+  return values;
+}
+
+void HierarchicalSplineSpace::Rebin() {
+  for (QuadtreeNode& node : nodes_) {
     node.range = node.parent < 0 ? cloud_.PatchOfLevel0(node.patch.i, node.patch.j)
                                  : cloud_.Child(nodes_[node.parent].range, node.patch);
     node.has_moments = node.measured = false;
   }
 }
 
-double OffsetTree::Squares() const {
+double HierarchicalSplineSpace::Squares() const {
   double sum = 0;
-  for (const TreeNode& node : nodes_) {
+  for (const QuadtreeNode& node : nodes_) {
     sum += node.children < 0 ? node.sums.squares : 0;
   }
   return sum;
 }
 
 // Level by level: an offset is measured from the next coarser surface, in its frame.
-HSplineSurface OffsetTree::Surface() const {
+HSplineSurface HierarchicalSplineSpace::Surface() const {
   ControlNet net{shape_.Columns(0), shape_.Rows(0), {}};
-  std::vector<std::vector<const TreeUnknown*>> levels(shape_.max_level + 1);
-  for (const TreeUnknown& unknown : unknowns_) {
-    if (unknown.vertex.level == 0) {
-      net.vertices.push_back(unknown.value);
+  std::vector<std::vector<const ControlDof*>> levels(shape_.max_level + 1);
+  for (const ControlDof& dof : dofs_) {
+    if (dof.vertex.level == 0) {
+      net.vertices.push_back(dof.value);
     } else {
-      levels[unknown.vertex.level].push_back(&unknown);
+      levels[dof.vertex.level].push_back(&dof);
     }
   }
   HSplineSurface surface(shape_, net);
   for (const auto& level : levels) {
     std::map<VertexId, std::optional<Vec3>> offsets;
-    for (const TreeUnknown* unknown : level) {
-      const VertexId& v = unknown->vertex;
+    for (const ControlDof* dof : level) {
+      const VertexId& v = dof->vertex;
       const SurfaceFrame frame = surface.LevelFrame(v.level - 1, surface.ParameterOf(v));
-      const Vec3 way = RefinedPlace(surface, v) + unknown->value - frame.point;
+      const Vec3 way = RefinedPlace(surface, v) + dof->value - frame.point;
       const bool world = shape_.reference == OffsetReference::kWorld;
       offsets[v] = world ? way : Vec3(frame.axes.transpose() * way);
     }

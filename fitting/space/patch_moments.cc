@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/adaptive/patch_moments.h"
+#include "fitting/space/patch_moments.h"
 
 #include <algorithm>
 #include <array>
@@ -19,15 +19,14 @@ namespace semblance {
 namespace {
 
 using Vec4 = double __attribute__((vector_size(32)));
-using Powers = Eigen::Matrix<double, 16, 16>;
 
 // Coefficients of 1, z, z^2, z^3, z = 2 s - 1, of the four B-spline segments on s in [0,1].
 constexpr double kSegment[4][4] = {
     {1, -3, 3, -1}, {23, -15, -3, 3}, {23, 15, -3, -3}, {1, 3, 3, 1}};
 
 // Row k: coefficients of z_u^a z_v^b, at a + 4 b, of the weight of vertex k.
-Powers MakePowers() {
-  Powers powers;
+Matrix16 MakePowers() {
+  Matrix16 powers;
   for (int k = 0; k < 16; ++k) {
     for (int m = 0; m < 16; ++m) {
       powers(k, m) = kSegment[k % 4][m % 4] / 48 * (kSegment[k / 4][m / 4] / 48);
@@ -36,8 +35,8 @@ Powers MakePowers() {
   return powers;
 }
 
-const Powers& PowersOfVertices() {
-  static const Powers powers = MakePowers();
+const Matrix16& PowersOfVertices() {
+  static const Matrix16 powers = MakePowers();
   return powers;
 }
 
@@ -117,17 +116,17 @@ SEMBLANCE_KERNEL void Accumulate(const Batch& batch, const Polynomial& p, PatchM
   __builtin_memcpy(sums.residual, residual, sizeof residual);
 }
 
-PatchForm MakeRefinement(int right, int upper) {
-  PatchForm form = PatchForm::Zero();
+Matrix16 MakeRefinement(int right, int upper) {
+  Matrix16 refinement = Matrix16::Zero();
   for (int k = 0; k < 16; ++k) {
     const RefinementRow u = RefineRow(right + k % 4), v = RefineRow(upper + k / 4);
     for (int a = 0; a < 3; ++a) {
       for (int b = 0; b < 3; ++b) {
-        form(k, u.index[a] + 4 * v.index[b]) += u.weight[a] * v.weight[b];
+        refinement(k, u.index[a] + 4 * v.index[b]) += u.weight[a] * v.weight[b];
       }
     }
   }
-  return form;
+  return refinement;
 }
 
 }  // namespace
@@ -139,8 +138,8 @@ void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
              PolynomialOf(patch, vertices), sums);
 }
 
-PatchForm GramOf(const PatchMoments& sums) {
-  PatchForm of_powers;
+Matrix16 GramOf(const PatchMoments& sums) {
+  Matrix16 of_powers;
   for (int k = 0; k < 16; ++k) {
     for (int l = 0; l < 16; ++l) {
       of_powers(k, l) = sums.moments[k / 4 + l / 4][k % 4 + l % 4];
@@ -157,10 +156,10 @@ PatchMatrix ResidualOf(const PatchMoments& sums) {
   return PowersOfVertices() * of_powers;
 }
 
-const PatchForm& RefinementMatrix(int right, int upper) {
-  static const std::array<PatchForm, 4> forms = {MakeRefinement(0, 0), MakeRefinement(1, 0),
-                                                 MakeRefinement(0, 1), MakeRefinement(1, 1)};
-  return forms[right + 2 * upper];
+const Matrix16& RefinementMatrix(int right, int upper) {
+  static const std::array<Matrix16, 4> matrices = {MakeRefinement(0, 0), MakeRefinement(1, 0),
+                                                   MakeRefinement(0, 1), MakeRefinement(1, 1)};
+  return matrices[right + 2 * upper];
 }
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/adaptive/point_cloud.h"
+#include "fitting/space/point_cloud.h"
 
 #include <algorithm>
 #include <array>

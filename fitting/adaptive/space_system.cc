@@ -1,37 +1,38 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/adaptive/tree_system.h"
+#include "fitting/adaptive/space_system.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "fitting/terms/smoothness_form.h"
+#include "fitting/terms/element_stiffness.h"
 
 namespace semblance {
 namespace {
 
 // A patch as its parent sees it, in the basis of its own sixteen vertices.
 struct PatchPart {
-  PatchForm matrix = PatchForm::Zero();
+  ElementStiffness matrix = ElementStiffness::Zero();
   PatchMatrix right = PatchMatrix::Zero();
-  std::vector<int> finer;  // unknowns of finer levels that reach into the patch
+  std::vector<int> finer;  // dofs of finer levels that reach into the patch
   Eigen::Matrix<double, 16, Eigen::Dynamic> cross{16, 0};  // against those
 };
 
 class Assembler {
  public:
-  Assembler(const OffsetTree& tree, double point_scale, std::span<const LevelForms> forms)
-      : tree_(tree),
+  Assembler(const HierarchicalSplineSpace& space, double point_scale,
+            std::span<const LevelStiffness> forms)
+      : space_(space),
         point_scale_(point_scale),
         forms_(forms),
-        column_of_(tree.unknowns().size(), -1) {
-    system_.right = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(tree.unknowns().size()), 3);
+        column_of_(space.dofs().size(), -1) {
+    system_.right = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(space.dofs().size()), 3);
   }
 
-  TreeSystem Run() {
-    for (std::size_t k = 0; k < tree_.nodes().size() && tree_.nodes()[k].parent < 0; ++k) {
+  SpaceSystem Run() {
+    for (std::size_t k = 0; k < space_.nodes().size() && space_.nodes()[k].parent < 0; ++k) {
       Collect(static_cast<int>(k));
     }
-    const auto n = static_cast<Eigen::Index>(tree_.unknowns().size());
+    const auto n = static_cast<Eigen::Index>(space_.dofs().size());
     Flush();
     system_.lower.resize(n, n);
     for (SparseMatrix& part : parts_) {
@@ -42,20 +43,20 @@ class Assembler {
 
  private:
   PatchPart Collect(int index) {
-    const TreeNode& node = tree_.nodes()[index];
+    const QuadtreeNode& node = space_.nodes()[index];
     PatchPart part = node.children < 0 ? Leaf(node) : Inner(node);
     Scatter(node, part);
     return part;
   }
 
-  PatchPart Leaf(const TreeNode& node) const {
+  PatchPart Leaf(const QuadtreeNode& node) const {
     PatchPart part;
     if (point_scale_ > 0 && node.range.size() > 0) {
       part.matrix = point_scale_ * GramOf(node.sums);
       part.right = point_scale_ * ResidualOf(node.sums);
     }
     if (!forms_.empty()) {
-      const LevelForms& forms = forms_[node.patch.level];
+      const LevelStiffness& forms = forms_[node.patch.level];
       part.matrix += forms.displacement + forms.surface;
       part.right -=
           forms.displacement * (node.vertices - node.rest) + forms.surface * node.vertices;
@@ -63,48 +64,49 @@ class Assembler {
     return part;
   }
 
-  PatchPart Inner(const TreeNode& node) {
+  PatchPart Inner(const QuadtreeNode& node) {
     std::array<PatchPart, 4> children;
     for (int c = 0; c < 4; ++c) {
       children[c] = Collect(node.children + c);
     }
     PatchPart part;
     for (int c = 0; c < 4; ++c) {
-      const PatchForm& refine = RefinementMatrix(c % 2, c / 2);
+      const ElementStiffness& refine = RefinementMatrix(c % 2, c / 2);
       part.matrix += refine.transpose() * children[c].matrix * refine;
       part.right += refine.transpose() * children[c].right;
-      for (const int unknown : tree_.nodes()[node.children + c].unknowns) {
-        Note(unknown, part);
+      for (const int dof : space_.nodes()[node.children + c].dofs) {
+        Note(dof, part);
       }
-      for (const int unknown : children[c].finer) {
-        Note(unknown, part);
+      for (const int dof : children[c].finer) {
+        Note(dof, part);
       }
     }
     part.cross = Eigen::MatrixXd::Zero(16, static_cast<Eigen::Index>(part.finer.size()));
     for (int c = 0; c < 4; ++c) {
-      AddCross(tree_.nodes()[node.children + c], children[c], RefinementMatrix(c % 2, c / 2), part);
+      AddCross(space_.nodes()[node.children + c], children[c], RefinementMatrix(c % 2, c / 2),
+               part);
     }
-    for (const int unknown : part.finer) {
-      column_of_[unknown] = -1;
+    for (const int dof : part.finer) {
+      column_of_[dof] = -1;
     }
     return part;
   }
 
-  bool Counts(int unknown) const { return unknown >= 0 && !tree_.unknowns()[unknown].covered; }
+  bool Counts(int dof) const { return dof >= 0 && !space_.dofs()[dof].covered; }
 
-  void Note(int unknown, PatchPart& part) {
-    if (Counts(unknown) && column_of_[unknown] < 0) {
-      column_of_[unknown] = static_cast<int>(part.finer.size());
-      part.finer.push_back(unknown);
+  void Note(int dof, PatchPart& part) {
+    if (Counts(dof) && column_of_[dof] < 0) {
+      column_of_[dof] = static_cast<int>(part.finer.size());
+      part.finer.push_back(dof);
     }
   }
 
-  void AddCross(const TreeNode& child, const PatchPart& of_child, const PatchForm& refine,
-                PatchPart& part) const {
-    const PatchForm own = refine.transpose() * of_child.matrix;
+  void AddCross(const QuadtreeNode& child, const PatchPart& of_child,
+                const ElementStiffness& refine, PatchPart& part) const {
+    const ElementStiffness own = refine.transpose() * of_child.matrix;
     for (int k = 0; k < 16; ++k) {
-      if (Counts(child.unknowns[k])) {
-        part.cross.col(column_of_[child.unknowns[k]]) += own.col(k);
+      if (Counts(child.dofs[k])) {
+        part.cross.col(column_of_[child.dofs[k]]) += own.col(k);
       }
     }
     if (of_child.finer.empty()) {
@@ -116,16 +118,16 @@ class Assembler {
     }
   }
 
-  void Scatter(const TreeNode& node, const PatchPart& part) {
+  void Scatter(const QuadtreeNode& node, const PatchPart& part) {
     for (int k = 0; k < 16; ++k) {
-      const int row = node.unknowns[k];
+      const int row = node.dofs[k];
       if (!Counts(row)) {
         continue;
       }
       system_.right.row(row) += part.right.row(k);
       for (int l = 0; l < 16; ++l) {
-        if (Counts(node.unknowns[l]) && row >= node.unknowns[l]) {
-          triplets_.emplace_back(row, node.unknowns[l], part.matrix(k, l));
+        if (Counts(node.dofs[l]) && row >= node.dofs[l]) {
+          triplets_.emplace_back(row, node.dofs[l], part.matrix(k, l));
         }
       }
       for (std::size_t f = 0; f < part.finer.size(); ++f) {
@@ -140,33 +142,33 @@ class Assembler {
   }
 
   void Flush() {
-    const auto n = static_cast<Eigen::Index>(tree_.unknowns().size());
+    const auto n = static_cast<Eigen::Index>(space_.dofs().size());
     SparseMatrix& part = parts_.emplace_back(n, n);
     part.setFromTriplets(triplets_.begin(), triplets_.end());
     triplets_.clear();
   }
 
-  const OffsetTree& tree_;
+  const HierarchicalSplineSpace& space_;
   double point_scale_;
-  std::span<const LevelForms> forms_;
-  std::vector<int> column_of_;  // of an unknown in the part at hand
+  std::span<const LevelStiffness> forms_;
+  std::vector<int> column_of_;  // of an dof in the part at hand
   std::vector<Eigen::Triplet<double>> triplets_;
   std::vector<SparseMatrix> parts_;
-  TreeSystem system_;
+  SpaceSystem system_;
 };
 
 }  // namespace
 
-std::vector<LevelForms> FormsOf(const HSplineShape& shape, std::span<const Term> terms,
-                                const Vec2& lengths_mm, double scale) {
-  std::vector<LevelForms> forms(shape.max_level + 1);
+std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::span<const Term> terms,
+                                             const Vec2& lengths_mm, double scale) {
+  std::vector<LevelStiffness> forms(shape.max_level + 1);
   for (int level = 0; level <= shape.max_level; ++level) {
     for (const Term& term : terms) {
       std::visit(
           [&]<class T>(const T& t) {
             if constexpr (std::is_same_v<T, SmoothnessTerm> || std::is_same_v<T, MembraneTerm>) {
-              const PatchForm form =
-                  scale * FormOf(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
+              const ElementStiffness form =
+                  scale * StiffnessOf(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
               (t.of == SmoothnessOf::kSurface ? forms[level].surface : forms[level].displacement) +=
                   form;
             }
@@ -177,11 +179,11 @@ std::vector<LevelForms> FormsOf(const HSplineShape& shape, std::span<const Term>
   return forms;
 }
 
-double EnergyOf(const OffsetTree& tree, std::span<const LevelForms> forms) {
+double EnergyOf(const HierarchicalSplineSpace& space, std::span<const LevelStiffness> forms) {
   double energy = 0;
-  for (const TreeNode& node : tree.nodes()) {
+  for (const QuadtreeNode& node : space.nodes()) {
     if (node.children < 0) {
-      const LevelForms& form = forms[node.patch.level];
+      const LevelStiffness& form = forms[node.patch.level];
       const PatchMatrix moved = node.vertices - node.rest;
       energy += (form.displacement * moved).cwiseProduct(moved).sum() +
                 (form.surface * node.vertices).cwiseProduct(node.vertices).sum();
@@ -190,8 +192,9 @@ double EnergyOf(const OffsetTree& tree, std::span<const LevelForms> forms) {
   return energy;
 }
 
-TreeSystem Assemble(const OffsetTree& tree, double point_scale, std::span<const LevelForms> forms) {
-  return Assembler(tree, point_scale, forms).Run();
+SpaceSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
+                     std::span<const LevelStiffness> forms) {
+  return Assembler(space, point_scale, forms).Run();
 }
 
 }  // namespace semblance

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/plan/fit_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "fitting/level/auto_weight.h"
+#include "fitting/terms/term_cost.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+[[noreturn]] void Fail(const std::string& what) { throw InputError("fit: " + what); }
+
+void CheckFeatures(std::span<const VertexId> features, const HSplineShape& shape) {
+  for (const VertexId& f : features) {
+    if (f.level < 1 || f.level > shape.max_level) {
+      Fail(
+          fmt::format("feature vertex ({}, {}) is of level {}; features are offsets, of levels "
+                      "1..{}",
+                      f.i, f.j, f.level, shape.max_level));
+    }
+    if (f.i < 0 || f.i >= shape.Columns(f.level) || f.j < 0 || f.j >= shape.Rows(f.level)) {
+      Fail(fmt::format("feature vertex ({}, {}) is not among the {} x {} of level {}", f.i, f.j,
+                       shape.Columns(f.level), shape.Rows(f.level), f.level));
+    }
+  }
+}
+
+class FaultFinder {
+ public:
+  FaultFinder(const FitOptions& options, int max_level)
+      : options_(options),
+        max_level_(max_level),
+        adaptive_(std::holds_alternative<AdaptivePlan>(options.plan)) {}
+
+  std::vector<FitFault> Take() {
+    std::visit([&](const auto& plan) { Plan(plan); }, options_.plan);
+    if (adaptive_) {
+      AdaptiveTerms();
+      AdaptiveFeatures();
+    }
+    AutoWeights();
+    FindRelaxation();
+    return std::move(faults_);
+  }
+
+ private:
+  void Add(std::string path, std::string what) {
+    faults_.push_back({std::move(path), std::move(what)});
+  }
+
+  void Level(std::string path, int level) {
+    if (level < 0) {
+      Add(std::move(path), fmt::format("level {} is negative; the coarsest is 0", level));
+    } else if (level > max_level_) {
+      faults_.push_back({std::move(path),
+                         fmt::format("level {} is finer than the surface, whose finest level is "
+                                     "{}; give a level up to that",
+                                     level, max_level_),
+                         /*too_fine=*/true});
+    }
+  }
+
+  void Fraction(std::string path, double fraction) {
+    if (!(fraction >= 0 && fraction <= 1)) {
+      Add(std::move(path), fmt::format("the fraction {} is not in 0..1", fraction));
+    }
+  }
+
+  template <class PlanWithSchedule>
+  void Plan(const PlanWithSchedule& plan) {
+    if (plan.schedule.empty()) {
+      Add("plan.schedule", "it is empty; give at least one {level, fraction}");
+    }
+    for (std::size_t k = 0; k < plan.schedule.size(); ++k) {
+      const std::string step = fmt::format("plan.schedule[{}]", k);
+      Level(step + ".level", plan.schedule[k].level);
+      Fraction(step + ".fraction", plan.schedule[k].fraction);
+    }
+  }
+  void Plan(const CoarseToFinePlan& plan) {
+    Level("plan.finest", plan.finest);
+    Fraction("plan.fraction", plan.fraction);
+  }
+  void Plan(const AdaptivePlan& plan) { Level("plan.finest", plan.finest); }
+
+  void AdaptiveTerms() {
+    int points = 0;
+    for (std::size_t k = 0; k < options_.terms.size(); ++k) {
+      const Term& term = options_.terms[k];
+      if (WeightOf(term) <= 0) {
+        continue;
+      }
+      if (std::holds_alternative<SymmetryTerm>(term)) {
+        Add(fmt::format("terms[{}]", k),
+            "the term 'symmetry' pairs control vertices, and the adaptive plan may have finer ones "
+            "on one side alone; leave it out or take another plan");
+      }
+      if (std::holds_alternative<PointTerm>(term) && ++points > 1) {
+        Add(fmt::format("terms[{}]", k), "a second term 'points' with a weight; give one");
+      }
+    }
+    if (points == 0) {
+      Add("terms", "the adaptive plan has no term 'points' with a weight; add one");
+    }
+  }
+
+  // Generalised cross-validation needs one matrix for x, y and z, and nothing that changes it.
+  void AutoWeights() {
+    int automatic = -1;
+    for (int k = 0; k < std::ssize(options_.terms); ++k) {
+      if (AutoTerm(std::span(&options_.terms[k], 1)) < 0) {
+        continue;
+      }
+      if (automatic >= 0) {
+        Add(fmt::format("terms[{}].weight", k),
+            fmt::format("the terms '{}' and '{}' both have weight: auto; give one of them a number",
+                        TermName(options_.terms[automatic]), TermName(options_.terms[k])));
+      }
+      automatic = k;
+    }
+    for (int k = 0; automatic >= 0 && k < std::ssize(options_.terms); ++k) {
+      if (k != automatic && !GoesWithAuto(options_.terms[k])) {
+        Add(fmt::format("terms[{}]", k),
+            fmt::format("weight: auto cannot be chosen beside the term '{}' {}; give a number{}",
+                        TermName(options_.terms[k]),
+                        adaptive_ ? "in the adaptive plan" : "with a loss or coupled coordinates",
+                        adaptive_ ? "" : ", or (points with a loss) take plan: adaptive"));
+      }
+    }
+  }
+
+  bool GoesWithAuto(const Term& term) const {
+    if (WeightOf(term) <= 0) {
+      return true;
+    }
+    if (adaptive_) {
+      return std::holds_alternative<PointTerm>(term) ||
+             std::holds_alternative<SmoothnessTerm>(term) ||
+             std::holds_alternative<MembraneTerm>(term);
+    }
+    return std::visit([](const auto& t) { return IsSeparable(t); }, term);
+  }
+
+  void AdaptiveFeatures() {
+    if (std::holds_alternative<WeightedFeatures>(options_.features) ||
+        std::holds_alternative<FrozenFeatures>(options_.features)) {
+      Add("features",
+          "features that are weighted or frozen need a plan that goes level by level; with the "
+          "adaptive plan take restore or free");
+    }
+  }
+
+  // Relaxations that are more than moves of points between fits.
+  void FindRelaxation() {
+    const bool slides = std::holds_alternative<TangentDistanceRelaxation>(options_.relaxation);
+    if (!slides && !std::holds_alternative<JointRelaxation>(options_.relaxation)) {
+      return;
+    }
+    const std::string_view name =
+        std::visit([](const auto& chosen) { return chosen.kName; }, options_.relaxation);
+    const auto& terms = options_.terms;
+    const auto points = std::find_if(terms.begin(), terms.end(), [](const Term& term) {
+      const auto* const p = std::get_if<PointTerm>(&term);
+      return p != nullptr && p->weight > 0;
+    });
+    if (points == terms.end()) {
+      Add("relaxation",
+          fmt::format("the relaxation {} needs a term 'points' with a weight; add one", name));
+    } else if (slides && std::get<PointTerm>(*points).loss != RobustLoss::kNone) {
+      Add("relaxation",
+          fmt::format("the relaxation {} lets points slide without a loss; write loss: none for "
+                      "the term 'points', or take alternating or joint",
+                      name));
+    }
+    if (adaptive_) {
+      Add("relaxation", fmt::format("the relaxation {} goes level by level; with the adaptive plan "
+                                    "take footpoint or alternating",
+                                    name));
+    }
+  }
+
+  const FitOptions& options_;
+  int max_level_;
+  bool adaptive_;
+  std::vector<FitFault> faults_;
+};
+
+}  // namespace
+
+std::vector<FitFault> FaultsOf(const FitOptions& options, int max_level) {
+  return FaultFinder(options, max_level).Take();
+}
+
+void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
+              std::span<const VertexId> features, const FitOptions& options) {
+  if (!(start.shape() == rest.shape())) {
+    Fail("the start and the template differ in shape (patches, levels, closure or reference)");
+  }
+  if (target.points.empty()) {
+    Fail("the target has no point; give dowels or seed some");
+  }
+  CheckTarget(target);
+  for (const FitFault& fault : FaultsOf(options, start.shape().max_level)) {
+    Fail(fmt::format("{}: {}", fault.path, fault.what));
+  }
+  CheckFeatures(features, start.shape());
+}
+
+}  // namespace semblance

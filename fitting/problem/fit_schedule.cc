@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/problem/fit_schedule.h"
+
+#include <algorithm>
+
+namespace semblance {
+
+std::vector<ScheduleStep> StepsOf(const SchedulePlan& plan) {
+  std::vector<ScheduleStep> steps;
+  if (const auto* const list = std::get_if<ListedPlan>(&plan)) {
+    steps = list->schedule;
+  } else if (const auto* const until = std::get_if<UntilPlan>(&plan)) {
+    steps = until->schedule;
+  } else if (const auto* const levels = std::get_if<CoarseToFinePlan>(&plan)) {
+    for (int level = 0; level <= levels->finest; ++level) {
+      steps.push_back({level, levels->fraction});
+    }
+  }
+  return steps;
+}
+
+FitAim AimOf(const SchedulePlan& plan) {
+  return std::visit(
+      []<class Plan>(const Plan& p) {
+        if constexpr (std::is_same_v<Plan, AdaptivePlan>) {
+          return FitAim::kSurface;
+        } else {
+          return p.aim;
+        }
+      },
+      plan);
+}
+
+int FinestLevelOf(const SchedulePlan& plan) {
+  const auto* const adaptive = std::get_if<AdaptivePlan>(&plan);
+  int finest = adaptive != nullptr ? adaptive->finest : 0;
+  for (const ScheduleStep& step : StepsOf(plan)) {
+    finest = std::max(finest, step.level);
+  }
+  return finest;
+}
+
+}  // namespace semblance
