@@ -51,7 +51,7 @@ TEST(Experiment, WhatAPlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(Faults("fit: {plan: adaptive}\n"),
               HasSubstr("1:13: fit.plan.finest: level 4 is finer than the surface"));
   EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, terms: [points, symmetry]}\n"),
-              HasSubstr("1:63: fit.terms[1]: the term 'symmetry'"));
+              HasSubstr("1:58: fit.terms[1]: the term 'symmetry'"));
   EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, features: frozen}\n"),
               HasSubstr("fit.features: features that are weighted or frozen"));
   EXPECT_NO_THROW(
