@@ -9,7 +9,7 @@ namespace semblance {
 
 // Shares, 0..1, of the errors that lie within the central interval of a normal distribution of the
 // stated sd which should hold 5 %, 10 %, .. 95 % of them: 19 values, rising. Over the errors for
-// which both error and sd are finite; weights: one an error, >= 0, or none for equal ones. Empty
+// which both error and sd are finite; weights: one per error, >= 0, or none for equal ones. Empty
 // where nothing counts. An sd of 0 holds an error of 0 and no other.
 std::vector<double> Coverage(std::span<const double> errors, std::span<const double> sds,
                              std::span<const double> weights = {});

@@ -8,6 +8,7 @@
 #include <map>
 #include <numeric>
 
+#include "interp/dowels/site_code.h"
 #include "interp/evaluation/calibration.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
@@ -19,10 +20,6 @@ namespace {
 
 constexpr double kSigmas90 = 1.6448536269514722;  // of a normal distribution, both sides
 
-std::string LandmarkOf(const std::string& site) {
-  return site.ends_with("_l") || site.ends_with("_r") ? site.substr(0, site.size() - 2) : site;
-}
-
 // The dowels that are shown, and the network between them.
 struct Shown {
   std::vector<Dowel> dowels;
@@ -31,16 +28,16 @@ struct Shown {
 
 Shown Without(const DepthInput& input, const std::vector<std::size_t>& fold) {
   Shown shown;
-  std::vector<int> place(input.dowels.size(), -1);
+  std::vector<int> index(input.dowels.size(), -1);
   for (std::size_t i = 0; i < input.dowels.size(); ++i) {
     if (std::ranges::find(fold, i) == fold.end()) {
-      place[i] = static_cast<int>(shown.dowels.size());
+      index[i] = static_cast<int>(shown.dowels.size());
       shown.dowels.push_back(input.dowels[i]);
     }
   }
   for (const auto& [a, b, c] : input.network.areas) {
-    if (place[a] >= 0 && place[b] >= 0 && place[c] >= 0) {
-      shown.network.areas.push_back({place[a], place[b], place[c]});
+    if (index[a] >= 0 && index[b] >= 0 && index[c] >= 0) {
+      shown.network.areas.push_back({index[a], index[b], index[c]});
     }
   }
   return shown;
@@ -180,19 +177,11 @@ void CheckFolds(const Folds& folds, std::size_t dowels) {
 
 }  // namespace
 
-Folds EachDowel(std::span<const Dowel> dowels) {
-  Folds folds;
-  for (std::size_t i = 0; i < dowels.size(); ++i) {
-    folds.push_back({i});
-  }
-  return folds;
-}
-
 Folds EachLandmark(std::span<const Dowel> dowels) {
   Folds folds;
   std::map<std::string, std::size_t> fold_of;
   for (std::size_t i = 0; i < dowels.size(); ++i) {
-    const auto [it, is_new] = fold_of.emplace(LandmarkOf(dowels[i].site), folds.size());
+    const auto [it, is_new] = fold_of.emplace(WithoutSide(dowels[i].site), folds.size());
     if (is_new) {
       folds.emplace_back();
     }
@@ -203,10 +192,10 @@ Folds EachLandmark(std::span<const Dowel> dowels) {
 
 Folds EachSide(std::span<const Dowel> dowels) {
   Folds folds;
-  for (const char* side : {"_l", "_r"}) {
+  for (const Side side : {Side::kLeft, Side::kRight}) {
     std::vector<std::size_t> fold;
     for (std::size_t i = 0; i < dowels.size(); ++i) {
-      if (dowels[i].site.ends_with(side)) {
+      if (SideOfSite(dowels[i].site) == side) {
         fold.push_back(i);
       }
     }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How well a scheme foretells dowels that it is not shown.
+// How well a scheme predicts dowels that it is not shown.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "interp/depth_scheme.h"
+#include "interp/interpolate_depth.h"
 #include "interp/schemes/outside_rule.h"
 
 namespace semblance {
@@ -14,13 +14,12 @@ namespace semblance {
 // Indices of dowels that are left out together.
 using Folds = std::vector<std::vector<std::size_t>>;
 
-Folds EachDowel(std::span<const Dowel> dowels);
 // A site's left and right (suffixes _l and _r) together: its twin tells much of a left-out dowel.
 Folds EachLandmark(std::span<const Dowel> dowels);
 // All left dowels, then all right ones: what half a face tells of the other. Sides that have no
 // dowel, or all of them, give no fold.
 Folds EachSide(std::span<const Dowel> dowels);
-// `count` folds as equal in size as can be (at most one a dowel), drawn from random_seed; which
+// `count` folds as equal in size as can be (at most one per dowel), drawn from random_seed; which
 // dowel is in which does not depend on their order. Throws InputError for a count below 2.
 Folds RandomFolds(std::span<const Dowel> dowels, int count, std::uint64_t random_seed);
 
@@ -48,8 +47,8 @@ struct CrossValidation {
 
 // Leaves each fold out, with the network's areas at its dowels, and asks at the left-out bases, as
 // if the bone there faced along the dowel's direction. Schemes that need the skull's surface are
-// solved on all of it once a fold and asked at the nearest corner of the closest triangle. Where a
-// scheme on the network is left without an area, the rule alone answers. Folds on run.threads
+// solved on all of it once per fold and asked at the nearest corner of the closest triangle. Where
+// a scheme on the network is left without an area, the rule alone answers. Folds on run.threads
 // threads; no result depends on them. Throws InputError as CheckDepthInput, if a fold names a dowel
 // that is not there or leaves none, and what the scheme throws without the fold's dowels; Cancelled
 // if stopped.

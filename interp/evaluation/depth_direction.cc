@@ -86,7 +86,7 @@ std::vector<Vec3> DirectionsOf(const DowelDirection&, const DepthInput& input,
   std::vector<Vec3> directions(input.normals.begin(), input.normals.end());
   ForEachVertex(input, run, [&](std::size_t i) {
     constexpr double kCancelled = 1e-6;
-    const AreaPlace in = FindArea(areas, AreaDistance::kTriangle, input.skull.points[i]);
+    const AreaPoint in = FindArea(areas, AreaDistance::kTriangle, input.skull.points[i]);
     Vec3 sum = Vec3::Zero();
     for (int k = 0; in.area != nullptr && k < 3; ++k) {
       sum += in.weights[k] * input.dowels[in.area->dowels[k]].direction;

@@ -23,7 +23,7 @@ void Fields(Visitor&, MeshNormal&) {}
 // has no say.
 struct SmoothedNormal {
   static constexpr std::string_view kName = "smoothed_normal";
-  double radius_mm = 5;
+  double radius_mm = 5;  // of the sphere in which normals are averaged
 };
 template <class Visitor>
 void Fields(Visitor& visit, SmoothedNormal& o) {
@@ -46,7 +46,7 @@ void Fields(Visitor&, DowelDirection&) {}
 
 using DepthDirection = std::variant<MeshNormal, SmoothedNormal, DowelDirection>;
 
-// Unit, one a vertex; zero where the mesh has no normal (and no dowel area helps). Throws
+// Unit, one per vertex; zero where the mesh has no normal (and no dowel area helps). Throws
 // InputError as CheckDepthInput, and dowel_direction as DowelAreas; Cancelled if stopped.
 std::vector<Vec3> DepthDirections(const DepthDirection& direction, const DepthInput& input,
                                   const RunContext& run);

@@ -83,8 +83,9 @@ DepthTruth MeasureDepthTruth(const TriMesh& skull, std::span<const Vec3> directi
   constexpr std::size_t kBlock = 256;
   const std::size_t vertices = skull.points.size();
   if (directions.size() != vertices) {
-    throw InputError(fmt::format("true depth: {} directions for {} vertices; one a vertex is due",
-                                 directions.size(), vertices));
+    throw InputError(
+        fmt::format("true depth: {} directions for {} vertices; there must be one per vertex",
+                    directions.size(), vertices));
   }
   const TruthMeter meter(skin, options);
   DepthTruth truth{EmptyMap(vertices), EmptyMap(vertices)};

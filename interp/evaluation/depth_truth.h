@@ -13,8 +13,8 @@
 namespace semblance {
 
 struct DepthTruthOptions {
-  double max_depth_mm = 60;
-  double max_grazing_deg = 75;
+  double max_depth_mm = 60;     // thicker tissue is an error of the search
+  double max_grazing_deg = 75;  // between skin's normal and the direction
 };
 template <class Visitor>
 void Fields(Visitor& visit, DepthTruthOptions& o) {
@@ -44,8 +44,8 @@ enum class TruthStatus : std::uint8_t {
 
 // One convention's depths.
 struct TruthMap {
-  std::vector<double> depth_mm;     // one a vertex, >= 0; NaN where not valid
-  std::vector<TruthStatus> status;  // one a vertex
+  std::vector<double> depth_mm;     // one per vertex, >= 0; NaN where not valid
+  std::vector<TruthStatus> status;  // one per vertex
 };
 
 // The two conventions of the literature, kept apart: of one head they differ by half a millimetre
@@ -55,9 +55,9 @@ struct DepthTruth {
   TruthMap closest;          // to the closest point of the skin
 };
 
-// directions: unit or zero, one a vertex of the skull. Skin's triangles face outwards; inner walls
-// of airways may be there. Throws InputError if the directions are not one a vertex or the skin has
-// no triangle; Cancelled if stopped.
+// directions: unit or zero, one per vertex of the skull. Skin's triangles face outwards; inner
+// walls of airways may be there. Throws InputError if the directions are not one per vertex or the
+// skin has no triangle; Cancelled if stopped.
 DepthTruth MeasureDepthTruth(const TriMesh& skull, std::span<const Vec3> directions,
                              const TriMesh& skin, const DepthTruthOptions& options,
                              const RunContext& run);

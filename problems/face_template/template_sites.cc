@@ -2,21 +2,26 @@
 #include "problems/face_template/template_sites.h"
 
 #include <algorithm>
+#include <cassert>
+#include <iterator>
 #include <limits>
+#include <string_view>
 
 #include "problems/face_template/head_formula.h"
+#include "problems/subject/sites.h"
 
 namespace semblance {
 namespace {
 
-struct SitePlace {
-  const char* code;  // without side
-  Vec3 place;        // near the skin of HeadPoint, mm; of the left one of a pair
+// Where the soft-tissue point of a landmark lies on an average adult; of a pair, on the left.
+struct SkinLandmark {
+  std::string_view code;  // Site::landmark
+  Vec3 near_skin;         // of HeadPoint, mm
 };
 
 // Heights and widths after the definitions of the sites on the skull, moved out to the skin along
 // the direction in which the dowel of the site stands.
-const SitePlace kMidline[] = {
+const SkinLandmark kAverageSkin[] = {
     {"sg", {0, 0, 25}},       // the shallow above glabella
     {"g", {0, -2, 13}},       // most forward point of the brow
     {"n", {0, 1, 1}},         // the root of the nose
@@ -27,35 +32,38 @@ const SitePlace kMidline[] = {
     {"sm", {0, 4, -94}},      // the deepest of the chin-lip fold
     {"pg", {0, 1, -107}},     // most forward point of the chin
     {"me", {0, 19, -121}},    // the underside of the chin; its dowel points down
+    {"fe", {34, 14, 47}},     // the forehead's fullest, over the middle of the brow
+    {"mso", {31, 8, 12}},     // the brow over the middle of the orbit
+    {"mio", {35, 9, -26}},    // below the middle of the orbit, on its rim
+    {"im", {42, 10, -45}},    // the lower border of the cheek bone, below mio
+    {"lo", {50, 14, -37}},    // below the lateral margin of the orbit, 10 mm under its floor
+    {"zy", {71, 62, -30}},    // halfway along the zygomatic arch
+    {"sgl", {72, 83, -29}},   // the root of the arch, before and above the ear opening
+    {"go", {61, 74, -84}},    // the angle of the jaw
+    {"sM2", {57, 39, -58}},   // the cheek over the second upper molar
+    {"mr", {65, 58, -70}},    // the ramus at the height of the mouth
+    {"iM2", {51, 33, -82}},   // the cheek over the second lower molar
 };
 
-const SitePlace kLateral[] = {
-    {"fe", {34, 14, 47}},    // the forehead's fullest, over the middle of the brow
-    {"mso", {31, 8, 12}},    // the brow over the middle of the orbit
-    {"mio", {35, 9, -26}},   // below the middle of the orbit, on its rim
-    {"im", {42, 10, -45}},   // the lower border of the cheek bone, below mio
-    {"lo", {50, 14, -37}},   // below the lateral margin of the orbit, 10 mm under its floor
-    {"zy", {71, 62, -30}},   // halfway along the zygomatic arch
-    {"sgl", {72, 83, -29}},  // the root of the arch, before and above the ear opening
-    {"go", {61, 74, -84}},   // the angle of the jaw
-    {"sM2", {57, 39, -58}},  // the cheek over the second upper molar
-    {"mr", {65, 58, -70}},   // the ramus at the height of the mouth
-    {"iM2", {51, 33, -82}},  // the cheek over the second lower molar
-};
+const Vec3& NearSkin(const Site& site) {
+  const auto* const found = std::ranges::find(kAverageSkin, site.landmark, &SkinLandmark::code);
+  assert(found != std::end(kAverageSkin));
+  return found->near_skin;
+}
 
-double DistanceSquared(const Vec2& uv, const Vec3& place) {
-  return (HeadPoint(uv.x(), uv.y()) - place).squaredNorm();
+double DistanceSquared(const Vec2& uv, const Vec3& near_skin) {
+  return (HeadPoint(uv.x(), uv.y()) - near_skin).squaredNorm();
 }
 
 // The closest point of the left half (u from 0.5) or of the midline (`last_u` = 0.5).
-Vec2 ClosestOnGrid(const Vec3& place, double last_u) {
+Vec2 ClosestOnGrid(const Vec3& near_skin, double last_u) {
   constexpr int kSteps = 60;
   double least = std::numeric_limits<double>::infinity();
   Vec2 best = Vec2::Constant(kNaN);
   for (int j = 0; j <= 2 * kSteps; ++j) {
     for (int i = 0; i <= (last_u > 0.5 ? kSteps : 0); ++i) {
       const Vec2 uv(0.5 + (last_u - 0.5) * i / kSteps, j / (2.0 * kSteps));
-      if (const double d = DistanceSquared(uv, place); d < least) {
+      if (const double d = DistanceSquared(uv, near_skin); d < least) {
         least = d;
         best = uv;
       }
@@ -65,15 +73,15 @@ Vec2 ClosestOnGrid(const Vec3& place, double last_u) {
 }
 
 // Pattern search from the grid's best: halve the step when no neighbour is closer.
-Vec2 Closest(const Vec3& place, double last_u) {
-  Vec2 best = ClosestOnGrid(place, last_u);
-  double least = DistanceSquared(best, place);
+Vec2 Closest(const Vec3& near_skin, double last_u) {
+  Vec2 best = ClosestOnGrid(near_skin, last_u);
+  double least = DistanceSquared(best, near_skin);
   for (double step = 0.5 / 60; step > 1e-9;) {
     const double u_step = last_u > 0.5 ? step : 0;
     const Vec2 start = best;
     for (const Vec2& d : {Vec2(u_step, 0), Vec2(-u_step, 0), Vec2(0, step), Vec2(0, -step)}) {
       const Vec2 uv = (start + d).cwiseMax(Vec2(0.5, 0)).cwiseMin(Vec2(last_u, 1));
-      if (const double distance = DistanceSquared(uv, place); distance < least) {
+      if (const double distance = DistanceSquared(uv, near_skin); distance < least) {
         least = distance;
         best = uv;
       }
@@ -85,28 +93,15 @@ Vec2 Closest(const Vec3& place, double last_u) {
 
 }  // namespace
 
-std::vector<std::string> TemplateSiteCodes() {
-  std::vector<std::string> codes;
-  for (const SitePlace& site : kMidline) {
-    codes.emplace_back(site.code);
-  }
-  for (const SitePlace& site : kLateral) {
-    codes.push_back(site.code + std::string("_l"));
-    codes.push_back(site.code + std::string("_r"));
-  }
-  std::sort(codes.begin(), codes.end());
-  return codes;
-}
-
 std::map<std::string, Vec2> TemplateSites() {
   std::map<std::string, Vec2> sites;
-  for (const SitePlace& site : kMidline) {
-    sites[site.code] = Closest(site.place, 0.5);
-  }
-  for (const SitePlace& site : kLateral) {
-    const Vec2 left = Closest(site.place, 1);
-    sites[site.code + std::string("_l")] = left;
-    sites[site.code + std::string("_r")] = Vec2(1 - left.x(), left.y());
+  for (const Site& site : StandardSites()) {
+    if (site.side == Side::kRight) {
+      const Vec2& left = sites.at(site.mirror);
+      sites[site.code] = Vec2(1 - left.x(), left.y());
+    } else {
+      sites[site.code] = Closest(NearSkin(site), site.side == Side::kMidline ? 0.5 : 1);
+    }
   }
   return sites;
 }

@@ -5,18 +5,14 @@
 
 #include <map>
 #include <string>
-#include <vector>
 
 #include "surfaces/base/geometry.h"
 
 namespace semblance {
 
-// The codes of the 32 sites (thesis app. A, rows 1-10 midline, 11-21 on both sides), sorted.
-std::vector<std::string> TemplateSiteCodes();
-
-// The (u,v) of each of the 32 sites on HeadPoint: the point of the face closest to where the site's
-// soft-tissue point lies on an average adult face. Midline sites have u = 0.5 exactly; the right of
-// a pair is the mirror image of the left, (1-u, v).
+// The (u,v) on HeadPoint of each of StandardSites(): the point of the face closest to where the
+// site's soft-tissue point lies on an average adult face. Midline sites have u = 0.5 exactly; the
+// right of a pair is the mirror image of the left, (1-u, v).
 std::map<std::string, Vec2> TemplateSites();
 
 }  // namespace semblance

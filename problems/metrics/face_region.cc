@@ -5,16 +5,12 @@
 
 #include <algorithm>
 
+#include "interp/dowels/site_code.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
-
-// A site without its side: "go_l" -> "go".
-std::string WithoutSide(const std::string& site) {
-  return site.ends_with("_l") || site.ends_with("_r") ? site.substr(0, site.size() - 2) : site;
-}
 
 TriMesh NetworkMesh(std::span<const Dowel> dowels, const DowelNetwork& network) {
   TriMesh mesh;

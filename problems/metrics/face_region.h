@@ -33,9 +33,9 @@ void Fields(Visitor& visit, ExcludedZone& o) {
 }
 
 struct FaceRegionOptions {
-  double margin_mm = 0;
-  double reach_mm = 60;
-  std::vector<ExcludedZone> exclude;
+  double margin_mm = 0;               // beyond the network's border
+  double reach_mm = 60;               // from the network
+  std::vector<ExcludedZone> exclude;  // not scored
 };
 template <class Visitor>
 void Fields(Visitor& visit, FaceRegionOptions& o) {
@@ -62,7 +62,7 @@ inline constexpr std::array<const char*, 8> kFaceParts = {"forehead", "orbits", 
 int FacePartOfSite(
     const std::string& site);  // index into kFaceParts; throws InputError for an unknown site
 
-// One entry a vertex of the skin.
+// One entry per vertex of the skin.
 struct FaceRegion {
   std::vector<bool> scored;
   std::vector<int> part;  // index into kFaceParts of the nearest dowel's site; -1 where not scored

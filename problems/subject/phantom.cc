@@ -4,33 +4,35 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <string_view>
 
 #include "problems/subject/phantom_shape.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
 
-struct SitePlace {
-  const char* code;  // without side
-  Vec3 place;        // near an average skull, mm; of the left one of a pair
-  double depth_mm;   // of an average adult
+// What an average head has at a landmark; of a pair, on the left.
+struct AverageLandmark {
+  std::string_view code;  // Site::landmark
+  Vec3 near_bone;         // mm; a ray from the centre through it meets the landmark
+  double depth_mm;        // of an average adult
 };
 
-const SitePlace kMidline[] = {
-    {"sg", {0, 2, 32}, 4.3},   {"g", {0, -3, 11}, 5.3},  {"n", {0, 0, 0}, 6.5},
-    {"rhi", {0, -10, -21}, 4}, {"mp", {0, -5, -58}, 10}, {"pr", {0, -8, -69}, 10},
-    {"id", {0, -5, -86}, 11},  {"sm", {0, -1, -96}, 11}, {"pg", {0, -4, -107}, 11},
-    {"me", {0, 8, -118}, 7.5},
-};
-const SitePlace kLateral[] = {
-    {"fe", {30, 10, 44}, 4.5},   {"mso", {27, 3, 13}, 7},     {"mio", {32, 8, -28}, 7},
-    {"im", {40, 17, -46}, 12},   {"lo", {50, 22, -28}, 10},   {"zy", {66, 58, -26}, 8},
-    {"sgl", {66, 82, -20}, 8.5}, {"go", {50, 70, -85}, 11.5}, {"sM2", {37, 28, -62}, 15},
-    {"mr", {50, 56, -60}, 14},   {"iM2", {36, 32, -88}, 14},
+const AverageLandmark kAverageHead[] = {
+    {"sg", {0, 2, 32}, 4.3},    {"g", {0, -3, 11}, 5.3},     {"n", {0, 0, 0}, 6.5},
+    {"rhi", {0, -10, -21}, 4},  {"mp", {0, -5, -58}, 10},    {"pr", {0, -8, -69}, 10},
+    {"id", {0, -5, -86}, 11},   {"sm", {0, -1, -96}, 11},    {"pg", {0, -4, -107}, 11},
+    {"me", {0, 8, -118}, 7.5},  {"fe", {30, 10, 44}, 4.5},   {"mso", {27, 3, 13}, 7},
+    {"mio", {32, 8, -28}, 7},   {"im", {40, 17, -46}, 12},   {"lo", {50, 22, -28}, 10},
+    {"zy", {66, 58, -26}, 8},   {"sgl", {66, 82, -20}, 8.5}, {"go", {50, 70, -85}, 11.5},
+    {"sM2", {37, 28, -62}, 15}, {"mr", {50, 56, -60}, 14},   {"iM2", {36, 32, -88}, 14},
 };
 constexpr double kVaultDepth = 5;     // mm
 constexpr double kBlendWidth = 0.27;  // sigma of a site's influence, radians
@@ -51,16 +53,22 @@ class DepthFormula {
   WaveSum waves_;
 };
 
-Vec3 OnSide(const Vec3& place, double side) { return {side * place.x(), place.y(), place.z()}; }
+const AverageLandmark& AverageAt(const Site& site) {
+  const auto* const found = std::ranges::find(kAverageHead, site.landmark, &AverageLandmark::code);
+  assert(found != std::end(kAverageHead));
+  return *found;
+}
+
+Vec3 DirectionOf(const Site& site) {
+  const Vec3& left = AverageAt(site).near_bone;
+  const double side = site.side == Side::kRight ? -1 : 1;
+  return PhantomDirection({side * left.x(), left.y(), left.z()});
+}
 
 std::vector<DirectionAnchor> SiteAnchors() {
   std::vector<DirectionAnchor> anchors;
-  for (const SitePlace& s : kMidline) {
-    anchors.push_back({PhantomDirection(s.place), s.depth_mm});
-  }
-  for (const SitePlace& s : kLateral) {
-    anchors.push_back({PhantomDirection(s.place), s.depth_mm});
-    anchors.push_back({PhantomDirection(OnSide(s.place, -1)), s.depth_mm});
+  for (const Site& site : StandardSites()) {
+    anchors.push_back({DirectionOf(site), AverageAt(site).depth_mm});
   }
   return anchors;
 }
@@ -177,12 +185,8 @@ class Head {
 
 std::vector<PhantomSite> AllSites(const Head& head) {
   std::vector<PhantomSite> sites;
-  for (const SitePlace& s : kMidline) {
-    sites.push_back(head.At(s.code, PhantomDirection(s.place)));
-  }
-  for (const SitePlace& s : kLateral) {
-    sites.push_back(head.At(fmt::format("{}_l", s.code), PhantomDirection(s.place)));
-    sites.push_back(head.At(fmt::format("{}_r", s.code), PhantomDirection(OnSide(s.place, -1))));
+  for (const Site& site : StandardSites()) {
+    sites.push_back(head.At(site.code, DirectionOf(site)));
   }
   return sites;
 }

@@ -15,8 +15,8 @@ namespace semblance {
 
 struct PhantomOptions {
   static constexpr std::string_view kName = "phantom";
-  std::uint64_t random_seed = 1;
-  int rings = 100;
+  std::uint64_t random_seed = 1;  // which head
+  int rings = 100;                // of triangles from crown to throat; about 3 rings^2 triangles
 };
 template <class Visitor>
 void Fields(Visitor& visit, PhantomOptions& o) {
@@ -41,7 +41,7 @@ struct PhantomSite {
 
 struct Phantom {
   TriMesh skull;                       // closed, outward; LPS, nasion at the origin
-  std::vector<double> depth_mm;        // tissue along the exact normal, one a skull vertex, > 0
+  std::vector<double> depth_mm;        // tissue along the exact normal, one per skull vertex, > 0
   TriMesh face;                        // skull vertex + depth * exact normal; the skull's triangles
   std::vector<PhantomSite> sites;      // all 32: midline from the forehead down, then pairs
   Vec3 centre = Vec3::Constant(kNaN);  // every ray from here meets the skull once

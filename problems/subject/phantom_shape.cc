@@ -8,7 +8,7 @@ namespace semblance {
 namespace {
 
 struct Feature {
-  Vec3 place;     // on an average skull, mm; the left one of a pair
+  Vec3 on_skull;  // on an average skull, mm; the left one of a pair
   Vec3 sigma_mm;  // width along x, y, z
   double height_mm;
 };
@@ -55,7 +55,7 @@ Vec3 Jittered(const Vec3& v, double share, Random& random) {
 
 }  // namespace
 
-Vec3 PhantomDirection(const Vec3& place) { return (place - kPhantomCentre).normalized(); }
+Vec3 PhantomDirection(const Vec3& toward) { return (toward - kPhantomCentre).normalized(); }
 
 double WaveSum::Value(const Vec3& direction) const {
   double sum = 0;
@@ -93,14 +93,14 @@ PhantomShape::PhantomShape(Random& random) {
                        turn * half.cwiseAbs2().cwiseInverse().asDiagonal() * turn.transpose()});
   }
   for (const Feature& f : kFeatures) {
-    const double reach = (f.place - kPhantomCentre).norm();
+    const double reach = (f.on_skull - kPhantomCentre).norm();
     const double height = f.height_mm * random.Uniform(0.8, 1.2);
-    const bool paired = f.place.x() > 0;
+    const bool paired = f.on_skull.x() > 0;
     for (const double side : {1.0, -1.0}) {
       if (side > 0 || paired) {
-        const Vec3 place(side * f.place.x(), f.place.y(), f.place.z());
+        const Vec3 on_skull(side * f.on_skull.x(), f.on_skull.y(), f.on_skull.z());
         const double asymmetry = paired ? random.Uniform(0.95, 1.05) : 1;
-        bumps_.push_back({PhantomDirection(place), f.sigma_mm / reach, height * asymmetry});
+        bumps_.push_back({PhantomDirection(on_skull), f.sigma_mm / reach, height * asymmetry});
       }
     }
   }

@@ -12,8 +12,8 @@ namespace semblance {
 // Where the rays start, mm, before the surface is moved to put nasion at the origin.
 inline const Vec3 kPhantomCentre(0, 75, -20);
 
-// The direction from the centre to a place given in the frame of an average skull, mm.
-Vec3 PhantomDirection(const Vec3& place);
+// The direction from the centre to a point given in the frame of an average skull, mm.
+Vec3 PhantomDirection(const Vec3& toward);
 
 struct WaveSum {  // a smooth function of direction; as drawn, rms about 0.7, never beyond 2.3
   struct Wave {

@@ -1,31 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The standard sites of the skull (thesis app. A): their codes and the names printed there.
+// The standard sites of the skull (thesis app. A): who they are. What a phantom or a generic face
+// has there stands with these, keyed by the codes.
 #pragma once
 
-#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "interp/dowels/site_code.h"
+
 namespace semblance {
 
-struct StandardSite {
-  int number;             // in the thesis's tables, 1 ... 21
-  std::string_view code;  // without side
-  std::string_view name;  // as printed, e.g. "Gonion"
-  bool paired;            // once on each side: code + "_l" and code + "_r"
+struct Site {
+  std::string code;       // with side, e.g. "g", "go_l"
+  std::string landmark;   // the code without side, "go": what tables of depth name
+  int number;             // of the landmark in the thesis's tables, 1 ... 21
+  std::string_view name;  // of the landmark as printed there, e.g. "Gonion"
+  Side side;
+  std::string mirror;  // the code of the site on the other side; its own in the midline
 };
 
-// In the order of the tables: 10 in the midline, 11 in pairs.
-const std::array<StandardSite, 21>& StandardSites();
+// All 32 in the order of the thesis's tables: 10 in the midline, then 11 pairs, left before right.
+const std::vector<Site>& StandardSites();
 
-// The codes of the 32 sites, those of pairs with side, in the order of the tables, left first.
+// Their codes in that order.
 std::vector<std::string> StandardSiteCodes();
 
-// "go" of "go_l", "go_r" and "go".
-std::string WithoutSide(std::string_view site);
-
-// "go_l (Gonion)"; the code alone where the site is not a standard one.
+// "go_l (Gonion)", also of "go"; the code alone where the site is not a standard one.
 std::string SiteInWords(std::string_view site);
 
 // "" if `site` is one of StandardSiteCodes(), else what is wrong with it and what to do.

@@ -96,15 +96,6 @@ TEST(LandmarkFile, RefusesNothingNoPointAndNoUnitNormal) {
               HasSubstr("depth_closest_mm"));
 }
 
-TEST(Sites, AreTheThesisOnes) {
-  EXPECT_EQ(StandardSiteCodes().size(), 32u);
-  EXPECT_EQ(WithoutSide("go_l"), "go");
-  EXPECT_EQ(WithoutSide("sM2_r"), "sM2");
-  EXPECT_EQ(WithoutSide("g"), "g");
-  EXPECT_EQ(SiteInWords("zy_r"), "zy_r (Zygomatic Arch, midway)");
-  EXPECT_EQ(SiteInWords("mmb"), "mmb");
-}
-
 TEST(PlaceDowels, SnapsToTheSkullAndTakesTheGivenNormal) {
   LandmarkFile file = OneAt({10, 10, 2.5});
   file.landmarks[0].normal = {0, 0.6, 0.7999};

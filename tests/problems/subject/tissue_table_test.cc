@@ -103,9 +103,11 @@ TEST(TissueTable, EveryCellIsTheThesisCell) {
 TEST(TissueTable, RowsOfTheThesisAreTheStandardSites) {
   for (const char* id : {"rhine_caucasoid", "rhine_black", "rhine_sw_indian"}) {
     const TissueTable table = Shipped(id);
-    for (std::size_t r = 0; r < 21; ++r) {
-      EXPECT_EQ(table.rows[r].site, StandardSites()[r].code);
-      EXPECT_EQ(table.rows[r].name, StandardSites()[r].name);
+    for (const Site& site : StandardSites()) {
+      const TissueRow& row = table.rows[site.number - 1];
+      EXPECT_EQ(row.number, site.number);
+      EXPECT_EQ(row.site, site.landmark);
+      EXPECT_EQ(row.name, site.name);
     }
   }
 }

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/sites.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Sites, AreTenInTheMidlineAndElevenPairs) {
+  std::map<Side, int> count;
+  std::set<std::string> codes;
+  std::set<int> numbers;
+  for (const Site& site : StandardSites()) {
+    ++count[site.side];
+    codes.insert(site.code);
+    numbers.insert(site.number);
+    EXPECT_EQ(site.side, SideOfSite(site.code)) << site.code;
+    EXPECT_EQ(site.landmark, WithoutSide(site.code));
+  }
+  EXPECT_EQ(count,
+            (std::map<Side, int>{{Side::kMidline, 10}, {Side::kLeft, 11}, {Side::kRight, 11}}));
+  EXPECT_EQ(codes.size(), 32u);
+  EXPECT_EQ(numbers.size(), 21u);
+}
+
+TEST(Sites, TheMirrorOfAMirrorIsTheSite) {
+  std::map<std::string, Site> by_code;
+  for (const Site& site : StandardSites()) {
+    by_code[site.code] = site;
+  }
+  for (const auto& [code, site] : by_code) {
+    const Site& mirror = by_code.at(site.mirror);
+    EXPECT_EQ(mirror.mirror, code);
+    EXPECT_EQ(mirror.number, site.number);
+    EXPECT_EQ(mirror.side == site.side, site.side == Side::kMidline);
+  }
+}
+
+TEST(Sites, AreNamedInWords) {
+  EXPECT_EQ(SiteInWords("zy_r"), "zy_r (Zygomatic Arch, midway)");
+  EXPECT_EQ(SiteInWords("go"), "go (Gonion)");
+  EXPECT_EQ(SiteInWords("mmb"), "mmb");
+}
+
+TEST(Sites, AComplaintSaysWhatToWrite) {
+  EXPECT_EQ(ComplaintAboutSite("go_l"), "");
+  EXPECT_EQ(ComplaintAboutSite("go"), "site 'go' stands on both sides; write 'go_l' or 'go_r'");
+  EXPECT_THAT(ComplaintAboutSite("gp_l"), HasSubstr("unknown site 'gp_l'"));
+}
+
+}  // namespace
+}  // namespace semblance
