@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "problems/metrics/quantile.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -15,17 +16,13 @@ struct Sample {
   double area_mm2;
 };
 
-// The smallest distance that at least `share` of the area does not exceed. sorted: by absolute
-// distance.
-double WeightedQuantile(const std::vector<Sample>& sorted, double total_mm2, double share) {
-  double below_mm2 = 0;
-  for (const Sample& s : sorted) {
-    below_mm2 += s.area_mm2;
-    if (below_mm2 >= share * total_mm2) {
-      return std::abs(s.signed_mm);
-    }
+std::vector<WeightedValue> SortedAbsolutes(const std::vector<Sample>& samples) {
+  std::vector<double> absolute_mm, areas_mm2;
+  for (const Sample& s : samples) {
+    absolute_mm.push_back(std::abs(s.signed_mm));
+    areas_mm2.push_back(s.area_mm2);
   }
-  return std::abs(sorted.back().signed_mm);
+  return SortedValues(absolute_mm, areas_mm2);
 }
 
 double ShareWithin(const std::vector<Sample>& samples, double total_mm2, double limit_mm) {
@@ -36,7 +33,7 @@ double ShareWithin(const std::vector<Sample>& samples, double total_mm2, double 
   return within_mm2 / total_mm2;
 }
 
-DistanceSummary Summarize(std::vector<Sample> samples) {
+DistanceSummary Summarize(const std::vector<Sample>& samples) {
   DistanceSummary summary;
   double area = 0, first = 0, absolute = 0, second = 0;
   for (const Sample& s : samples) {
@@ -48,34 +45,26 @@ DistanceSummary Summarize(std::vector<Sample> samples) {
   if (!(area > 0)) {
     return summary;
   }
-  std::stable_sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
-    return std::abs(a.signed_mm) < std::abs(b.signed_mm);
-  });
+  const std::vector<WeightedValue> sorted = SortedAbsolutes(samples);
   summary.area_cm2 = area / 100;
   summary.mean_signed_mm = first / area;
   summary.mean_abs_mm = absolute / area;
   summary.sd_mm = std::sqrt(std::max(0.0, second / area - std::pow(first / area, 2)));
   summary.rms_mm = std::sqrt(second / area);
-  summary.median_mm = WeightedQuantile(samples, area, 0.5);
-  summary.p95_mm = WeightedQuantile(samples, area, 0.95);
-  summary.max_mm = std::abs(samples.back().signed_mm);
+  summary.median_mm = Quantile(sorted, 0.5);
+  summary.p95_mm = Quantile(sorted, 0.95);
+  summary.max_mm = sorted.back().value;
   summary.within_2_5mm = ShareWithin(samples, area, 2.5);
   summary.within_5mm = ShareWithin(samples, area, 5);
   return summary;
 }
 
-std::vector<double> Quantiles(std::vector<Sample> samples) {
+std::vector<double> Quantiles(const std::vector<Sample>& samples) {
   constexpr int kSteps = 20;
-  std::stable_sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) {
-    return std::abs(a.signed_mm) < std::abs(b.signed_mm);
-  });
-  double area = 0;
-  for (const Sample& s : samples) {
-    area += s.area_mm2;
-  }
+  const std::vector<WeightedValue> sorted = SortedAbsolutes(samples);
   std::vector<double> quantiles;
-  for (int k = 0; k <= kSteps && area > 0; ++k) {
-    quantiles.push_back(WeightedQuantile(samples, area, static_cast<double>(k) / kSteps));
+  for (int k = 0; k <= kSteps && !sorted.empty(); ++k) {
+    quantiles.push_back(Quantile(sorted, static_cast<double>(k) / kSteps));
   }
   return quantiles;
 }

@@ -29,7 +29,7 @@ struct DistanceSummary {
 };
 
 // Of the signed values at the vertices that are finite and for which take(v), weighted by the
-// areas; one value and area a vertex.
+// areas; one value and area per vertex.
 DistanceSummary SummarizeDistances(const std::vector<double>& signed_mm,
                                    const std::vector<double>& areas_mm2,
                                    const std::function<bool(std::size_t)>& take);
@@ -50,7 +50,7 @@ struct FaceMetrics {
   std::map<std::string, DistanceSummary> regions;  // truth_to_face by part of the face
   std::vector<double> quantiles_mm;  // of the absolute truth_to_face, by area: the k-th of 21 is
                                      // not exceeded on k/20 of it
-  std::vector<double> signed_mm;     // one a vertex of the true skin, NaN where not scored
+  std::vector<double> signed_mm;     // one per vertex of the true skin, NaN where not scored
 };
 
 // Area-weighted, closest-point distances (not along a normal); no alignment is done.
@@ -58,8 +58,9 @@ struct FaceMetrics {
 FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                          const RunContext& context);
 
-// One entry a triangle of the true skin: whether what is nearest to it can be compared with it. All
-// three corners are scored and none is on an open border, where a scan ends and the face goes on.
+// One entry per triangle of the true skin: whether what is nearest to it can be compared with it.
+// All three corners are scored and none is on an open border, where a scan ends and the face goes
+// on.
 std::vector<bool> ComparableTriangles(const TriMesh& truth, const FaceRegion& region);
 
 // All of `truth` as one region without parts.

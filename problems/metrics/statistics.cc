@@ -10,6 +10,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "problems/metrics/quantile.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
@@ -17,14 +18,6 @@ namespace semblance {
 namespace {
 
 double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
-
-// Of sorted values; share in [0,1].
-double Quantile(const std::vector<double>& sorted, double share) {
-  const double at = share * static_cast<double>(sorted.size() - 1);
-  const auto low = static_cast<std::size_t>(at);
-  const std::size_t high = std::min(low + 1, sorted.size() - 1);
-  return sorted[low] + (at - static_cast<double>(low)) * (sorted[high] - sorted[low]);
-}
 
 double MeanOf(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
@@ -41,8 +34,8 @@ Interval BootstrapMean(std::span<const double> values, std::uint64_t random_seed
     }
     mean = sum / static_cast<double>(values.size());
   }
-  std::sort(means.begin(), means.end());
-  return {Quantile(means, 0.025), Quantile(means, 0.975)};
+  const std::vector<WeightedValue> sorted = SortedValues(means);
+  return {Quantile(sorted, 0.025), Quantile(sorted, 0.975)};
 }
 
 // Mean ranks from 1, smallest first.
@@ -125,9 +118,10 @@ SampleSummary Summarize(std::span<const double> values, std::uint64_t random_see
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
   s.mean = MeanOf(sorted);
-  s.median = Quantile(sorted, 0.5);
-  s.quartile_1 = Quantile(sorted, 0.25);
-  s.quartile_3 = Quantile(sorted, 0.75);
+  const std::vector<WeightedValue> alike = SortedValues(sorted);
+  s.median = Quantile(alike, 0.5);
+  s.quartile_1 = Quantile(alike, 0.25);
+  s.quartile_3 = Quantile(alike, 0.75);
   s.min = sorted.front();
   s.max = sorted.back();
   if (s.n >= 2) {

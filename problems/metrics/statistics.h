@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Comparing treatments over subjects. The unit is the subject: one value a subject and treatment.
+// Comparing treatments over subjects. The unit is the subject: one value per subject and treatment.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct Interval {
 struct SampleSummary {
   int n = 0;
   double mean = kNaN, sd = kNaN, median = kNaN, min = kNaN, max = kNaN;
-  double quartile_1 = kNaN, quartile_3 = kNaN;  // linear between order statistics (R's type 7)
+  double quartile_1 = kNaN, quartile_3 = kNaN;  // Quantile, as the median
   Interval mean_95;  // bootstrap percentiles of the mean; NaN below 3 values
 };
 
@@ -46,7 +46,7 @@ std::vector<double> Holm(std::span<const double> p);
 // (values rounded to 1e-9 first).
 struct FriedmanResult {
   int subjects = 0, treatments = 0;
-  std::vector<double> mean_ranks;     // one a treatment, 1 is best
+  std::vector<double> mean_ranks;     // one per treatment, 1 is best
   double chi2 = kNaN;                 // Friedman 1937, with correction for ties
   double f = kNaN, p = kNaN;          // Iman & Davenport 1980
   double critical_difference = kNaN;  // of mean ranks at 5 % (Nemenyi; Demsar 2006); NaN for more

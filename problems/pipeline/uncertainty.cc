@@ -7,14 +7,16 @@
 #include "fitting/uncertainty/error_propagation.h"
 #include "interp/evaluation/calibration.h"
 #include "interp/schemes/kriging_process.h"
+#include "problems/metrics/quantile.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
 
-// Where on the skull a point of the fit has its depth from, and how uncertain the dowels make it.
-struct DepthPlace {
+// The depth behind a point of the fit: where on the skull it stands, and how uncertain the dowels
+// make it.
+struct DepthBehind {
   Vec3 base = Vec3::Constant(kNaN);
   double dowels_sd_mm = 0;
   double depth_mm = kNaN;
@@ -47,33 +49,33 @@ std::int32_t NearestCorner(const TriMesh& shell, const MeshPoint& at) {
   });
 }
 
-std::vector<DepthPlace> PlacesOf(const FitTarget& target, const DepthStage& stage,
-                                 std::span<const Dowel> dowels, const RunContext& context) {
+std::vector<DepthBehind> DepthsBehind(const FitTarget& target, const DepthStage& stage,
+                                      std::span<const Dowel> dowels, const RunContext& context) {
   const MeshQuery shell(stage.shell);
-  std::vector<DepthPlace> places(target.points.size());
-  ParallelFor(places.size(), context.threads, 64, [&](std::size_t k) {
+  std::vector<DepthBehind> depths(target.points.size());
+  ParallelFor(depths.size(), context.threads, 64, [&](std::size_t k) {
     const FitPoint& point = target.points[k];
     const auto dowel = std::find_if(dowels.begin(), dowels.end(),
                                     [&](const Dowel& d) { return d.site == point.label; });
     if (dowel != dowels.end()) {
-      places[k] = {dowel->base, dowel->sd_mm, dowel->depth_mm};
+      depths[k] = {dowel->base, dowel->sd_mm, dowel->depth_mm};
       return;
     }
     const MeshPoint at = shell.Closest(point.position);
     const std::int32_t corner = NearestCorner(stage.shell, at);
     const double stated = stage.depth.sd_mm[corner];
-    places[k] = {at.position, std::isfinite(stated) ? stated : SdNear(dowels, at.position),
+    depths[k] = {at.position, std::isfinite(stated) ? stated : SdNear(dowels, at.position),
                  stage.depth.depth_mm[corner]};
   });
-  return places;
+  return depths;
 }
 
-// Adds sd_i sd_j times the correlation of the places, Matern 3/2 as kriging's default.
-void AddSmoothErrors(std::span<const DepthPlace> places, const std::vector<double>& sd_mm,
+// Adds sd_i sd_j times the correlation of depths at their bases, Matern 3/2 as kriging's default.
+void AddSmoothErrors(std::span<const DepthBehind> depths, const std::vector<double>& sd_mm,
                      double length_mm, Eigen::MatrixXd& covariance) {
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    for (std::size_t j = 0; j < places.size(); ++j) {
-      const double between_mm = (places[i].base - places[j].base).norm();
+  for (std::size_t i = 0; i < depths.size(); ++i) {
+    for (std::size_t j = 0; j < depths.size(); ++j) {
+      const double between_mm = (depths[i].base - depths[j].base).norm();
       covariance(i, j) +=
           sd_mm[i] * sd_mm[j] * CorrelationAt(Covariance::kMatern32, between_mm, length_mm).value;
     }
@@ -81,11 +83,11 @@ void AddSmoothErrors(std::span<const DepthPlace> places, const std::vector<doubl
 }
 
 // What the scheme's depths are off from the likeliest ones: known, but taken as one deviation.
-void AddKnownError(std::span<const DepthPlace> places, const Eigen::VectorXd& likeliest_mm,
+void AddKnownError(std::span<const DepthBehind> depths, const Eigen::VectorXd& likeliest_mm,
                    Eigen::MatrixXd& covariance) {
   Eigen::VectorXd off(likeliest_mm.size());
   for (Eigen::Index k = 0; k < off.size(); ++k) {
-    const double depth_mm = places[k].depth_mm;
+    const double depth_mm = depths[k].depth_mm;
     off[k] = std::isfinite(depth_mm) ? depth_mm - likeliest_mm[k] : 0;
   }
   covariance += off * off.transpose();
@@ -93,7 +95,7 @@ void AddKnownError(std::span<const DepthPlace> places, const Eigen::VectorXd& li
 
 // Of the points' depths, mm^2; what kriging found goes into the result.
 Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& input,
-                            std::span<const DepthPlace> places, FaceUncertainty& result,
+                            std::span<const DepthBehind> depths, FaceUncertainty& result,
                             const RunContext& context) {
   const auto* const own = std::get_if<Kriging>(&experiment.interp);
   Kriging kriging = own == nullptr ? Kriging{.nugget_share = 0} : *own;
@@ -102,14 +104,14 @@ Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& inpu
   kriging.signal_mm = result.depth_signal_mm = model.signal_mm;
   std::vector<Vec3> bases;
   std::vector<double> sd_mm;
-  for (const DepthPlace& place : places) {
-    bases.push_back(place.base);
-    sd_mm.push_back(own == nullptr ? place.dowels_sd_mm : 0);
+  for (const DepthBehind& depth : depths) {
+    bases.push_back(depth.base);
+    sd_mm.push_back(own == nullptr ? depth.dowels_sd_mm : 0);
   }
   DepthPosterior posterior = KrigingPosterior(kriging, input, bases, context);
-  AddSmoothErrors(places, sd_mm, model.length_mm, posterior.covariance);
+  AddSmoothErrors(depths, sd_mm, model.length_mm, posterior.covariance);
   if (own == nullptr) {
-    AddKnownError(places, posterior.mean_mm, posterior.covariance);
+    AddKnownError(depths, posterior.mean_mm, posterior.covariance);
   }
   return std::move(posterior.covariance);
 }
@@ -117,10 +119,11 @@ Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& inpu
 PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
                      const HSplineSurface& surface, const FitTarget& target,
                      FaceUncertainty& result, const RunContext& context) {
-  const std::vector<Dowel> dowels = WithSd(stage.standing, experiment.uncertainty.dowel_sd_mm);
+  const std::vector<Dowel> dowels =
+      WithSd(stage.dowels_on_shell, experiment.uncertainty.dowel_sd_mm);
   const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network};
-  const std::vector<DepthPlace> places = PlacesOf(target, stage, dowels, context);
-  Eigen::MatrixXd covariance = DepthErrors(experiment, input, places, result, context);
+  const std::vector<DepthBehind> depths = DepthsBehind(target, stage, dowels, context);
+  Eigen::MatrixXd covariance = DepthErrors(experiment, input, depths, result, context);
   PointErrors errors;
   std::vector<double> laid_mm;  // seeds alone
   for (const FitPoint& point : target.points) {
@@ -130,7 +133,7 @@ PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
                                                       : surface.Normal(point.uv));
     laid_mm.push_back(point.role == PointRole::kSeed ? experiment.uncertainty.implicit_sd_mm : 0);
   }
-  AddSmoothErrors(places, laid_mm, result.depth_length_mm, covariance);
+  AddSmoothErrors(depths, laid_mm, result.depth_length_mm, covariance);
   errors.root = PivotedRoot(std::move(covariance));
   return errors;
 }
@@ -148,26 +151,6 @@ FitTarget AsLeft(FitTarget target, const FitResult& fit) {
     target.points[k].uv = fit.uv[k];
   }
   return target;
-}
-
-double AreaQuantile(const std::vector<double>& values, const std::vector<double>& areas,
-                    double share) {
-  std::vector<std::pair<double, double>> sorted;
-  double all = 0, below = 0;
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    if (std::isfinite(values[k])) {
-      sorted.emplace_back(values[k], areas[k]);
-      all += areas[k];
-    }
-  }
-  std::sort(sorted.begin(), sorted.end());
-  for (const auto& [value, area] : sorted) {
-    below += area;
-    if (below >= share * all) {
-      return value;
-    }
-  }
-  return kNaN;
 }
 
 // Sigma where a point of the fit lies in the same patch of its finest level, else NaN.
@@ -209,9 +192,9 @@ FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& 
     result.sigma_mm = spread.Sigma(fitted.face.uv, fitted.face.normals);
     const std::vector<double> held =
         WhereHeld(result.sigma_mm, fitted.face.uv, target, surface.shape(), level);
-    const std::vector<double> areas = VertexAreas(fitted.face.mesh);
-    result.median_mm = AreaQuantile(held, areas, 0.5);
-    result.p95_mm = AreaQuantile(held, areas, 0.95);
+    const std::vector<WeightedValue> by_area = SortedValues(held, VertexAreas(fitted.face.mesh));
+    result.median_mm = Quantile(by_area, 0.5);
+    result.p95_mm = Quantile(by_area, 0.95);
   }
   result.samples = spread.Samples(options.samples, options.random_seed);
   return result;

@@ -10,6 +10,7 @@
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
+#include "problems/metrics/quantile.h"
 #include "problems/output/manifest.h"
 #include "problems/report/fit_json.h"
 #include "problems/report/timing_json.h"
@@ -44,12 +45,6 @@ void CheckClosure(ParameterSource source, Closure closure) {
   }
 }
 
-double Quantile(std::vector<double> values, double part) {
-  const auto at = static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
-
 Json VerticesJson(const HSplineSurface& surface) {
   const int coarsest = surface.Columns(0) * surface.Rows(0);
   Json json = {{"total", coarsest + surface.Offsets().size()},
@@ -62,12 +57,12 @@ Json VerticesJson(const HSplineSurface& surface) {
 
 Json ResultJsonOf(const PointFitOptions& options, const std::filesystem::path& points,
                   const PointFit& result) {
-  const std::vector<double>& residual = result.fit.residual_mm;
+  const std::vector<WeightedValue> residual = SortedValues(result.fit.residual_mm);
   Json json = {{"title", options.title},
                {"version", SEMBLANCE_VERSION},
                {"points_file", points.filename().string()},
                {"points_sha256", Sha256OfFile(points)},
-               {"points", residual.size()},
+               {"points", result.fit.residual_mm.size()},
                {"parameters", result.parameters},
                {"rms_mm", result.fit.point_rms_mm},
                {"median_mm", Quantile(residual, 0.5)},

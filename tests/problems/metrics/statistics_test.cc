@@ -14,7 +14,7 @@ namespace {
 using ::testing::DoubleNear;
 using ::testing::ElementsAre;
 
-TEST(Summarize, QuantilesAreThoseOfRsDefault) {
+TEST(Summarize, TellsTheMiddleAndTheSpread) {
   const SampleSummary s = Summarize(std::vector<double>{7, 1, 3, 2, 10});
   EXPECT_EQ(s.n, 5);
   EXPECT_DOUBLE_EQ(s.mean, 4.6);
@@ -24,6 +24,7 @@ TEST(Summarize, QuantilesAreThoseOfRsDefault) {
   EXPECT_NEAR(s.sd, 3.7815340802, 1e-9);
   EXPECT_LT(s.mean_95.low, 4.6);
   EXPECT_GT(s.mean_95.high, 4.6);
+  EXPECT_DOUBLE_EQ(Summarize(std::vector<double>{7, 1, 3, 2}).median, 2.5);
   EXPECT_TRUE(std::isnan(Summarize(std::vector<double>{}).mean));
   EXPECT_TRUE(std::isnan(Summarize(std::vector<double>{1, 2}).mean_95.low));
 }

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/metrics/quantile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace semblance {
+
+std::vector<WeightedValue> SortedValues(std::span<const double> values,
+                                        std::span<const double> weights) {
+  std::vector<WeightedValue> sorted;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (std::isfinite(values[k])) {
+      sorted.push_back({values[k], weights.empty() ? 1 : weights[k]});
+    }
+  }
+  std::ranges::stable_sort(sorted, {}, &WeightedValue::value);
+  return sorted;
+}
+
+double Quantile(std::span<const WeightedValue> sorted, double share) {
+  double all = 0;
+  for (const WeightedValue& v : sorted) {
+    all += v.weight;
+  }
+  const double wanted = share * all, rounding = 1e-12 * all;
+  double below = 0, last = std::numeric_limits<double>::quiet_NaN();
+  bool met = false;  // exactly, up to `last`
+  for (const auto& [value, weight] : sorted) {
+    if (weight > 0) {
+      if (met) {
+        return (last + value) / 2;
+      }
+      below += weight;
+      if (below > wanted + rounding) {
+        return value;
+      }
+      met = below >= wanted - rounding;
+      last = value;
+    }
+  }
+  return last;
+}
+
+}  // namespace semblance
