@@ -17,9 +17,9 @@ using Notes = std::vector<std::string>;
 
 void CheckSetSites(const std::map<std::string, double>& set_mm) {
   std::vector<std::string> known = StandardSiteCodes();
-  for (const StandardSite& site : StandardSites()) {
-    if (site.paired) {
-      known.emplace_back(site.code);
+  for (const Site& site : StandardSites()) {
+    if (site.side == Side::kLeft) {
+      known.push_back(site.landmark);
     }
   }
   for (const auto& [site, depth_mm] : set_mm) {
@@ -71,6 +71,25 @@ std::vector<Dowel*> ApplySets(const TissueOptions& options, std::vector<Dowel>& 
   return open;
 }
 
+void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::string> sites,
+                       Notes& notes) {
+  const std::vector<std::string> landmarks = UnorderedLandmarks(table, sex, sites);
+  if (!landmarks.empty()) {
+    notes.push_back(fmt::format(
+        "tissue table '{}': depth does not grow from emaciated to obese at {}; `semblance check` "
+        "shows the rows",
+        table.id, fmt::join(landmarks, ", ")));
+  }
+}
+
+std::vector<std::string> SitesOf(const std::vector<Dowel*>& dowels) {
+  std::vector<std::string> sites;
+  for (const Dowel* dowel : dowels) {
+    sites.push_back(dowel->site);
+  }
+  return sites;
+}
+
 void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open, Notes& notes) {
   if (open.empty()) {
     return;
@@ -81,10 +100,7 @@ void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open
         "configs/tables/rhine_caucasoid.yaml, or `depths: measured`");
   }
   const TissueTable table = ReadTissueTable(options.table);
-  std::vector<std::string> sites;
-  for (const Dowel* dowel : open) {
-    sites.push_back(dowel->site);
-  }
+  const std::vector<std::string> sites = SitesOf(open);
   RequireDepths(table, options.sex, options.build, sites);
   for (Dowel* dowel : open) {
     const TissueDepth depth = LookUpDepth(table, options.sex, options.build, dowel->site);
@@ -95,6 +111,7 @@ void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open
                                   SiteInWords(dowel->site), depth.mean_mm, table.id, depth.note));
     }
   }
+  NoteUnorderedRows(table, options.sex, sites, notes);
 }
 
 const Landmark& LandmarkAt(const LandmarkFile& file, const std::string& site) {
@@ -144,6 +161,11 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
         "table`");
   }
   return notes;
+}
+
+std::vector<std::string> DepthWarnings(const TissueOptions& options) {
+  const bool uses_table = options.depths == DepthSource::kTable && !options.table.empty();
+  return uses_table ? TableWarnings(ReadTissueTable(options.table)) : std::vector<std::string>();
 }
 
 }  // namespace semblance

@@ -24,11 +24,11 @@ constexpr auto EnumNames(DepthSource) {
 }
 
 struct TissueOptions {
-  DepthSource depths = DepthSource::kTable;
-  std::filesystem::path table;
-  Sex sex = Sex::kMale;
-  Build build = Build::kNormal;
-  std::map<std::string, double> set_mm;
+  DepthSource depths = DepthSource::kTable;  // measured: those in the landmark file
+  std::filesystem::path table;               // tissue table; for depths: table
+  Sex sex = Sex::kMale;                      // of the subject; a pooled table does not ask
+  Build build = Build::kNormal;              // of the subject; never interpolated between builds
+  std::map<std::string, double> set_mm;      // by site, before all others
 };
 
 template <class Visitor>
@@ -52,15 +52,19 @@ void Fields(Visitor& visit, TissueOptions& o) {
         o.set_mm);
 }
 
-// Sets depth_mm and sd_mm of each dowel; a depth under set_mm comes first (that of "go_l" before
+// Sets depth_mm and sd_mm of each dowel. A depth under set_mm comes first (that of "go_l" before
 // that of "go"). Measured depths are those along the normal, else to the closest skin. Dowels of
 // landmarks without any measured depth are removed.
 //
-// Returns what people should know: suspect cells used, entries of set_mm used and unused, depths to
-// the closest skin, dowels removed. Throws InputError if a table is needed and not given or lacks a
-// depth (all such sites are named), if set_mm names an unknown site, or if no dowel is left;
-// IoError and ConfigError as ReadTissueTable.
+// Returns what people should know: suspect cells used, rows used whose depths do not grow with the
+// build, entries of set_mm used and unused, depths to the closest skin, dowels removed. Throws
+// InputError if a table is needed and not given or lacks a depth (all such sites are named), if
+// set_mm names an unknown site, or if no dowel is left; IoError and ConfigError as ReadTissueTable.
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels);
+
+// TableWarnings of the table that the options name; nothing where they name none or do not use it.
+// Throws as ReadTissueTable.
+std::vector<std::string> DepthWarnings(const TissueOptions& options);
 
 }  // namespace semblance

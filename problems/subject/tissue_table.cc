@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "problems/config/config.h"
@@ -61,20 +62,31 @@ std::string WhyNoDepth(const TissueCell* cell) {
   return cell->note.empty() ? "missing" : fmt::format("missing: {}", cell->note);
 }
 
-// "" if the row's depths grow with the build in both sexes, as far as they are known.
+// The row's depths by build, lightest first, as far as they are known.
+std::vector<double> MeansByBuild(const TissueRow& row, Sex sex) {
+  std::vector<double> means;
+  for (const Build build : {Build::kEmaciated, Build::kNormal, Build::kObese}) {
+    const auto it = row.values.find(StratumName(sex, build));
+    if (it != row.values.end() && it->second.mean) {
+      means.push_back(*it->second.mean);
+    }
+  }
+  return means;
+}
+
+bool GrowsWithBuild(const TissueRow& row, Sex sex) {
+  const std::vector<double> means = MeansByBuild(row, sex);
+  return std::is_sorted(means.begin(), means.end());
+}
+
+// "" if the row's depths grow with the build in both sexes.
 std::string BrokenOrder(const TissueRow& row) {
   std::string broken;
   for (const Sex sex : {Sex::kMale, Sex::kFemale}) {
-    std::vector<double> means;
-    for (const Build build : {Build::kEmaciated, Build::kNormal, Build::kObese}) {
-      const auto it = row.values.find(StratumName(sex, build));
-      if (it != row.values.end() && it->second.mean) {
-        means.push_back(*it->second.mean);
-      }
-    }
-    if (!std::is_sorted(means.begin(), means.end())) {
+    if (!GrowsWithBuild(row, sex)) {
       broken += fmt::format("{} {} {:.2f} mm", broken.empty() ? "" : ",",
-                            sex == Sex::kMale ? "male" : "female", fmt::join(means, " "));
+                            sex == Sex::kMale ? "male" : "female",
+                            fmt::join(MeansByBuild(row, sex), " "));
     }
   }
   return broken;
@@ -163,6 +175,19 @@ void RequireDepths(const TissueTable& table, Sex sex, Build build,
         "file",
         table.id, stratum, fmt::join(lacking, "; ")));
   }
+}
+
+std::vector<std::string> UnorderedLandmarks(const TissueTable& table, Sex sex,
+                                            std::span<const std::string> sites) {
+  std::set<std::string> used;
+  std::ranges::transform(sites, std::inserter(used, used.end()), WithoutSide);
+  std::vector<std::string> unordered;
+  for (const TissueRow& row : table.rows) {
+    if (used.contains(row.site) && !GrowsWithBuild(row, sex)) {
+      unordered.push_back(row.site);
+    }
+  }
+  return unordered;
 }
 
 std::vector<std::string> TableWarnings(const TissueTable& table) {

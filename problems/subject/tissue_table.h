@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables of tissue depth (thesis app. A; configs/tables): a row a site, a cell a stratum.
+// Tables of tissue depth (thesis app. A; configs/tables): a row per site, a cell per stratum.
 //
 // A table has either the six strata of build and sex, "emaciated_male" ... "obese_female", or the
 // one stratum "adult": then it is pooled, and holds for every sex and build alike.
@@ -115,7 +115,7 @@ void Fields(Visitor& visit, TissueTable& o) {
         o.population_label);
   visit(FieldInfo{.name = "units", .doc = "mm"}, o.units);
   visit(FieldInfo{.name = "measurement", .doc = "method, convention and posture"}, o.measurement);
-  visit(FieldInfo{.name = "rows", .min = 1, .doc = "one a site"}, o.rows);
+  visit(FieldInfo{.name = "rows", .min = 1, .doc = "one per site"}, o.rows);
 }
 
 // "emaciated_male" ... "obese_female".
@@ -134,6 +134,12 @@ TissueDepth LookUpDepth(const TissueTable& table, Sex sex, Build build, const st
 // Throws one InputError that names all those of `sites` for which LookUpDepth would throw.
 void RequireDepths(const TissueTable& table, Sex sex, Build build,
                    std::span<const std::string> sites);
+
+// The rows, by their code and in the table's order, that hold one of `sites` and in which depth
+// does not grow from emaciated over normal to obese in this sex: a depth between two builds must
+// not be interpolated there.
+std::vector<std::string> UnorderedLandmarks(const TissueTable& table, Sex sex,
+                                            std::span<const std::string> sites);
 
 // One line for each row in which depth does not grow from emaciated over normal to obese in one of
 // the sexes, and one for each suspect cell. To be told, not to be refused: the published tables

@@ -93,8 +93,29 @@ TEST(FillDepths, SaysThatASuspectCellIsUsed) {
       FillDepths(FromTable("rhine_sw_indian", Sex::kMale, Build::kNormal), s.file, s.dowels),
       ElementsAre("site n (Nasion): the depth of 6.86 mm in table 'rhine_sw_indian' is suspect: "
                   "footnote 1 of table A.3: may be a typographical error within the original "
-                  "data"));
+                  "data",
+                  "tissue table 'rhine_sw_indian': depth does not grow from emaciated to obese at "
+                  "n; `semblance check` shows the rows"));
   EXPECT_EQ(s.dowels[0].depth_mm, 6.86);
+}
+
+// Of the rows used sM2 is out of order for women, n for both, go for nobody.
+TEST(FillDepths, SaysWhichRowsUsedDoNotGrowWithTheBuild) {
+  Subject s({"n", "sM2_l", "sM2_r", "go_l"});
+  TissueOptions options = FromTable("rhine_black", Sex::kFemale, Build::kNormal);
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels), ElementsAre(HasSubstr("to obese at n, sM2;")));
+  options.sex = Sex::kMale;
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels), ElementsAre(HasSubstr("to obese at n;")));
+  options.set_mm = {{"n", 5}};
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels), ElementsAre(HasSubstr("set to 5 mm by hand")));
+}
+
+TEST(DepthWarnings, AreThoseOfTheTableThatIsUsed) {
+  TissueOptions options = FromTable("rhine_black", Sex::kMale, Build::kNormal);
+  EXPECT_EQ(DepthWarnings(options).size(), 9u);
+  options.depths = DepthSource::kMeasured;
+  EXPECT_THAT(DepthWarnings(options), IsEmpty());
+  EXPECT_THAT(DepthWarnings({}), IsEmpty());
 }
 
 TEST(FillDepths, AMissingCellIsAnErrorUnlessSet) {
