@@ -66,7 +66,7 @@ const std::map<std::string, Layers> kRooms = {
 };
 
 // The front doors, by stem. Nothing else lies flat in a floor but its CMakeLists.txt.
-const std::set<std::string> kFrontDoors = {"surfaces/implicit_face", "interp/depth_scheme",
+const std::set<std::string> kFrontDoors = {"surfaces/implicit_face", "interp/interpolate_depth",
                                            "fitting/fit", "problems/run"};
 
 // A room is neither a cupboard nor a warehouse.

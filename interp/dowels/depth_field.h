@@ -16,7 +16,7 @@ enum class DepthStatus : std::uint8_t {
   kNotFacing,  // in an area, but on bone that faces away from its dowels (inner table, far side)
 };
 
-// All vectors have one entry a vertex.
+// All vectors have one entry per vertex.
 struct DepthField {
   std::vector<double> depth_mm;  // NaN where there is none: such a vertex does not emit
   std::vector<DepthStatus> status;

@@ -54,7 +54,7 @@ void CheckSkull(const DepthInput& input) {
   const std::size_t vertices = input.skull.points.size();
   if (input.normals.size() != vertices) {
     throw InputError(
-        fmt::format("skull: {} normals for {} vertices; there must be one a vertex; compute them "
+        fmt::format("skull: {} normals for {} vertices; there must be one per vertex; compute them "
                     "from this mesh",
                     input.normals.size(), vertices));
   }

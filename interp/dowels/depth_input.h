@@ -17,17 +17,17 @@ namespace semblance {
 
 struct DepthInput {
   const TriMesh& skull;
-  std::span<const Vec3> normals;  // unit, out of the bone, one a vertex; zero where there is none
+  std::span<const Vec3> normals;  // unit, out of the bone, one per vertex; zero where there is none
   std::span<const Dowel> dowels;
   const DowelNetwork& network;  // may have no area where the scheme needs none
 };
 
 // Throws InputError if there is no dowel, if one has no finite base, no unit direction or no depth
-// above 0, if the normals are not one a vertex, if an area names a dowel that is not there, or if a
-// vertex is not finite.
+// above 0, if the normals are not one per vertex, if an area names a dowel that is not there, or if
+// a vertex is not finite.
 void CheckDepthInput(const DepthInput& input);
 
-// One entry a vertex: no depth, outside.
+// One entry per vertex: no depth, outside.
 DepthField EmptyDepthField(std::size_t vertices);
 
 // body(i) for each vertex on run.threads threads; as ParallelFor. Throws Cancelled if stopped.

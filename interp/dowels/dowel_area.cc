@@ -118,8 +118,8 @@ std::vector<DowelArea> DowelAreas(std::string_view scheme, const DepthInput& inp
   return areas;
 }
 
-AreaPlace FindArea(const std::vector<DowelArea>& areas, AreaDistance distance, const Vec3& p) {
-  AreaPlace found;
+AreaPoint FindArea(const std::vector<DowelArea>& areas, AreaDistance distance, const Vec3& p) {
+  AreaPoint found;
   double nearest = std::numeric_limits<double>::infinity();
   for (const DowelArea& area : areas) {
     const std::optional<Vec3> weights = Projection(area, p);
@@ -137,10 +137,10 @@ AreaPlace FindArea(const std::vector<DowelArea>& areas, AreaDistance distance, c
 
 DepthField AssignInAreas(const std::vector<DowelArea>& areas, AreaDistance distance,
                          double max_angle_deg, const DepthInput& input, const RunContext& run,
-                         const std::function<double(const AreaPlace&, const Vec3&)>& depth_at) {
+                         const std::function<double(const AreaPoint&, const Vec3&)>& depth_at) {
   DepthField field = EmptyDepthField(input.skull.points.size());
   ForEachVertex(input, run, [&](std::size_t i) {
-    const AreaPlace in = FindArea(areas, distance, input.skull.points[i]);
+    const AreaPoint in = FindArea(areas, distance, input.skull.points[i]);
     if (in.area == nullptr) {
       return;
     }

@@ -43,24 +43,24 @@ struct DowelArea {
   Vec3 mean_direction;  // unit
 };
 
-// One an area of the network, in its order. Throws InputError, naming the scheme, if the network
+// One per area of the network, in its order. Throws InputError, naming the scheme, if the network
 // has no area, and if an area has no triangle or a cutting plane is degenerate.
 std::vector<DowelArea> DowelAreas(std::string_view scheme, const DepthInput& input);
 
 // A point is in an area if it lies inside the area's three cutting planes: through each edge, along
 // the sum of its two dowels' directions, on the side of the third base. Of several areas the
 // nearest counts, of equally near ones the first.
-struct AreaPlace {
+struct AreaPoint {
   const DowelArea* area = nullptr;  // none: in no area
   Vec3 weights = Vec3::Zero();      // barycentric, >= 0, of the point's projection
 };
-AreaPlace FindArea(const std::vector<DowelArea>& areas, AreaDistance distance, const Vec3& p);
+AreaPoint FindArea(const std::vector<DowelArea>& areas, AreaDistance distance, const Vec3& p);
 
-// The field of a scheme on the network: depth_at(place, p) where p is in an area and its normal is
+// The field of a scheme on the network: depth_at(point, p) where p is in an area and its normal is
 // within max_angle_deg of the area's mean direction, kNotFacing or kOutside elsewhere. sd_mm is
 // barycentric, as if the three dowels deviated together; NaN if one of them has none.
 DepthField AssignInAreas(const std::vector<DowelArea>& areas, AreaDistance distance,
                          double max_angle_deg, const DepthInput& input, const RunContext& run,
-                         const std::function<double(const AreaPlace&, const Vec3&)>& depth_at);
+                         const std::function<double(const AreaPoint&, const Vec3&)>& depth_at);
 
 }  // namespace semblance

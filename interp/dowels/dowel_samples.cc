@@ -14,7 +14,6 @@
 namespace semblance {
 namespace {
 
-constexpr double kSamePlace_mm = 1e-6;
 constexpr double kLeastShare = 0.1;   // of the least depth, without clamp
 constexpr double kFlatSpread = 1e-3;  // relative; points thinner than this are a plane or a line
 
@@ -25,7 +24,7 @@ bool Before(const Dowel& a, const Dowel& b) {
   return key(a) < key(b);
 }
 
-// The mean of dowels in one place.
+// The mean of dowels whose bases are one point.
 DepthSample Merged(const std::vector<Dowel>& same) {
   const auto count = static_cast<double>(same.size());
   DepthSample mean{same.front().base, Vec3::Zero(), 0, 0};
@@ -42,7 +41,7 @@ Vec3 DirectionAround(const std::vector<DepthSample>& samples, const Vec3& p) {
   Vec3 sum = Vec3::Zero();
   for (const DepthSample& sample : samples) {
     const double distance2 = (sample.base - p).squaredNorm();
-    if (distance2 <= kSamePlace_mm * kSamePlace_mm) {
+    if (distance2 <= kSamePoint_mm * kSamePoint_mm) {
       return sample.direction;
     }
     sum += sample.direction / distance2;
@@ -55,18 +54,18 @@ Vec3 DirectionAround(const std::vector<DepthSample>& samples, const Vec3& p) {
 std::vector<DepthSample> DepthSamples(std::span<const Dowel> dowels) {
   std::vector<Dowel> sorted(dowels.begin(), dowels.end());
   std::ranges::sort(sorted, Before);
-  std::vector<std::vector<Dowel>> places;
+  std::vector<std::vector<Dowel>> groups;  // of one base each
   for (const Dowel& dowel : sorted) {
-    auto it = std::ranges::find_if(places, [&](const std::vector<Dowel>& place) {
-      return (place.front().base - dowel.base).squaredNorm() <= kSamePlace_mm * kSamePlace_mm;
+    auto it = std::ranges::find_if(groups, [&](const std::vector<Dowel>& group) {
+      return (group.front().base - dowel.base).squaredNorm() <= kSamePoint_mm * kSamePoint_mm;
     });
-    if (it == places.end()) {
-      it = places.insert(it, std::vector<Dowel>());
+    if (it == groups.end()) {
+      it = groups.insert(it, std::vector<Dowel>());
     }
     it->push_back(dowel);
   }
-  std::vector<DepthSample> samples(places.size());
-  std::ranges::transform(places, samples.begin(), Merged);
+  std::vector<DepthSample> samples(groups.size());
+  std::ranges::transform(groups, samples.begin(), Merged);
   return samples;
 }
 
@@ -119,7 +118,7 @@ SampleFrame FrameOf(const std::vector<DepthSample>& samples) {
     spread += from_center * from_center.transpose() / static_cast<double>(samples.size());
   }
   const double size = std::sqrt(spread.trace());
-  if (size <= kSamePlace_mm) {
+  if (size <= kSamePoint_mm) {
     return frame;
   }
   frame.size_mm = size;

@@ -11,6 +11,10 @@
 
 namespace semblance {
 
+// Points closer than this are one: two bases, or a vertex and a base, which then has the base's
+// depth.
+inline constexpr double kSamePoint_mm = 1e-6;
+
 struct DepthSample {
   Vec3 base = Vec3::Constant(kNaN);
   Vec3 direction = Vec3::Constant(kNaN);  // unit
@@ -19,8 +23,7 @@ struct DepthSample {
 };
 
 // The dowels sorted by site, so that no result depends on their order, not even by rounding. Those
-// whose bases are the same to 1e-6 mm become one with the means of their values. At least one
-// dowel.
+// whose bases are one point become one sample with the means of their values. At least one dowel.
 std::vector<DepthSample> DepthSamples(std::span<const Dowel> dowels);
 
 // A depth as a scheme may give it: within the samples' range if `clamp`; else only kept from

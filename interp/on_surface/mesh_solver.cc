@@ -89,9 +89,9 @@ struct Update {
 class Elimination {
  public:
   Elimination(const Dissection& dissection, const Eigen::SparseMatrix<double>& matrix)
-      : order_(dissection.order), matrix_(matrix), place_(order_.size()), local_(order_.size()) {
+      : order_(dissection.order), matrix_(matrix), rank_(order_.size()), local_(order_.size()) {
     for (std::size_t k = 0; k < order_.size(); ++k) {
-      place_[order_[k]] = static_cast<int>(k);
+      rank_[order_[k]] = static_cast<int>(k);
     }
     for (const Dissection::Node& node : dissection.nodes) {
       Eliminate(node);
@@ -130,8 +130,8 @@ class Elimination {
     std::vector<int> border;
     for (int k = node.begin; k < node.end; ++k) {
       for (Eigen::SparseMatrix<double>::InnerIterator it(matrix_, order_[k]); it; ++it) {
-        if (place_[it.row()] >= node.end) {
-          border.push_back(place_[it.row()]);
+        if (rank_[it.row()] >= node.end) {
+          border.push_back(rank_[it.row()]);
         }
       }
     }
@@ -157,8 +157,8 @@ class Elimination {
     Eigen::MatrixXd full = Eigen::MatrixXd::Zero(size, size);
     for (int k = front.begin; k < front.end; ++k) {
       for (Eigen::SparseMatrix<double>::InnerIterator it(matrix_, order_[k]); it; ++it) {
-        if (place_[it.row()] >= k) {
-          full(local_[place_[it.row()]], k - front.begin) = it.value();
+        if (rank_[it.row()] >= k) {
+          full(local_[rank_[it.row()]], k - front.begin) = it.value();
         }
       }
     }
@@ -179,8 +179,8 @@ class Elimination {
 
   const std::vector<int>& order_;
   const Eigen::SparseMatrix<double>& matrix_;
-  std::vector<int> place_;  // of each unknown in the order
-  std::vector<int> local_;  // of each place in the current front
+  std::vector<int> rank_;   // of each unknown in the order
+  std::vector<int> local_;  // of each rank in the current front
   std::vector<Update> updates_;
   std::vector<MeshSolver::Front> fronts_;
 };

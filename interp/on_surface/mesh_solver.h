@@ -14,11 +14,11 @@ namespace semblance {
 // times as fast as a sparse factorisation by columns.
 class MeshSolver {
  public:
-  // matrix: positive definite, both triangles. points: one an unknown, where it lies; they give an
+  // matrix: positive definite, both triangles. points: one per unknown, where it lies; they give an
   // elimination order, no result but for rounding.
   MeshSolver(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& matrix);
 
-  // One solution a column; several at once cost less than one by one.
+  // One solution per column; several at once cost less than one by one.
   Eigen::MatrixXd Solve(const Eigen::MatrixXd& right) const;
 
   // Unknowns that are eliminated together: those at begin..end-1 in the order, coupled with later

@@ -15,44 +15,47 @@ namespace {
 
 constexpr double kLeastSoftness = 1e-12;  // two dowels closest to one vertex must not be singular
 
-constexpr Eigen::Index kMostHeld = 64;       // functions held at a time: 8 bytes a vertex each
-constexpr std::size_t kSolvedTogether = 16;  // right sides solved at a time: 8 bytes a vertex each
+constexpr Eigen::Index kMostHeld = 64;  // functions held at a time: 8 bytes per vertex each
+constexpr std::size_t kSolvedTogether =
+    16;  // right sides solved at a time: 8 bytes per vertex each
 
 // The function's mean that one dowel speaks of: sum of weight times value, weights of sum 1.
-struct Place {
+struct LocalMean {
   std::vector<std::pair<int, double>> weights;
   int piece = 0;
 };
 
-Place PlaceOf(const Vec3& base, double radius_mm, const TriMesh& skull, const MeshQuery& query,
-              const MeshLaplacian& laplacian, const std::vector<int>& pieces) {
+LocalMean LocalMeanAt(const Vec3& base, double radius_mm, const TriMesh& skull,
+                      const MeshQuery& query, const MeshLaplacian& laplacian,
+                      const std::vector<int>& pieces) {
   const MeshPoint closest = query.Closest(base);
   const Triangle& t = skull.triangles[closest.triangle];
-  Place place;
-  place.piece = pieces[t[0]];
+  LocalMean mean;
+  mean.piece = pieces[t[0]];
   double sum = 0;
   for (std::size_t i = 0; radius_mm > 0 && i < skull.points.size(); ++i) {
     const bool near = (skull.points[i] - closest.position).norm() <= radius_mm;
-    if (near && pieces[i] == place.piece) {
-      place.weights.emplace_back(static_cast<int>(i), laplacian.area_mm2[i]);
+    if (near && pieces[i] == mean.piece) {
+      mean.weights.emplace_back(static_cast<int>(i), laplacian.area_mm2[i]);
       sum += laplacian.area_mm2[i];
     }
   }
-  for (auto& weight : place.weights) {
+  for (auto& weight : mean.weights) {
     weight.second /= sum;
   }
-  if (place.weights.empty()) {
+  if (mean.weights.empty()) {
     for (int corner = 0; corner < 3; ++corner) {
-      place.weights.emplace_back(t[corner], closest.weights[corner]);
+      mean.weights.emplace_back(t[corner], closest.weights[corner]);
     }
   }
-  return place;
+  return mean;
 }
 
-// Let b_i be the places, G the inverse of the energy's matrix on functions of mean 0, piece by
-// piece. The least energy with means d + residuals is u = sum_i l_i G b_i + a constant a piece,
-// where the l_i of a piece sum to 0: small equations in S_ij = b_i' G b_j, whatever the skull's
-// size. As the l_i sum to 0, S may have its means taken off, rows and columns, piece by piece.
+// Let b_i be the local means as vectors of weights, G the inverse of the energy's matrix on
+// functions of mean 0, piece by piece. The least energy with means d + residuals is u = sum_i l_i G
+// b_i + a constant a piece, where the l_i of a piece sum to 0: small equations in S_ij = b_i' G
+// b_j, whatever the skull's size. As the l_i sum to 0, S may have its means taken off, rows and
+// columns, piece by piece.
 class Spline {
  public:
   Spline(const MeshSpline& options, const TriMesh& skull, const std::vector<DepthSample>& samples,
@@ -68,7 +71,8 @@ class Spline {
     }
     const MeshQuery query(skull);
     for (const DepthSample& sample : samples) {
-      places_.push_back(PlaceOf(sample.base, options.radius_mm, skull, query, laplacian_, pieces_));
+      means_.push_back(
+          LocalMeanAt(sample.base, options.radius_mm, skull, query, laplacian_, pieces_));
     }
   }
 
@@ -84,14 +88,14 @@ class Spline {
     const double softness = std::max(options_.softness, kLeastSoftness) * scale;
     for (Eigen::Index i = 0; i < n; ++i) {
       matrix(i, i) += softness;
-      const auto at = std::ranges::find(used, places_[i].piece) - used.begin();
+      const auto at = std::ranges::find(used, means_[i].piece) - used.begin();
       matrix(i, n + at) = matrix(n + at, i) = scale;
       right[i] = samples[i].depth_mm;
     }
     const Eigen::VectorXd pull = Eigen::PartialPivLU<Eigen::MatrixXd>(matrix).solve(right).head(n);
     const Eigen::VectorXd varying = Varying(Combined(pull));
     const Eigen::VectorXd constants =
-        MeanByPiece(right.head(n) - softness * pull - AtPlaces(varying));
+        MeanByPiece(right.head(n) - softness * pull - LocalMeansOf(varying));
     std::vector<double> values(pieces_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = constants[pieces_[i]] + varying[static_cast<Eigen::Index>(i)];
@@ -100,9 +104,9 @@ class Spline {
   }
 
  private:
-  Eigen::Index Size() const { return static_cast<Eigen::Index>(places_.size()); }
+  Eigen::Index Size() const { return static_cast<Eigen::Index>(means_.size()); }
 
-  // The stiffness with one vertex a piece held, which changes no solution but for a constant.
+  // The stiffness with one vertex per piece held, which changes no solution but for a constant.
   Eigen::SparseMatrix<double> Grounded() const {
     Eigen::SparseMatrix<double> matrix = laplacian_.stiffness;
     std::vector<Eigen::Triplet<double>> held;
@@ -132,21 +136,21 @@ class Spline {
     }
   }
 
-  // One column a column of place weights.
-  Eigen::MatrixXd Combined(const Eigen::MatrixXd& of_place) const {
+  // One column per column of weights of the local means.
+  Eigen::MatrixXd Combined(const Eigen::MatrixXd& of_mean) const {
     Eigen::MatrixXd right =
-        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pieces_.size()), of_place.cols());
-    for (std::size_t k = 0; k < places_.size(); ++k) {
-      for (const auto& [vertex, weight] : places_[k].weights) {
-        right.row(vertex) += weight * of_place.row(static_cast<Eigen::Index>(k));
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pieces_.size()), of_mean.cols());
+    for (std::size_t k = 0; k < means_.size(); ++k) {
+      for (const auto& [vertex, weight] : means_[k].weights) {
+        right.row(vertex) += weight * of_mean.row(static_cast<Eigen::Index>(k));
       }
     }
     return right;
   }
 
   // G times right sides; of mean 0 on each piece. Where a right side's sum on a piece is not 0,
-  // what holds its vertex answers: the same for all places there, so nothing where the l_i sum to
-  // 0.
+  // what holds its vertex answers: the same for all local means there, so nothing where the l_i sum
+  // to 0.
   Eigen::MatrixXd Varying(const Eigen::MatrixXd& right) const {
     const Eigen::MatrixXd values = HalfVarying(right);
     return options_.energy == SplineEnergy::kLaplacian
@@ -162,26 +166,26 @@ class Spline {
     return values;
   }
 
-  // The means of functions, one a column, at the places.
-  Eigen::MatrixXd AtPlaces(const Eigen::MatrixXd& values) const {
+  // The local means of functions, one function per column.
+  Eigen::MatrixXd LocalMeansOf(const Eigen::MatrixXd& values) const {
     Eigen::MatrixXd at = Eigen::MatrixXd::Zero(Size(), values.cols());
     for (Eigen::Index k = 0; k < Size(); ++k) {
-      for (const auto& [vertex, weight] : places_[k].weights) {
+      for (const auto& [vertex, weight] : means_[k].weights) {
         at.row(k) += weight * values.row(vertex);
       }
     }
     return at;
   }
 
-  // Over the places of each piece, of one value a place; NaN on pieces without one.
-  Eigen::VectorXd MeanByPiece(const Eigen::VectorXd& of_place) const {
+  // Over the local means of each piece, of one value per local mean; NaN on pieces without any.
+  Eigen::VectorXd MeanByPiece(const Eigen::VectorXd& of_mean) const {
     const auto count = static_cast<Eigen::Index>(piece_area_.size());
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(count), places = sum;
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(count), members = sum;
     for (Eigen::Index k = 0; k < Size(); ++k) {
-      sum[places_[k].piece] += of_place[k];
-      ++places[places_[k].piece];
+      sum[means_[k].piece] += of_mean[k];
+      ++members[means_[k].piece];
     }
-    return sum.cwiseQuotient(places);
+    return sum.cwiseQuotient(members);
   }
 
   // S without the means, piece by piece, of its columns and then of its rows.
@@ -190,7 +194,7 @@ class Spline {
       for (Eigen::Index c = 0; c < Size(); ++c) {
         const Eigen::VectorXd mean = MeanByPiece(matrix.col(c));
         for (Eigen::Index r = 0; r < Size(); ++r) {
-          matrix(r, c) -= mean[places_[r].piece];
+          matrix(r, c) -= mean[means_[r].piece];
         }
       }
       matrix.transposeInPlace();
@@ -203,7 +207,7 @@ class Spline {
     const Eigen::Index n = Size();
     const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMostHeld;
     Eigen::MatrixXd held(inner_product ? laplacian_.area_mm2.size() : 0, n), kernel(n, n);
-    const std::size_t blocks = (places_.size() + kSolvedTogether - 1) / kSolvedTogether;
+    const std::size_t blocks = (means_.size() + kSolvedTogether - 1) / kSolvedTogether;
     ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
       run.ThrowIfStopped();
       const auto first = static_cast<Eigen::Index>(block * kSolvedTogether);
@@ -213,7 +217,7 @@ class Spline {
       if (inner_product) {
         held.middleCols(first, count) = HalfVarying(right);
       } else {
-        kernel.middleCols(first, count) = AtPlaces(Varying(right));
+        kernel.middleCols(first, count) = LocalMeansOf(Varying(right));
       }
     });
     return inner_product ? Products(held) : kernel;
@@ -226,8 +230,8 @@ class Spline {
 
   std::vector<int> UsedPieces() const {
     std::vector<int> used;
-    for (const Place& place : places_) {
-      used.push_back(place.piece);
+    for (const LocalMean& mean : means_) {
+      used.push_back(mean.piece);
     }
     std::ranges::sort(used);
     used.erase(std::unique(used.begin(), used.end()), used.end());
@@ -239,7 +243,7 @@ class Spline {
   std::vector<int> pieces_;
   MeshSolver solver_;
   std::vector<double> piece_area_;
-  std::vector<Place> places_;
+  std::vector<LocalMean> means_;
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The smoothest function on a skull that has given means at some places: the kernel of the harmonic
-// and the biharmonic scheme.
+// The smoothest function on a skull that has given means around some points: the kernel of the
+// harmonic and the biharmonic scheme.
 #pragma once
 
 #include <string_view>

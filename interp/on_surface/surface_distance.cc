@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-constexpr std::size_t kHeldTogether = 8;  // distances held at a time: 8 bytes a vertex each
+constexpr std::size_t kHeldTogether = 8;  // distances held at a time: 8 bytes per vertex each
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
 // The distance at c of a front that reached a and b from one source: a, b and c in a plane, the
@@ -36,9 +36,9 @@ double ThroughEdge(const Vec3& a, double at_a, const Vec3& b, double at_b, const
   return crossing >= 0 && crossing <= edge ? std::hypot(x - source_x, height) : kFar;
 }
 
-class Front {
+class FastMarching {
  public:
-  explicit Front(const TriMesh& mesh)
+  explicit FastMarching(const TriMesh& mesh)
       : mesh_(mesh), distance_(mesh.points.size(), kFar), passed_(mesh.points.size(), false) {}
 
   void Offer(int vertex, double distance) {
@@ -111,16 +111,16 @@ SurfaceDistance::SurfaceDistance(const TriMesh& mesh)
 
 std::vector<double> SurfaceDistance::From(const Vec3& p) const {
   const MeshPoint source = query_.Closest(p);
-  Front front(mesh_);
+  FastMarching march(mesh_);
   for (const int v : mesh_.triangles[source.triangle]) {
-    front.Offer(v, (mesh_.points[v] - source.position).norm());
+    march.Offer(v, (mesh_.points[v] - source.position).norm());
   }
-  for (int v = front.Pass(); v >= 0; v = front.Pass()) {
+  for (int v = march.Pass(); v >= 0; v = march.Pass()) {
     for (const int t : TrianglesAt(v)) {
-      front.Spread(v, mesh_.triangles[t]);
+      march.Spread(v, mesh_.triangles[t]);
     }
   }
-  return front.Take();
+  return march.Take();
 }
 
 void ForEachGeodesic(std::string_view scheme, const TriMesh& skull,

@@ -25,7 +25,7 @@ void DistanceField(Visitor& visit, DowelDistance& distance) {
                   .doc = "between dowels and vertices: euclidean, a straight line, or geodesic, "
                          "along the bone, by which a dowel does not reach through it or across a "
                          "gap; pieces of the skull that are closest to no dowel get no depth then; "
-                         "some 0.3 s a dowel on a skull of 400k vertices"},
+                         "some 0.3 s per dowel on a skull of 400k vertices"},
         distance);
 }
 
@@ -38,7 +38,7 @@ class SurfaceDistance {
   // Throws InputError as MeshQuery. The mesh must outlive this.
   explicit SurfaceDistance(const TriMesh& mesh);
 
-  // mm, from the point of the surface closest to p, one a vertex; infinite on other pieces.
+  // mm, from the point of the surface closest to p, one per vertex; infinite on other pieces.
   std::vector<double> From(const Vec3& p) const;
 
  private:

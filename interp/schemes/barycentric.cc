@@ -9,7 +9,7 @@ DepthField InterpolateDepth(const Barycentric& options, const DepthInput& input,
   const std::vector<DowelArea> areas = DowelAreas(Barycentric::kName, input);
   return AssignInAreas(
       areas, options.distance, options.max_angle_deg, input, run,
-      [&](const AreaPlace& in, const Vec3&) {
+      [&](const AreaPoint& in, const Vec3&) {
         const auto& [a, b, c] = in.area->dowels;
         return in.weights.dot(
             Vec3(input.dowels[a].depth_mm, input.dowels[b].depth_mm, input.dowels[c].depth_mm));

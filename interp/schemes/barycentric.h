@@ -10,8 +10,8 @@ namespace semblance {
 
 struct Barycentric {
   static constexpr std::string_view kName = "barycentric";
-  AreaDistance distance = AreaDistance::kTriangle;
-  double max_angle_deg = 90;
+  AreaDistance distance = AreaDistance::kTriangle;  // the thesis's plane can pick a far area
+  double max_angle_deg = 90;                        // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, Barycentric& o) {

@@ -11,9 +11,9 @@ namespace semblance {
 
 struct Biharmonic {
   static constexpr std::string_view kName = "biharmonic";
-  double softness = 0;
-  bool clamp = true;
-  double max_angle_deg = 90;
+  double softness = 0;        // 0 honours every dowel
+  bool clamp = true;          // to the dowels' range
+  double max_angle_deg = 90;  // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, Biharmonic& o) {
@@ -23,7 +23,7 @@ void Fields(Visitor& visit, Biharmonic& o) {
 }
 
 // The least squared Laplacian along the surface, with the cotangent Laplacian: smooth through the
-// dowels, may leave their range between and beyond them. Solves twice a dowel. kOutside on pieces
+// dowels, may leave their range between and beyond them. Solves twice per dowel. kOutside on pieces
 // of the skull that are closest to no dowel; kNotFacing as AssignWhereFacing; no sd_mm. Throws
 // InputError as CheckDepthInput, or if the skull has no triangle.
 DepthField InterpolateDepth(const Biharmonic& options, const DepthInput& input,

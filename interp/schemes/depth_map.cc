@@ -63,7 +63,7 @@ void CheckMap(const MappedDepth& map, const DepthMap& options) {
   const std::string where = options.file.string();
   if (map.depth_mm.size() != map.mesh.points.size()) {
     throw InputError(fmt::format(
-        "{}: {} depths for {} vertices of {}; there must be one a vertex", where,
+        "{}: {} depths for {} vertices of {}; there must be one per vertex", where,
         map.depth_mm.size(), map.mesh.points.size(),
         options.mesh.empty() ? std::string("the skull (after fill)") : options.mesh.string()));
   }

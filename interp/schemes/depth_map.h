@@ -12,10 +12,10 @@ namespace semblance {
 
 struct DepthMap {
   static constexpr std::string_view kName = "depth_map";
-  std::filesystem::path file = {};
-  std::string scalar = "scalar_depth_mm";
-  std::filesystem::path mesh = {};
-  double reach_mm = 3;
+  std::filesystem::path file = {};         // PLY or CSV
+  std::string scalar = "scalar_depth_mm";  // the property or column
+  std::filesystem::path mesh = {};         // of a CSV; empty: the skull
+  double reach_mm = 3;                     // skull further off gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, DepthMap& o) {

@@ -11,9 +11,9 @@ namespace semblance {
 
 struct Harmonic {
   static constexpr std::string_view kName = "harmonic";
-  double radius_mm = 5;
-  double softness = 0;
-  double max_angle_deg = 90;
+  double radius_mm = 5;       // of the bone whose mean a dowel sets; at 0 it is a spike
+  double softness = 0;        // 0 honours every dowel
+  double max_angle_deg = 90;  // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, Harmonic& o) {

@@ -28,8 +28,6 @@ DepthValue WeightedMean(const std::vector<DepthSample>& samples, double power, c
   return {depth / sum, sd / sum};
 }
 
-constexpr double kAtBase_mm = 1e-9;  // so near, a dowel stands alone
-
 struct Sums {
   double weight = 0, depth = 0, sd = 0;
   bool at_base = false;
@@ -38,7 +36,7 @@ struct Sums {
     if (at_base || !std::isfinite(distance_mm)) {
       return;
     }
-    at_base = distance_mm <= kAtBase_mm;
+    at_base = distance_mm <= kSamePoint_mm;
     if (at_base) {
       *this = {1, sample.depth_mm, sample.sd_mm, true};
       return;

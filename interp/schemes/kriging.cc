@@ -116,17 +116,17 @@ KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const R
 }
 
 DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
-                                std::span<const Vec3> places, const RunContext& run) {
+                                std::span<const Vec3> points, const RunContext& run) {
   CheckDepthInput(input);
   Kriging straight = options;
   straight.distance = DowelDistance::kEuclidean;
   const KrigingScene scene = SceneOf(straight, input, DepthSamples(input.dowels), run);
-  const auto count = static_cast<Eigen::Index>(places.size());
+  const auto count = static_cast<Eigen::Index>(points.size());
   Eigen::MatrixXd to_dowels_mm(scene.data.depth_mm.size(), count), between_mm(count, count);
   for (Eigen::Index i = 0; i < count; ++i) {
-    to_dowels_mm.col(i) = scene.DistancesTo(places[i], 0);
+    to_dowels_mm.col(i) = scene.DistancesTo(points[i], 0);
     for (Eigen::Index j = 0; j < count; ++j) {
-      between_mm(i, j) = (places[i] - places[j]).norm();
+      between_mm(i, j) = (points[i] - points[j]).norm();
     }
   }
   return KrigingProcess(straight.covariance, scene.data, HyperFor(straight, scene, run))

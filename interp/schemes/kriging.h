@@ -22,21 +22,21 @@ constexpr auto EnumNames(Covariance) {
 
 struct Kriging {
   static constexpr std::string_view kName = "kriging";
-  Covariance covariance = Covariance::kMatern32;
-  DowelDistance distance = DowelDistance::kEuclidean;
-  std::optional<double> length_mm = std::nullopt;
-  double length_prior_mm = 60;
-  double length_prior_spread = 0.5;
-  std::optional<double> signal_mm = std::nullopt;
-  double nugget_share = 1;
-  bool clamp = true;
-  bool state_sd = true;
-  double max_angle_deg = 90;
+  Covariance covariance = Covariance::kMatern32;       // smoother ones oscillate between far dowels
+  DowelDistance distance = DowelDistance::kEuclidean;  // or along the bone
+  std::optional<double> length_mm = std::nullopt;      // none: by maximum likelihood
+  double length_prior_mm = 60;                         // median; dowels alone do not fix a length
+  double length_prior_spread = 0.5;                    // sd of the logarithm
+  std::optional<double> signal_mm = std::nullopt;      // none: by maximum likelihood
+  double nugget_share = 1;                             // of a dowel's sd_mm; 0 honours every dowel
+  bool clamp = true;                                   // to the dowels' range
+  bool state_sd = true;                                // sd_mm per vertex
+  double max_angle_deg = 90;                           // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, Kriging& o) {
   visit(FieldInfo{.name = "covariance",
-                  .doc = "of two depths by the distance of their places, from rough "
+                  .doc = "of two depths by the distance between their bases, from rough "
                          "(matern_1_2, an exponential) to very smooth (squared_exponential, which "
                          "oscillates between dowels that are far apart)"},
         o.covariance);
@@ -93,7 +93,7 @@ struct KrigingModel {
 // dowels it uses 200 that lie far apart. Throws as InterpolateDepth.
 KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
 
-// Of the depths at some places, given the dowels, the model and the uncertain mean.
+// Of the depths at some points, given the dowels, the model and the uncertain mean.
 struct DepthPosterior {
   Eigen::VectorXd mean_mm;     // without `clamp`
   Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is the square of the sd_mm below
@@ -102,13 +102,13 @@ struct DepthPosterior {
 // By straight distances, also where `options` says along the bone. Throws InputError as
 // CheckDepthInput.
 DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
-                                std::span<const Vec3> places, const RunContext& run);
+                                std::span<const Vec3> points, const RunContext& run);
 
 // Far from all dowels the depth is the process's mean. sd_mm is that of the process at the vertex,
 // given the dowels, the model and the uncertain mean; it does not hold the nugget of a further
 // measurement there, nor the uncertainty of length and signal. kNotFacing as AssignWhereFacing;
 // kOutside where no dowel is reached along the bone. There the smoother covariances are not always
-// definite; then the field smooths, and may miss certain dowels. It keeps 8 bytes a vertex and
+// definite; then the field smooths, and may miss certain dowels. It keeps 8 bytes per vertex and
 // dowel. Throws InputError as CheckDepthInput, or if the skull has no triangle to go along.
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
 

@@ -49,9 +49,9 @@ class KrigingProcess {
 
   // Before the first ValueAt with an sd; costs the cube of n.
   void PrepareSd();
-  // distance_mm: n, from each dowel to the place.
+  // distance_mm: n, from each dowel to the point.
   DepthValue ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm) const;
-  // Of m places together. to_dowels_mm: n x m; between_mm: m x m, symmetric.
+  // Of m points together. to_dowels_mm: n x m; between_mm: m x m, symmetric.
   DepthPosterior Posterior(const Eigen::MatrixXd& to_dowels_mm,
                            const Eigen::MatrixXd& between_mm) const;
 
@@ -68,7 +68,7 @@ class KrigingProcess {
   Eigen::VectorXd nugget_mm2_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Eigen::VectorXd inverse_ones_, inverse_residual_;
-  Eigen::VectorXd weights_;       // of the dowels' covariances at a place
+  Eigen::VectorXd weights_;       // of the dowels' covariances with a point
   Eigen::MatrixXd inverse_root_;  // empty without PrepareSd
   double ones_ = 0, mean_mm_ = 0, misfit_ = 0;
 };

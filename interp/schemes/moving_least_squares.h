@@ -11,10 +11,10 @@ namespace semblance {
 
 struct MovingLeastSquares {
   static constexpr std::string_view kName = "moving_least_squares";
-  double width_mm = 25;
-  double thin_mm = 3;
-  bool clamp = true;
-  double max_angle_deg = 90;
+  double width_mm = 25;       // of the weights' Gaussian
+  double thin_mm = 3;         // half of the slope is kept at this spread
+  bool clamp = true;          // to the dowels' range
+  double max_angle_deg = 90;  // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, MovingLeastSquares& o) {

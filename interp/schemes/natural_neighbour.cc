@@ -11,8 +11,7 @@
 namespace semblance {
 namespace {
 
-constexpr double kAtBase_mm = 1e-6;  // so near, a dowel stands alone
-constexpr double kReach = 4;         // times the furthest dowel's distance
+constexpr double kReach = 4;  // times the furthest dowel's distance
 
 // Of each dowel, all dowels with their distances: the nearest hundred in order, then the rest.
 class Neighbourhoods {
@@ -69,7 +68,7 @@ struct TangentPlane {
   TangentPlane(const Vec3& p, const Vec3& normal, const Vec3& nearest) : at(p) {
     const Vec3 towards = nearest - p;
     first = towards - normal.dot(towards) * normal;
-    first = first.norm() > kAtBase_mm ? first.normalized() : normal.unitOrthogonal();
+    first = first.norm() > kSamePoint_mm ? first.normalized() : normal.unitOrthogonal();
     second = normal.cross(first);
   }
   PowerSite SiteOf(const Vec3& base) const {
@@ -79,19 +78,19 @@ struct TangentPlane {
 };
 
 // A point's cell, and the dowels that may have a part in it.
-struct Cell {
-  explicit Cell(double reach) : shape(reach) {}
+struct NeighbourCell {
+  explicit NeighbourCell(double reach) : shape(reach) {}
 
   PowerCell shape;
   boost::container::small_vector<PowerSite, 48> sites;
   boost::container::small_vector<int, 48> samples;  // each site's
 };
 
-// No dowel matters that is further from the nearest one than twice any place of the cell is: there,
-// the nearest one is nearer. And no place is further from it than the cell's furthest corner from
-// the point and the point from it.
+// A dowel whose distance from the nearest one is more than twice that of any point of the cell does
+// not matter: the nearest one is nearer to all of the cell. And no point of the cell is further
+// from the nearest dowel than the cell's furthest corner is from p, plus p from that dowel.
 void CutCell(const std::vector<DepthSample>& samples, const Neighbourhoods& neighbourhoods,
-             const Range& range, const TangentPlane& plane, Cell& cell) {
+             const Range& range, const TangentPlane& plane, NeighbourCell& cell) {
   constexpr double kSlack = 1 + 1e-9;
   for (const Neighbourhoods::Other& other : neighbourhoods.Of(range.nearest)) {
     const double corner_mm = std::sqrt(cell.shape.FurthestCorner2());
@@ -106,11 +105,11 @@ void CutCell(const std::vector<DepthSample>& samples, const Neighbourhoods& neig
 
 // use(site, weight) for each that has one.
 template <class Use>
-void ForEachWeight(NeighbourWeights kind, const Cell& cell, const Use& use) {
+void ForEachWeight(NeighbourWeights kind, const NeighbourCell& cell, const Use& use) {
   const CellPolygon& corners = cell.shape.polygon();
   if (kind == NeighbourWeights::kSibson) {
     SiteAreas areas;
-    FindParts({cell.sites.data(), cell.sites.size()}, corners, areas);
+    SibsonAreas({cell.sites.data(), cell.sites.size()}, corners, areas);
     for (std::size_t k = 0; k < areas.size(); ++k) {
       if (areas[k] > 0) {
         use(k, areas[k]);
@@ -121,7 +120,7 @@ void ForEachWeight(NeighbourWeights kind, const Cell& cell, const Use& use) {
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vec2& next = corners[i + 1 < corners.size() ? i + 1 : 0].at;
     const auto site = static_cast<std::size_t>(corners[i].edge);
-    use(site, (next - corners[i].at).norm() / cell.sites[site].place.norm());
+    use(site, (next - corners[i].at).norm() / cell.sites[site].position.norm());
   }
 }
 
@@ -129,13 +128,13 @@ DepthValue DepthAt(const std::vector<DepthSample>& samples, const Neighbourhoods
                    NeighbourWeights kind, const Vec3& p, const Vec3& normal) {
   const Range range = RangeOf(samples, p);
   const DepthSample& nearest = samples[range.nearest];
-  if (range.nearest_mm <= kAtBase_mm) {
+  if (range.nearest_mm <= kSamePoint_mm) {
     return {nearest.depth_mm, nearest.sd_mm};
   }
   if (normal.squaredNorm() == 0) {
     return {};  // no tangent plane
   }
-  Cell cell(kReach * range.furthest_mm);
+  NeighbourCell cell(kReach * range.furthest_mm);
   CutCell(samples, neighbourhoods, range, TangentPlane(p, normal, nearest.base), cell);
   const CellPolygon& corners = cell.shape.polygon();
   if (corners.empty() || std::ranges::count(corners, kOpenEdge, &CellCorner::edge) > 0) {

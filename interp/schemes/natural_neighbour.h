@@ -16,8 +16,8 @@ constexpr auto EnumNames(NeighbourWeights) {
 
 struct NaturalNeighbour {
   static constexpr std::string_view kName = "natural_neighbour";
-  NeighbourWeights weights = NeighbourWeights::kSibson;
-  double max_angle_deg = 90;
+  NeighbourWeights weights = NeighbourWeights::kSibson;  // laplace is cheaper, but creased
+  double max_angle_deg = 90;                             // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, NaturalNeighbour& o) {

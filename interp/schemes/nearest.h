@@ -11,8 +11,8 @@ namespace semblance {
 
 struct Nearest {
   static constexpr std::string_view kName = "nearest";
-  DowelDistance distance = DowelDistance::kEuclidean;
-  double max_angle_deg = 90;
+  DowelDistance distance = DowelDistance::kEuclidean;  // or along the bone
+  double max_angle_deg = 90;                           // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, Nearest& o) {

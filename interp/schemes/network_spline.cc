@@ -61,7 +61,7 @@ class BendingEquations {
     }
   }
 
-  // In space, one a dowel. A direction in which no edge of a dowel goes gets no slope.
+  // In space, one per dowel. A direction in which no edge of a dowel goes gets no slope.
   std::vector<Vec3> Gradients() {
     constexpr double kRidge = 1e-10;  // relative: decides only what no edge decides
     for (Eigen::Index i = 0; i < right_.size(); ++i) {
@@ -174,7 +174,7 @@ DepthField InterpolateDepth(const NetworkSpline& options, const DepthInput& inpu
   const std::vector<AreaEdges> edges = MakeAreaEdges(input, bending.Gradients());
   const DepthLimits limits(DepthSamples(input.dowels), options.clamp);
   return AssignInAreas(areas, options.distance, options.max_angle_deg, input, run,
-                       [&](const AreaPlace& in, const Vec3& p) {
+                       [&](const AreaPoint& in, const Vec3& p) {
                          return limits(Blend(edges[in.area - areas.data()], in.weights, p));
                        });
 }

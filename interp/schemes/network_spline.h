@@ -11,9 +11,9 @@ namespace semblance {
 
 struct NetworkSpline {
   static constexpr std::string_view kName = "network_spline";
-  AreaDistance distance = AreaDistance::kTriangle;
-  bool clamp = true;
-  double max_angle_deg = 90;
+  AreaDistance distance = AreaDistance::kTriangle;  // as barycentric
+  bool clamp = true;                                // to the dowels' range
+  double max_angle_deg = 90;                        // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, NetworkSpline& o) {

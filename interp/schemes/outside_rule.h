@@ -18,7 +18,7 @@ namespace semblance {
 // where bone merely bulges off its triangle. A network without an area is infinitely far away.
 struct ExtendNetwork {
   static constexpr std::string_view kName = "extend";
-  double blend_mm = 60;
+  double blend_mm = 60;     // over which the network's depth turns into the site's
   std::string site = "sg";  // without a dowel there: the mean depth of all dowels, and reported
 };
 template <class Visitor>
@@ -71,7 +71,7 @@ using OutsideRule = std::variant<ExtendNetwork, ConstantDepth, LeaveUnassigned>;
 // The field with depth_mm and sd_mm set at every vertex that is not kAssigned; all else, also the
 // status, is unchanged. sd_mm follows the depth where it is a dowel's or between dowels', else NaN.
 // Reports through `run` (step "outside rule") if the site has no dowel. Throws InputError as
-// CheckDepthInput, or if the field is not one entry a vertex; Cancelled if stopped.
+// CheckDepthInput, or if the field is not one entry per vertex; Cancelled if stopped.
 DepthField ApplyOutsideRule(const OutsideRule& rule, const DepthInput& input, DepthField field,
                             const RunContext& run);
 

@@ -62,8 +62,8 @@ double Furthest2(const CellPolygon& polygon) {
 
 // Those that may keep a part of the cell, also such as the point would swallow whole: the lowest of
 // the linear functions is nowhere in the cell above the least of their largest values.
-boost::container::small_vector<int, 48> OwnersIn(std::span<const PowerSite> sites,
-                                                 const CellPolygon& cell) {
+boost::container::small_vector<int, 48> ContendersFor(std::span<const PowerSite> sites,
+                                                      const CellPolygon& cell) {
   boost::container::small_vector<double, 48> least(sites.size(), kInfinity);
   double bound = kInfinity;
   for (std::size_t k = 0; k < sites.size(); ++k) {
@@ -75,23 +75,24 @@ boost::container::small_vector<int, 48> OwnersIn(std::span<const PowerSite> site
     }
     bound = std::min(bound, most);
   }
-  boost::container::small_vector<int, 48> owners;
+  boost::container::small_vector<int, 48> contenders;
   for (std::size_t k = 0; k < sites.size(); ++k) {
     if (least[k] <= bound) {
-      owners.push_back(static_cast<int>(k));
+      contenders.push_back(static_cast<int>(k));
     }
   }
-  return owners;
+  return contenders;
 }
 
-// Where three sites have the same value, and that value; infinite where they do not meet inwards.
-struct Meeting {
+// A vertex of the lower envelope of the values: where three sites have the same value, and that
+// value; infinite where they do not meet inwards.
+struct Vertex {
   Vec2 at = Vec2::Zero();
   double level = kInfinity;
 };
 
-Meeting MeetingOf(const PowerSite& a, const PowerSite& b, const PowerSite& c) {
-  const Vec2 ab = b.place - a.place, bc = c.place - b.place;
+Vertex VertexOf(const PowerSite& a, const PowerSite& b, const PowerSite& c) {
+  const Vec2 ab = b.position - a.position, bc = c.position - b.position;
   const double across = 2 * Cross(ab, bc);
   if (across == 0) {
     return {};
@@ -100,88 +101,90 @@ Meeting MeetingOf(const PowerSite& a, const PowerSite& b, const PowerSite& c) {
   const Vec2 at((of_ab * bc.y() - of_bc * ab.y()) / across,
                 (of_bc * ab.x() - of_ab * bc.x()) / across);
   const double level = b.At(at);
-  return level >= 0 ? Meeting{at, level} : Meeting{};
+  return level >= 0 ? Vertex{at, level} : Vertex{};
 }
 
-// One of the parts that still border on each other. As the level rises from 0, the region where all
-// values reach it shrinks from the cell, and its edges vanish one by one where their neighbours
-// meet.
-struct OpenPart {
+// As the level rises from 0, the region where all values reach it shrinks from the cell. Each of
+// its edges belongs to one site, and vanishes where its two neighbours meet.
+struct ActiveEdge {
   int site = kOpenEdge;
-  Vec2 border;  // how far the border to the part before it has come
-  Meeting end;  // of this part, if it is the next to vanish
+  Vec2 start;  // where the edge and the one before it meet at the level that was reached
+  Vertex end;  // where it vanishes, if it is the next to do so
 };
-using OpenParts = boost::container::small_vector<OpenPart, 24>;
+using ActiveEdges = boost::container::small_vector<ActiveEdge, 24>;
 
-class PartsTree {
+// Follows the edges of the envelope up from the corners of the cell: a tree whose leaves are the
+// corners.
+class LowerEnvelopeTree {
  public:
-  PartsTree(std::span<const PowerSite> sites, const CellPolygon& cell, SiteAreas& twice_area)
+  LowerEnvelopeTree(std::span<const PowerSite> sites, const CellPolygon& cell,
+                    SiteAreas& twice_area)
       : sites_(sites), twice_area_(twice_area) {
     for (std::size_t i = 0; i < cell.size(); ++i) {
       twice_area_[cell[i].edge] += Cross(cell[i].at, Next(cell, i).at);
-      parts_.push_back({cell[i].edge, cell[i].at, {}});
+      edges_.push_back({cell[i].edge, cell[i].at, {}});
     }
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
       FindEnd(i);
     }
   }
 
   bool Trace() {
-    while (parts_.size() > 3) {
+    while (edges_.size() > 3) {
       const std::size_t i =
-          std::ranges::min_element(parts_, {}, [](const auto& p) { return p.end.level; }) -
-          parts_.begin();
-      if (!Passes(parts_[i].end)) {
+          std::ranges::min_element(edges_, {}, [](const ActiveEdge& e) { return e.end.level; }) -
+          edges_.begin();
+      if (!Passes(edges_[i].end)) {
         return false;
       }
       Close(i);
     }
-    if (parts_.size() < 3 || !Passes(parts_[0].end)) {
+    if (edges_.size() < 3 || !Passes(edges_[0].end)) {
       return false;
     }
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
-      AddBorder(i, parts_[0].end.at);
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      AddBorder(i, edges_[0].end.at);
     }
     return true;
   }
 
  private:
-  std::size_t Before(std::size_t i) const { return (i > 0 ? i : parts_.size()) - 1; }
-  std::size_t After(std::size_t i) const { return i + 1 < parts_.size() ? i + 1 : 0; }
+  std::size_t Before(std::size_t i) const { return (i > 0 ? i : edges_.size()) - 1; }
+  std::size_t After(std::size_t i) const { return i + 1 < edges_.size() ? i + 1 : 0; }
 
   void FindEnd(std::size_t i) {
-    parts_[i].end = MeetingOf(sites_[parts_[Before(i)].site], sites_[parts_[i].site],
-                              sites_[parts_[After(i)].site]);
+    edges_[i].end = VertexOf(sites_[edges_[Before(i)].site], sites_[edges_[i].site],
+                             sites_[edges_[After(i)].site]);
   }
 
   // No other site is lower there: none has a part between these.
-  bool Passes(const Meeting& meeting) const {
-    return std::isfinite(meeting.level) && std::ranges::all_of(sites_, [&](const PowerSite& site) {
-             return site.At(meeting.at) >= meeting.level - 1e-9 * site.distance2;
+  bool Passes(const Vertex& vertex) const {
+    return std::isfinite(vertex.level) && std::ranges::all_of(sites_, [&](const PowerSite& site) {
+             return site.At(vertex.at) >= vertex.level - 1e-9 * site.distance2;
            });
   }
 
-  // The border between part i and the one before it reaches `to`.
+  // The border between the parts of edge i and of the edge before it reaches `to`.
   void AddBorder(std::size_t i, const Vec2& to) {
-    const double twice = Cross(parts_[i].border, to);
-    twice_area_[parts_[Before(i)].site] += twice;
-    twice_area_[parts_[i].site] -= twice;
+    const double twice = Cross(edges_[i].start, to);
+    twice_area_[edges_[Before(i)].site] += twice;
+    twice_area_[edges_[i].site] -= twice;
   }
 
   void Close(std::size_t i) {
-    const Vec2 at = parts_[i].end.at;
+    const Vec2 at = edges_[i].end.at;
     AddBorder(i, at);
     AddBorder(After(i), at);
-    parts_[After(i)].border = at;
-    parts_.erase(parts_.begin() + static_cast<std::ptrdiff_t>(i));
-    const std::size_t after = i < parts_.size() ? i : 0;
+    edges_[After(i)].start = at;
+    edges_.erase(edges_.begin() + static_cast<std::ptrdiff_t>(i));
+    const std::size_t after = i < edges_.size() ? i : 0;
     FindEnd(Before(after));
     FindEnd(after);
   }
 
   std::span<const PowerSite> sites_;
   SiteAreas& twice_area_;
-  OpenParts parts_;
+  ActiveEdges edges_;
 };
 
 }  // namespace
@@ -192,8 +195,9 @@ PowerCell::PowerCell(double reach) {
 }
 
 void PowerCell::Cut(const PowerSite& site, int edge) {
-  const double edge4 = site.distance2 * site.distance2;  // 4 |place|^2 times its edge's distance^2
-  if (edge4 > 4 * site.place.squaredNorm() * furthest2_) {
+  const double edge4 =
+      site.distance2 * site.distance2;  // 4 |position|^2 times its edge's distance^2
+  if (edge4 > 4 * site.position.squaredNorm() * furthest2_) {
     return;  // beyond all corners
   }
   const int other = 1 - current_;
@@ -204,20 +208,20 @@ void PowerCell::Cut(const PowerSite& site, int edge) {
   }
 }
 
-bool FindPartsByTree(std::span<const PowerSite> sites, const CellPolygon& cell,
-                     SiteAreas& twice_area) {
+bool SibsonAreasByEnvelope(std::span<const PowerSite> sites, const CellPolygon& cell,
+                           SiteAreas& twice_area) {
   twice_area.assign(sites.size(), 0);
-  return PartsTree(sites, cell, twice_area).Trace();
+  return LowerEnvelopeTree(sites, cell, twice_area).Trace();
 }
 
-void FindPartsByClipping(std::span<const PowerSite> sites, const CellPolygon& cell,
-                         SiteAreas& twice_area) {
+void SibsonAreasByClipping(std::span<const PowerSite> sites, const CellPolygon& cell,
+                           SiteAreas& twice_area) {
   twice_area.assign(sites.size(), 0);
-  const auto owners = OwnersIn(sites, cell);
+  const auto contenders = ContendersFor(sites, cell);
   CellPolygon part, spare;
-  for (const int own : owners) {
+  for (const int own : contenders) {
     part = cell;
-    for (const int other : owners) {
+    for (const int other : contenders) {
       if (other != own && !part.empty()) {
         const PowerSite &a = sites[own], &b = sites[other];
         const auto value = [&](const Vec2& x) { return b.At(x) - a.At(x); };
@@ -230,9 +234,9 @@ void FindPartsByClipping(std::span<const PowerSite> sites, const CellPolygon& ce
   }
 }
 
-void FindParts(std::span<const PowerSite> sites, const CellPolygon& cell, SiteAreas& twice_area) {
-  if (!FindPartsByTree(sites, cell, twice_area)) {
-    FindPartsByClipping(sites, cell, twice_area);
+void SibsonAreas(std::span<const PowerSite> sites, const CellPolygon& cell, SiteAreas& twice_area) {
+  if (!SibsonAreasByEnvelope(sites, cell, twice_area)) {
+    SibsonAreasByClipping(sites, cell, twice_area);
   }
 }
 

@@ -11,12 +11,12 @@
 namespace semblance {
 
 // In a plane, with the point as origin. A site's power at x less that of the point is
-// distance2 - 2 place . x: a linear function, negative where the site would keep x.
+// distance2 - 2 position . x: a linear function, negative where the site would keep x.
 struct PowerSite {
-  Vec2 place;
+  Vec2 position;
   double distance2 = 0;  // to the point, in space; at least that in the plane
 
-  double At(const Vec2& x) const { return distance2 - 2 * place.dot(x); }
+  double At(const Vec2& x) const { return distance2 - 2 * position.dot(x); }
 };
 
 // A convex polygon, counter-clockwise; `edge` is the site behind the edge from this corner to the
@@ -48,16 +48,16 @@ class PowerCell {
   double furthest2_ = 0;
 };
 
-// Twice the area of the part of a closed cell where each site's value is the least, one a site: by
-// the tree of borders between the parts, or where that would not do (a site whose part lies wholly
-// inside, ties) by clipping.
-void FindParts(std::span<const PowerSite> sites, const CellPolygon& cell, SiteAreas& twice_area);
+// Twice the area that each site would lose to a closed cell, one per site (Sibson 1981): that of
+// the part of the cell where the site's value is the least. By the tree of the lower envelope of
+// the values; where that does not do (a site whose part lies wholly inside, ties) by clipping.
+void SibsonAreas(std::span<const PowerSite> sites, const CellPolygon& cell, SiteAreas& twice_area);
 
-// The two ways. The tree's gives false if it would not do; clipping costs the square of the sites
-// that have a part, and always does.
-bool FindPartsByTree(std::span<const PowerSite> sites, const CellPolygon& cell,
-                     SiteAreas& twice_area);
-void FindPartsByClipping(std::span<const PowerSite> sites, const CellPolygon& cell,
-                         SiteAreas& twice_area);
+// The two ways. The envelope's returns false where it does not do. Clipping always does; it costs
+// the square of the number of sites that have a part.
+bool SibsonAreasByEnvelope(std::span<const PowerSite> sites, const CellPolygon& cell,
+                           SiteAreas& twice_area);
+void SibsonAreasByClipping(std::span<const PowerSite> sites, const CellPolygon& cell,
+                           SiteAreas& twice_area);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Radial basis functions in space: one bump a dowel and a low polynomial, through all dowels.
+// Radial basis functions in space: one bump per dowel and a low polynomial, through all dowels.
 #pragma once
 
 #include <array>
@@ -17,12 +17,12 @@ constexpr auto EnumNames(RadialKernel) {
 
 struct RadialBasis {
   static constexpr std::string_view kName = "radial_basis";
-  RadialKernel kernel = RadialKernel::kLinear;
-  double width_mm = 80;
-  int tail_degree = 1;
-  double smoothing = 0;
-  bool clamp = true;
-  double max_angle_deg = 90;
+  RadialKernel kernel = RadialKernel::kLinear;  // needs no width, and does not oscillate
+  double width_mm = 80;                         // of gaussian and wendland_c2
+  int tail_degree = 1;                          // a linear depth is reproduced
+  double smoothing = 0;                         // 0 honours every dowel
+  bool clamp = true;                            // to the dowels' range
+  double max_angle_deg = 90;                    // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, RadialBasis& o) {

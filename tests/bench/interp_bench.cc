@@ -17,7 +17,7 @@
 #include <string>
 #include <utility>
 
-#include "interp/depth_scheme.h"
+#include "interp/interpolate_depth.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {

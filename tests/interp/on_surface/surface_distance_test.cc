@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-#include "interp/depth_scheme.h"
+#include "interp/interpolate_depth.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
 

@@ -104,7 +104,7 @@ double DepthFromAll(const std::vector<Dowel>& dowels, const Vec3& p, const Vec3&
     cell.Cut(sites.back(), static_cast<int>(sites.size()) - 1);
   }
   SiteAreas areas;
-  FindPartsByClipping(sites, cell.polygon(), areas);
+  SibsonAreasByClipping(sites, cell.polygon(), areas);
   double sum = 0, depth = 0;
   for (std::size_t k = 0; k < areas.size(); ++k) {
     sum += areas[k];

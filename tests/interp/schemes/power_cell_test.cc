@@ -70,14 +70,14 @@ TEST(PowerCell, TreeAndClippingGiveTheSameParts) {
       continue;
     }
     SiteAreas tree, clipped;
-    FindPartsByClipping(sites, cell, clipped);
+    SibsonAreasByClipping(sites, cell, clipped);
     double sum = 0;
     for (const double area : clipped) {
       sum += area;
     }
     ++closed;
     ASSERT_NEAR(sum, TwiceArea(cell), 1e-9 * sum) << trial;
-    if (FindPartsByTree(sites, cell, tree)) {
+    if (SibsonAreasByEnvelope(sites, cell, tree)) {
       ++by_tree;
       for (std::size_t k = 0; k < sites.size(); ++k) {
         ASSERT_NEAR(tree[k], clipped[k], 1e-9 * sum) << trial << " " << k;
@@ -94,8 +94,8 @@ TEST(PowerCell, ASiteWhosePartLiesWhollyInsideIsFound) {
       {{10, 0}, 100}, {{0, 10}, 100}, {{-10, 0}, 100}, {{0, -10}, 100}, {{0.1, 0}, 20}};
   const CellPolygon cell = CellOf(sites);
   SiteAreas areas;
-  EXPECT_FALSE(FindPartsByTree(sites, cell, areas));
-  FindParts(sites, cell, areas);
+  EXPECT_FALSE(SibsonAreasByEnvelope(sites, cell, areas));
+  SibsonAreas(sites, cell, areas);
   EXPECT_EQ(cell.size(), 4U);
   EXPECT_GT(areas[4], 0);
   EXPECT_NEAR(areas[0] + areas[1] + areas[2] + areas[3] + areas[4], 200, 1e-9);
@@ -106,7 +106,7 @@ TEST(PowerCell, SitesOnOneCircleShareAlike) {
       {{10, 0}, 100}, {{0, 10}, 100}, {{-10, 0}, 100}, {{0, -10}, 100}};
   const CellPolygon cell = CellOf(sites);
   SiteAreas areas;
-  FindParts(sites, cell, areas);
+  SibsonAreas(sites, cell, areas);
   for (const double area : areas) {
     EXPECT_NEAR(area, 50, 1e-9);
   }

@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "interp/depth_scheme.h"
 #include "interp/dowels/dowel_samples.h"
+#include "interp/interpolate_depth.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {

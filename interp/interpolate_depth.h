@@ -24,9 +24,9 @@ using DepthScheme =
     std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis, MovingLeastSquares,
                  Kriging, Harmonic, Biharmonic, NaturalNeighbour, NetworkSpline, DepthMap>;
 
-// One entry a vertex. Where the status is kAssigned the depth is finite and within the range of the
-// dowels' depths (without a scheme's `clamp`: above 0; depth_map's are the map's); elsewhere it is
-// NaN, for an OutsideRule to fill. The result does not depend on run.threads nor on the order of
+// One entry per vertex. Where the status is kAssigned the depth is finite and within the range of
+// the dowels' depths (without a scheme's `clamp`: above 0; depth_map's are the map's); elsewhere it
+// is NaN, for an OutsideRule to fill. The result does not depend on run.threads nor on the order of
 // the dowels (beyond rounding). Throws InputError where the scheme cannot use the input, Cancelled
 // if stopped.
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,

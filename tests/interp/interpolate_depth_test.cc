@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The laws of every scheme of the variant, and what nearest and mean add to them.
-#include "interp/depth_scheme.h"
+#include "interp/interpolate_depth.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -284,7 +284,7 @@ TEST_P(EveryScheme, SaysWhatIsWrongWithTheRest) {
   scene = FlatScene();
   scene.normals.pop_back();
   EXPECT_EQ(ErrorOf(scene),
-            "skull: 440 normals for 441 vertices; there must be one a vertex; compute them from "
+            "skull: 440 normals for 441 vertices; there must be one per vertex; compute them from "
             "this mesh");
   scene = FlatScene();
   scene.network.areas[1][2] = 4;

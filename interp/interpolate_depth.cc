@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/depth_scheme.h"
+#include "interp/interpolate_depth.h"
 
 #include <type_traits>
 
