@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
 
 #include "problems/pipeline/cut_planes.h"
 #include "problems/pipeline/stage_key.h"
@@ -38,8 +39,7 @@ Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& dowels,
   return PlaceTemplate(on_template, on_subject, {}, options);
 }
 
-// The generic face with its features' regions, in the subject's frame.
-TemplateFace Placed(const TemplateFace& generic, const Similarity& face_from_template) {
+TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_from_template) {
   TemplateFace placed = generic;
   placed.surface = Transformed(generic.surface, face_from_template);
   for (TemplateFeature& feature : placed.features) {
@@ -48,6 +48,20 @@ TemplateFace Placed(const TemplateFace& generic, const Similarity& face_from_tem
     }
   }
   return placed;
+}
+
+// The generic face in the subject's frame.
+struct PlacedTemplate {
+  FitTarget dowels;
+  Similarity face_from_template;
+  TemplateFace face;
+};
+
+PlacedTemplate Place(const TemplateFace& generic, const std::vector<Dowel>& dowels_on_bone,
+                     const PlacementOptions& options) {
+  FitTarget dowels = DowelTarget(dowels_on_bone, generic);
+  const Similarity face_from_template = PlaceOnDowels(generic, dowels, options);
+  return {std::move(dowels), face_from_template, InSubjectFrame(generic, face_from_template)};
 }
 
 struct FaceFit {
@@ -90,32 +104,46 @@ std::vector<BoneAnchor> AnchorsOf(const std::vector<FitPoint>& seeds, const TriM
   return anchors;
 }
 
+// The template, bent to the dowels alone: what the first seeds are taken on.
+HSplineSurface FirstFit(const Experiment& experiment, const TemplateFace& placed,
+                        const FitTarget& dowels, const RunContext& context) {
+  if (experiment.first_fit.empty()) {
+    return placed.surface;
+  }
+  FitOptions first = experiment.fit;
+  first.plan = ListedPlan{.schedule = experiment.first_fit, .aim = AimOf(experiment.fit.plan)};
+  first.relaxation = NoRelaxation{};
+  return Fit(placed.surface, placed.surface, dowels, FeatureVertices(placed), first, context)
+      .surface;
+}
+
+FitTarget WithSeeds(FitTarget target, const std::vector<FitPoint>& seeds,
+                    const std::vector<Term>& terms, const TriMesh& shell) {
+  target.points.insert(target.points.end(), seeds.begin(), seeds.end());
+  target.anchors.resize(target.points.size());
+  if (LooksAtBone(terms)) {
+    const std::vector<BoneAnchor> anchors = AnchorsOf(seeds, shell);
+    std::copy(anchors.begin(), anchors.end(), target.anchors.end() - std::ssize(anchors));
+  }
+  return target;
+}
+
 // Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
 // both (see seeding.h for why).
-FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTarget dowels,
-                const TriMesh& implicit, const TriMesh& shell, const RunContext& context) {
-  const std::vector<VertexId> features = FeatureVertices(placed);
-  const std::vector<Sphere> masks = TemplateMasks(placed);
+FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, const TriMesh& implicit,
+                const TriMesh& shell, const RunContext& context) {
+  const HSplineSurface& rest = placed.face.surface;
+  const std::vector<VertexId> features = FeatureVertices(placed.face);
+  const std::vector<Sphere> masks = TemplateMasks(placed.face);
+  FitTarget dowels = placed.dowels;
   const MeshQuery query(implicit);
-  HSplineSurface surface = placed.surface;
-  if (!experiment.first_fit.empty()) {
-    FitOptions first = experiment.fit;
-    first.plan = ListedPlan{.schedule = experiment.first_fit, .aim = AimOf(experiment.fit.plan)};
-    first.relaxation = NoRelaxation{};
-    surface = Fit(surface, placed.surface, dowels, features, first, context).surface;
-  }
+  HSplineSurface surface = FirstFit(experiment, placed.face, dowels, context);
   std::optional<FaceFit> result;
   for (int round = 0; round < experiment.rounds; ++round) {
     context.Report("fit", fmt::format("round {} of {}", round + 1, experiment.rounds));
     SeedResult seeding = SeedDowels(surface, query, implicit, masks, experiment.seeds);
-    FitTarget target = dowels;
-    target.points.insert(target.points.end(), seeding.points.begin(), seeding.points.end());
-    target.anchors.resize(target.points.size());
-    if (LooksAtBone(experiment.fit.terms)) {
-      const std::vector<BoneAnchor> anchors = AnchorsOf(seeding.points, shell);
-      std::copy(anchors.begin(), anchors.end(), target.anchors.end() - std::ssize(anchors));
-    }
-    FitResult fit = Fit(surface, placed.surface, target, features, experiment.fit, context);
+    FitTarget target = WithSeeds(dowels, seeding.points, experiment.fit.terms, shell);
+    FitResult fit = Fit(surface, rest, target, features, experiment.fit, context);
     surface = fit.surface;
     for (std::size_t k = 0; k < dowels.points.size(); ++k) {
       dowels.points[k].uv = fit.uv[k];  // where relaxation has left them
@@ -128,7 +156,8 @@ FaceFit FitFace(const Experiment& experiment, const TemplateFace& placed, FitTar
 bool TakesTableAsExact(const Experiment& experiment, const Case& subject) {
   return experiment.tissue.depths == DepthSource::kTable &&
          experiment.uncertainty.dowel_sd_mm == 0 &&
-         std::ranges::any_of(subject.dowels, [](const Dowel& d) { return std::isnan(d.sd_mm); });
+         std::ranges::any_of(subject.dowels_on_bone,
+                             [](const Dowel& d) { return std::isnan(d.sd_mm); });
 }
 
 std::optional<FaceUncertainty> EstimateUncertainty(const Experiment& experiment,
@@ -163,7 +192,8 @@ std::optional<TruthComparison> Measure(const Experiment& experiment, const Skull
     return std::nullopt;
   }
   TruthComparison truth;
-  truth.region = FindFaceRegion(*subject.skin, subject.dowels, subject.network, experiment.region);
+  truth.region =
+      FindFaceRegion(*subject.skin, subject.dowels_on_bone, subject.network, experiment.region);
   truth.face = CompareFaces(*subject.skin, truth.region, face, context);
   truth.implicit = CompareFaces(*subject.skin, truth.region, skull.implicit.mesh, context);
   truth.depth = CompareDepths(experiment, *skull.depth_stage, context);
@@ -174,6 +204,11 @@ std::optional<TruthComparison> Measure(const Experiment& experiment, const Skull
   return truth;
 }
 
+std::shared_ptr<const TemplateFace> GenericFace(const TemplateSource& source, StageCache& cache) {
+  return cache.Get<TemplateFace>(StageKey("template", source),
+                                 [&source] { return LoadTemplate(source); });
+}
+
 }  // namespace
 
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache) {
@@ -182,36 +217,39 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   StageCache own_cache(4);
   StageCache& shared = cache ? *cache : own_cache;
   const auto skull = MakeSkullStage(experiment, shared, step, context);
-  Case subject = skull->depth_stage->subject;
-  const auto generic = step("make template", [&] {
-    return shared.Get<TemplateFace>(StageKey("template", experiment.face_template),
-                                    [&] { return MakeTemplateFace(experiment.face_template); });
-  });
-  const FitTarget dowels = DowelTarget(subject.dowels, *generic);
-  const Similarity face_from_template = PlaceOnDowels(*generic, dowels, experiment.placement);
-  TemplateFace placed = Placed(*generic, face_from_template);
-  FaceFit fitted = step("fit", [&] {
-    return FitFace(experiment, placed, dowels,
-                   SeedableFace(experiment, subject, skull->implicit.dense),
-                   skull->depth_stage->shell, context);
-  });
+  const DepthStage& bone = *skull->depth_stage;
+  Case subject = bone.subject;
+  const auto generic =
+      step("make template", [&] { return GenericFace(experiment.face_template, shared); });
+  std::ranges::copy(TemplateFiles(experiment.face_template), std::back_inserter(subject.inputs));
+  PlacedTemplate placed = Place(*generic, subject.dowels_on_bone, experiment.placement);
+  const TriMesh seedable = SeedableFace(experiment, subject, skull->implicit.dense);
+  FaceFit fitted =
+      step("fit", [&] { return FitFace(experiment, placed, seedable, bone.shell, context); });
   Tessellation face =
       step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
   std::optional<FaceUncertainty> uncertainty = step("uncertainty", [&] {
-    return EstimateUncertainty(experiment, *skull->depth_stage,
-                               {placed.surface, fitted.target, fitted.fit, face}, subject, context);
+    return EstimateUncertainty(
+        experiment, bone, {placed.face.surface, fitted.target, fitted.fit, face}, subject, context);
   });
   std::optional<TruthComparison> truth = step("measure", [&] {
-    return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(placed), context);
+    return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(placed.face), context);
   });
-  std::vector<FeatureDistortion> features = MeasureFeatures(placed, fitted.fit.surface);
-  return {std::move(subject),        skull->depth_stage->shell,
-          skull->depth_stage->depth, skull->implicit,
-          face_from_template,        std::move(placed),
-          std::move(fitted.seeding), std::move(fitted.target),
-          std::move(fitted.fit),     std::move(face),
-          std::move(uncertainty),    std::move(truth),
-          std::move(features),       step.Take()};
+  std::vector<FeatureDistortion> features = MeasureFeatures(placed.face, fitted.fit.surface);
+  return {.subject = std::move(subject),
+          .shell = bone.shell,
+          .depth = bone.depth,
+          .implicit = skull->implicit,
+          .face_from_template = placed.face_from_template,
+          .placed = std::move(placed.face),
+          .seeding = std::move(fitted.seeding),
+          .target = std::move(fitted.target),
+          .fit = std::move(fitted.fit),
+          .face = std::move(face),
+          .uncertainty = std::move(uncertainty),
+          .truth = std::move(truth),
+          .features = std::move(features),
+          .times = step.Take()};
 }
 
 }  // namespace semblance

@@ -34,7 +34,7 @@ struct CtVolume {
 double SampleHu(const CtVolume& volume, const Vec3& world);
 
 // Throws InputError, naming `where`, unless the volume is at least 2 voxels each way, its spacing
-// is positive and finite, and there is one value a voxel.
+// is positive and finite, and there is one value per voxel.
 void CheckVolume(const CtVolume& volume, const std::string& where);
 
 // Reads an InVesalius project (.inv3: a tar, gzipped or not, of `main.plist` and the matrix it

@@ -9,10 +9,10 @@
 namespace semblance {
 
 struct HalfMaximumOptions {
-  double reach_mm = 3;  // plateaus are looked for up to this far on either side
-  double most_move_mm = 1.5;
-  double step_mm = 0.25;
-  int smoothings = 2;  // of the moves, over neighbouring vertices: they follow noise else
+  double reach_mm = 3;        // plateaus are looked for up to this far on either side
+  double most_move_mm = 1.5;  // a vertex is moved no further
+  double step_mm = 0.25;      // between samples of the profile
+  int smoothings = 2;         // of the moves, over neighbouring vertices: they follow noise else
 };
 
 // A blurred edge lies midway between the plateaus on its two sides: the highest value within reach

@@ -21,12 +21,12 @@ constexpr auto EnumNames(CtEdges) {
 }
 
 struct CtImportOptions {
-  double bone_hu = 226;
-  double skin_hu = -200;
-  CtEdges edges = CtEdges::kThreshold;
-  double thinnest_head_mm = 8;
-  double widest_opening_mm = 12;
-  double smallest_bone_cm2 = 3;
+  double bone_hu = 226;                 // the skull's surface
+  double skin_hu = -200;                // the skin's surface; between air and fat
+  CtEdges edges = CtEdges::kThreshold;  // half_maximum moves the surfaces between the plateaus
+  double thinnest_head_mm = 8;          // thinner things apart from the head are dropped
+  double widest_opening_mm = 12;        // air behind narrower openings is inside
+  double smallest_bone_cm2 = 3;         // smaller pieces of bone are dropped
 };
 template <class Visitor>
 void Fields(Visitor& visit, CtImportOptions& o) {

@@ -60,33 +60,33 @@ void DistancePass(int axis, const VoxelGrid& grid, double reach_mm, int threads,
 }  // namespace
 
 VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid) {
-  VoxelComponents pieces;
-  pieces.of_voxel.assign(mask.size(), -1);
+  VoxelComponents components;
+  components.of_voxel.assign(mask.size(), -1);
   std::vector<std::int64_t> open;
   for (std::int64_t start = 0; start < grid.Count(); ++start) {
-    if (!mask[start] || pieces.of_voxel[start] >= 0) {
+    if (!mask[start] || components.of_voxel[start] >= 0) {
       continue;
     }
-    const auto piece = static_cast<std::int32_t>(pieces.sizes.size());
-    pieces.sizes.push_back(1);
-    pieces.of_voxel[start] = piece;
+    const auto component = static_cast<std::int32_t>(components.sizes.size());
+    components.sizes.push_back(1);
+    components.of_voxel[start] = component;
     open.assign(1, start);
     while (!open.empty()) {
       const std::int64_t voxel = open.back();
       open.pop_back();
       ForNeighbours(grid, voxel, [&](std::int64_t next) {
-        if (mask[next] && pieces.of_voxel[next] < 0) {
-          pieces.of_voxel[next] = piece;
-          ++pieces.sizes[piece];
+        if (mask[next] && components.of_voxel[next] < 0) {
+          components.of_voxel[next] = component;
+          ++components.sizes[component];
           open.push_back(next);
         }
       });
     }
   }
-  return pieces;
+  return components;
 }
 
-VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& seeds, const VoxelGrid& grid) {
+VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGrid& grid) {
   VoxelMask reached(allowed.size(), 0);
   std::vector<std::int64_t> open;
   const auto visit = [&](std::int64_t voxel) {
@@ -96,7 +96,7 @@ VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& seeds, const VoxelGri
     }
   };
   for (std::int64_t start = 0; start < grid.Count(); ++start) {
-    if (seeds[start]) {
+    if (starts[start]) {
       visit(start);
     }
     while (!open.empty()) {

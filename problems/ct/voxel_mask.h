@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sets of voxels: pieces, floods, and growing by a distance.
+// Sets of voxels: connected components, flooding, and dilation by a distance.
 #pragma once
 
 #include <array>
@@ -21,20 +21,20 @@ struct VoxelGrid {
   std::int64_t Count() const { return std::int64_t{counts[0]} * counts[1] * counts[2]; }
 };
 
-// One entry a voxel, 1 in the set, 0 not.
+// One entry per voxel, 1 in the set, 0 not.
 using VoxelMask = std::vector<std::uint8_t>;
 
-// The piece of each voxel by shared faces, numbered 0, 1, ... in order of the first voxel; -1 where
-// the mask is 0.
+// The component of each voxel by shared faces, numbered 0, 1, ... in order of the first voxel; -1
+// where the mask is 0.
 struct VoxelComponents {
   std::vector<std::int32_t> of_voxel;
-  std::vector<std::int64_t> sizes;  // voxels, one a piece
+  std::vector<std::int64_t> sizes;  // voxels, one per component
 };
 VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid);
 
-// The voxels of `allowed` that can be reached from those of `seeds` that are in it, by shared
-// faces.
-VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& seeds, const VoxelGrid& grid);
+// The voxels of `allowed` that can be reached by shared faces from those of `starts` that are in
+// it.
+VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGrid& grid);
 
 // The voxels whose centre is within distance_mm (>= 0) of the centre of one in the mask. Exact.
 VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads);

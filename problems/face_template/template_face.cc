@@ -6,7 +6,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <set>
 #include <utility>
 
@@ -128,12 +127,12 @@ void AddDetail(HSplineSurface& surface, int level, double tolerance_mm) {
   surface.SetNet(level, net);
 }
 
-struct FeatureRegion {
+struct HeadFeature {
   const char* name;
   Sphere region;
 };
 
-const FeatureRegion kRegions[] = {
+const HeadFeature kHeadFeatures[] = {
     {"nose", {{0, -6, -36}, 26}},
     {"mouth", {{0, -4, -74}, 27}},
     {"eye_l", {{31.5, 14, -3}, 19}},
@@ -157,7 +156,7 @@ std::vector<VertexId> VerticesInside(const HSplineSurface& surface, const Sphere
   return inside;
 }
 
-void CheckOptions(const TemplateOptions& o) {
+void CheckOptions(const FormulaTemplate& o) {
   const auto check = [](const char* name, double value, double least, double most) {
     if (!(value >= least && value <= most)) {
       throw InputError(
@@ -182,7 +181,7 @@ void Disturb(double error, std::uint64_t random_seed, std::map<std::string, Vec2
 
 }  // namespace
 
-TemplateFace MakeTemplateFace(const TemplateOptions& options) {
+TemplateFace MakeTemplateFace(const FormulaTemplate& options) {
   CheckOptions(options);
   const HSplineShape shape{.patches_u = options.patches_u,
                            .patches_v = options.patches_v,
@@ -195,7 +194,7 @@ TemplateFace MakeTemplateFace(const TemplateOptions& options) {
     AddDetail(surface, level, options.detail_tolerance_mm);
   }
   TemplateFace face{.surface = std::move(surface), .site_uv = TemplateSites(), .features = {}};
-  for (const FeatureRegion& f : kRegions) {
+  for (const HeadFeature& f : kHeadFeatures) {
     face.features.push_back({f.name, VerticesInside(face.surface, f.region), f.region});
   }
   if (options.site_error > 0) {
@@ -224,23 +223,6 @@ std::vector<Sphere> TemplateMasks(const TemplateFace& face) {
 
 Sphere Transformed(const Sphere& sphere, const Similarity& to_from) {
   return {to_from * sphere.center, to_from.scale * sphere.radius_mm};
-}
-
-TemplateResidual ResidualToFormula(const HSplineSurface& surface, int samples_u, int samples_v) {
-  TemplateResidual residual{.rms_mm = 0, .max_mm = -1};
-  for (int j = 0; j < samples_v; ++j) {
-    for (int i = 0; i < samples_u; ++i) {
-      const Vec2 uv(i / (samples_u - 1.0), j / (samples_v - 1.0));
-      const double d = (surface.Point(uv) - HeadPoint(uv.x(), uv.y())).norm();
-      residual.rms_mm += d * d;
-      if (d > residual.max_mm) {
-        residual.max_mm = d;
-        residual.worst_uv = uv;
-      }
-    }
-  }
-  residual.rms_mm = std::sqrt(residual.rms_mm / (static_cast<double>(samples_u) * samples_v));
-  return residual;
 }
 
 }  // namespace semblance

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "surfaces/base/fields.h"
@@ -14,18 +15,19 @@
 
 namespace semblance {
 
-struct TemplateOptions {
+struct FormulaTemplate {
+  static constexpr std::string_view kName = "formula";
   int patches_u = 8;                 // of level 0, from ear to ear
   int patches_v = 8;                 // of level 0, from throat to crown
   int max_level = 3;                 // finest level that holds detail
   double detail_tolerance_mm = 0.1;  // a level keeps a vertex that moves by more than this
-  OffsetReference reference = OffsetReference::kFrame;
-  double site_error = 0;               // part of the domain
-  std::uint64_t site_random_seed = 1;  // of the errors
+  OffsetReference reference = OffsetReference::kFrame;  // world: detail does not turn with the face
+  double site_error = 0;                                // part of the domain
+  std::uint64_t site_random_seed = 1;                   // of the errors
 };
 
 template <class Visitor>
-void Fields(Visitor& visit, TemplateOptions& o) {
+void Fields(Visitor& visit, FormulaTemplate& o) {
   visit(FieldInfo{.name = "patches_u",
                   .min = 4,
                   .max = 16,
@@ -80,7 +82,7 @@ struct TemplateFace {
 // finer level adds offsets where its own least-squares fit differs. Mirror symmetric, (u,v) ->
 // (1-u,v) is x -> -x. All 32 sites; features nose, mouth, eye_l, eye_r. Throws InputError if an
 // option is out of range.
-TemplateFace MakeTemplateFace(const TemplateOptions& options);
+TemplateFace MakeTemplateFace(const FormulaTemplate& options);
 
 // The vertices of all features, each once, sorted: what a fit restores.
 std::vector<VertexId> FeatureVertices(const TemplateFace& face);
@@ -90,14 +92,5 @@ std::vector<Sphere> TemplateMasks(const TemplateFace& face);
 
 // The sphere that a similarity makes of a sphere.
 Sphere Transformed(const Sphere& sphere, const Similarity& to_from);
-
-// How far the surface is from HeadPoint at the same (u,v), over a grid of samples_u x samples_v
-// points (>= 2 each).
-struct TemplateResidual {
-  double rms_mm = kNaN;
-  double max_mm = kNaN;
-  Vec2 worst_uv = Vec2::Constant(kNaN);
-};
-TemplateResidual ResidualToFormula(const HSplineSurface& surface, int samples_u, int samples_v);
 
 }  // namespace semblance

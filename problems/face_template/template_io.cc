@@ -10,8 +10,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "problems/face_template/template_sites.h"
 #include "problems/output/files.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
@@ -28,7 +28,7 @@ constexpr int kVersion = 1;
 // ---------------------------------------------------------------------------------------------
 
 void CheckSites(const TemplateFace& face) {
-  for (const std::string& code : TemplateSiteCodes()) {
+  for (const std::string& code : StandardSiteCodes()) {
     if (!face.site_uv.contains(code)) {
       throw InputError(
           fmt::format("site '{}' is missing; a template needs the (u,v) of all 32 sites", code));
@@ -160,6 +160,25 @@ TemplateFace FaceFrom(const Json& json, HSplineSurface surface) {
   return face;
 }
 
+std::filesystem::path SurfacePath(const std::filesystem::path& path, const Json& json) {
+  return path.parent_path() / json.at("surface").get<std::string>();
+}
+
+// What parse(json) makes of the file. Faults are told in one line that starts with its path.
+template <class Parse>
+auto ReadJson(const std::filesystem::path& path, const Parse& parse) {
+  const std::string text = ReadFileBytes(path);
+  try {
+    const Json json = Json::parse(text);
+    CheckFormat(json);
+    return parse(json);
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(fmt::format("{}: not a template file: {}", path.string(), error.what()));
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", path.string(), error.what()));
+  }
+}
+
 }  // namespace
 
 void WriteTemplate(const std::filesystem::path& path, const TemplateFace& face) {
@@ -175,17 +194,14 @@ void WriteTemplate(const std::filesystem::path& path, const TemplateFace& face) 
 }
 
 TemplateFace ReadTemplate(const std::filesystem::path& path) {
-  const std::string text = ReadFileBytes(path);
-  try {
-    const Json json = Json::parse(text);
-    CheckFormat(json);
-    const auto surface = path.parent_path() / json.at("surface").get<std::string>();
+  return ReadJson(path, [&](const Json& json) {
+    const std::filesystem::path surface = SurfacePath(path, json);
     return FaceFrom(json, HSplineFromJson(ReadFileBytes(surface), surface.string()));
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError(fmt::format("{}: not a template file: {}", path.string(), error.what()));
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", path.string(), error.what()));
-  }
+  });
+}
+
+std::filesystem::path SurfaceFileOf(const std::filesystem::path& path) {
+  return ReadJson(path, [&](const Json& json) { return SurfacePath(path, json); });
 }
 
 }  // namespace semblance

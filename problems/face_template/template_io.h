@@ -20,4 +20,8 @@ void WriteTemplate(const std::filesystem::path& path, const TemplateFace& face);
 // that is not positive. Sites beyond the 32 are kept.
 TemplateFace ReadTemplate(const std::filesystem::path& path);
 
+// The file of the surface that the template file `path` names. Throws IoError if `path` cannot be
+// read, InputError if it is not a template file.
+std::filesystem::path SurfaceFileOf(const std::filesystem::path& path);
+
 }  // namespace semblance

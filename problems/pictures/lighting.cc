@@ -87,7 +87,7 @@ std::vector<Light> LightsInView(Lighting lighting) {
 }
 
 // What is nearest to a light, seen from it.
-struct DepthMap {
+struct ShadowMap {
   Projection projection;
   std::vector<float> depth;  // kMapSize^2, row by row; infinite where nothing is
 };
@@ -100,10 +100,10 @@ Mat3 ViewTowards(const Vec3& to_viewer) {
   return view;
 }
 
-DepthMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const Box3& box,
-               const Vec3& to_light) {
+ShadowMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const Box3& box,
+                const Vec3& to_light) {
   const double diameter = std::max(box.diagonal().norm(), 1e-9);
-  DepthMap map{
+  ShadowMap map{
       .projection = {.view_from_world = ViewTowards(to_light),
                      .centre = box.center(),
                      .samples_per_mm = (kMapSize - 4) / diameter,
@@ -135,7 +135,7 @@ Rgb Passed(float thickness_mm, const Rgb& scatter_mm) {
 }
 
 // Between the four texels around the point: 1 in the open, towards 0 behind matter.
-Rgb LightThrough(const DepthMap& map, const Vec3& p, const Rgb& scatter_mm) {
+Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
   const RasterPoint at = map.projection * p;
   const float texel_mm = static_cast<float>(1 / map.projection.samples_per_mm);
   const std::int32_t half = kSubsamples / 2;
@@ -156,7 +156,7 @@ Rgb LightThrough(const DepthMap& map, const Vec3& p, const Rgb& scatter_mm) {
 }
 
 void LightVertex(const Material& material, const std::vector<Light>& lights,
-                 const std::vector<DepthMap>& maps, SceneVertex& vertex) {
+                 const std::vector<ShadowMap>& maps, SceneVertex& vertex) {
   const Rgb scatter = material.scatter_mm.cast<float>().array();
   const auto wrap = static_cast<float>(material.wrap);
   float key_all = 0, key_seen = 0;
@@ -207,7 +207,7 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
   if (box.isEmpty()) {
     box = Box3(Vec3::Zero(), Vec3::Zero());  // nothing casts shadows
   }
-  std::vector<DepthMap> maps(lights.size());
+  std::vector<ShadowMap> maps(lights.size());
   ParallelFor(lights.size(), threads, 1,
               [&](std::size_t i) { maps[i] = MapOf(flat, casts, box, lights[i].to_light); });
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {

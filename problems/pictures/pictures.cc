@@ -36,7 +36,7 @@ void CheckSheet(std::span<const Image> pictures, const Sheet& sheet) {
   }
   if (!sheet.captions.empty() && sheet.captions.size() != pictures.size()) {
     throw InputError(
-        fmt::format("contact sheet: {} captions for {} pictures; give one a picture or none",
+        fmt::format("contact sheet: {} captions for {} pictures; give one per picture or none",
                     sheet.captions.size(), pictures.size()));
   }
 }
@@ -65,7 +65,7 @@ SceneObject DowelObject(std::span<const Dowel> dowels, double radius_mm) {
 
 SceneObject MappedObject(TriMesh mesh, std::span<const double> values_mm, const ColourMap& map) {
   if (values_mm.size() != mesh.points.size()) {
-    throw InputError(fmt::format("coloured surface: {} values for {} points; give one a point",
+    throw InputError(fmt::format("coloured surface: {} values for {} points; give one per point",
                                  values_mm.size(), mesh.points.size()));
   }
   return {.mesh = std::move(mesh),

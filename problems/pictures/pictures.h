@@ -17,22 +17,22 @@ namespace semblance {
 SceneObject SkullObject(TriMesh mesh);
 SceneObject SkinObject(TriMesh mesh, double opacity = 1);
 
-// One red cylinder a dowel from base to tip, with a sphere at the tip. radius_mm > 0. A dowel with
-// no finite tip, or no depth, is left out.
+// One red cylinder per dowel from base to tip, with a sphere at the tip. radius_mm > 0. A dowel
+// with no finite tip, or no depth, is left out.
 SceneObject DowelObject(std::span<const Dowel> dowels, double radius_mm = 1.1);
 
-// Matte, coloured by one value a vertex; NaN is grey. For Lighting::kEven. Throws InputError if the
-// numbers of values and points differ.
+// Matte, coloured by one value per vertex; NaN is grey. For Lighting::kEven. Throws InputError if
+// the numbers of values and points differ.
 SceneObject MappedObject(TriMesh mesh, std::span<const double> values_mm, const ColourMap& map);
 
 struct Sheet {
   std::string title;                  // above all; may be empty
-  std::vector<std::string> captions;  // one a picture, or none
+  std::vector<std::string> captions;  // one per picture, or none
   std::optional<Legend> legend;       // below all
 };
 
 // Pictures side by side on white, in order. Throws InputError without a picture, or with captions
-// that are not one a picture.
+// that are not one per picture.
 Image ContactSheet(std::span<const Image> pictures, const Sheet& sheet);
 
 // One Render a view, framed to `region` and all at one scale, on one sheet.

@@ -31,7 +31,7 @@ void CheckObject(const SceneObject& object, std::size_t index) {
   }
   if (colours != 0 && colours != points) {
     throw InputError(
-        fmt::format("scene object {}: {} vertex colours for {} points; give one a point or none",
+        fmt::format("scene object {}: {} vertex colours for {} points; give one per point or none",
                     index, colours, points));
   }
   for (std::size_t i = 0; i < points; ++i) {

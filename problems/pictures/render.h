@@ -29,7 +29,7 @@ Material MatteMaterial();                        // for colours that stand for n
 struct SceneObject {
   TriMesh mesh;
   Material material;
-  std::vector<Colour> vertex_colours = {};  // one a vertex, or none: material.colour
+  std::vector<Colour> vertex_colours = {};  // one per vertex, or none: material.colour
   // Seen face on; at a slant more, as through a thin sheet: 1 - (1 - opacity)^(1 / cos). Behind the
   // nearest surface with opacity < 1 only opaque ones are seen.
   double opacity = 1;
@@ -90,7 +90,7 @@ void Fields(Visitor& visit, RenderOptions& o) {
 
 // Throws InputError for options out of range, a camera without height, a point that is not finite,
 // a triangle that names a point which is not there, an opacity outside 0..1 or colours that are not
-// one a vertex. An empty scene shows the background. threads >= 1; the picture does not depend on
+// one per vertex. An empty scene shows the background. threads >= 1; the picture does not depend on
 // it.
 Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads);
 

@@ -107,12 +107,12 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
   Case subject{.name = data.landmarks.subject,
                .skull = data.skull,
                .skin = data.skin,
-               .dowels = PlaceDowels(data.landmarks, data.skull, experiment.landmarks),
+               .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, experiment.landmarks),
                .network = {},
                .notes = data.notes,
                .inputs = data.inputs};
-  Append(subject.notes, FillDepths(experiment.tissue, data.landmarks, subject.dowels));
-  subject.network = BuildNetwork(ReadNetworkPlan(experiment.network), subject.dowels);
+  Append(subject.notes, FillDepths(experiment.tissue, data.landmarks, subject.dowels_on_bone));
+  subject.network = BuildNetwork(ReadNetworkPlan(experiment.network), subject.dowels_on_bone);
   if (subject.network.areas.empty()) {
     throw InputError(fmt::format(
         "{}: no area of the dowel network has all its three dowels; more landmarks are needed",

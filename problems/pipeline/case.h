@@ -25,9 +25,9 @@ struct Case {
   std::string name;
   TriMesh skull;
   std::optional<TriMesh> skin;
-  std::vector<Dowel> dowels;       // with depths
-  DowelNetwork network;            // of those dowels
-  std::vector<std::string> notes;  // what a reader of the result should know, a line each
+  std::vector<Dowel> dowels_on_bone;  // with depths
+  DowelNetwork network;               // of those dowels
+  std::vector<std::string> notes;     // what a reader of the result should know, a line each
   std::vector<std::filesystem::path> inputs;  // for the manifest
 };
 

@@ -49,7 +49,7 @@ DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& st
                               const RunContext& context) {
   DepthComparison comparison;
   comparison.region =
-      FindFaceRegion(stage.shell, stage.standing, stage.subject.network, experiment.region);
+      FindFaceRegion(stage.shell, stage.dowels_on_shell, stage.subject.network, experiment.region);
   comparison.directions = DepthDirections(experiment.direction, stage.Input(), context);
   comparison.truth = MeasureDepthTruth(stage.shell, comparison.directions, *stage.subject.skin,
                                        experiment.depth_truth, context);

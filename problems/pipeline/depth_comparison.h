@@ -16,7 +16,7 @@ namespace semblance {
 struct DepthErrors {
   DistanceSummary all;
   std::map<std::string, DistanceSummary> regions;  // by part of the face
-  std::vector<double> error_mm;         // one a vertex of the shell; NaN where not scored
+  std::vector<double> error_mm;         // one per vertex of the shell; NaN where not scored
   std::map<TruthStatus, int> vertices;  // of the scored region, by what the truth says
   std::vector<double> coverage;         // of the area with a stated sd_mm (interp/calibration.h)
   double coverage_90 = kNaN;            // its share at 90 %

@@ -38,7 +38,7 @@ double HeightOfShell(const Dowel& dowel, const TriMesh& shell, const MeshQuery& 
   return beyond > 0 ? beyond : GapUnderShell(dowel, shell, query);
 }
 
-// A place where the shell is too high.
+// Where the shell is too high.
 struct Dimple {
   Vec3 at, inward;
   double depth_mm = 0, radius_mm = 0;
@@ -61,32 +61,32 @@ double RoomOverBone(const Vec3& p, const Vec3& inward, double at_most_mm, const 
 std::vector<Dimple> DimplesOf(std::span<const Dowel> dowels, const TriMesh& shell,
                               double press_mm) {
   const MeshQuery query(shell);
-  std::vector<Dimple> dents;
+  std::vector<Dimple> dimples;
   for (const Dowel& dowel : dowels) {
     const double height = HeightOfShell(dowel, shell, query),
                  wanted = dowel.depth_mm - std::min(press_mm, dowel.depth_mm);
     if (height > wanted) {
       const double depth = height - wanted;
-      dents.push_back({dowel.base + height * dowel.direction, -dowel.direction, depth,
-                       std::max(10.0, 2.5 * depth)});
+      dimples.push_back({dowel.base + height * dowel.direction, -dowel.direction, depth,
+                         std::max(10.0, 2.5 * depth)});
     }
   }
-  return dents;
+  return dimples;
 }
 
 }  // namespace
 
-TriMesh IndentShell(TriMesh shell, std::span<const Dowel> dowels, const TriMesh& bone,
+TriMesh IndentShell(TriMesh shell, std::span<const Dowel> dowels_on_bone, const TriMesh& bone,
                     double press_mm) {
-  const std::vector<Dimple> dents =
-      press_mm > 0 ? DimplesOf(dowels, shell, press_mm) : std::vector<Dimple>();
-  if (dents.empty()) {
+  const std::vector<Dimple> dimples =
+      press_mm > 0 ? DimplesOf(dowels_on_bone, shell, press_mm) : std::vector<Dimple>();
+  if (dimples.empty()) {
     return shell;
   }
   const MeshQuery query(bone);
   for (Vec3& p : shell.points) {
-    const auto deepest =
-        std::ranges::max_element(dents, {}, [&p](const Dimple& dent) { return dent.DepthAt(p); });
+    const auto deepest = std::ranges::max_element(
+        dimples, {}, [&p](const Dimple& dimple) { return dimple.DepthAt(p); });
     if (const double depth = deepest->DepthAt(p); depth > 0) {
       p += RoomOverBone(p, deepest->inward, depth, query) * deepest->inward;
     }
@@ -94,12 +94,12 @@ TriMesh IndentShell(TriMesh shell, std::span<const Dowel> dowels, const TriMesh&
   return shell;
 }
 
-ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels, const TriMesh& shell,
+ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels_on_bone, const TriMesh& shell,
                                  double least_depth_mm) {
   constexpr double kWorthSaying_mm = 1;
   const MeshQuery query(shell);
   ProjectedDowels result;
-  for (Dowel dowel : dowels) {
+  for (Dowel dowel : dowels_on_bone) {
     const double beyond = WayOut(dowel, shell, query);
     const double gap = HeightOfShell(dowel, shell, query);
     if (beyond > 0) {
@@ -116,7 +116,7 @@ ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels, const TriMesh& s
     }
     dowel.base += gap * dowel.direction;
     dowel.depth_mm = std::max(dowel.depth_mm - gap, std::min(least_depth_mm, dowel.depth_mm));
-    result.dowels.push_back(dowel);
+    result.dowels_on_shell.push_back(dowel);
   }
   return result;
 }

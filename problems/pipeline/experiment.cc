@@ -3,23 +3,45 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+#include <string>
 #include <utility>
+#include <variant>
 
 #include "fitting/plan/fit_check.h"
+#include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
+// What the options may say of levels, given the generic face.
+struct TemplateLevels {
+  int finest = 0;
+  std::string remedy;  // for a level beyond it
+};
+
+// Of a file that cannot be used: any level. What is wrong with the file the run says.
+TemplateLevels LevelsOf(const TemplateSource& source) {
+  if (const auto* formula = std::get_if<FormulaTemplate>(&source)) {
+    return {formula->max_level, "raise template.max_level"};
+  }
+  try {
+    return {LoadTemplate(source).surface.shape().max_level, "take a template with more levels"};
+  } catch (const Error&) {
+    return {std::numeric_limits<int>::max(), ""};
+  }
+}
+
 class LevelCheck {
  public:
-  explicit LevelCheck(int finest) : finest_(finest) {}
+  explicit LevelCheck(TemplateLevels levels) : levels_(std::move(levels)) {}
 
   void At(std::string path, int level) {
-    if (level > finest_) {
-      faults_.push_back(
-          {std::move(path), fmt::format("level {} is finer than the surface, whose finest level is "
-                                        "{}; give a level up to that, or raise template.max_level",
-                                        level, finest_)});
+    if (level > levels_.finest) {
+      faults_.push_back({std::move(path),
+                         fmt::format("level {} is finer than the surface, whose finest level "
+                                     "is {}; give a level up to that, or {}",
+                                     level, levels_.finest, levels_.remedy)});
     }
   }
   void Steps(const std::string& path, const std::vector<ScheduleStep>& steps) {
@@ -30,20 +52,21 @@ class LevelCheck {
   std::vector<OptionFault> Take() { return std::move(faults_); }
 
  private:
-  int finest_;
+  TemplateLevels levels_;
   std::vector<OptionFault> faults_;
 };
 
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) {
-  LevelCheck check(experiment.face_template.max_level);
+  const TemplateLevels levels = LevelsOf(experiment.face_template);
+  LevelCheck check(levels);
   check.Steps("first_fit", experiment.first_fit);
   check.At("seeds.direction_level", experiment.seeds.direction_level);
   std::vector<OptionFault> faults = check.Take();
-  for (const FitFault& fault : FaultsOf(experiment.fit, experiment.face_template.max_level)) {
+  for (const FitFault& fault : FaultsOf(experiment.fit, levels.finest)) {
     faults.push_back({"fit." + fault.path,
-                      fault.too_fine ? fault.what + ", or raise template.max_level" : fault.what});
+                      fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
   return faults;
 }

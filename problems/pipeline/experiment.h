@@ -11,13 +11,13 @@
 #include "fitting/fit.h"
 #include "fitting/problem/placement.h"
 #include "fitting/problem/seeding.h"
-#include "interp/depth_scheme.h"
 #include "interp/evaluation/depth_direction.h"
 #include "interp/evaluation/depth_truth.h"
+#include "interp/interpolate_depth.h"
 #include "interp/schemes/outside_rule.h"
 #include "problems/config/config_errors.h"
 #include "problems/ct/import_ct.h"
-#include "problems/face_template/template_face.h"
+#include "problems/face_template/template_source.h"
 #include "problems/metrics/face_region.h"
 #include "problems/pipeline/uncertainty_options.h"
 #include "problems/subject/dowel_depths.h"
@@ -62,19 +62,20 @@ void Fields(Visitor& visit, CtSubject& o) {
         o.import);
 }
 
-// How dowels are left out to see how well the others foretell them (`semblance depth`, and studies
+// How dowels are left out to see how well the others predict them (`semblance depth`, and studies
 // with `job: depth`): a landmark of both sides, a side, and one of `folds` random parts at a time.
 struct CrossValidationOptions {
-  int folds = 5;
-  std::uint64_t random_seed = 1;
+  int folds = 5;                  // random parts
+  std::uint64_t random_seed = 1;  // which dowels are left out together
 };
 template <class Visitor>
 void Fields(Visitor& visit, CrossValidationOptions& o) {
-  visit(FieldInfo{.name = "folds",
-                  .min = 2,
-                  .max = 1000,
-                  .doc = "random parts of the dowels, each left out in turn; at most one a dowel"},
-        o.folds);
+  visit(
+      FieldInfo{.name = "folds",
+                .min = 2,
+                .max = 1000,
+                .doc = "random parts of the dowels, each left out in turn; at most one per dowel"},
+      o.folds);
   visit(FieldInfo{.name = "random_seed", .doc = "which dowels are left out together"},
         o.random_seed);
 }
@@ -83,26 +84,26 @@ using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
 struct Experiment {
   std::string title = "untitled";
-  Subject subject;
-  PlaceOptions landmarks;
-  TissueOptions tissue;
-  std::filesystem::path network;
-  DepthScheme interp;
-  OutsideRule outside;
-  SkullFill fill;
-  ImplicitFaceOptions implicit;
-  TemplateOptions face_template;
-  PlacementOptions placement;
+  Subject subject;                // whose skull
+  PlaceOptions landmarks;         // how they are laid onto bone
+  TissueOptions tissue;           // where the dowels' depths come from
+  std::filesystem::path network;  // which dowels share an area
+  DepthScheme interp;             // depth between the dowels
+  OutsideRule outside;            // depth outside the network
+  SkullFill fill;                 // how temples, orbits and gaps are bridged
+  ImplicitFaceOptions implicit;   // the implicit surface and its polygons
+  TemplateSource face_template;   // `template`: the generic face
+  PlacementOptions placement;     // how it is brought to the dowels
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
-  double cut_margin_mm = 5;
-  int rounds = 1;
+  double cut_margin_mm = 5;             // no seeds nearer to where the scan ends
+  int rounds = 1;                       // of seeding and fitting
   FitOptions fit = {.relaxation = FootpointRelaxation{}};
-  UncertaintyOptions uncertainty;
-  FaceRegionOptions region;
-  DepthDirection direction;
-  DepthTruthOptions depth_truth;
-  CrossValidationOptions cross_validation;
+  UncertaintyOptions uncertainty;           // how far the face may be off
+  FaceRegionOptions region;                 // which skin is scored
+  DepthDirection direction;                 // along which depths are compared
+  DepthTruthOptions depth_truth;            // what counts as a true depth
+  CrossValidationOptions cross_validation;  // for depth alone
 };
 template <class Visitor>
 void Fields(Visitor& visit, Experiment& o) {
@@ -119,7 +120,9 @@ void Fields(Visitor& visit, Experiment& o) {
         o.outside);
   visit(FieldInfo{.name = "fill", .doc = "how temples, orbits and gaps are bridged"}, o.fill);
   visit(FieldInfo{.name = "implicit", .doc = "the implicit surface and its polygons"}, o.implicit);
-  visit(FieldInfo{.name = "template", .doc = "the generic face"}, o.face_template);
+  visit(FieldInfo{.name = "template",
+                  .doc = "the generic face: by the built-in formula, or from a file"},
+        o.face_template);
   visit(FieldInfo{.name = "placement", .doc = "how the generic face is brought to the dowels"},
         o.placement);
   visit(FieldInfo{.name = "first_fit",

@@ -23,12 +23,15 @@ DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
   });
   const auto* const wrap = std::get_if<WrapFill>(&e.fill);
   TriMesh pressed =
-      wrap ? IndentShell(*shell, subject.dowels, data->skull, wrap->press_mm) : *shell;
-  ProjectedDowels standing = ProjectOntoShell(subject.dowels, pressed, kLeastDepth_mm);
-  subject.notes.insert(subject.notes.end(), standing.notes.begin(), standing.notes.end());
+      wrap ? IndentShell(*shell, subject.dowels_on_bone, data->skull, wrap->press_mm) : *shell;
+  ProjectedDowels projected = ProjectOntoShell(subject.dowels_on_bone, pressed, kLeastDepth_mm);
+  subject.notes.insert(subject.notes.end(), projected.notes.begin(), projected.notes.end());
   std::vector<Vec3> normals = VertexNormals(pressed);
-  DepthStage stage{
-      std::move(subject), std::move(pressed), std::move(normals), std::move(standing.dowels), {}};
+  DepthStage stage{std::move(subject),
+                   std::move(pressed),
+                   std::move(normals),
+                   std::move(projected.dowels_on_shell),
+                   {}};
   stage.depth = step("interpolate depth", [&] {
     return ApplyOutsideRule(e.outside, stage.Input(),
                             InterpolateDepth(e.interp, stage.Input(), context), context);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Keys of the stage cache: what a value is made from, as text.
+// Keys of the stage cache: what a value is made from, as text. Apart from stage_cache.h, whose
+// users need not know how options are written.
 #pragma once
 
 #include <string>
@@ -8,7 +9,7 @@
 
 namespace semblance {
 
-// The stage's name and the resolved options, one a line. Paths stand as they are: a file must not
+// The stage's name and the resolved options, one per line. Paths stand as they are: a file must not
 // change while a cache lives.
 template <class... Options>
 std::string StageKey(const char* stage, const Options&... options) {

@@ -23,8 +23,9 @@ struct SigmaCoverage {
 };
 
 struct FaceUncertainty {
-  std::vector<double> sigma_mm;  // one a vertex of the tessellated face; NaN where nothing is known
-  double median_mm = kNaN;       // of sigma by area, over the vertices that dowels or seeds hold
+  std::vector<double>
+      sigma_mm;             // one per vertex of the tessellated face; NaN where nothing is known
+  double median_mm = kNaN;  // of sigma by area, over the vertices that dowels or seeds hold
   double p95_mm = kNaN;
   double prior_sd = kNaN;             // ErrorPropagation::prior_sd
   double depth_length_mm = kNaN;      // over which depths resemble each other (Kriging)
@@ -42,7 +43,7 @@ struct FittedFace {
 };
 
 // The depths' errors are a Gaussian process over the skull. Kriging states its own, with its
-// covariance between places. The error of any other has three parts: that between exact dowels,
+// covariance between points. The error of any other has three parts: that between exact dowels,
 // which kriging without a nugget states for the subject's dowels; what the scheme differs from that
 // kriging, taken as one deviation; and that of the dowels themselves, of the deviation that the
 // scheme states there (where it states none, the dowels' by inverse squared distance) and

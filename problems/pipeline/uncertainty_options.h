@@ -9,18 +9,19 @@
 namespace semblance {
 
 struct UncertaintyOptions {
-  bool sigma = true;
-  int samples = 0;
-  std::uint64_t random_seed = 1;
-  double dowel_sd_mm = 0;
-  double implicit_sd_mm = 0.5;
+  bool sigma = true;              // sigma_mm per vertex of face.ply
+  int samples = 0;                // faces to draw
+  std::uint64_t random_seed = 1;  // which faces
+  double dowel_sd_mm = 0;         // where the depth's source states none; 0: exact
+  double implicit_sd_mm = 0.5;    // of the implicit face even where all depths are right
 };
 template <class Visitor>
 void Fields(Visitor& visit, UncertaintyOptions& o) {
-  visit(FieldInfo{.name = "sigma",
-                  .doc = "give each vertex of face.ply the standard deviation of its place along "
-                         "the normal, sigma_mm"},
-        o.sigma);
+  visit(
+      FieldInfo{.name = "sigma",
+                .doc = "give each vertex of face.ply the standard deviation of its position along "
+                       "the normal, sigma_mm"},
+      o.sigma);
   visit(FieldInfo{.name = "samples",
                   .min = 0,
                   .max = 1000,

@@ -76,7 +76,7 @@ Json DepthToJson(const DepthField& depth, const Case& subject) {
                {"min_mm", nullptr},
                {"mean_mm", nullptr},
                {"max_mm", nullptr},
-               {"dowels", subject.dowels.size()},
+               {"dowels", subject.dowels_on_bone.size()},
                {"areas", subject.network.areas.size()}};
   if (!assigned.empty()) {
     json["min_mm"] = *std::min_element(assigned.begin(), assigned.end());

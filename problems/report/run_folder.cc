@@ -107,7 +107,7 @@ std::string DowelsCsv(const RunResult& result) {
   CsvWriter csv({"site", "base_x_mm", "base_y_mm", "base_z_mm", "direction_x", "direction_y",
                  "direction_z", "depth_mm", "sd_mm", "tip_x_mm", "tip_y_mm", "tip_z_mm", "u", "v",
                  "fit_residual_mm"});
-  for (const Dowel& d : result.subject.dowels) {
+  for (const Dowel& d : result.subject.dowels_on_bone) {
     const int index = TargetIndex(result.target, d.site);
     const Vec2 uv = index < 0 ? Vec2(kNaN, kNaN) : result.fit.uv[index];
     const Vec3 tip = d.Tip();

@@ -16,7 +16,7 @@ constexpr int kWidth = 560, kHeight = 640;
 Box3 Region(const RunResult& result) {
   Box3 box = Bounds(result.face.mesh);
   box.extend(Bounds(result.shell));
-  for (const Dowel& dowel : result.subject.dowels) {
+  for (const Dowel& dowel : result.subject.dowels_on_bone) {
     box.extend(dowel.Tip());
   }
   return box;
@@ -39,7 +39,7 @@ Image Front(const Scene& scene, const RunResult& result, int threads) {
 }
 
 Scene SkullScene(const RunResult& result) {
-  return {{SkullObject(result.subject.skull), DowelObject(result.subject.dowels)}};
+  return {{SkullObject(result.subject.skull), DowelObject(result.subject.dowels_on_bone)}};
 }
 
 // The story in one row: skull and dowels, implicit face, H-spline face and, where it is known, the

@@ -179,7 +179,7 @@ class SceneWriter {
 
   void Dowels() {
     Json dowels = Json::array();
-    for (const Dowel& dowel : result_.subject.dowels) {
+    for (const Dowel& dowel : result_.subject.dowels_on_bone) {
       if (!dowel.Tip().allFinite()) {
         continue;
       }

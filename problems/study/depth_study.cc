@@ -38,7 +38,8 @@ std::vector<std::pair<std::string, CrossValidation>> LeaveOut(const Experiment& 
                                                               const DepthStage& stage,
                                                               const RunContext& context) {
   std::vector<std::pair<std::string, CrossValidation>> left_out;
-  for (const auto& [kind, folds] : KindsOfFolds(experiment.cross_validation, stage.standing)) {
+  for (const auto& [kind, folds] :
+       KindsOfFolds(experiment.cross_validation, stage.dowels_on_shell)) {
     left_out.emplace_back(
         kind, CrossValidate(experiment.interp, experiment.outside, stage.Input(), folds, context));
   }

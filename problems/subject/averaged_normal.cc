@@ -44,12 +44,12 @@ double AreaInside(const TriMesh& mesh, int t, const Sphere& ball) {
                     ball, kMaxSplits);
 }
 
-// Of each triangle that reaches into the ball, and of the seed.
-std::map<int, double> AreasInside(const TriMesh& mesh, int seed, const Sphere& ball) {
+// Of each triangle that reaches into the ball, and of `first`.
+std::map<int, double> AreasInside(const TriMesh& mesh, int first, const Sphere& ball) {
   std::map<int, double> areas;
   for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
     const double area = AreaInside(mesh, t, ball);
-    if (area > 0 || t == seed) {
+    if (area > 0 || t == first) {
       areas[t] = area;
     }
   }
@@ -75,20 +75,20 @@ Vec3 UnitNormal(const TriMesh& mesh, int t) {
 
 }  // namespace
 
-Vec3 AveragedNormal(const TriMesh& mesh, int seed, const Sphere& ball) {
-  const std::map<int, double> area_inside = AreasInside(mesh, seed, ball);
+Vec3 AveragedNormal(const TriMesh& mesh, int first, const Sphere& ball) {
+  const std::map<int, double> area_inside = AreasInside(mesh, first, ball);
   const auto by_point = TrianglesByPoint(mesh, area_inside);
-  const Vec3 facing = UnitNormal(mesh, seed);
+  const Vec3 facing = UnitNormal(mesh, first);
   const double least_cosine = facing.isZero() ? -2 : std::cos(80 * std::numbers::pi / 180);
   Vec3 sum = Vec3::Zero();
-  std::vector<int> patch = {seed};
-  std::set<int> seen = {seed};
-  for (std::size_t next = 0; next < patch.size(); ++next) {
-    sum += area_inside.at(patch[next]) * UnitNormal(mesh, patch[next]);
-    for (const auto p : mesh.triangles[patch[next]]) {
+  std::vector<int> connected = {first};
+  std::set<int> seen = {first};
+  for (std::size_t next = 0; next < connected.size(); ++next) {
+    sum += area_inside.at(connected[next]) * UnitNormal(mesh, connected[next]);
+    for (const auto p : mesh.triangles[connected[next]]) {
       for (const int t : by_point.at(p)) {
         if (facing.dot(UnitNormal(mesh, t)) >= least_cosine && seen.insert(t).second) {
-          patch.push_back(t);
+          connected.push_back(t);
         }
       }
     }

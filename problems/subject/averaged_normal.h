@@ -6,10 +6,10 @@
 
 namespace semblance {
 
-// The unit mean normal, weighted by area, of the part of the mesh inside `ball` (the area of a
-// triangle counts as far as it lies inside, to some percent) that hangs together inside it with the
-// triangle `seed` and faces within 80 degrees of it (anyhow, if `seed` has no area). Zero if there
-// is no such area.
-Vec3 AveragedNormal(const TriMesh& mesh, int seed, const Sphere& ball);
+// The unit mean normal, weighted by area, of the mesh inside `ball`: of the triangles that are
+// connected there with the triangle `first` and face within 80 degrees of it (in any direction if
+// `first` has no area). A triangle's area counts as far as it lies inside, to some percent. Zero if
+// there is no such area.
+Vec3 AveragedNormal(const TriMesh& mesh, int first, const Sphere& ball);
 
 }  // namespace semblance

@@ -15,7 +15,7 @@
 
 namespace semblance {
 
-// How sure the observer was of a landmark's place.
+// How sure the observer was of a landmark's position.
 enum class Certainty { kHigh, kMedium, kLow };
 
 constexpr auto EnumNames(Certainty) {
@@ -47,8 +47,8 @@ struct LandmarkFile {
 };
 
 struct PlaceOptions {
-  double max_distance_mm = 3;
-  double normal_radius_mm = 3;
+  double max_distance_mm = 3;   // of a landmark from the skull; more is an error
+  double normal_radius_mm = 3;  // of the mean normal where a landmark has none
 };
 
 template <class Visitor>
@@ -71,7 +71,7 @@ void Fields(Visitor& visit, Landmark& o) {
                   .max = 100,
                   .doc = "measured distance to the closest skin"},
         o.depth_closest_mm);
-  visit(FieldInfo{.name = "certainty", .doc = "of the place"}, o.certainty);
+  visit(FieldInfo{.name = "certainty", .doc = "of the position"}, o.certainty);
   visit(FieldInfo{.name = "note", .doc = "what the observer had to say"}, o.note);
 }
 
@@ -115,7 +115,7 @@ void Fields(Visitor& visit, PlaceOptions& o) {
 // lacks, or a normal is not of length 1 within 1 %.
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
 
-// One dowel a landmark, in the file's order, its depth still NaN. The base is the skull's point
+// One dowel per landmark, in the file's order, its depth still NaN. The base is the skull's point
 // nearest to the landmark; the direction the landmark's normal, else the area-weighted normal of
 // the skull within the radius: of the bone that hangs together with the base there and faces within
 // 80 degrees of it, so that the inner side of a thin wall has no say. Throws InputError if a

@@ -15,6 +15,7 @@
 #include <numbers>
 
 #include "fitting/terms/metric_distortion.h"
+#include "problems/face_template/template_io.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
@@ -27,6 +28,7 @@ namespace semblance {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::ScratchFolder;
 using ::testing::UnorderedElementsAreArray;
@@ -197,6 +199,30 @@ TEST(Run, SameBytesEachTimeAndForAnyNumberOfThreads) {
   EXPECT_EQ(FilesOfRun(experiment, folder / "two", 2), one);
   const auto resolved = ReadConfig<Experiment>(folder / "one" / "resolved.yaml", {});
   EXPECT_EQ(FilesOfRun(resolved, folder / "again", 2), one);
+}
+
+TEST(Run, ATemplateFromAFileGivesTheSameFaceToTheBit) {
+  const ScratchFolder folder;
+  const Experiment formula = SmallPhantom();
+  const fs::path file = folder / "head.json";
+  WriteTemplate(file, LoadTemplate(formula.face_template));
+  const Experiment from_file =
+      SmallPhantom({fmt::format("template={{type: file, file: {}}}", file.string())});
+  const auto first = FilesOfRun(formula, folder / "formula", 2);
+  const auto second = FilesOfRun(from_file, folder / "file", 2);
+  for (const char* name : {"result.json", "face.hspline.json", "face.ply", "dowels.csv",
+                           "seeds.csv", "implicit.ply", "scene.json"}) {
+    EXPECT_EQ(first.at(name), second.at(name)) << name;
+  }
+  EXPECT_THAT(second.at("manifest.json"),
+              AllOf(HasSubstr("head.json"), HasSubstr("head.hspline.json")));
+}
+
+TEST(Run, ATemplateThatIsNotThereIsOneClearError) {
+  EXPECT_THAT(WordsOf<InputError>([] { semblance::Run(SmallPhantom({"template=file"}), {}); }),
+              HasSubstr("template.file: no file is named"));
+  EXPECT_THROW(semblance::Run(SmallPhantom({"template={type: file, file: /no/head.json}"}), {}),
+               IoError);
 }
 
 TEST(Run, TheFolderHoldsWhatItsManifestLists) {

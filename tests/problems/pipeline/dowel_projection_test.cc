@@ -25,45 +25,45 @@ class ShellDowelsTest : public ::testing::Test {
 
 TEST_F(ShellDowelsTest, OnTheShellADowelStaysAsItIs) {
   const std::vector<Dowel> dowels = {DowelAt(50.0, 7), DowelAt(50.3, 7, {-1, 1, 0})};
-  const ProjectedDowels standing = ProjectOntoShell(dowels, shell_, 1);
+  const ProjectedDowels projected = ProjectOntoShell(dowels, shell_, 1);
   for (int n = 0; n < 2; ++n) {
-    EXPECT_NEAR(standing.dowels[n].depth_mm, 7, 0.05);
-    EXPECT_LT((standing.dowels[n].Tip() - dowels[n].Tip()).norm(), 1e-9);
+    EXPECT_NEAR(projected.dowels_on_shell[n].depth_mm, 7, 0.05);
+    EXPECT_LT((projected.dowels_on_shell[n].Tip() - dowels[n].Tip()).norm(), 1e-9);
   }
-  EXPECT_TRUE(standing.notes.empty());
+  EXPECT_TRUE(projected.notes.empty());
 }
 
 TEST_F(ShellDowelsTest, UnderTheShellItIsShortenedAndItsTipStays) {
   const std::vector<Dowel> dowels = {DowelAt(40, 25)};
-  const ProjectedDowels standing = ProjectOntoShell(dowels, shell_, 1);
-  EXPECT_NEAR(standing.dowels[0].base.norm(), 50, 0.05);
-  EXPECT_NEAR(standing.dowels[0].depth_mm, 15, 0.05);
-  EXPECT_LT((standing.dowels[0].Tip() - dowels[0].Tip()).norm(), 1e-9);
-  EXPECT_THAT(standing.notes, ElementsAre(HasSubstr("10.0 mm over the bone")));
+  const ProjectedDowels projected = ProjectOntoShell(dowels, shell_, 1);
+  EXPECT_NEAR(projected.dowels_on_shell[0].base.norm(), 50, 0.05);
+  EXPECT_NEAR(projected.dowels_on_shell[0].depth_mm, 15, 0.05);
+  EXPECT_LT((projected.dowels_on_shell[0].Tip() - dowels[0].Tip()).norm(), 1e-9);
+  EXPECT_THAT(projected.notes, ElementsAre(HasSubstr("10.0 mm over the bone")));
 }
 
 TEST_F(ShellDowelsTest, OneThatEndsUnderTheShellKeepsTheLeastDepthOverIt) {
-  const ProjectedDowels standing =
+  const ProjectedDowels projected =
       ProjectOntoShell(std::vector<Dowel>{DowelAt(40, 6)}, shell_, 1.5);
-  EXPECT_NEAR(standing.dowels[0].base.norm(), 50, 0.05);
-  EXPECT_EQ(standing.dowels[0].depth_mm, 1.5);
-  EXPECT_THAT(standing.notes, ElementsAre(HasSubstr("ends 4.0 mm under the shell")));
+  EXPECT_NEAR(projected.dowels_on_shell[0].base.norm(), 50, 0.05);
+  EXPECT_EQ(projected.dowels_on_shell[0].depth_mm, 1.5);
+  EXPECT_THAT(projected.notes, ElementsAre(HasSubstr("ends 4.0 mm under the shell")));
 }
 
 TEST_F(ShellDowelsTest, NoDowelIsMadeLonger) {
-  const ProjectedDowels standing =
+  const ProjectedDowels projected =
       ProjectOntoShell(std::vector<Dowel>{DowelAt(50, 0.4)}, shell_, 1);
-  EXPECT_LE(standing.dowels[0].depth_mm, 0.4 + 1e-9);
+  EXPECT_LE(projected.dowels_on_shell[0].depth_mm, 0.4 + 1e-9);
 }
 
 TEST_F(ShellDowelsTest, PressedInADowelReachesOutAsFarAsAsked) {
   const std::vector<Dowel> dowels = {DowelAt(40, 6), DowelAt(50, 8, {-1, 1, 0})};
   const TriMesh bone = testing::SphereMesh({0, 0, 0}, 40, 120);
   const TriMesh pressed = IndentShell(shell_, dowels, bone, 3);
-  const ProjectedDowels standing = ProjectOntoShell(dowels, pressed, 1);
-  EXPECT_NEAR(standing.dowels[0].depth_mm, 3, 0.1);
-  EXPECT_NEAR(standing.dowels[1].depth_mm, 8, 0.1);
-  EXPECT_LT((standing.dowels[0].Tip() - dowels[0].Tip()).norm(), 0.1);
+  const ProjectedDowels projected = ProjectOntoShell(dowels, pressed, 1);
+  EXPECT_NEAR(projected.dowels_on_shell[0].depth_mm, 3, 0.1);
+  EXPECT_NEAR(projected.dowels_on_shell[1].depth_mm, 8, 0.1);
+  EXPECT_LT((projected.dowels_on_shell[0].Tip() - dowels[0].Tip()).norm(), 0.1);
 }
 
 TEST_F(ShellDowelsTest, PressedInItStaysOutsideBoneAndTheRestStaysToTheBit) {

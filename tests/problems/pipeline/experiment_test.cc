@@ -2,14 +2,17 @@
 // Options that are right each by itself but not together.
 #include "problems/pipeline/experiment.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "problems/face_template/template_io.h"
 #include "problems/pipeline/experiment_config.h"
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
 
 namespace semblance {
 namespace {
@@ -143,6 +146,18 @@ TEST(Experiment, ASchemeCanBeSetByItsTypeAlone) {
   EXPECT_TRUE(std::holds_alternative<NaturalNeighbour>(set("", {"interp.type=natural_neighbour"})));
   EXPECT_TRUE(std::holds_alternative<NaturalNeighbour>(
       set("interp: {type: kriging}", {"interp.type=natural_neighbour"})));
+}
+
+TEST(Experiment, TheLevelsOfATemplateFromAFileAreThoseOfItsSurface) {
+  const testing::ScratchFolder folder;
+  const std::filesystem::path file = folder / "head.json";
+  WriteTemplate(file, MakeTemplateFace({.max_level = 1}));
+  EXPECT_THAT(Faults(fmt::format("template: {{type: file, file: {}}}\n", file.string())),
+              AllOf(HasSubstr("schedule[2].level: level 2 is finer than the"),
+                    HasSubstr("take a template with more levels")));
+  Experiment missing;
+  missing.face_template = FileTemplate{folder / "none.json"};
+  EXPECT_THAT(FaultsBetween(missing), IsEmpty());
 }
 
 }  // namespace

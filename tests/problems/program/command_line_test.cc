@@ -221,6 +221,26 @@ TEST_F(CommandLine, TheReadmeHasEveryCommandAndNoOther) {
   }
 }
 
+TEST_F(CommandLine, CheckWarnsOfATableWhoseDepthsDoNotGrowWithTheBuild) {
+  Write("e.yaml", fmt::format("tissue: {{table: {}/tables/rhine_black.yaml}}\n", kConfigs));
+  const Outcome outcome = Call("check e.yaml");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("e.yaml: warning: tissue table 'rhine_black', sg "
+                                     "(Supraglabella): depth does not grow from emaciated to "
+                                     "obese: female 5.00 4.50 3.50 mm\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("e.yaml: no fault found"));
+  EXPECT_THAT(Call("check e.yaml --set tissue.depths=measured").out, Not(HasSubstr("warning")));
+}
+
+TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
+  Write("e.yaml", "template: {max_level: 1}\n");
+  EXPECT_EQ(Call("template e.yaml --out generic").code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "generic" / "template.hspline.json"));
+  EXPECT_THAT(Call("check e.yaml --set 'template={type: file, file: generic/template.json}'").err,
+              HasSubstr("take a template with more levels"));
+  EXPECT_EQ(Call("template e.yaml --out generic").code, 2);
+}
+
 TEST_F(CommandLine, OptionsNameEveryKeyAndTheSchemaIsJson) {
   const std::string options = Call("options").out;
   for (const char* key : {"subject", "emitter", "fraction", "tail_error", "random_seed"}) {
