@@ -38,10 +38,10 @@ class LevelCheck {
 
   void At(std::string path, int level) {
     if (level > levels_.finest) {
-      faults_.push_back({std::move(path),
-                         fmt::format("level {} is finer than the surface, whose finest level "
-                                     "is {}; give a level up to that, or {}",
-                                     level, levels_.finest, levels_.remedy)});
+      faults_.push_back(
+          {std::move(path), fmt::format("level {} is finer than the surface, whose finest level "
+                                        "is {}; give a level up to that, or {}",
+                                        level, levels_.finest, levels_.remedy)});
     }
   }
   void Steps(const std::string& path, const std::vector<ScheduleStep>& steps) {
@@ -65,8 +65,8 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) {
   check.At("seeds.direction_level", experiment.seeds.direction_level);
   std::vector<OptionFault> faults = check.Take();
   for (const FitFault& fault : FaultsOf(experiment.fit, levels.finest)) {
-    faults.push_back({"fit." + fault.path,
-                      fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
+    faults.push_back(
+        {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
   return faults;
 }

@@ -72,8 +72,9 @@ TEST(CalibrationPlot, TrueStatementsLieOnTheDiagonal) {
   EXPECT_THAT(svg, HasSubstr("x1=\"60.00\" y1=\"340.00\" x2=\"870.00\" y2=\"20.00\""));
   EXPECT_THAT(svg, HasSubstr("points=\"60.00,340.00 262.50,260.00 465.00,180.00 667.50,100.00 "
                              "870.00,20.00\""));
-  EXPECT_THAT(svg,
-              HasSubstr("60.00,340.00 465.00,308.00 870.00,20.00\""));  // 10 % where 50 % is expected
+  EXPECT_THAT(
+      svg,
+      HasSubstr("60.00,340.00 465.00,308.00 870.00,20.00\""));  // 10 % where 50 % is expected
 }
 
 TEST(RankPlot, PutsTheBestFirst) {
