@@ -98,7 +98,7 @@ TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
   EXPECT_EQ(edges.non_manifold, 0);
   EXPECT_EQ(edges.inconsistent, 0);
   EXPECT_EQ(ConnectedComponents(face).count, 1);
-  EXPECT_LT(SharpestEdge_deg(face), 90);
+  EXPECT_LT(SharpestEdge_deg(face), 60);
   // Away from the middle of the head: no triangle on the dowels' side is turned over.
   const Vec3 middle = Bounds(result.subject.skull).center();
   int turned = 0;
@@ -149,22 +149,17 @@ double Strain(const RunResult& result) {
 }
 
 TEST(Run, ATermIsObeyedTheMoreItWeighs) {
-  const RunResult none = RunWithTerm(", {type: non_penetration, min_depth_mm: 0}");
-  const double plain_mm = MeanHeight_mm(none);
-  EXPECT_NEAR(MeanHeight_mm(RunWithTerm("")), plain_mm, 0.1);
+  // It does nothing here, but seeds have anchors.
+  const RunResult idle = RunWithTerm(", {type: non_penetration, min_depth_mm: 0}");
+  const double height_mm = MeanHeight_mm(idle);
+  EXPECT_NEAR(MeanHeight_mm(RunWithTerm("")), height_mm, 0.1);
   EXPECT_GT(MeanHeight_mm(RunWithTerm(", {type: non_penetration, weight: 10, min_depth_mm: 25}")),
-            plain_mm + 5);
-  double spring_mm = SpringRms_mm(none), strain = Strain(none);
-  for (const char* weight : {"1", "100"}) {
-    const double more_mm =
-        SpringRms_mm(RunWithTerm(fmt::format(", {{type: spring, weight: {}}}", weight)));
-    EXPECT_LT(more_mm, 0.95 * spring_mm);
-    spring_mm = more_mm;
-    const double less =
-        Strain(RunWithTerm(fmt::format(", {{type: distortion, weight: {}}}", weight)));
-    EXPECT_LT(less, 0.95 * strain);
-    strain = less;
-  }
+            height_mm + 5);
+  EXPECT_LT(SpringRms_mm(RunWithTerm(", {type: spring, weight: 100}")), SpringRms_mm(idle));
+  const double little = Strain(RunWithTerm(", {type: distortion, weight: 1}")),
+               much = Strain(RunWithTerm(", {type: distortion, weight: 100}"));
+  EXPECT_LT(little, 0.6 * Strain(idle));
+  EXPECT_LT(much, 0.6 * little);
 }
 
 // How many of the offsets that make features are the template's after a run.
@@ -182,7 +177,11 @@ TEST(Run, SaysWhatItDidToTheFeatures) {
     const RunResult result =
         semblance::Run(SmallPhantom({fmt::format("fit.features={}", rule)}), {});
     const int features = static_cast<int>(FeatureVertices(result.placed).size());
-    EXPECT_EQ(KeptFeatures(result), rule == "frozen" ? features : 0);
+    if (rule == "frozen") {
+      EXPECT_EQ(KeptFeatures(result), features);
+    } else {
+      EXPECT_LT(KeptFeatures(result), features);
+    }
     EXPECT_EQ(result.fit.restored_features, rule == "frozen" ? features : 0);
     EXPECT_EQ(result.features.back().part, "elsewhere");
     const FeatureDistortion& all = *(result.features.end() - 2);
