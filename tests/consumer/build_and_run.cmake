@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Installs the package from BUILD below OUT, builds the consumer in SOURCE against it with CXX, and runs it on points of a known
+# surface. Nothing of the checkout is on its include path, and no private header is installed.
+file(REMOVE_RECURSE ${OUT})
+execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${OUT}/prefix OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+if(NOT EXISTS ${OUT}/prefix/include/semblance/fitting/fit.h)
+  message(FATAL_ERROR "fitting/fit.h is not installed")
+endif()
+if(EXISTS ${OUT}/prefix/include/semblance/fitting/least_squares/sparse_factor.h)
+  message(FATAL_ERROR "fitting/least_squares/sparse_factor.h is private, and yet installed")
+endif()
+execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE} -B ${OUT}/build -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release
+  -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_PREFIX_PATH=${OUT}/prefix OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${CMAKE_COMMAND} --build ${OUT}/build OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+
+# A paraboloid over [-20, 20] x [-20, 20].
+set(points "")
+foreach(i RANGE -20 20)
+  foreach(j RANGE -20 20)
+    math(EXPR z "${i} * ${i} + ${j} * ${j}")
+    string(APPEND points "${i} ${j} ${z}e-2\n")
+  endforeach()
+endforeach()
+file(WRITE ${OUT}/points.txt "${points}")
+execute_process(COMMAND ${OUT}/build/app INPUT_FILE ${OUT}/points.txt OUTPUT_VARIABLE said COMMAND_ERROR_IS_FATAL ANY)
+message(STATUS "${said}")
+if(NOT said MATCHES "^rms ([0-9.e-]+) mm, centre")
+  message(FATAL_ERROR "expected 'rms NUMBER mm, centre ...'")
+endif()
+if(CMAKE_MATCH_1 GREATER 0.01)
+  message(FATAL_ERROR "expected the surface within 0.01 mm of the points")
+endif()
+
+# Fitting asks for no package of the program's.
+file(READ ${OUT}/build/CMakeCache.txt cache)
+foreach(package yaml-cpp SQLite3 OpenSSL PNG LibArchive pugixml)
+  if(cache MATCHES "\n${package}_(DIR|FOUND|LIBRARY)")
+    message(FATAL_ERROR "COMPONENTS fitting asked for ${package}")
+  endif()
+endforeach()
