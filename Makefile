@@ -58,14 +58,15 @@ check: build headers tidy configs
 headers: build
 	@cmake --build --preset $(PRESET) --target all_verify_interface_header_sets
 
-# clang-tidy on the sources that changed since BASE, a commit.
-tidy: build
+# clang-tidy on the sources that changed since BASE, a commit. clang cannot read the precompiled headers of g++.
+tidy: setup
+	@cmake --preset $(PRESET) -B build-tidy -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON > /dev/null
 	@git diff --name-only --diff-filter=d $(BASE) -- 'surfaces/*.cc' 'interp/*.cc' 'fitting/*.cc' 'problems/*.cc' | \
-	  xargs -r -n 1 -P $$(nproc) clang-tidy -p $(BUILD) --quiet --extra-arg=-Wno-unknown-warning-option
+	  xargs -r -n 1 -P $$(nproc) clang-tidy -p build-tidy --quiet --extra-arg=-Wno-unknown-warning-option
 
 # Every configuration and every study is one that the program takes.
 configs: build
 	@$(BUILD)/problems/semblance check configs/*.yaml configs/fit/*.yaml configs/studies/*.yaml
 
 clean:
-	@rm -rf build build-debug build-sanitize build-quick
+	@rm -rf build build-debug build-sanitize build-quick build-tidy

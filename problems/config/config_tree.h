@@ -45,8 +45,8 @@ struct ConfigNode {
 
   static ConfigNode Scalar(std::string text);
   static ConfigNode Quoted(std::string text);
-  static ConfigNode Map() { return OfKind(Kind::kMap); }
-  static ConfigNode List() { return OfKind(Kind::kList); }
+  static ConfigNode Map();
+  static ConfigNode List();
 
   bool IsNull() const { return kind == Kind::kNull; }
   bool IsScalar() const { return kind == Kind::kScalar; }
@@ -68,6 +68,10 @@ struct ConfigNode::Entry {
   ConfigPlace key_place;
   ConfigNode value;
 };
+
+// Here, where an entry is a whole type.
+inline ConfigNode ConfigNode::Map() { return OfKind(Kind::kMap); }
+inline ConfigNode ConfigNode::List() { return OfKind(Kind::kList); }
 
 // A map in the order of the file that remembers where its keys stand: a field for option paths and
 // other keys whose order or place matters.
