@@ -36,7 +36,7 @@ struct SpaceProblem {
 // Two ways to the same minimum. With `fastest`, and no terms but points, smoothness and membrane:
 // one Cholesky factor of the normal equations, assembled from moments of each leaf's points; a loss
 // by iterative reweighting. Else a ceres::Problem whose parameter blocks are the dofs: in tiles of
-// 3 x 3 vertices of a level where the terms treat x, y and z alike, else one a vertex; the points
+// 3 x 3 vertices of a level where the terms treat x, y and z alike, else one per vertex; the points
 // of a leaf are reduced to at most sixteen rows.
 class SpaceSolver {
  public:

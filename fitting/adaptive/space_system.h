@@ -33,7 +33,7 @@ struct SpaceSystem {
 
 // Of point_scale * sum w |e|^2 + the energies; the space must be measured. Each leaf gives its
 // sixteen vertices' matrix, which is taken up the quadtree by the refinement matrices, so that the
-// work grows with the patches and not with the points or the pairs of levels. forms: one a level,
+// work grows with the patches and not with the points or the pairs of levels. forms: one per level,
 // or none. Unknowns that finer ones cover have empty rows and columns.
 SpaceSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
                      std::span<const LevelStiffness> forms);

@@ -21,7 +21,7 @@ struct PatchCoverage {
   double median_patch_points = kNaN;  // observations in each of the others
 };
 
-// counts: of the observations, one a patch.
+// counts: of the observations, one per patch.
 PatchCoverage CoverageOf(std::vector<int> counts);
 
 struct TermCosts {

@@ -21,7 +21,7 @@ struct PatchMoments {
   double largest = 0;                       // |e|^2, of points whose factor is 0.5 or more
 };
 
-// What AddPoints takes and gives one a point; each may be null.
+// What AddPoints takes and gives per point; each may be null.
 struct PointFactors {
   const double* factors = nullptr;  // of the points' weights
   double* squares = nullptr;        // |e|^2

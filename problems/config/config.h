@@ -7,7 +7,7 @@
 // else that is not exactly right is an error: unknown and repeated keys, null where the field is
 // not optional, quoted numbers, whole numbers written 1e3 or 1.0, numbers with a leading zero or
 // in another base, nan and inf, yes/no/on/off, values out of range, anchors, aliases, tags, merge
-// keys, tabs, a second document. All errors are reported at once, one a line, as
+// keys, tabs, a second document. All errors are reported at once, one per line, as
 //     file:line:column: path: what; did you mean 'x'?
 //
 // `base: other.yaml` at the top lays the file over another one: maps merge key by key, lists and

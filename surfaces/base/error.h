@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The three ways in which a caller can be wrong. Numerical outcomes are fields of results, not
-// exceptions.
+// The three ways in which a caller can be wrong, and a request to stop. Numerical outcomes are
+// fields of results, not exceptions.
 #pragma once
 
 #include <stdexcept>
@@ -8,8 +8,8 @@
 
 namespace semblance {
 
-// Base of all errors that a user can mend. The message says where, what, what is allowed, and what
-// to do.
+// Base of all errors that a user can correct. The message says where, what, what is allowed, and
+// what to do.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -21,7 +21,7 @@ class InputError : public Error {
   using Error::Error;
 };
 
-// A configuration that cannot be used; the message may hold several lines, one an error.
+// A configuration that cannot be used; the message may hold several lines, one per error.
 class ConfigError : public Error {
  public:
   using Error::Error;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The vectors and the few solids that every floor speaks of. All lengths in mm. World frame LPS: +x
+// The vectors and the few solids that every floor uses. All lengths in mm. World frame LPS: +x
 // subject left, +y posterior, +z up.
 #pragma once
 

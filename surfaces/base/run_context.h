@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a long step tells of its progress and hears that it should stop.
+// How a long step reports its progress and learns that it should stop.
 #pragma once
 
 #include <functional>
 #include <limits>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "surfaces/base/error.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hierarchical B-spline surface (Forsey & Bartels 1988; thesis ch. 4): bicubic, uniform, dyadic
-// levels, detail kept as offsets from the next coarser surface.
+// The hierarchical B-spline surface (Forsey & Bartels 1988; thesis ch. 4): bicubic, uniform, with
+// dyadic levels; detail is kept as offsets from the next coarser surface.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ struct SecondDerivatives {  // with respect to u and v in [0,1], mm
   Vec3 dvv = Vec3::Constant(kNaN);
 };
 
-// Stored are the vertices of level 0 and the offsets of edited ones; from them follow, at each
+// Stores the vertices of level 0 and the offsets of edited ones. From them it computes, at each
 // change, the vertices of the patches that the offsets reach, and no others: memory grows with the
 // edits, not with 4^level. Const calls may run at the same time.
 class HSplineSurface {
@@ -83,7 +83,7 @@ class HSplineSurface {
   std::map<VertexId, Vec3> Offsets(int level) const;  // those of one level
   std::optional<Vec3> Offset(const VertexId& vertex) const;
   // Sets the offsets of some vertices, or removes them (nullopt: the vertex follows the coarser
-  // level again). All or, where one cannot be set (no such vertex, not finite, no frame:
+  // level again). Sets all or, if one cannot be set (no such vertex, not finite, no frame:
   // InputError), none. One call for many vertices is much faster than many calls: each makes the
   // stored vertices anew, from the coarsest level that it changes.
   void SetOffsets(const std::map<VertexId, std::optional<Vec3>>& offsets);

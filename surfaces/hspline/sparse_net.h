@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Control vertices of one level of which only some exist, column by column in runs of rows.
+// The control vertices of one level, of which only some exist: per column, runs of rows.
 #pragma once
 
 #include <cstddef>
@@ -17,12 +17,13 @@ struct RowSpan {
   bool operator==(const RowSpan&) const = default;
 };
 
-using ColumnSpans = std::vector<std::vector<RowSpan>>;  // one list a column; none at all: empty
+using ColumnSpans =
+    std::vector<std::vector<RowSpan>>;  // one list per column; empty if there are none
 
-// Sorts the spans and unites those that overlap or touch.
+// Sorts the spans and merges those that overlap or touch.
 std::vector<RowSpan> Merged(std::vector<RowSpan> spans);
 
-// Which (i, j) of a grid are there; spans in order and apart. Memory: the spans, and four bytes a
+// Which (i, j) of a grid exist; spans in order and apart. Memory: the spans, and four bytes per
 // column.
 class RowTable {
  public:
@@ -60,7 +61,7 @@ class RowTable {
   bool operator==(const RowTable&) const = default;
 
  private:
-  std::vector<std::int32_t> starts_;  // one a column and one more, or none
+  std::vector<std::int32_t> starts_;  // one per column and one more, or none
   std::vector<RowSpan> spans_;
   int whole_ = 0;
 };
@@ -88,14 +89,14 @@ class SparseNet {
     return const_cast<Vec3*>(static_cast<const SparseNet*>(this)->Find(i, j, 1));
   }
 
-  // Puts the vertices that exist in the places of a dense net.
+  // Copies the vertices that exist into a dense net.
   void CopyTo(ControlNet& net) const;
 
   std::size_t Bytes() const;
 
  private:
   RowTable rows_;
-  std::vector<std::size_t> first_;  // one a span: the index of its first vertex
+  std::vector<std::size_t> first_;  // per span: the index of its first vertex
   std::vector<Vec3> vertices_;
 };
 

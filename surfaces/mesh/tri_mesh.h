@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A triangle mesh as two arrays, and what can be said of it without a search tree. It can hold what
-// real scans hold (open borders, several components, non-manifold edges); halfedge structures are
-// built from it where an algorithm needs one.
+// A triangle mesh as two arrays, and what can be computed from it without a search tree. It can
+// hold what real scans hold (open borders, several components, non-manifold edges); half-edge
+// structures are built from it where an algorithm needs them.
 #pragma once
 
 #include <array>
@@ -29,8 +29,8 @@ double Area(const TriMesh& mesh);                                 // mm^2
 double SignedVolume(
     const TriMesh& mesh);  // mm^3; > 0 if closed and outward; origin-dependent if open
 
-// Unit normals, one a vertex, weighted by the area of its triangles, so that the slivers of
-// marching cubes have no say. Zero where a vertex has no triangle of positive area.
+// Unit normals per vertex, weighted by the area of its triangles, so that the slivers of marching
+// cubes hardly count. Zero where a vertex has no triangle of positive area.
 std::vector<Vec3> VertexNormals(const TriMesh& mesh);
 
 // A third of the area of the triangles at each vertex, mm^2.
@@ -57,8 +57,8 @@ EdgeReport CheckEdges(const TriMesh& mesh);
 using MeshEdge = std::array<std::int32_t, 2>;
 std::vector<MeshEdge> BorderEdges(const TriMesh& mesh);
 
-// The triangles for which keep[t] is true, and the points they use, in their old order. keep: one a
-// triangle.
+// The triangles for which keep[t] is true, and the points they use, in their old order. keep: one
+// entry per triangle.
 TriMesh Submesh(const TriMesh& mesh, const std::vector<bool>& keep);
 
 TriMesh Transformed(const TriMesh& mesh, const Similarity& to_from);
