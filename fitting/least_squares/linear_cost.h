@@ -46,9 +46,9 @@ class CoupledCost final : public ceres::CostFunction {
 void AddCoupledResidual(const Eigen::MatrixXd& a, Eigen::VectorXd b, std::span<const int> vertices,
                         ControlNet& net, ceres::Problem& problem);
 
-// Adds a LinearCost over the vertices of `net` that `vertices` names, one per column of `a`. A vertex
-// named twice gets the sum of its columns; one whose columns are zero is left out.
-// `loss` may be empty.
+// Adds a LinearCost over the vertices of `net` that `vertices` names, one per column of `a`. A
+// vertex named twice gets the sum of its columns; one whose columns are zero is left out. `loss`
+// may be empty.
 void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                        std::span<const int> vertices, std::unique_ptr<ceres::LossFunction> loss,
                        ControlNet& net, ceres::Problem& problem);
