@@ -306,6 +306,18 @@ TEST(Architecture, TheMapNamesFilesThatAreThere) {
   }
 }
 
+TEST(Architecture, TheReadmeShowsTheConsumersProgram) {
+  const fs::path root(SEMBLANCE_SOURCE_DIR);
+  const std::string program = ReadText(root / "tests/consumer/main.cc");
+  const std::string readme = ReadText(root / "README.md");
+  std::istringstream lines(program.substr(program.find("#include")));
+  std::string shown;
+  for (std::string line; std::getline(lines, line);) {
+    shown += line.empty() ? "\n" : "    " + line + "\n";
+  }
+  EXPECT_NE(readme.find(shown), std::string::npos) << "README.md lacks\n" << shown;
+}
+
 TEST(Architecture, OnlyTheAgreedEntriesStandAtTheTop) {
   const std::set<std::string> allowed = {"CMakeLists.txt", "fitting", "surfaces", "interp",
                                          "problems", "tests", "configs", "README.md", "LICENSE",
