@@ -53,7 +53,7 @@ class DepthMapTest : public ::testing::Test {
     return InterpolateDepth(options, scene_.Input(), RunContext{});
   }
   std::string ErrorOf(const DepthMap& options) {
-    return testing::WordsOf<InputError>([&] { Field(options); });
+    return testing::WordsOf<Error>([&] { Field(options); });
   }
 
   testing::DowelScene scene_ = FlatScene();
@@ -119,8 +119,9 @@ TEST_F(DepthMapTest, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(ErrorOf({.file = WritePly(scene_.skull, depth_mm_)}),
               HasSubstr("the depth of vertex 3 is -1 mm; it must be finite and above 0, or nan"));
   depth_mm_[3] = std::numeric_limits<double>::infinity();
-  EXPECT_THAT(ErrorOf({.file = WriteCsv(CsvOf(depth_mm_))}),
-              HasSubstr("the depth of vertex 3 is inf mm"));
+  EXPECT_THAT(
+      ErrorOf({.file = WriteCsv(CsvOf(depth_mm_))}),
+      HasSubstr("map.csv:5: column 'scalar_depth_mm': 'inf' is not a finite decimal number"));
   depth_mm_.pop_back();
   depth_mm_[3] = 4;
   EXPECT_THAT(ErrorOf({.file = WriteCsv(CsvOf(depth_mm_))}),

@@ -233,10 +233,16 @@ TEST_F(CommandLine, CheckWarnsOfATableWhoseDepthsDoNotGrowWithTheBuild) {
 }
 
 TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
-  Write("e.yaml", "template: {max_level: 1}\n");
-  EXPECT_EQ(Call("template e.yaml --out generic").code, 0);
+  Write("e.yaml",
+        "template: {max_level: 1}\n"
+        "fit: {plan: {type: coarse_to_fine, finest: 1}}\n");
+  const Outcome written = Call("template e.yaml --out generic");
+  EXPECT_EQ(written.code, 0) << written.err;
   EXPECT_TRUE(fs::exists(folder_ / "generic" / "template.hspline.json"));
-  EXPECT_THAT(Call("check e.yaml --set 'template={type: file, file: generic/template.json}'").err,
+  const std::string from_file =
+      "check e.yaml --set 'template={type: file, file: generic/template.json}'";
+  EXPECT_EQ(Call(from_file).code, 0);
+  EXPECT_THAT(Call(from_file + " --set fit.plan.finest=2").err,
               HasSubstr("take a template with more levels"));
   EXPECT_EQ(Call("template e.yaml --out generic").code, 2);
 }

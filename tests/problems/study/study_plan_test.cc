@@ -28,7 +28,7 @@ using testing::WordsOf;
 const std::string kBase = fmt::format(
     "base: {}/configs/phantom.yaml\n"
     "set: {{subject.rings: 40, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
-    "      fit.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
+    "      fit.plan.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
     SEMBLANCE_SOURCE_DIR);
 
 class StudyPlanTest : public ::testing::Test {
