@@ -12,7 +12,7 @@
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/curvature.h"
 #include "surfaces/mesh/mesh_io.h"
-#include "surfaces/mesh/ply_layout.h"
+#include "surfaces/mesh/read_ply.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/splines.h"
 
