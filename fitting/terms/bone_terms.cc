@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The terms that look at the bone beneath the points: non-penetration and springs.
+#include "fitting/terms/bone_terms.h"
+
 #include <ceres/cost_function.h>
 
 #include <algorithm>

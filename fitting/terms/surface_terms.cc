@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/terms/surface_terms.h"
+
+#include <ceres/cost_function.h>
+
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include "fitting/least_squares/linear_cost.h"
+#include "fitting/terms/element_stiffness.h"
+#include "fitting/terms/strain.h"
+#include "fitting/terms/term_cost.h"
+
+namespace semblance {
+namespace {
+
+const ControlNet& Anchor(const PriorTerm& term, const LevelView& view) {
+  return term.towards == PriorTowards::kStart ? view.start : view.rest;
+}
+
+// Calls `look` with each vertex that the term holds.
+void ForEach(const PriorTerm& term, const LevelView& view, const auto& look) {
+  const std::size_t count = term.held_only ? view.held.size() : view.start.vertices.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    look(term.held_only ? view.held[k] : static_cast<int>(k));
+  }
+}
+
+}  // namespace
+
+void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink) {
+  const ControlNet& anchor = Anchor(term, view);
+  const double factor = std::sqrt(term.weight / static_cast<double>(anchor.vertices.size()));
+  const auto a = std::make_shared<const Eigen::MatrixXd>(Eigen::MatrixXd::Constant(1, 1, factor));
+  ForEach(term, view,
+          [&](int k) { sink.Add(a, factor * anchor.vertices[k].transpose(), std::array{k}); });
+}
+
+double TermCost(const PriorTerm& term, const LevelView& view, const ControlNet& net) {
+  const ControlNet& anchor = Anchor(term, view);
+  double sum = 0;
+  ForEach(term, view, [&](int k) { sum += (net.vertices[k] - anchor.vertices[k]).squaredNorm(); });
+  return term.weight * sum / static_cast<double>(net.vertices.size());
+}
+
+namespace {
+
+// The sixteen vertices at which the energy is zero: the template's, or nothing.
+PatchMatrix Origin(SmoothnessOf of, const SplineElement& element) {
+  return of == SmoothnessOf::kSurface ? PatchMatrix(PatchMatrix::Zero()) : element.rest;
+}
+
+// Calls `look` with each element and its stiffness, and with a root of that, which elements of one
+// level share.
+void ForEachElement(const auto& term, const LevelView& view, const auto& look) {
+  std::shared_ptr<const Eigen::MatrixXd> root;
+  ElementStiffness stiffness;
+  int patches_u = -1;
+  for (int e = 0; e < view.elements(); ++e) {
+    const SplineElement element = view.Element(e);
+    if (element.patches_u != patches_u) {
+      patches_u = element.patches_u;
+      stiffness = StiffnessOf(term, view.lengths_mm, patches_u, element.patches_v);
+      root = std::make_shared<const Eigen::MatrixXd>(StiffnessRoot(stiffness));
+    }
+    look(element, stiffness, root);
+  }
+}
+
+void AddEnergy(const auto& term, const LevelView& view, RowSink& sink) {
+  ForEachElement(term, view,
+                 [&](const SplineElement& element, const ElementStiffness&,
+                     const std::shared_ptr<const Eigen::MatrixXd>& root) {
+                   AddElementRows(element, root, *root * Origin(term.of, element), sink);
+                 });
+}
+
+double Energy(const auto& term, const LevelView& view, const ControlNet& net) {
+  double energy = 0;
+  ForEachElement(term, view,
+                 [&](const SplineElement& element, const ElementStiffness& stiffness, const auto&) {
+                   const PatchMatrix x = element.Vertices(net) - Origin(term.of, element);
+                   energy += (stiffness * x).cwiseProduct(x).sum();
+                 });
+  return energy;
+}
+
+}  // namespace
+
+// weight * length^4 / area * energy of a patch.
+ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
+                             int patches_v) {
+  const double scale = term.weight * std::pow(term.length_mm, 4) / lengths_mm.prod();
+  return scale * ThinPlateStiffness(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v);
+}
+
+// weight * length^2 / area * energy of a patch.
+ElementStiffness StiffnessOf(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
+                             int patches_v) {
+  const double scale = term.weight * std::pow(term.length_mm, 2) / lengths_mm.prod();
+  return scale * MembraneStiffness(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v);
+}
+
+void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink) {
+  AddEnergy(term, view, sink);
+}
+
+void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink) {
+  AddEnergy(term, view, sink);
+}
+
+double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net) {
+  return Energy(term, view, net);
+}
+
+double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net) {
+  return Energy(term, view, net);
+}
+
+namespace {
+
+int MirrorOf(const PatchGrid& grid, int vertex) {
+  const int columns = grid.Columns(), i = vertex % columns;
+  const int mirrored = grid.periodic_u ? (columns + 2 - i) % columns : columns - 1 - i;
+  return vertex - i + mirrored;
+}
+
+struct Mirror {
+  Vec3 point = Vec3::Zero();  // of the plane
+  Mat3 reflection = Mat3::Identity();
+};
+
+// The reflection that takes the template's vertices nearest to their mirrors: its normal n makes
+// n . sum_k x_k y_k^T n least, x and y being a vertex and its mirror from their common centre.
+Mirror MirrorOf(const LevelView& view) {
+  const std::vector<Vec3>& rest = view.rest.vertices;
+  Mirror mirror;
+  for (const Vec3& v : rest) {
+    mirror.point += v / static_cast<double>(rest.size());
+  }
+  Mat3 sum = Mat3::Zero();
+  for (std::size_t k = 0; k < rest.size(); ++k) {
+    const Vec3& twin = rest[MirrorOf(view.grid, static_cast<int>(k))];
+    sum += (rest[k] - mirror.point) * (twin - mirror.point).transpose();
+  }
+  const Mat3 symmetric = sum + sum.transpose();
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(symmetric);
+  const Vec3 normal = eigen.eigenvectors().col(0);
+  mirror.reflection -= 2 * normal * normal.transpose();
+  return mirror;
+}
+
+// Where a vertex's f is zero.
+Vec3 Origin(const SymmetryTerm& term, const LevelView& view, const Mirror& mirror, int vertex) {
+  return term.of == SmoothnessOf::kDisplacement ? view.rest.vertices[vertex] : mirror.point;
+}
+
+}  // namespace
+
+// Both vertices of a pair have the same misfit, so one stands for both.
+void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem) {
+  const Mirror mirror = MirrorOf(view);
+  const double scale = term.weight / static_cast<double>(net.vertices.size());
+  for (int k = 0; k < static_cast<int>(net.vertices.size()); ++k) {
+    const int twin = MirrorOf(view.grid, k);
+    if (twin < k) {
+      continue;
+    }
+    const double factor = std::sqrt(twin == k ? scale : 2 * scale);
+    Eigen::MatrixXd a(3, 6);
+    a << factor * Mat3::Identity(), -factor * mirror.reflection;
+    Eigen::VectorXd origins(6);
+    origins << Origin(term, view, mirror, k), Origin(term, view, mirror, twin);
+    AddCoupledResidual(a, a * origins, std::array{k, twin}, net, problem);
+  }
+}
+
+double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net) {
+  const Mirror mirror = MirrorOf(view);
+  double sum = 0;
+  for (int k = 0; k < static_cast<int>(net.vertices.size()); ++k) {
+    const int twin = MirrorOf(view.grid, k);
+    const Vec3 f = net.vertices[k] - Origin(term, view, mirror, k);
+    const Vec3 g = net.vertices[twin] - Origin(term, view, mirror, twin);
+    sum += (f - mirror.reflection * g).squaredNorm();
+  }
+  return term.weight * sum / static_cast<double>(net.vertices.size());
+}
+
+namespace {
+
+// One of the 2 x 2 Gauss points of each patch where the template has tangents.
+struct Sample {
+  SplineElement element;
+  std::array<double, 16> x1{}, x2{};  // of the images of the template's axes, 1/mm
+  double area = kNaN;                 // of the template, relative
+};
+
+using Weights = std::array<double, 16>;
+
+Vec3 Applied(const Weights& weights, const PatchMatrix& vertices) {
+  return (Eigen::Map<const Eigen::Matrix<double, 1, 16>>(weights.data()) * vertices).transpose();
+}
+
+void AddSamples(const LevelView& view, const SplineElement& element, std::vector<Sample>& samples) {
+  for (int k = 0; k < 4; ++k) {
+    const Vec2 in_patch = GaussPoint(k, 1, 1);
+    const Vec2 uv((element.patch.i + in_patch.x()) / element.patches_u,
+                  (element.patch.j + in_patch.y()) / element.patches_v);
+    const Weights du = view.LocalAt(uv, {1, 0}).weight, dv = view.LocalAt(uv, {0, 1}).weight;
+    const auto axes = TemplateAxes::At(Applied(du, element.rest), Applied(dv, element.rest));
+    if (!axes) {
+      continue;
+    }
+    Sample& sample = samples.emplace_back();
+    sample.element = element;
+    sample.area = axes->area / element.patches_u / element.patches_v;
+    for (int v = 0; v < 16; ++v) {
+      sample.x1[v] = axes->a1 * du[v];
+      sample.x2[v] = axes->a2 * du[v] + axes->b2 * dv[v];
+    }
+  }
+}
+
+std::vector<Sample> SamplesOf(const LevelView& view) {
+  std::vector<Sample> samples;
+  for (int e = 0; e < view.elements(); ++e) {
+    AddSamples(view, view.Element(e), samples);
+  }
+  return samples;
+}
+
+// Weights of an element's vertices as weights of its dofs.
+Eigen::VectorXd OverDofs(const Weights& weights, const SplineElement& element) {
+  const Eigen::Map<const Eigen::Matrix<double, 16, 1>> local(weights.data());
+  return element.IsIdentity() ? Eigen::VectorXd(local)
+                              : Eigen::VectorXd(element.extraction.transpose() * local);
+}
+
+double AreaOf(const std::vector<Sample>& samples) {
+  double sum = 0;
+  for (const Sample& sample : samples) {
+    sum += sample.area;
+  }
+  return sum;
+}
+
+// factor (e11, e22, sqrt(2) e12), or factor (area / template's - 1).
+class DistortionCost final : public ceres::CostFunction {
+ public:
+  DistortionCost(const Sample& sample, DistortionOf of, double factor)
+      : x1_(OverDofs(sample.x1, sample.element)),
+        x2_(OverDofs(sample.x2, sample.element)),
+        fixed_x1_(Applied(sample.x1, sample.element.fixed)),
+        fixed_x2_(Applied(sample.x2, sample.element.fixed)),
+        of_(of),
+        factor_(factor) {
+    mutable_parameter_block_sizes()->assign(sample.element.dofs.size(), 3);
+    set_num_residuals(of == DistortionOf::kMetric ? 3 : 1);
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    Vec3 x1 = fixed_x1_, x2 = fixed_x2_;
+    for (int k = 0; k < x1_.size(); ++k) {
+      x1 += x1_[k] * Eigen::Map<const Vec3>(parameters[k]);
+      x2 += x2_[k] * Eigen::Map<const Vec3>(parameters[k]);
+    }
+    of_ == DistortionOf::kMetric ? Metric(x1, x2, residuals, jacobians)
+                                 : Area(x1, x2, residuals, jacobians);
+    return true;
+  }
+
+ private:
+  void Metric(const Vec3& x1, const Vec3& x2, double* residuals, double** jacobians) const {
+    const double root = std::numbers::sqrt2;
+    residuals[0] = factor_ * (x1.squaredNorm() - 1) / 2;
+    residuals[1] = factor_ * (x2.squaredNorm() - 1) / 2;
+    residuals[2] = factor_ * x1.dot(x2) / root;
+    for (int k = 0; jacobians != nullptr && k < x1_.size(); ++k) {
+      if (jacobians[k] != nullptr) {
+        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> j(jacobians[k]);
+        j.row(0) = factor_ * x1_[k] * x1;
+        j.row(1) = factor_ * x2_[k] * x2;
+        j.row(2) = factor_ / root * (x1_[k] * x2 + x2_[k] * x1);
+      }
+    }
+  }
+
+  void Area(const Vec3& x1, const Vec3& x2, double* residuals, double** jacobians) const {
+    const Vec3 cross = x1.cross(x2), normal = cross.normalized();
+    residuals[0] = factor_ * (cross.norm() - 1);
+    for (int k = 0; jacobians != nullptr && k < x1_.size(); ++k) {
+      if (jacobians[k] != nullptr) {
+        Eigen::Map<Vec3>(jacobians[k], 3) =
+            factor_ * (x1_[k] * x2.cross(normal) + x2_[k] * normal.cross(x1));
+      }
+    }
+  }
+
+  Eigen::VectorXd x1_, x2_;  // by dof
+  Vec3 fixed_x1_, fixed_x2_;
+  DistortionOf of_;
+  double factor_;
+};
+
+}  // namespace
+
+void AddResiduals(const DistortionTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem) {
+  const std::vector<Sample> samples = SamplesOf(view);
+  const double area = AreaOf(samples);
+  for (const Sample& sample : samples) {
+    std::vector<double*> blocks;
+    for (const int dof : sample.element.dofs) {
+      blocks.push_back(net.vertices[dof].data());
+    }
+    const double factor = term.length_mm * std::sqrt(term.weight * sample.area / area);
+    problem.AddResidualBlock(new DistortionCost(sample, term.of, factor), nullptr, blocks);
+  }
+}
+
+double TermCost(const DistortionTerm& term, const LevelView& view, const ControlNet& net) {
+  const std::vector<Sample> samples = SamplesOf(view);
+  double sum = 0;
+  for (const Sample& sample : samples) {
+    const TemplateAxes identity{.a1 = 1, .a2 = 0, .b2 = 1, .area = 1};
+    const PatchMatrix vertices = sample.element.Vertices(net);
+    const Strain strain =
+        StrainOf(identity, Applied(sample.x1, vertices), Applied(sample.x2, vertices));
+    sum += sample.area *
+           (term.of == DistortionOf::kMetric ? strain.SquaredNorm() : strain.area * strain.area);
+  }
+  const double scale = term.weight * term.length_mm * term.length_mm;
+  return samples.empty() ? 0 : scale * sum / AreaOf(samples);
+}
+
+}  // namespace semblance
