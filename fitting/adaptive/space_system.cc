@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "fitting/terms/element_stiffness.h"
+#include "fitting/terms/term_cost.h"
 
 namespace semblance {
 namespace {
@@ -28,7 +28,7 @@ class Assembler {
     system_.right = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(space.dofs().size()), 3);
   }
 
-  SpaceSystem Run() {
+  NormalSystem Run() {
     for (std::size_t k = 0; k < space_.nodes().size() && space_.nodes()[k].parent < 0; ++k) {
       Collect(static_cast<int>(k));
     }
@@ -154,7 +154,7 @@ class Assembler {
   std::vector<int> column_of_;  // of an dof in the part at hand
   std::vector<Eigen::Triplet<double>> triplets_;
   std::vector<SparseMatrix> parts_;
-  SpaceSystem system_;
+  NormalSystem system_;
 };
 
 }  // namespace
@@ -192,8 +192,8 @@ double EnergyOf(const HierarchicalSplineSpace& space, std::span<const LevelStiff
   return energy;
 }
 
-SpaceSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
-                     std::span<const LevelStiffness> forms) {
+NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
+                      std::span<const LevelStiffness> forms) {
   return Assembler(space, point_scale, forms).Run();
 }
 

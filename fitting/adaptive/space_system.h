@@ -26,16 +26,11 @@ std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::spa
 // Sum of the energies over the surface, mm^2.
 double EnergyOf(const HierarchicalSplineSpace& space, std::span<const LevelStiffness> forms);
 
-struct SpaceSystem {
-  SparseMatrix lower;      // triangle
-  Eigen::MatrixX3d right;  // dofs x 3: half of minus the gradient at the space's surface
-};
-
 // Of point_scale * sum w |e|^2 + the energies; the space must be measured. Each leaf gives its
 // sixteen vertices' matrix, which is taken up the quadtree by the refinement matrices, so that the
 // work grows with the patches and not with the points or the pairs of levels. forms: one per level,
 // or none. Unknowns that finer ones cover have empty rows and columns.
-SpaceSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
-                     std::span<const LevelStiffness> forms);
+NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
+                      std::span<const LevelStiffness> forms);
 
 }  // namespace semblance

@@ -15,6 +15,12 @@ namespace semblance {
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
+// In steps from where a surface stands, the same matrix for x, y and z.
+struct NormalSystem {
+  SparseMatrix lower;      // triangle
+  Eigen::MatrixX3d right;  // unknowns x 3: half of minus the gradient
+};
+
 // Adds A^T A of each block of rows; patches find the place of their entries prepared.
 class NormalMatrix final : public RowSink {
  public:

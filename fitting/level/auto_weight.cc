@@ -37,8 +37,8 @@ class WeightSearch {
  public:
   // probes: of the trace, if it is not taken exactly.
   WeightSearch(const WeightProblem& problem, int probes)
-      : problem_(problem), probes_(ProbesFor(problem.points.rows(), probes)) {
-    influenced_ = problem.points.selfadjointView<Eigen::Lower>() * probes_;
+      : problem_(problem), probes_(ProbesFor(problem.points.lower.rows(), probes)) {
+    influenced_ = problem.points.lower.selfadjointView<Eigen::Lower>() * probes_;
   }
 
   // NaN scores are never the best.
@@ -56,11 +56,11 @@ class WeightSearch {
 
  private:
   WeightChoice At(double weight) const {
-    SparseMatrix lower = problem_.points + weight * problem_.smooth;
-    Eigen::MatrixX3d right = problem_.points_right + weight * problem_.smooth_right;
-    if (problem_.fixed.rows() > 0) {
-      lower += problem_.fixed;
-      right += problem_.fixed_right;
+    SparseMatrix lower = problem_.points.lower + weight * problem_.smooth.lower;
+    Eigen::MatrixX3d right = problem_.points.right + weight * problem_.smooth.right;
+    if (problem_.fixed.lower.rows() > 0) {
+      lower += problem_.fixed.lower;
+      right += problem_.fixed.right;
     }
     const double mean = lower.diagonal().mean();
     const SparseFactor factor(lower, 1e-11 * std::max(mean, 1e-300));
@@ -69,8 +69,8 @@ class WeightSearch {
     }
     const Eigen::MatrixXd step = factor.Solve(right);
     const double misfit =
-        problem_.misfit - 2 * step.cwiseProduct(problem_.points_right).sum() +
-        step.cwiseProduct(problem_.points.selfadjointView<Eigen::Lower>() * step).sum();
+        problem_.misfit - 2 * step.cwiseProduct(problem_.points.right).sum() +
+        step.cwiseProduct(problem_.points.lower.selfadjointView<Eigen::Lower>() * step).sum();
     const double trace = probes_.cwiseProduct(factor.Solve(influenced_)).sum() /
                          (probes_.rows() <= kExact ? 1.0 : static_cast<double>(probes_.cols()));
     const double left = 1 - trace / problem_.count;
@@ -83,34 +83,6 @@ class WeightSearch {
   std::map<double, WeightChoice> tried_;
   WeightChoice best_;
 };
-
-void AddTerm(const Term& term, const LevelView& view, RowSink& sink) {
-  std::visit(
-      [&]<class T>(const T& t) {
-        if constexpr (RowTerm<T>) {
-          AddRows(t, view, sink);
-        }
-      },
-      term);
-}
-
-// The matrix and right side of some terms at the view's start.
-struct Part {
-  SparseMatrix lower;
-  Eigen::MatrixX3d right;
-};
-
-Part PartOf(const LevelView& view, std::span<const Term> terms) {
-  NormalMatrix matrix(view.grid);
-  NormalResidual residual(view.start);
-  for (const Term& term : terms) {
-    if (WeightOf(term) > 0) {
-      AddTerm(term, view, matrix);
-      AddTerm(term, view, residual);
-    }
-  }
-  return {matrix.Lower(), residual.Sum()};
-}
 
 void CheckSeparable(std::span<const Term> terms) {
   for (const Term& term : terms) {
@@ -134,8 +106,8 @@ namespace {
 double BestDecade(const WeightProblem& problem, double near) {
   constexpr double kTurned = 1.05;
   WeightSearch search(problem, kRoughProbes);
-  const double even =
-      problem.points.diagonal().sum() / std::max(problem.smooth.diagonal().sum(), 1e-300);
+  const double even = problem.points.lower.diagonal().sum() /
+                      std::max(problem.smooth.lower.diagonal().sum(), 1e-300);
   int turned = 0;
   for (int decade = near > 0 ? 1 : 4; decade >= (near > 0 ? -1 : -10) && turned < 2; --decade) {
     const double score = search.Try((near > 0 ? near : even) * std::pow(10.0, decade)).score;
@@ -174,6 +146,23 @@ WeightChoice ChooseWeight(const WeightProblem& problem, double near) {
     search.Try(middle / factor);
   }
   return SmoothestAsGood(search);
+}
+
+WeightChoice ChooseWeight(TermEquations& equations, const WeightQuestion& question, double near) {
+  std::vector<Term> points, smooth(1, question.terms[question.at]), others;
+  SetWeight(1, smooth[0]);
+  for (int k = 0; k < static_cast<int>(question.terms.size()); ++k) {
+    const Term& term = question.terms[k];
+    if (k != question.at) {
+      (std::holds_alternative<PointTerm>(term) ? points : others).push_back(term);
+    }
+  }
+  return ChooseWeight({.points = equations.System(points),
+                       .smooth = equations.System(smooth),
+                       .fixed = equations.System(others),
+                       .misfit = question.misfit,
+                       .count = static_cast<double>(question.points)},
+                      near);
 }
 
 int AutoTerm(std::span<const Term> terms) {
@@ -216,28 +205,14 @@ std::vector<Term> WithChosenWeight(const LevelView& view, std::span<const Term> 
     return result;
   }
   CheckSeparable(terms);
-  SetWeight(1, result[at]);
-  std::vector<Term> points, others;
-  for (int k = 0; k < static_cast<int>(result.size()); ++k) {
-    if (k != at) {
-      (std::holds_alternative<PointTerm>(result[k]) ? points : others).push_back(result[k]);
-    }
-  }
-  const Part data = PartOf(view, points), smooth = PartOf(view, std::span(&result[at], 1)),
-             fixed = PartOf(view, others);
   double misfit = 0;
-  for (const Term& term : points) {
-    misfit += TermCost(std::get<PointTerm>(term), view, view.start);
+  for (const Term& term : terms) {
+    const auto* const points = std::get_if<PointTerm>(&term);
+    misfit += points != nullptr ? TermCost(*points, view, view.start) : 0;
   }
-  chosen = ChooseWeight({.points = data.lower,
-                         .points_right = data.right,
-                         .smooth = smooth.lower,
-                         .smooth_right = smooth.right,
-                         .fixed = fixed.lower,
-                         .fixed_right = fixed.right,
-                         .misfit = misfit,
-                         .count = static_cast<double>(view.observations.size())})
-               .weight;
+  ControlNet net = view.start;
+  LevelEquations equations(view, net);
+  chosen = ChooseWeight(equations, {terms, at, misfit, view.observations.size()}).weight;
   if (std::isnan(chosen)) {
     throw InputError(
         "weight: auto: no weight has a usable solve; more points than directions they determine "

@@ -6,21 +6,17 @@
 #include <vector>
 
 #include "fitting/least_squares/normal_equations.h"
-#include "fitting/level/level_fit.h"
+#include "fitting/level/level_solver.h"
 #include "fitting/terms/term.h"
 
 namespace semblance {
 
 // The least squares |e - A d|^2 + |fixed terms|^2 + lambda |smoothness|^2 in steps d from where the
-// surface stands, for each coordinate. Matrices are lower triangles of unknowns x unknowns, `right`
-// unknowns x 3 and half of minus the gradients.
+// surface stands, for each coordinate.
 struct WeightProblem {
-  SparseMatrix points;
-  Eigen::MatrixX3d points_right;
-  SparseMatrix smooth;  // at weight 1
-  Eigen::MatrixX3d smooth_right;
-  SparseMatrix fixed;  // other terms, or 0 x 0
-  Eigen::MatrixX3d fixed_right;
+  NormalSystem points;
+  NormalSystem smooth;   // at weight 1
+  NormalSystem fixed;    // other terms, or 0 x 0
   double misfit = kNaN;  // |e|^2, in the units of `points`
   double count = kNaN;   // of points
 };
@@ -38,6 +34,16 @@ struct WeightChoice {
 // thousand (8 while it goes by decades). near: a weight to search around (a decade up and down); 0:
 // everywhere.
 WeightChoice ChooseWeight(const WeightProblem& problem, double near = 0);
+
+// The same for one of separable terms.
+struct WeightQuestion {
+  std::span<const Term> terms;
+  int at = -1;             // the index of that one
+  double misfit = kNaN;    // of the points where the surface stands, mm^2
+  std::size_t points = 0;  // their number
+};
+WeightChoice ChooseWeight(TermEquations& equations, const WeightQuestion& question,
+                          double near = 0);
 
 // The terms with numbers for `auto`, for the solve of `view`. At most one may be `auto`, and then
 // the points have no loss and no term couples x, y and z; else InputError. chosen: what it became;

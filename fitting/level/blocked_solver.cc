@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Ceres on separable terms: its parameter blocks are tiles of 3 x 3 control vertices, one
-// coordinate each, which its sparse Cholesky likes far better than single vertices.
+#include "fitting/level/blocked_solver.h"
+
 #include <ceres/cost_function.h>
 #include <ceres/problem.h>
 
@@ -13,7 +13,7 @@
 
 #include "fitting/least_squares/qr_compression.h"
 #include "fitting/level/level_cost.h"
-#include "fitting/level/level_solver.h"
+#include "fitting/terms/term_cost.h"
 
 namespace semblance {
 namespace {
@@ -172,7 +172,7 @@ ceres::Solver::Summary SolveCoordinate(const BlockedRowSink& sink, const Tiles& 
 SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
   const Tiles tiles(view);
   BlockedRowSink sink(tiles);
-  AddAllRows(view, terms, sink);
+  AddRows(terms, view, sink);
   SolverOutcome outcome{.free_vertices = sink.Touched()};
   if (outcome.free_vertices == 0) {
     return outcome;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the ways to solve a level with Ceres share.
+// What the ways to solve with Ceres share.
 #pragma once
 
 #include <ceres/solver.h>
@@ -7,14 +7,12 @@
 #include <span>
 #include <string>
 
-#include "fitting/terms/term_cost.h"
+#include "fitting/terms/term.h"
 
 namespace semblance {
 
-// Of a level of so many vertices: damped by a multiple of the identity (level_fit.h), one thread.
+// Damped by a multiple of the identity (level_fit.h), for so many vertices; one thread.
 ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t vertices);
 std::string TerminationName(ceres::TerminationType type);  // lower case
-// The rows of all separable terms with a weight.
-void AddAllRows(const LevelView& view, std::span<const Term> terms, RowSink& sink);
 
 }  // namespace semblance

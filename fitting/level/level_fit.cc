@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "fitting/least_squares/normal_equations.h"
-#include "fitting/least_squares/sparse_factor.h"
 #include "fitting/level/auto_weight.h"
 #include "fitting/level/level_solver.h"
 #include "fitting/level/reweighting.h"
@@ -43,14 +42,14 @@ void CheckSizes(const LevelView& view) {
 // Patches are named by their first vertex.
 int PatchOf(const PatchGrid& grid, const Vec2& uv) { return grid.StencilAt(uv).index[0]; }
 
-PatchCoverage PatchCounts(const LevelView& view) {
+std::vector<int> PatchCounts(const LevelView& view) {
   std::vector<int> counts(static_cast<std::size_t>(view.grid.patches_u) * view.grid.patches_v, 0);
   const auto cell = [](double x, int n) { return std::clamp(static_cast<int>(x * n), 0, n - 1); };
   for (const Observation& o : view.observations) {
     ++counts[cell(o.uv.x(), view.grid.patches_u) +
              view.grid.patches_u * cell(o.uv.y(), view.grid.patches_v)];
   }
-  return CoverageOf(std::move(counts));
+  return counts;
 }
 
 double MaxMove(const ControlNet& a, const ControlNet& b) {
@@ -76,20 +75,12 @@ SparseMatrix PointNormal(const LevelView& view) {
   return normal.Lower();
 }
 
-void Measure(const LevelView& view, std::span<const Term> terms, const SparseMatrix& lower,
-             LevelSolution& solution) {
-  LevelSummary& summary = solution.summary;
-  summary.rms_before_mm = ObservationRms(view, view.start);
-  summary.rms_after_mm = ObservationRms(view, solution.net);
+Standing StandingOf(const LevelView& view, std::span<const Term> terms, const ControlNet& net) {
+  Standing standing{.rms_mm = ObservationRms(view, net)};
   for (const Term& term : terms) {
-    summary.terms.push_back({.term = std::string(TermName(term)),
-                             .before = CostOf(term, view, view.start, summary.rms_before_mm),
-                             .after = CostOf(term, view, solution.net, summary.rms_after_mm)});
+    standing.costs.push_back(CostOf(term, view, net, standing.rms_mm));
   }
-  summary.uncovered_vertices = static_cast<int>((lower.diagonal().array() <= 0).count());
-  summary.coverage = PatchCounts(view);
-  summary.rank = NumericalRank(lower, view.observations.size());
-  summary.max_move_mm = MaxMove(view.start, solution.net);
+  return standing;
 }
 
 void SortBone(std::vector<BoneObservation>& bone) {
@@ -109,31 +100,35 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver 
   CheckTerms(view, given);
   SortObservations(view.grid, view.observations);
   SortBone(view.bone);
-  LevelSolution solution{.net = view.start, .summary = {}};
-  const std::vector<Term> terms = WithChosenWeight(view, given, solution.summary.auto_weight);
-  const bool coupled = !SeparableButForLoss(terms);
-  const bool direct = solver == LevelSolver::kFastest && !coupled;
-  const auto solve = coupled ? SolveByCeres : direct ? SolveDirectly : SolveBlocked;
-  const SolverOutcome outcome = coupled || AllSeparable(terms)
-                                    ? solve(view, terms, solution.net)
-                                    : SolveReweighted(view, terms, solve, solution.net);
-  solution.summary.solver = direct ? "direct" : "ceres";
-  solution.summary.iterations = outcome.iterations;
-  solution.summary.free_vertices = outcome.free_vertices;
-  solution.summary.termination = outcome.termination;
-  solution.summary.usable = outcome.usable;
-  Measure(view, terms, outcome.points.rows() > 0 ? outcome.points : PointNormal(view), solution);
-  return solution;
+  double auto_weight = kNaN;
+  const std::vector<Term> terms = WithChosenWeight(view, given, auto_weight);
+  ControlNet net = view.start;
+  SolverOutcome outcome = Minimise(view, terms, solver, net);
+  LevelSummary summary =
+      SummaryOf(terms, StandingOf(view, terms, view.start), StandingOf(view, terms, net), outcome);
+  summary.auto_weight = auto_weight;
+  summary.max_move_mm = MaxMove(view.start, net);
+  summary.solver =
+      solver == LevelSolver::kFastest && SeparableButForLoss(terms) ? "direct" : "ceres";
+  NoteCoverage({.points = outcome.points.rows() > 0 ? std::move(outcome.points) : PointNormal(view),
+                .count = view.observations.size(),
+                .patch_counts = PatchCounts(view)},
+               summary);
+  return {std::move(net), std::move(summary)};
 }
 
-void CheckTerms(const LevelView& view, std::span<const Term> terms) {
-  const bool extent = view.lengths_mm.allFinite() && view.lengths_mm.minCoeff() > 0;
+void CheckExtent(const Vec2& lengths_mm, std::span<const Term> terms) {
+  const bool extent = lengths_mm.allFinite() && lengths_mm.minCoeff() > 0;
   if (!extent && std::any_of(terms.begin(), terms.end(), NeedsExtent)) {
     throw InputError(fmt::format(
         "fit: the template's mean lengths along u and v are {} and {} mm; the smoothness and "
         "membrane terms need a template that is more than a point or a line",
-        view.lengths_mm.x(), view.lengths_mm.y()));
+        lengths_mm.x(), lengths_mm.y()));
   }
+}
+
+void CheckTerms(const LevelView& view, std::span<const Term> terms) {
+  CheckExtent(view.lengths_mm, terms);
   const auto bone = std::find_if(terms.begin(), terms.end(), NeedsFeet);
   if (bone != terms.end() && view.bone.empty()) {
     throw InputError(fmt::format(

@@ -76,6 +76,9 @@ constexpr auto EnumNames(LevelSolver) {
 LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
                        LevelSolver solver = LevelSolver::kCeres);
 
+// Throws InputError for a term that needs the template's extent where it has none.
+void CheckExtent(const Vec2& lengths_mm, std::span<const Term> terms);
+
 // Throws InputError for a term that has nothing to look at: no extent of the template, no foot on
 // bone, no landmark.
 void CheckTerms(const LevelView& view, std::span<const Term> terms);

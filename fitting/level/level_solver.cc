@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "fitting/least_squares/blas_threads.h"
-#include "fitting/least_squares/normal_equations.h"
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/level/level_cost.h"
+#include "fitting/terms/term_cost.h"
 
 namespace semblance {
 namespace {
@@ -29,58 +30,6 @@ double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
 }
 
 double Radius(double stiffness) { return std::min(1e8 / stiffness, 1e16); }
-
-// Moves the vertices; returns the length of the step over that of all coordinates.
-double Step(const Eigen::MatrixX3d& step, ControlNet& net) {
-  double length = 0, size = 0;
-  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
-    if (!step.row(k).isZero(0)) {
-      net.vertices[k] += step.row(k).transpose();
-    }
-    length += step.row(k).squaredNorm();
-    size += net.vertices[k].squaredNorm();
-  }
-  return std::sqrt(length / std::max(size, 1e-26));
-}
-
-// All terms' matrix; that of the points is kept on the way.
-SparseMatrix NormalOf(const LevelView& view, std::span<const Term> terms, SparseMatrix& points) {
-  std::vector<Term> observing, others;
-  for (const Term& term : terms) {
-    (std::holds_alternative<PointTerm>(term) && WeightOf(term) > 0 ? observing : others)
-        .push_back(term);
-  }
-  NormalMatrix matrix(view.grid);
-  AddAllRows(view, observing, matrix);
-  if (!observing.empty()) {
-    points = matrix.Lower();
-  }
-  AddAllRows(view, others, matrix);
-  return matrix.Lower();
-}
-
-Eigen::MatrixX3d ResidualOf(const LevelView& view, std::span<const Term> terms,
-                            const ControlNet& net) {
-  NormalResidual residual(net);
-  AddAllRows(view, terms, residual);
-  return residual.Sum();
-}
-
-void Descend(const LevelView& view, std::span<const Term> terms, const SparseMatrix& normal,
-             ControlNet& net, SolverOutcome& outcome) {
-  const SparseFactor factor(normal, 1 / Radius(TypicalStiffness(terms, net.vertices.size())));
-  outcome.usable = factor.usable();
-  outcome.termination = "no_convergence";
-  while (outcome.usable && outcome.iterations < kMaxIterations) {
-    const Eigen::MatrixX3d step = factor.Solve(ResidualOf(view, terms, net));
-    outcome.usable = step.allFinite();
-    ++outcome.iterations;
-    if (outcome.usable && Step(step, net) <= kStepTolerance) {
-      outcome.termination = "convergence";
-      break;
-    }
-  }
-}
 
 }  // namespace
 
@@ -114,26 +63,6 @@ std::string TerminationName(ceres::TerminationType type) {
   return text;
 }
 
-void AddAllRows(const LevelView& view, std::span<const Term> terms, RowSink& sink) {
-  for (const Term& term : terms) {
-    if (WeightOf(term) > 0) {
-      std::visit(
-          [&]<class T>(const T& t) {
-            if constexpr (RowTerm<T>) {
-              AddRows(t, view, sink);
-            }
-          },
-          term);
-    }
-  }
-}
-
-bool AllSeparable(std::span<const Term> terms) {
-  return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
-    return WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsSeparable(t); }, term);
-  });
-}
-
 SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
   ceres::Problem problem;
   for (const Term& term : terms) {
@@ -157,20 +86,109 @@ SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, C
   return outcome;
 }
 
-SolverOutcome SolveDirectly(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
-  SolverOutcome outcome;
-  const SparseMatrix normal = NormalOf(view, terms, outcome.points);
-  outcome.free_vertices = static_cast<int>((normal.diagonal().array() > 0).count());
+// The points' matrix is kept on the way.
+NormalSystem LevelEquations::System(std::span<const Term> terms) {
+  std::vector<Term> observing, others;
+  for (const Term& term : terms) {
+    (std::holds_alternative<PointTerm>(term) && WeightOf(term) > 0 ? observing : others)
+        .push_back(term);
+  }
+  NormalMatrix matrix(view_.grid);
+  AddRows(observing, view_, matrix);
+  if (!observing.empty()) {
+    points_ = matrix.Lower();
+  }
+  AddRows(others, view_, matrix);
+  return {matrix.Lower(), Right(terms)};
+}
+
+Eigen::MatrixX3d LevelEquations::Right(std::span<const Term> terms) {
+  NormalResidual residual(net_);
+  AddRows(terms, view_, residual);
+  return residual.Sum();
+}
+
+// The length of the step over that of all coordinates.
+double LevelEquations::Move(const Eigen::MatrixX3d& step, const Eigen::MatrixX3d& /*right*/) {
+  double length = 0, size = 0;
+  for (std::size_t k = 0; k < net_.vertices.size(); ++k) {
+    if (!step.row(k).isZero(0)) {
+      net_.vertices[k] += step.row(k).transpose();
+    }
+    length += step.row(k).squaredNorm();
+    size += net_.vertices[k].squaredNorm();
+  }
+  return std::sqrt(length / std::max(size, 1e-26));
+}
+
+SolverOutcome Descend(TermEquations& equations, std::span<const Term> terms,
+                      const DescentOptions& options) {
+  NormalSystem system = equations.System(terms);
+  SolverOutcome outcome{.free_vertices =
+                            static_cast<int>((system.lower.diagonal().array() > 0).count())};
   if (outcome.free_vertices == 0) {
     return outcome;
   }
+  outcome.termination = "no_convergence";
+  std::optional<SparseFactor> factor;
+  while (outcome.iterations < kMaxIterations) {
+    if (outcome.iterations > 0 && options.reweighted) {
+      system = equations.System(terms);
+    } else if (outcome.iterations > 0) {
+      system.right = equations.Right(terms);
+    }
+    if (!factor || options.reweighted) {
+      const double mean = std::max(system.lower.diagonal().mean(), 1e-300);
+      factor.emplace(system.lower, options.shift + options.relative_shift * mean);
+    }
+    ++outcome.iterations;
+    const Eigen::MatrixX3d step =
+        factor->usable() ? Eigen::MatrixX3d(factor->Solve(system.right)) : Eigen::MatrixX3d();
+    outcome.usable = factor->usable() && step.allFinite();
+    const double moved = outcome.usable ? equations.Move(step, system.right) : 0;
+    if (!(moved > options.least_move) || options.one_step) {
+      outcome.termination = !outcome.usable                 ? "failure"
+                            : !(moved > options.least_move) ? "convergence"
+                                                            : "first step";
+      break;
+    }
+  }
+  return outcome;
+}
+
+SolverOutcome SolveDirectly(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
   const ControlNet before = net;
-  Descend(view, terms, normal, net, outcome);
+  LevelEquations equations(view, net);
+  const double stiffness = TypicalStiffness(terms, net.vertices.size());
+  SolverOutcome outcome =
+      Descend(equations, terms, {.shift = 1 / Radius(stiffness), .least_move = kStepTolerance});
+  outcome.points = equations.points();
   if (!outcome.usable) {
-    outcome.termination = "failure";
     net = before;
   }
   return outcome;
+}
+
+LevelSummary SummaryOf(std::span<const Term> terms, const Standing& before, const Standing& after,
+                       const SolverOutcome& outcome) {
+  LevelSummary summary{.terms = {},
+                       .rms_before_mm = before.rms_mm,
+                       .rms_after_mm = after.rms_mm,
+                       .iterations = outcome.iterations,
+                       .free_vertices = outcome.free_vertices,
+                       .termination = outcome.termination,
+                       .usable = outcome.usable};
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    summary.terms.push_back({std::string(TermName(terms[k])), before.costs[k], after.costs[k]});
+  }
+  return summary;
+}
+
+void NoteCoverage(const PointCover& cover, LevelSummary& summary) {
+  summary.coverage = CoverageOf(cover.patch_counts);
+  summary.uncovered_vertices =
+      static_cast<int>((cover.points.diagonal().array() <= 0).count()) - cover.covered;
+  summary.rank = NumericalRank(cover.points, cover.count);
 }
 
 }  // namespace semblance

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "fitting/level/blocked_solver.h"
 #include "fitting/terms/robust_loss.h"
 #include "fitting/terms/term_cost.h"
 
@@ -74,12 +75,6 @@ std::vector<double> CostWeights(const LevelView& view, std::span<const Term> ter
   return weights;
 }
 
-bool SeparableButForLoss(std::span<const Term> terms) {
-  return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
-    return std::visit([]<class T>(const T& t) { return t.weight <= 0 || RowTerm<T>; }, term);
-  });
-}
-
 SolverOutcome SolveReweighted(const LevelView& view, std::span<const Term> terms,
                               const SeparableSolver& solve, ControlNet& net, double least_move) {
   const ControlNet before = net;
@@ -102,6 +97,16 @@ SolverOutcome SolveReweighted(const LevelView& view, std::span<const Term> terms
     net = before;
   }
   return outcome;
+}
+
+SolverOutcome Minimise(const LevelView& view, std::span<const Term> terms, LevelSolver solver,
+                       ControlNet& net, double least_move) {
+  if (!SeparableButForLoss(terms)) {
+    return SolveByCeres(view, terms, net);
+  }
+  const auto solve = solver == LevelSolver::kFastest ? SolveDirectly : SolveBlocked;
+  return AllSeparable(terms) ? solve(view, terms, net)
+                             : SolveReweighted(view, terms, solve, net, least_move);
 }
 
 }  // namespace semblance

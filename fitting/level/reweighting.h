@@ -17,9 +17,6 @@ namespace semblance {
 std::vector<double> CostWeights(const LevelView& view, std::span<const Term> terms,
                                 const ControlNet& net);
 
-// Whether all terms with a weight are separable but for a loss.
-bool SeparableButForLoss(std::span<const Term> terms);
-
 using SeparableSolver = std::function<SolverOutcome(const LevelView& view,
                                                     std::span<const Term> terms, ControlNet& net)>;
 
@@ -31,5 +28,10 @@ using SeparableSolver = std::function<SolverOutcome(const LevelView& view,
 SolverOutcome SolveReweighted(const LevelView& view, std::span<const Term> terms,
                               const SeparableSolver& solve, ControlNet& net,
                               double least_move = 1e-12);
+
+// By what fits the terms, to the minimum: SolveByCeres where they couple x, y and z, else
+// SolveDirectly if the fastest way is asked for, else SolveBlocked; a loss by reweighting.
+SolverOutcome Minimise(const LevelView& view, std::span<const Term> terms, LevelSolver solver,
+                       ControlNet& net, double least_move = 1e-12);
 
 }  // namespace semblance

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "fitting/least_squares/linear_cost.h"
-#include "fitting/terms/element_stiffness.h"
 #include "fitting/terms/strain.h"
 #include "fitting/terms/term_cost.h"
 

@@ -6,7 +6,9 @@
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 
+#include <algorithm>
 #include <memory>
+#include <span>
 
 #include "fitting/least_squares/linear_cost.h"
 #include "fitting/least_squares/row_sink.h"
@@ -28,11 +30,45 @@ template <class T>
 concept RowTerm = requires(const T& term, const LevelView& view, RowSink& sink) {
   AddRows(term, view, sink);
 };
+// All rows of those terms that have any, and a weight.
+inline void AddRows(std::span<const Term> terms, const LevelView& view, RowSink& sink) {
+  for (const Term& term : terms) {
+    std::visit(
+        [&]<class T>(const T& t) {
+          if constexpr (RowTerm<T>) {
+            if (t.weight > 0) {
+              AddRows(t, view, sink);
+            }
+          }
+        },
+        term);
+  }
+}
+
 inline bool IsSeparable(const PointTerm& term) { return term.loss == RobustLoss::kNone; }
 template <class T>
 bool IsSeparable(const T&) {
   return RowTerm<T>;
 }
+
+// Of each term with a weight.
+inline bool AllSeparable(std::span<const Term> terms) {
+  return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
+    return WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsSeparable(t); }, term);
+  });
+}
+inline bool SeparableButForLoss(std::span<const Term> terms) {
+  return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
+    return std::visit([]<class T>(const T& t) { return t.weight <= 0 || RowTerm<T>; }, term);
+  });
+}
+
+// What the term costs on one patch of a level of patches_u x patches_v, mm^2: x^T form x for each
+// coordinate x of the patch's sixteen f. lengths_mm: what [0,1] stands for along u and v.
+ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
+                             int patches_v);
+ElementStiffness StiffnessOf(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
+                             int patches_v);
 
 // Adds the residuals of a term over `net`, whose vertices become parameter blocks of 3 doubles. The
 // sum of their squares (robust: of their losses), which is twice Ceres' cost, equals TermCost but

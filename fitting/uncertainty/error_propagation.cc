@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 #include <variant>
 
@@ -24,35 +25,28 @@ namespace {
 
 constexpr Eigen::Index kAtOnce = 64;  // right-hand sides, to bound the memory
 
-template <class T>
-constexpr bool kIsPoints = std::is_same_v<T, PointTerm> || std::is_same_v<T, LandmarkTerm> ||
-                           std::is_same_v<T, TangentPointTerm>;
-
-// The terms that are not of the points, as rows.
-void AddOthers(std::span<const Term> terms, const LevelView& view, RowSink& sink) {
-  for (const Term& term : terms) {
-    std::visit(
-        [&]<class T>(const T& t) {
-          if constexpr (RowTerm<T> && !kIsPoints<T>) {
-            if (t.weight > 0) {
-              AddRows(t, view, sink);
-            }
-          }
-        },
-        term);
-  }
+bool IsOfPoints(const Term& term) {
+  return std::holds_alternative<PointTerm>(term) || std::holds_alternative<LandmarkTerm>(term) ||
+         std::holds_alternative<TangentPointTerm>(term);
 }
 
-double CostOfOthers(std::span<const Term> terms, const LevelView& view) {
+bool IsOfRows(const Term& term) {
+  return std::visit([]<class T>(const T&) { return RowTerm<T>; }, term);
+}
+
+// The terms with a weight that are not of the points, and are rows.
+std::vector<Term> OthersAmong(std::span<const Term> terms) {
+  std::vector<Term> others;
+  std::copy_if(terms.begin(), terms.end(), std::back_inserter(others), [](const Term& term) {
+    return WeightOf(term) > 0 && IsOfRows(term) && !IsOfPoints(term);
+  });
+  return others;
+}
+
+double CostOf(std::span<const Term> terms, const LevelView& view) {
   double sum = 0;
   for (const Term& term : terms) {
-    std::visit(
-        [&]<class T>(const T& t) {
-          if constexpr (RowTerm<T> && !kIsPoints<T>) {
-            sum += t.weight > 0 ? TermCost(t, view, view.start) : 0;
-          }
-        },
-        term);
+    sum += std::visit([&](const auto& t) { return TermCost(t, view, view.start); }, term);
   }
   return sum;
 }
@@ -60,9 +54,7 @@ double CostOfOthers(std::span<const Term> terms, const LevelView& view) {
 std::vector<std::string_view> LeftOut(std::span<const Term> terms) {
   std::vector<std::string_view> names;
   for (const Term& term : terms) {
-    const bool left = std::visit(
-        []<class T>(const T& t) { return t.weight > 0 && !RowTerm<T> && !kIsPoints<T>; }, term);
-    if (left) {
+    if (WeightOf(term) > 0 && !IsOfRows(term) && !IsOfPoints(term)) {
       names.push_back(TermName(term));
     }
   }
@@ -136,12 +128,6 @@ Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd left, double share) {
 
 namespace {
 
-SparseMatrix OthersOf(const LevelView& view, std::span<const Term> terms) {
-  NormalMatrix matrix(view.grid);
-  AddOthers(terms, view, matrix);
-  return matrix.Lower();
-}
-
 double Sum(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) {
@@ -158,13 +144,12 @@ void AddAll(std::span<const Term> terms, const LevelView& view, const std::vecto
     points.observations[k].weight = weights[k];
   }
   AddRows(PointTerm{.weight = Sum(weights)}, points, sink);
-  AddOthers(terms, view, sink);
+  AddRows(OthersAmong(terms), view, sink);
 }
 
-SparseMatrix NormalOf(const LevelView& view, std::span<const Term> terms,
-                      const std::vector<double>& weights) {
+SparseMatrix NormalOf(const LevelView& view, const auto& add_rows) {
   NormalMatrix matrix(view.grid);
-  AddAll(terms, view, weights, matrix);
+  add_rows(matrix);
   return matrix.Lower();
 }
 
@@ -210,7 +195,8 @@ struct ErrorPropagation::Model {
   LevelView view;
   std::vector<Term> terms;
   std::vector<double> weights;                 // of the points, in the cost
-  SparseMatrix others;                         // P, lower
+  std::vector<Term> others;                    // of the terms, those that make P
+  SparseMatrix others_normal;                  // P, lower
   SparseMatrix normal;                         // M, lower
   SubspaceSolver factor;                       // of M
   std::array<Eigen::MatrixXd, 3> points = {};  // M^-1 A'W root of each coordinate, transposed
@@ -225,8 +211,9 @@ struct ErrorPropagation::Model {
         view(ViewOfLevel(fitted, rest, target, fitted_level)),
         terms(WithNumbers(given, view)),
         weights(CostWeights(view, terms, view.start)),
-        others(OthersOf(view, terms)),
-        normal(NormalOf(view, terms, weights)),
+        others(OthersAmong(terms)),
+        others_normal(NormalOf(view, [&](RowSink& sink) { AddRows(others, view, sink); })),
+        normal(NormalOf(view, [&](RowSink& sink) { AddAll(terms, view, weights, sink); })),
         factor(normal, SubspaceBasis(fitted, fitted_level)) {}
 
   void Solve(const PointErrors& errors) {
@@ -237,7 +224,7 @@ struct ErrorPropagation::Model {
     AddAll(terms, view, weights, residual);
     undone = factor.Solve(residual.Sum());
     determined = Determined(view, weights, factor);
-    prior_sd = determined > 0 ? std::sqrt(CostOfOthers(terms, view) / (3 * determined)) : 0;
+    prior_sd = determined > 0 ? std::sqrt(CostOf(others, view) / (3 * determined)) : 0;
   }
 
   std::vector<char> Touched() const {
@@ -275,7 +262,7 @@ struct ErrorPropagation::Model {
       const Eigen::Index part = std::min(kAtOnce, normal.rows() - begin);
       const Eigen::MatrixXd inverse = factor.Solve(UnitColumns(normal.rows(), begin, part));
       const Eigen::MatrixXd columns =
-          factor.Solve(others.selfadjointView<Eigen::Lower>() * inverse);
+          factor.Solve(others_normal.selfadjointView<Eigen::Lower>() * inverse);
       for (Eigen::Index column = 0; column < part; ++column) {
         for (const auto& [k, entry] : uses[begin + column]) {
           const Stencil& s = stencils[k];
@@ -335,7 +322,7 @@ std::vector<HSplineSurface> ErrorPropagation::Samples(int count, std::uint64_t r
   std::vector<HSplineSurface> samples;
   for (int sample = 0; sample < count; ++sample) {
     NoiseSink noise(vertices, random);
-    AddOthers(m.terms, m.view, noise);
+    AddRows(m.others, m.view, noise);
     Eigen::MatrixXd step = m.prior_sd * m.factor.Solve(noise.Sum()) + random.Normal() * m.undone;
     const Eigen::VectorXd z = Eigen::VectorXd::NullaryExpr(
         m.points[0].rows(), [&](Eigen::Index) { return random.Normal(); });

@@ -150,7 +150,7 @@ TEST(AdaptiveFit, TheSystemIsTheGradientOfTheCost) {
     step(k / 3, k % 3) = random.Uniform(-1, 1);
   }
   cost();
-  const SpaceSystem system = Assemble(space, scale, forms);
+  const NormalSystem system = Assemble(space, scale, forms);
   const Eigen::MatrixXd normal = Eigen::MatrixXd(system.lower).selfadjointView<Eigen::Lower>();
   const double here = cost();
   space.Move(step);

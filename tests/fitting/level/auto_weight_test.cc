@@ -90,14 +90,12 @@ TEST(AutoWeight, TheScoreIsThatOfCravenAndWahba) {
     e.row(k) = (target.points[k].position - start.Point(target.points[k].uv)) / std::sqrt(n);
   }
   const Eigen::MatrixXd smooth = Eigen::MatrixXd::Identity(49, 49), none;
-  const WeightChoice choice = ChooseWeight({.points = (a.transpose() * a).sparseView(),
-                                            .points_right = a.transpose() * e,
-                                            .smooth = smooth.sparseView(),
-                                            .smooth_right = Eigen::MatrixX3d::Zero(49, 3),
-                                            .fixed = {},
-                                            .fixed_right = {},
-                                            .misfit = e.squaredNorm(),
-                                            .count = n});
+  const WeightChoice choice =
+      ChooseWeight({.points = {(a.transpose() * a).sparseView(), a.transpose() * e},
+                    .smooth = {smooth.sparseView(), Eigen::MatrixX3d::Zero(49, 3)},
+                    .fixed = {},
+                    .misfit = e.squaredNorm(),
+                    .count = n});
   const auto score = [&](double weight) {
     const Eigen::MatrixXd influence =
         a * (a.transpose() * a + weight * smooth).inverse() * a.transpose();

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The ways to solve a level agree.
+#include "fitting/level/blocked_solver.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "fitting/level/level_solver.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
