@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <optional>
 #include <utility>
 
@@ -18,14 +17,6 @@ namespace semblance {
 namespace {
 
 double Enough(SolveTolerance until) { return until == SolveTolerance::kTight ? 1e-14 : 1e-4; }
-
-Vec2 LengthsOf(const HSplineSurface& rest) {
-  const HSplineShape& shape = rest.shape();
-  return MeanLengths({.patches_u = shape.patches_u,
-                      .patches_v = shape.patches_v,
-                      .periodic_u = shape.closure == Closure::kPeriodicU},
-                     rest.Net(0));
-}
 
 bool IsSmoothness(const Term& term) {
   return std::holds_alternative<SmoothnessTerm>(term) || std::holds_alternative<MembraneTerm>(term);
@@ -69,7 +60,7 @@ AdaptiveSolve::AdaptiveSolve(const HSplineSurface& start, const HSplineSurface& 
       auto_term_(AutoTerm(terms)),
       solver_(solver),
       threads_(threads),
-      lengths_mm_(LengthsOf(rest)) {
+      lengths_mm_(MeanLengths(rest)) {
   CheckExtent(lengths_mm_, terms);
   Measure();
 }
@@ -189,26 +180,6 @@ SolverOutcome AdaptiveSolve::SolveWithCeres(SolveTolerance until) {
                                          until == SolveTolerance::kTight ? 1e-12 : Enough(until));
   Take(view.space->StepTo(net));
   return outcome;
-}
-
-// The points in the cloud's order, in which those of a leaf stand together.
-LevelView AdaptiveSolve::View() const {
-  const auto elements = std::make_shared<const SplineElements>(space_);
-  LevelView view{.grid = {},
-                 .start = elements->Values(),
-                 .rest = elements->RestValues(),
-                 .lengths_mm = lengths_mm_,
-                 .observations = {},
-                 .space = elements};
-  view.observations.reserve(cloud_.points().size());
-  for (std::size_t k = 0; k < cloud_.points().size(); ++k) {
-    const std::size_t given = cloud_.Given(k);
-    const Observation& o = view.observations.emplace_back(Observe(target_.points[given]));
-    if (!target_.anchors.empty() && target_.anchors[given].foot.allFinite()) {
-      view.bone.push_back({o, target_.anchors[given].foot, target_.anchors[given].direction});
-    }
-  }
-  return view;
 }
 
 Standing AdaptiveSolve::Stand() const {

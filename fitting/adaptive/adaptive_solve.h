@@ -53,7 +53,7 @@ class AdaptiveSolve final : private TermEquations {
   double ChooseSmoothness();
   bool GoesDirectly() const;
   SolverOutcome SolveWithCeres(SolveTolerance until);
-  LevelView View() const;
+  LevelView View() const { return ViewOfSpace(space_, cloud_, target_, lengths_mm_); }
   Standing Stand() const;
   double LeastLossWidth_mm() const;
   double PointCost() const;

@@ -119,11 +119,7 @@ void AddCoupledResidual(const Eigen::MatrixXd& a, Eigen::VectorXd b, std::span<c
 
 void ProblemSink::Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                       std::span<const int> vertices) {
-  if (reduce_ && a->rows() > a->cols()) {
-    LinearRows rows = CompressRows(*a, b);
-    a = std::make_shared<const Eigen::MatrixXd>(std::move(rows.a));
-    b = std::move(rows.b);
-  }
+  CompressShared(a, b);
   AddLinearResidual(std::move(a), std::move(b), vertices, nullptr, net_, problem_);
 }
 

@@ -54,18 +54,16 @@ void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                        ControlNet& net, ceres::Problem& problem);
 
 // Rows become residuals over the vertices of `net`, a parameter block of 3 doubles each. Blocks
-// with more rows than columns are reduced first (qr_compression.h), unless told not to.
+// with more rows than columns are reduced first (qr_compression.h).
 class ProblemSink final : public RowSink {
  public:
-  ProblemSink(ControlNet& net, ceres::Problem& problem, bool reduce = true)
-      : net_(net), problem_(problem), reduce_(reduce) {}
+  ProblemSink(ControlNet& net, ceres::Problem& problem) : net_(net), problem_(problem) {}
   void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
            std::span<const int> vertices) override;
 
  private:
   ControlNet& net_;
   ceres::Problem& problem_;
-  bool reduce_;
 };
 
 }  // namespace semblance

@@ -65,6 +65,12 @@ std::array<int, 16> PatchGrid::PatchVertices(int i, int j) const {
   return vertices;
 }
 
+PatchGrid PatchGrid::Of(const HSplineShape& shape, int level) {
+  return {.patches_u = shape.PatchesU(level),
+          .patches_v = shape.PatchesV(level),
+          .periodic_u = shape.closure == Closure::kPeriodicU};
+}
+
 HSplineShape PatchGrid::Shape() const {
   return {.patches_u = patches_u,
           .patches_v = patches_v,
@@ -116,6 +122,10 @@ Vec2 MeanLengths(const PatchGrid& grid, const ControlNet& net) {
   const double size_u = 1.0 / grid.patches_u, size_v = 1.0 / grid.patches_v;
   return {std::sqrt(StiffnessEnergy(DerivativeStiffness(1, 0, size_u, size_v), grid, net)),
           std::sqrt(StiffnessEnergy(DerivativeStiffness(0, 1, size_u, size_v), grid, net))};
+}
+
+Vec2 MeanLengths(const HSplineSurface& surface) {
+  return MeanLengths(PatchGrid::Of(surface.shape(), 0), surface.Net(0));
 }
 
 }  // namespace semblance

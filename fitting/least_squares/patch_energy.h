@@ -18,6 +18,7 @@ struct PatchGrid {
 
   int Columns() const { return periodic_u ? patches_u : patches_u + 3; }
   int Rows() const { return patches_v + 3; }
+  static PatchGrid Of(const HSplineShape& shape, int level);
   HSplineShape Shape() const;  // with this as level 0, and no other
   // The sixteen vertices of patch (i, j), the one at column a, row b of its 4 x 4 at a + 4 b. With
   // periodic u a column stands at several a if patches_u < 4.
@@ -44,5 +45,7 @@ double StiffnessEnergy(const ElementStiffness& form, const PatchGrid& grid, cons
 // The lengths in mm that [0,1] stands for along u and v: root mean square over the domain of |S_u|
 // and of |S_v|. The same whatever level the surface is written at.
 Vec2 MeanLengths(const PatchGrid& grid, const ControlNet& net);
+// Of level 0, which is that of all levels without detail.
+Vec2 MeanLengths(const HSplineSurface& surface);
 
 }  // namespace semblance

@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace semblance {
 namespace {
@@ -65,6 +66,14 @@ LinearRows CompressRows(const Eigen::MatrixXd& a, const Rows3& b) {
   }
   const Eigen::MatrixXd triangle = TriangleOf(a, b);
   return TruncateRank({.a = triangle.leftCols(a.cols()), .b = triangle.rightCols<3>()});
+}
+
+void CompressShared(std::shared_ptr<const Eigen::MatrixXd>& a, Rows3& b) {
+  if (a->rows() > a->cols()) {
+    LinearRows rows = CompressRows(*a, b);
+    a = std::make_shared<const Eigen::MatrixXd>(std::move(rows.a));
+    b = std::move(rows.b);
+  }
 }
 
 }  // namespace semblance

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
 #include "fitting/least_squares/row_sink.h"
 
@@ -18,5 +19,8 @@ struct LinearRows {
 // made a slab of rows at a time. Rows that carry nothing (rank below a.cols()) are left out. No
 // more rows than columns come back as they are.
 LinearRows CompressRows(const Eigen::MatrixXd& a, const Rows3& b);
+
+// The same in place, as a RowSink takes rows; no more rows than columns stay shared.
+void CompressShared(std::shared_ptr<const Eigen::MatrixXd>& a, Rows3& b);
 
 }  // namespace semblance

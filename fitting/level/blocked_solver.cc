@@ -109,11 +109,7 @@ class BlockedRowSink final : public RowSink {
 
   void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
            std::span<const int> vertices) override {
-    if (a->rows() > a->cols()) {
-      LinearRows reduced = CompressRows(*a, b);
-      a = std::make_shared<const Eigen::MatrixXd>(std::move(reduced.a));
-      b = std::move(reduced.b);
-    }
+    CompressShared(a, b);
     TileRows rows{.a = std::make_shared<const Eigen::MatrixXd>(kScale * *a),
                   .b = kScale * b,
                   .tiles = {},

@@ -38,19 +38,13 @@ std::vector<int> Ordered(std::span<const Vec2> uv) {
   return order;
 }
 
-Vec2 Lengths(const HSplineSurface& surface) {
-  const HSplineShape& shape = surface.shape();
-  const PatchGrid grid{.patches_u = shape.patches_u,
-                       .patches_v = shape.patches_v,
-                       .periodic_u = shape.closure == Closure::kPeriodicU};
-  return MeanLengths(grid, surface.Net(0));
-}
-
 }  // namespace
 
 DowelMesh::DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv,
                      DowelLinks links)
-    : rest_uv_(uv.begin(), uv.end()), corner_(uv.size()), lengths_mm_(Lengths(template_surface)) {
+    : rest_uv_(uv.begin(), uv.end()),
+      corner_(uv.size()),
+      lengths_mm_(MeanLengths(template_surface)) {
   std::iota(corner_.begin(), corner_.end(), 0);
   if (links == DowelLinks::kDelaunay) {
     Link(uv);

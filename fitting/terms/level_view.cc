@@ -20,12 +20,6 @@ Observation Observe(const FitPoint& point) {
 
 namespace {
 
-PatchGrid GridOf(const HSplineShape& shape, int level) {
-  return {.patches_u = shape.PatchesU(level),
-          .patches_v = shape.PatchesV(level),
-          .periodic_u = shape.closure == Closure::kPeriodicU};
-}
-
 // The detail that finer levels add at uv is taken off the point that the level aims at.
 Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
   Observation o = Observe(point);
@@ -33,6 +27,13 @@ Observation Observe(const FitPoint& point, const HSplineSurface& surface, int le
     o.position -= surface.Point(point.uv) - surface.LevelDerivative(level, point.uv);
   }
   return o;
+}
+
+// If the point has a foot; what has been taken off the point is taken off the foot too.
+void AddBone(const BoneAnchor& anchor, const Vec3& given, const Observation& o, LevelView& view) {
+  if (anchor.foot.allFinite()) {
+    view.bone.push_back({o, anchor.foot - (given - o.position), anchor.direction});
+  }
 }
 
 }  // namespace
@@ -129,25 +130,41 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
         "shape",
         level, shape.max_level));
   }
-  LevelView view{.grid = GridOf(shape, level),
+  LevelView view{.grid = PatchGrid::Of(shape, level),
                  .start = surface.Net(level),
                  .rest = rest.Net(level),
-                 .lengths_mm = MeanLengths(GridOf(shape, 0), rest.Net(0)),
+                 .lengths_mm = MeanLengths(rest),
                  .observations = {}};
   view.observations.reserve(target.points.size());
   for (const FitPoint& point : target.points) {
     view.observations.push_back(Observe(point, surface, level, options.aim));
   }
   for (std::size_t k = 0; k < target.anchors.size(); ++k) {
-    const Observation& o = view.observations[k];
-    const Vec3 detail = target.points[k].position - o.position;
-    if (target.anchors[k].foot.allFinite()) {
-      view.bone.push_back({o, target.anchors[k].foot - detail, target.anchors[k].direction});
-    }
+    AddBone(target.anchors[k], target.points[k].position, view.observations[k], view);
   }
   for (const VertexId& vertex : options.held) {
     if (vertex.level == level) {
       view.held.push_back(view.start.Index(vertex.i, vertex.j));
+    }
+  }
+  return view;
+}
+
+LevelView ViewOfSpace(const HierarchicalSplineSpace& space, const PointCloud& cloud,
+                      const FitTarget& target, const Vec2& lengths_mm) {
+  const auto elements = std::make_shared<const SplineElements>(space);
+  LevelView view{.grid = {},
+                 .start = elements->Values(),
+                 .rest = elements->RestValues(),
+                 .lengths_mm = lengths_mm,
+                 .observations = {},
+                 .space = elements};
+  view.observations.reserve(cloud.points().size());
+  for (std::size_t k = 0; k < cloud.points().size(); ++k) {
+    const FitPoint& point = target.points[cloud.Given(k)];
+    const Observation& o = view.observations.emplace_back(Observe(point));
+    if (!target.anchors.empty()) {
+      AddBone(target.anchors[cloud.Given(k)], point.position, o, view);
     }
   }
   return view;

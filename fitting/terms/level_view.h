@@ -11,6 +11,8 @@
 #include "fitting/least_squares/row_sink.h"
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/problem/fit_target.h"
+#include "fitting/space/hierarchical_spline_space.h"
+#include "fitting/space/point_cloud.h"
 #include "fitting/space/spline_element.h"
 #include "surfaces/hspline/control_net.h"
 #include "surfaces/hspline/hspline_surface.h"
@@ -97,5 +99,11 @@ struct ViewOptions {
 // shape. Throws InputError for a level that the surface does not have, or another shape.
 LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
                       const FitTarget& target, int level, const ViewOptions& options = {});
+
+// All levels as they stand, with the points of the target in the order of its cloud, in which those
+// of a leaf stand together. lengths_mm: of the template. Keeps a reference to the space, which must
+// not be edited.
+LevelView ViewOfSpace(const HierarchicalSplineSpace& space, const PointCloud& cloud,
+                      const FitTarget& target, const Vec2& lengths_mm);
 
 }  // namespace semblance
