@@ -42,7 +42,7 @@ void CheckSizes(const LevelView& view) {
 // Patches are named by their first vertex.
 int PatchOf(const PatchGrid& grid, const Vec2& uv) { return grid.StencilAt(uv).index[0]; }
 
-std::vector<int> PatchCounts(const LevelView& view) {
+std::vector<int> PointsPerPatch(const LevelView& view) {
   std::vector<int> counts(static_cast<std::size_t>(view.grid.patches_u) * view.grid.patches_v, 0);
   const auto cell = [](double x, int n) { return std::clamp(static_cast<int>(x * n), 0, n - 1); };
   for (const Observation& o : view.observations) {
@@ -112,7 +112,7 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> given, LevelSolver 
       solver == LevelSolver::kFastest && SeparableButForLoss(terms) ? "direct" : "ceres";
   NoteCoverage({.points = outcome.points.rows() > 0 ? std::move(outcome.points) : PointNormal(view),
                 .count = view.observations.size(),
-                .patch_counts = PatchCounts(view)},
+                .patch_counts = PointsPerPatch(view)},
                summary);
   return {std::move(net), std::move(summary)};
 }

@@ -101,7 +101,8 @@ int KnownKeys(const std::filesystem::path& file) {
 template <class T>
 int OwnKeys(const std::filesystem::path& file) {
   ConfigErrors errors;
-  const ConfigNode tree = ParseConfigText(ReadFileBytes(file), {.name = file.string()}, errors);
+  const ConfigNode tree = ParseConfigText(
+      ReadFileBytes(file), {.name = file.string(), .folder = file.parent_path()}, errors);
   ConfigNode fields = ConfigTreeOf(T{});
   std::erase_if(fields.entries, [](const auto& entry) { return entry.key == "base"; });
   return CommonKeys(tree, fields);
