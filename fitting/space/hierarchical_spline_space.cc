@@ -236,11 +236,11 @@ void HierarchicalSplineSpace::Measure(std::span<const double> factors, int threa
 }
 
 int HierarchicalSplineSpace::LeafAt(const Vec2& uv) const {
-  const PatchPlace at = Locate(shape_, 0, uv);
+  const PatchPoint at = PatchPointAt(shape_, 0, uv);
   int node = at.patch.i + shape_.patches_u * at.patch.j;
   while (nodes_[node].children >= 0) {
     const PatchId& parent = nodes_[node].patch;
-    const PatchId child = Locate(shape_, parent.level + 1, uv).patch;
+    const PatchId child = PatchPointAt(shape_, parent.level + 1, uv).patch;
     node = nodes_[node].children + (child.i - 2 * parent.i) + 2 * (child.j - 2 * parent.j);
   }
   return node;

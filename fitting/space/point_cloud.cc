@@ -29,14 +29,14 @@ std::uint64_t Cell(double s) {
   return std::min(static_cast<std::uint64_t>(s * kCells), (std::uint64_t{1} << kBits) - 1);
 }
 
-std::uint64_t PatchOf(const HSplineShape& shape, const PatchPlace& place) {
-  return place.patch.i + static_cast<std::uint64_t>(shape.patches_u) * place.patch.j;
+std::uint64_t PatchOf(const HSplineShape& shape, const PatchPoint& at) {
+  return at.patch.i + static_cast<std::uint64_t>(shape.patches_u) * at.patch.j;
 }
 
 Key KeyOf(const HSplineShape& shape, const Vec2& uv, std::size_t index) {
-  const PatchPlace place = Locate(shape, 0, uv);
-  const std::uint64_t z = Spread(Cell(place.s)) | Spread(Cell(place.t)) << 1;
-  return {PatchOf(shape, place) << (2 * kBits) | z, static_cast<std::uint32_t>(index)};
+  const PatchPoint at = PatchPointAt(shape, 0, uv);
+  const std::uint64_t z = Spread(Cell(at.s)) | Spread(Cell(at.t)) << 1;
+  return {PatchOf(shape, at) << (2 * kBits) | z, static_cast<std::uint32_t>(index)};
 }
 
 // Stable, digit by digit.
@@ -82,9 +82,9 @@ void SortTies(const FitTarget& target, std::vector<Key>& keys) {
 }
 
 CloudPoint MakePoint(const HSplineShape& shape, const FitPoint& p) {
-  const PatchPlace place = Locate(shape, 0, p.uv);
-  return {.x = place.patch.i + place.s,
-          .y = place.patch.j + place.t,
+  const PatchPoint at = PatchPointAt(shape, 0, p.uv);
+  return {.x = at.patch.i + at.s,
+          .y = at.patch.j + at.t,
           .position = {p.position.x(), p.position.y(), p.position.z(), 0},
           .weight = p.weight};
 }

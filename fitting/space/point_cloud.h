@@ -14,7 +14,7 @@ namespace semblance {
 
 struct CloudPoint {
   double x = kNaN;  // u * patches_u of level 0, v * patches_v; in a patch of level L at
-  double y = kNaN;  // x * 2^L - i, exactly as Locate has it
+  double y = kNaN;  // x * 2^L - i, exactly as PatchPointAt has it
   std::array<double, 4> position{};  // mm; and a zero
   double weight = kNaN;              // of the target
 };

@@ -77,13 +77,13 @@ SplineElement LevelView::Element(int element) const {
 LocalStencil LevelView::LocalAt(const Vec2& uv, DerivativeOrder order) const {
   if (space != nullptr) {
     const int element = space->At(uv);
-    const PatchPlace place = Locate(space->shape(), (*space)[element].patch.level, uv);
-    return {element, PatchWeights(space->shape(), place, order)};
+    const PatchPoint at = PatchPointAt(space->shape(), (*space)[element].patch.level, uv);
+    return {element, PatchWeights(space->shape(), at, order)};
   }
   const HSplineShape shape = grid.Shape();
-  CheckPlace(shape, 0, uv);
-  const PatchPlace place = Locate(shape, 0, uv);
-  return {place.patch.i + grid.patches_u * place.patch.j, PatchWeights(shape, place, order)};
+  CheckParameter(shape, 0, uv);
+  const PatchPoint at = PatchPointAt(shape, 0, uv);
+  return {at.patch.i + grid.patches_u * at.patch.j, PatchWeights(shape, at, order)};
 }
 
 DofStencil LevelView::StencilAt(const Vec2& uv, DerivativeOrder order) const {

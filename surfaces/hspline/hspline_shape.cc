@@ -13,8 +13,8 @@
 namespace semblance {
 namespace {
 
-// The patch along one direction, and the place in it.
-std::pair<int, double> LocateAlong(double x, int patches, Closure closure) {
+// The patch along one direction, and the coordinate in it, 0..1.
+std::pair<int, double> PatchAlong(double x, int patches, Closure closure) {
   x = closure == Closure::kPeriodicU ? x - std::floor(x) : std::clamp(x, 0.0, 1.0);
   const int patch = std::min(static_cast<int>(x * patches), patches - 1);
   return {patch, x * patches - patch};
@@ -40,7 +40,7 @@ void CheckShape(const HSplineShape& shape) {
   }
 }
 
-void CheckPlace(const HSplineShape& shape, int level, const Vec2& uv) {
+void CheckParameter(const HSplineShape& shape, int level, const Vec2& uv) {
   if (level < 0 || level > shape.max_level) {
     throw InputError(
         fmt::format("H-spline: there is no level {}; levels are 0..{}", level, shape.max_level));
@@ -51,17 +51,16 @@ void CheckPlace(const HSplineShape& shape, int level, const Vec2& uv) {
   }
 }
 
-PatchPlace Locate(const HSplineShape& shape, int level, const Vec2& uv) {
-  const auto [i, s] = LocateAlong(uv.x(), shape.PatchesU(level), shape.closure);
-  const auto [j, t] = LocateAlong(uv.y(), shape.PatchesV(level), Closure::kOpen);
+PatchPoint PatchPointAt(const HSplineShape& shape, int level, const Vec2& uv) {
+  const auto [i, s] = PatchAlong(uv.x(), shape.PatchesU(level), shape.closure);
+  const auto [j, t] = PatchAlong(uv.y(), shape.PatchesV(level), Closure::kOpen);
   return {{level, i, j}, s, t};
 }
 
-std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPlace& place,
+std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPoint& at,
                                     DerivativeOrder order) {
-  const std::array<double, 4> wu = CubicWeights(place.s, order.u),
-                              wv = CubicWeights(place.t, order.v);
-  const int level = place.patch.level;
+  const std::array<double, 4> wu = CubicWeights(at.s, order.u), wv = CubicWeights(at.t, order.v);
+  const int level = at.patch.level;
   const double scale =
       Power(shape.PatchesU(level), order.u) * Power(shape.PatchesV(level), order.v);
   std::array<double, 16> weights;
@@ -72,14 +71,14 @@ std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPlace&
 }
 
 Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order) {
-  CheckPlace(shape, level, uv);
-  const PatchPlace place = Locate(shape, level, uv);
+  CheckParameter(shape, level, uv);
+  const PatchPoint at = PatchPointAt(shape, level, uv);
   Stencil stencil;
   for (int k = 0; k < 16; ++k) {
     stencil.index[k] =
-        shape.Column(level, place.patch.i + k % 4) + shape.Columns(level) * (place.patch.j + k / 4);
+        shape.Column(level, at.patch.i + k % 4) + shape.Columns(level) * (at.patch.j + k / 4);
   }
-  stencil.weight = PatchWeights(shape, place, order);
+  stencil.weight = PatchWeights(shape, at, order);
   return stencil;
 }
 

@@ -14,8 +14,8 @@ constexpr auto EnumNames(Closure) {
   return std::to_array<std::string_view>({"open", "periodic_u"});
 }
 
-// In what axes an offset is kept: the frame of the next coarser surface, so that detail turns with
-// it, or the world's.
+// The axes of an offset: the frame of the next coarser surface, so that detail turns with it, or
+// the world's.
 enum class OffsetReference { kFrame, kWorld };
 constexpr auto EnumNames(OffsetReference) {
   return std::to_array<std::string_view>({"frame", "world"});
@@ -63,8 +63,8 @@ struct DerivativeOrder {
   int v = 0;
 };
 
-// A place in a patch.
-struct PatchPlace {
+// A point of the domain, as a patch and coordinates in it.
+struct PatchPoint {
   PatchId patch;
   double s = kNaN;  // along u, 0..1
   double t = kNaN;  // along v, 0..1
@@ -74,24 +74,24 @@ struct PatchPlace {
 void CheckShape(const HSplineShape& shape);
 
 // Throws InputError for a level that is not there or a (u,v) that is not finite.
-void CheckPlace(const HSplineShape& shape, int level, const Vec2& uv);
+void CheckParameter(const HSplineShape& shape, int level, const Vec2& uv);
 
 // The patch of `level` at uv: u is clamped (open) or wrapped (periodic), v is clamped to [0,1]. The
 // arguments are not checked.
-PatchPlace Locate(const HSplineShape& shape, int level, const Vec2& uv);
+PatchPoint PatchPointAt(const HSplineShape& shape, int level, const Vec2& uv);
 
-// The weights of the patch's sixteen vertices, [a + 4 b] with a along u, in the point, or in its
-// derivative with respect to u, v in [0,1].
-std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPlace& place,
+// The weights of the patch's sixteen vertices, [a + 4 b] with a along u, for the surface's point,
+// or for its derivative with respect to u, v in [0,1].
+std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPoint& at,
                                     DerivativeOrder order = {});
 
 // The sixteen vertices of `level` that make the point of the plain B-spline at uv, or its
-// derivative with respect to u, v in [0,1]. uv: as in Locate. level: 0..shape.max_level. Throws as
-// CheckPlace.
+// derivative with respect to u, v in [0,1]. uv: as in PatchPointAt. level: 0..shape.max_level.
+// Throws as CheckParameter.
 Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order = {});
 
-// Where a control vertex has the greatest influence, clamped (open) or wrapped (periodic) into the
-// domain.
+// The (u,v) where a control vertex has the greatest influence, clamped (open) or wrapped (periodic)
+// into the domain.
 Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex);
 
 // The net of the same surface one level finer (knot insertion at every midpoint).

@@ -13,7 +13,7 @@ namespace semblance {
 namespace {
 
 void CheckNet(const HSplineShape& shape, int level, const ControlNet& net) {
-  CheckPlace(shape, level, Vec2::Zero());
+  CheckParameter(shape, level, Vec2::Zero());
   const std::size_t expected = static_cast<std::size_t>(shape.Columns(level)) * shape.Rows(level);
   if (net.columns != shape.Columns(level) || net.rows != shape.Rows(level) ||
       net.vertices.size() != expected) {
@@ -102,12 +102,12 @@ HSplineSurface::HSplineSurface(const HSplineShape& shape, const ControlNet& leve
                 SparseNet::WholeNet(level0)};
 }
 
-PatchPlace HSplineSurface::FinestPatch(int level, const Vec2& uv) const {
-  CheckPlace(shape_, level, uv);
+PatchPoint HSplineSurface::FinestPatch(int level, const Vec2& uv) const {
+  CheckParameter(shape_, level, uv);
   for (;; --level) {
-    const PatchPlace place = Locate(shape_, level, uv);
-    if (levels_[level].reached.Find(place.patch.i, place.patch.j) >= 0) {
-      return place;  // at the latest on level 0
+    const PatchPoint at = PatchPointAt(shape_, level, uv);
+    if (levels_[level].reached.Find(at.patch.i, at.patch.j) >= 0) {
+      return at;  // at the latest on level 0
     }
   }
 }
@@ -121,32 +121,32 @@ HSplineSurface::Columns4 HSplineSurface::StoredColumns(const PatchId& patch) con
 }
 
 Vec3 HSplineSurface::LevelDerivative(int level, const Vec2& uv, DerivativeOrder order) const {
-  const PatchPlace place = FinestPatch(level, uv);
-  return Sum(PatchWeights(shape_, place, order), StoredColumns(place.patch));
+  const PatchPoint at = FinestPatch(level, uv);
+  return Sum(PatchWeights(shape_, at, order), StoredColumns(at.patch));
 }
 
 SecondDerivatives HSplineSurface::Second(const Vec2& uv) const {
-  const PatchPlace place = FinestPatch(shape_.max_level, uv);
-  const Columns4 columns = StoredColumns(place.patch);
+  const PatchPoint at = FinestPatch(shape_.max_level, uv);
+  const Columns4 columns = StoredColumns(at.patch);
   const auto derivative = [&](DerivativeOrder order) {
-    return Sum(PatchWeights(shape_, place, order), columns);
+    return Sum(PatchWeights(shape_, at, order), columns);
   };
   return {derivative({2, 0}), derivative({1, 1}), derivative({0, 2})};
 }
 
 SurfaceFrame HSplineSurface::LevelFrame(int level, const Vec2& uv) const {
-  const PatchPlace place = FinestPatch(level, uv);
-  const Columns4 columns = StoredColumns(place.patch);
+  const PatchPoint at = FinestPatch(level, uv);
+  const Columns4 columns = StoredColumns(at.patch);
   SurfaceFrame frame;
-  frame.point = Sum(PatchWeights(shape_, place), columns);
-  frame.du = Sum(PatchWeights(shape_, place, {1, 0}), columns);
-  frame.dv = Sum(PatchWeights(shape_, place, {0, 1}), columns);
-  OrientFrame(shape_, place.patch.level, frame);
+  frame.point = Sum(PatchWeights(shape_, at), columns);
+  frame.du = Sum(PatchWeights(shape_, at, {1, 0}), columns);
+  frame.dv = Sum(PatchWeights(shape_, at, {0, 1}), columns);
+  OrientFrame(shape_, at.patch.level, frame);
   return frame;
 }
 
 ControlNet HSplineSurface::Net(int level) const {
-  CheckPlace(shape_, level, Vec2::Zero());
+  CheckParameter(shape_, level, Vec2::Zero());
   int l = level;  // the finest level of which all vertices are stored
   while (levels_[l].net.size() < static_cast<std::size_t>(Columns(l)) * Rows(l)) {
     --l;

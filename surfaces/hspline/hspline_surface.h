@@ -49,7 +49,7 @@ class HSplineSurface {
   }
 
   // The finest surface; all levels' detail included. (u,v) lies in the finest patch that an offset
-  // reaches; the patch's own level is evaluated. uv: as in Locate; InputError if not finite.
+  // reaches; the patch's own level is evaluated. uv: as in PatchPointAt; InputError if not finite.
   Vec3 Point(const Vec2& uv) const { return Derivative(uv, {}); }
   Vec3 Derivative(const Vec2& uv, DerivativeOrder order) const {
     return LevelDerivative(shape_.max_level, uv, order);
@@ -101,7 +101,7 @@ class HSplineSurface {
   // The four columns of a patch's vertices, each four in a row; null where they are not stored.
   using Columns4 = std::array<const Vec3*, 4>;
 
-  PatchPlace FinestPatch(int level, const Vec2& uv) const;
+  PatchPoint FinestPatch(int level, const Vec2& uv) const;
   Columns4 StoredColumns(const PatchId& patch) const;
   std::map<VertexId, Vec3> OffsetsThatGive(int level, const ControlNet& net) const;
   void RebuildFrom(int level);

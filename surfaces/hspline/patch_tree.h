@@ -18,7 +18,7 @@ class PatchTree {
 
   const std::vector<PatchId>& leaves() const { return leaves_; }
 
-  // uv clamped or wrapped as in Locate. It must be finite (not checked here).
+  // uv clamped or wrapped as in PatchPointAt. It must be finite (not checked here).
   Vec2 IntoDomain(const Vec2& uv) const;
   // The leaf, as an index, that holds a (u,v) of the domain.
   std::int32_t LeafAt(const Vec2& uv) const;

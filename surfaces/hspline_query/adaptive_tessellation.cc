@@ -89,16 +89,16 @@ class Quadtree {
             Cell{c.level + 1, 2 * c.i, 2 * c.j + 1}, Cell{c.level + 1, 2 * c.i + 1, 2 * c.j + 1}};
   }
 
-  // Splits the cell that covers `place` until it is coarser by one level at most.
-  void RefineAt(const Cell& place, std::vector<Cell>& open) {
-    for (int up = 2; up <= place.level; ++up) {
-      const Cell cell{place.level - up, place.i >> up, place.j >> up};
+  // Splits the cell that covers `fine` until it is coarser by at most one level.
+  void RefineAt(const Cell& fine, std::vector<Cell>& open) {
+    for (int up = 2; up <= fine.level; ++up) {
+      const Cell cell{fine.level - up, fine.i >> up, fine.j >> up};
       if (cells_.erase(cell) > 0) {
         for (const Cell& child : Children(cell)) {
           cells_.insert(child);
           open.push_back(child);
         }
-        RefineAt(place, open);
+        RefineAt(fine, open);
         return;
       }
     }
@@ -108,7 +108,7 @@ class Quadtree {
   std::set<Cell> cells_;
 };
 
-// Triangles over a quadtree's cells; vertices by their place (v, u) on the finest lattice.
+// Triangles over a quadtree's cells; vertices by their (v, u) on the finest lattice.
 class Triangulation {
  public:
   Triangulation(const HSplineShape& shape, const std::set<Cell>& cells) : shape_(shape) {
@@ -139,13 +139,13 @@ class Triangulation {
   }
 
   int Vertex(std::int64_t x, std::int64_t y) {
-    const auto [place, is_new] = vertices_.emplace(Key(x, y), static_cast<int>(result_.uv.size()));
+    const auto [vertex, is_new] = vertices_.emplace(Key(x, y), static_cast<int>(result_.uv.size()));
     if (is_new) {
       const double unit = 2 << kDeepest;
-      result_.uv.emplace_back(place->first.second / (shape_.patches_u * unit),
-                              place->first.first / (shape_.patches_v * unit));
+      result_.uv.emplace_back(vertex->first.second / (shape_.patches_u * unit),
+                              vertex->first.first / (shape_.patches_v * unit));
     }
-    return place->second;
+    return vertex->second;
   }
 
   void Emit(const std::array<std::int64_t, 3>& box,

@@ -129,7 +129,7 @@ Polynomial PolynomialOf(const HSplineSurface& surface, const PatchId& patch) {
           kPower[a][m] * kPower[b][n] * (vertices[m + 4 * n][d] - vertices[0][d]);
     }
   }
-  for (int d = 0; d < 3; ++d) {  // apart, so that tangents are not rounded to the place's size
+  for (int d = 0; d < 3; ++d) {  // added last, so that tangents do not suffer its rounding
     polynomial.power[0][d] += vertices[0][d];
   }
   polynomial.scale_u = surface.shape().PatchesU(patch.level);

@@ -69,7 +69,7 @@ TEST_P(BatchLaws, LeavesCoverTheDomainOnceAndHoldTheirPlaces) {
   EXPECT_NEAR(area, 1, 1e-12);
   for (const Vec2& uv : RandomParameters(300, 0, 1)) {
     const PatchId leaf = tree.leaves()[tree.LeafAt(uv)];
-    EXPECT_EQ(Locate(surface.shape(), leaf.level, uv).patch, leaf);
+    EXPECT_EQ(PatchPointAt(surface.shape(), leaf.level, uv).patch, leaf);
   }
 }
 
