@@ -147,9 +147,9 @@ FeatureBlend BlendFeatures(std::string name, std::span<const Feature> features,
         std::max(blend.feature.shape.max_level, features[k].shape.max_level);
     for (const auto& [vertex, offset] : features[k].offsets) {
       const Vec3 part = weights[k] * offset;
-      const auto [place, is_new] = blend.feature.offsets.emplace(vertex, part);
+      const auto [entry, is_new] = blend.feature.offsets.emplace(vertex, part);
       if (!is_new) {
-        place->second += part;
+        entry->second += part;
       }
     }
   }

@@ -32,12 +32,12 @@ void CheckUnit(double size, const std::string& name) {
                   size, kSmallest_mm, kLargest_mm, guess));
 }
 
-// The share of rays from all sides towards the mesh that meet a front first.
-double ShareOfFronts(const TriMesh& mesh) {
+// The share of rays from all sides towards the mesh that hit the outside of a triangle first.
+double OutwardShare(const TriMesh& mesh) {
   const MeshQuery query(mesh);
   const Box3 box = Bounds(mesh);
   const double radius = box.diagonal().norm();
-  int fronts = 0, hits = 0;
+  int outward_hits = 0, hits = 0;
   constexpr int kRays = 256;
   for (int n = 0; n < kRays; ++n) {  // directions of a Fibonacci sphere
     const double z = 1 - (2 * n + 1.0) / kRays, angle = n * std::numbers::pi * (3 - std::sqrt(5.0));
@@ -45,10 +45,10 @@ double ShareOfFronts(const TriMesh& mesh) {
                        std::sqrt(1 - z * z) * std::sin(angle), z);
     if (const auto hit = query.FirstHit(box.center() + radius * outward, -outward, 2 * radius)) {
       ++hits;
-      fronts += TriangleAreaVector(mesh, mesh.triangles[hit->triangle]).dot(outward) > 0;
+      outward_hits += TriangleAreaVector(mesh, mesh.triangles[hit->triangle]).dot(outward) > 0;
     }
   }
-  return hits > 0 ? static_cast<double>(fronts) / hits : kNaN;
+  return hits > 0 ? static_cast<double>(outward_hits) / hits : kNaN;
 }
 
 }  // namespace
@@ -58,12 +58,12 @@ std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& n
     throw InputError(fmt::format("{}: the mesh has no triangles", name));
   }
   CheckUnit(Bounds(mesh).sizes().maxCoeff(), name);
-  const double fronts = ShareOfFronts(mesh);
-  if (fronts < 0.5) {
+  const double outward = OutwardShare(mesh);
+  if (outward < 0.5) {
     throw InputError(
         fmt::format("{}: {:.0f} % of its outside shows triangles' backs: the mesh is inside out; "
                     "flip its normals",
-                    name, 100 * (1 - fronts)));
+                    name, 100 * (1 - outward)));
   }
   const EdgeReport edges = CheckEdges(mesh);
   std::vector<std::string> notes;
