@@ -5,12 +5,12 @@
 
 #include <variant>
 
+#include "interp/kriging/kriging.h"
 #include "interp/schemes/barycentric.h"
 #include "interp/schemes/biharmonic.h"
 #include "interp/schemes/depth_map.h"
 #include "interp/schemes/harmonic.h"
 #include "interp/schemes/inverse_distance.h"
-#include "interp/schemes/kriging.h"
 #include "interp/schemes/mean.h"
 #include "interp/schemes/moving_least_squares.h"
 #include "interp/schemes/natural_neighbour.h"

@@ -10,9 +10,9 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/mesh_io.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "surfaces/mesh/read_ply.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "surfaces/mesh_files/read_ply.h"
 
 namespace semblance {
 namespace {

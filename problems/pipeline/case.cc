@@ -5,7 +5,7 @@
 
 #include "problems/subject/network_file.h"
 #include "surfaces/mesh/mesh_check.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {

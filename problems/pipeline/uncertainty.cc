@@ -6,7 +6,7 @@
 
 #include "fitting/uncertainty/error_propagation.h"
 #include "interp/evaluation/calibration.h"
-#include "interp/schemes/kriging_process.h"
+#include "interp/kriging/kriging_process.h"
 #include "problems/metrics/quantile.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"

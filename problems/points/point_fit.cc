@@ -18,7 +18,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {

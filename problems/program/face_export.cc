@@ -15,7 +15,7 @@
 #include "surfaces/hspline_files/surface_export.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/curvature.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {

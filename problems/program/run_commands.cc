@@ -27,7 +27,7 @@
 #include "problems/study/study_report.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_check.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {

@@ -21,8 +21,8 @@
 #include "surfaces/base/csv.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline_files/hspline_json.h"
-#include "surfaces/mesh/mesh_io.h"
 #include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {

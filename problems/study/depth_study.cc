@@ -14,7 +14,7 @@
 #include "problems/report/timing_json.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/csv.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "surfaces/decimate/decimate.h"
-#include "surfaces/mesh/mesh_io.h"
 #include "surfaces/mesh/skull_fill.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/bench/phantom_head.h"
 
 namespace semblance::bench {

@@ -7,10 +7,10 @@
 #include <string_view>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/read_obj.h"
-#include "surfaces/mesh/read_off.h"
-#include "surfaces/mesh/read_ply.h"
-#include "surfaces/mesh/read_stl.h"
+#include "surfaces/mesh_files/read_obj.h"
+#include "surfaces/mesh_files/read_off.h"
+#include "surfaces/mesh_files/read_ply.h"
+#include "surfaces/mesh_files/read_stl.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/dowel_scenes.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"

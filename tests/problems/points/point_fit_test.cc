@@ -11,7 +11,7 @@
 #include "problems/config/config.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "surfaces/base/atomic_file.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/shapes.h"
 

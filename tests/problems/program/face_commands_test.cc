@@ -11,8 +11,8 @@
 #include "surfaces/hspline_files/surface_export.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/curvature.h"
-#include "surfaces/mesh/mesh_io.h"
-#include "surfaces/mesh/read_ply.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "surfaces/mesh_files/read_ply.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/splines.h"
 

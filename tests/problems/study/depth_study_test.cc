@@ -12,7 +12,7 @@
 #include "problems/study/study_report.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_subtables.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 

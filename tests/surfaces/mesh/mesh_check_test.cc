@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {

@@ -2,7 +2,7 @@
 // Length and signal of a kriging process by maximum likelihood.
 #pragma once
 
-#include "interp/schemes/kriging_process.h"
+#include "interp/kriging/kriging_process.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/mesh/text_lines.h"
+#include "surfaces/mesh_files/text_lines.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/read_parts.h"
+#include "surfaces/mesh_files/read_parts.h"
 
 namespace semblance {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/mesh/read_parts.h"
+#include "surfaces/mesh_files/read_parts.h"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -16,9 +16,9 @@
 #include <string_view>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/ply_header.h"
-#include "surfaces/mesh/read_parts.h"
-#include "surfaces/mesh/text_lines.h"
+#include "surfaces/mesh_files/ply_header.h"
+#include "surfaces/mesh_files/read_parts.h"
+#include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
 

@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-#include "interp/schemes/kriging.h"
+#include "interp/kriging/kriging.h"
 
 namespace semblance {
 

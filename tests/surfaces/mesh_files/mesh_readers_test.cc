@@ -10,11 +10,11 @@
 #include <random>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/mesh_io.h"
-#include "surfaces/mesh/read_obj.h"
-#include "surfaces/mesh/read_off.h"
-#include "surfaces/mesh/read_ply.h"
-#include "surfaces/mesh/read_stl.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "surfaces/mesh_files/read_obj.h"
+#include "surfaces/mesh_files/read_off.h"
+#include "surfaces/mesh_files/read_ply.h"
+#include "surfaces/mesh_files/read_stl.h"
 #include "tests/testing/shapes.h"
 
 namespace {

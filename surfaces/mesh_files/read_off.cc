@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/mesh/read_off.h"
+#include "surfaces/mesh_files/read_off.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "surfaces/mesh/read_parts.h"
-#include "surfaces/mesh/text_lines.h"
+#include "surfaces/mesh_files/read_parts.h"
+#include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
 namespace {

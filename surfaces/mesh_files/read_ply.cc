@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/mesh/read_ply.h"
+#include "surfaces/mesh_files/read_ply.h"
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <optional>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/ply_data.h"
-#include "surfaces/mesh/ply_header.h"
-#include "surfaces/mesh/read_parts.h"
+#include "surfaces/mesh_files/ply_data.h"
+#include "surfaces/mesh_files/ply_header.h"
+#include "surfaces/mesh_files/read_parts.h"
 
 namespace semblance {
 namespace {

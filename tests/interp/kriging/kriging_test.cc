@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/schemes/kriging.h"
+#include "interp/kriging/kriging.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "interp/schemes/kriging_process.h"
+#include "interp/kriging/kriging_process.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/schemes/kriging_process.h"
+#include "interp/kriging/kriging_process.h"
 
 #include <cmath>
 #include <numbers>

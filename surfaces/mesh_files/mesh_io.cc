@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/mesh/mesh_io.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 #include <fmt/format.h>
 
@@ -13,11 +13,11 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/read_obj.h"
-#include "surfaces/mesh/read_off.h"
-#include "surfaces/mesh/read_parts.h"
-#include "surfaces/mesh/read_ply.h"
-#include "surfaces/mesh/read_stl.h"
+#include "surfaces/mesh_files/read_obj.h"
+#include "surfaces/mesh_files/read_off.h"
+#include "surfaces/mesh_files/read_parts.h"
+#include "surfaces/mesh_files/read_ply.h"
+#include "surfaces/mesh_files/read_stl.h"
 
 namespace semblance {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/schemes/kriging.h"
+#include "interp/kriging/kriging.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "interp/schemes/kriging_likelihood.h"
-#include "interp/schemes/kriging_process.h"
+#include "interp/kriging/kriging_likelihood.h"
+#include "interp/kriging/kriging_process.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
