@@ -56,7 +56,7 @@ const std::map<std::string, Layers> kRooms = {
     {"problems",
      {{"config", "ct", "output"},
       {"pictures", "subject"},
-      {"face_template"},
+      {"face_template", "landmark_files"},
       {"metrics"},
       {"pipeline"},
       {kHall},

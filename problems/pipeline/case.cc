@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "problems/landmark_files/read_landmarks.h"
 #include "problems/subject/network_file.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -25,14 +26,16 @@ TriMesh ReadHeadMesh(const std::filesystem::path& path, const char* option, Subj
   return mesh;
 }
 
-LandmarkFile ReadLandmarks(const std::filesystem::path& path, SubjectData& subject) {
+LandmarkFile LandmarksOf(const std::filesystem::path& path, SubjectData& subject) {
   if (path.empty()) {
     throw InputError(
         "subject.landmarks: no file is named; a skull needs landmarks (configs/landmarks/ shows "
         "the form)");
   }
   subject.inputs.push_back(path);
-  return ReadLandmarkFile(path);
+  LandmarkReading reading = ReadLandmarks(path);
+  Append(subject.notes, reading.notes);
+  return std::move(reading.file);
 }
 
 // Each Load fills subject.skull, skin, inputs and notes, and returns the landmarks.
@@ -54,7 +57,7 @@ LandmarkFile Load(const PhantomOptions& options, SubjectData& subject, const Run
 }
 
 LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunContext&) {
-  LandmarkFile landmarks = ReadLandmarks(options.landmarks, subject);
+  LandmarkFile landmarks = LandmarksOf(options.landmarks, subject);
   subject.skull = ReadHeadMesh(options.skull, "skull", subject);
   if (!options.skin.empty()) {
     subject.skin = ReadHeadMesh(options.skin, "skin", subject);
@@ -66,7 +69,7 @@ LandmarkFile Load(const CtSubject& options, SubjectData& subject, const RunConte
   if (options.volume.empty()) {
     throw InputError("subject.volume: no file is named; give the path of an InVesalius project");
   }
-  LandmarkFile landmarks = ReadLandmarks(options.landmarks, subject);
+  LandmarkFile landmarks = LandmarksOf(options.landmarks, subject);
   subject.inputs.push_back(options.volume);
   CtImport import = ImportCt(ReadInvesalius(options.volume), options.import, context);
   subject.skull = std::move(import.skull);

@@ -9,6 +9,7 @@
 
 #include "problems/program/exit_code.h"
 #include "problems/program/face_commands.h"
+#include "problems/program/landmark_commands.h"
 #include "problems/program/run_commands.h"
 #include "problems/program/study_commands.h"
 #include "surfaces/base/error.h"
@@ -41,7 +42,7 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   app.require_subcommand(1);
   CommandLine line{.stop = StopSource().get_token(), .chosen = {}};
-  for (const auto& commands : {RunCommands(), StudyCommands(), FaceCommands()}) {
+  for (const auto& commands : {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands()}) {
     Declare(commands, app, line);
   }
   try {

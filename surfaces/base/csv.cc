@@ -26,20 +26,10 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(0, last == text.npos ? 0 : last + 1);
 }
 
-// The number that is the whole of `text`, or nothing; nan and inf are numbers here.
-std::optional<double> ToNumber(std::string_view text) {
-  if (text.starts_with('+')) {  // from_chars takes no plus sign
-    text.remove_prefix(1);
-  }
-  double value = kNaN;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool is_whole = error == std::errc{} && end == text.data() + text.size();
-  return is_whole ? std::optional(value) : std::nullopt;
-}
-
 }  // namespace
 
-CsvReader::CsvReader(std::string_view text, std::string_view name) : rest_(text), name_(name) {
+CsvReader::CsvReader(std::string_view text, std::string_view name, const CsvDialect& dialect)
+    : rest_(text), name_(name), dialect_(dialect) {
   if (rest_.starts_with("\xEF\xBB\xBF")) {
     rest_.remove_prefix(3);  // what spreadsheets put before UTF-8
   }
@@ -82,6 +72,24 @@ bool CsvReader::NextRow() {
   return true;
 }
 
+// The number that is the whole of `text`, or nothing; nan and inf are numbers here.
+std::optional<double> CsvReader::ToNumber(std::string_view text) const {
+  std::string with_point;
+  if (dialect_.decimal != '.') {
+    with_point = text;
+    std::replace(with_point.begin(), with_point.end(), '.', '?');  // so that 1.000,5 is no number
+    std::replace(with_point.begin(), with_point.end(), dialect_.decimal, '.');
+    text = with_point;
+  }
+  if (text.starts_with('+')) {  // from_chars takes no plus sign
+    text.remove_prefix(1);
+  }
+  double value = kNaN;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_whole = error == std::errc{} && end == text.data() + text.size();
+  return is_whole ? std::optional(value) : std::nullopt;
+}
+
 double CsvReader::Number(std::size_t column) const {
   const auto value = ToNumber(cells_[column]);
   if (!value || !std::isfinite(*value)) {
@@ -112,17 +120,17 @@ void CsvReader::ReadCells() {
   while (more) {
     const std::size_t first = std::min(rest_.find_first_not_of(kBlanks), rest_.size());
     cells_.push_back(rest_.substr(first, 1) == "\"" ? TakeQuoted() : TakePlain());
-    more = rest_.starts_with(',');
+    more = rest_.starts_with(dialect_.separator);
     rest_.remove_prefix(more ? 1 : 0);
   }
   rest_.remove_prefix(rest_.starts_with("\r\n") ? 2 : std::min<std::size_t>(1, rest_.size()));
   ++next_line_;
 }
 
-// Up to the next comma or the end of the line, which stay.
+// Up to the next separator or the end of the line, which stay.
 std::string_view CsvReader::TakePlain() {
   std::size_t end = 0;
-  while (end < rest_.size() && rest_[end] != ',' && rest_[end] != '\n') {
+  while (end < rest_.size() && rest_[end] != dialect_.separator && rest_[end] != '\n') {
     ++end;
   }
   std::string_view cell = rest_.substr(0, end);

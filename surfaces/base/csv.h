@@ -13,6 +13,12 @@
 
 namespace semblance {
 
+// How a table is written: in countries with a decimal comma, spreadsheets separate by semicolons.
+struct CsvDialect {
+  char separator = ',';
+  char decimal = '.';
+};
+
 // Reads a table row by row. A cell may be quoted, with "" for a quote inside; blanks around a cell
 // that is not quoted are dropped, and so is a byte order mark. Every fault is an IoError
 // "name:line: what": columns of one name, a row with more or fewer cells than columns, a quote that
@@ -20,7 +26,7 @@ namespace semblance {
 class CsvReader {
  public:
   // name: of the file, for messages. Reads the names of the columns.
-  CsvReader(std::string_view text, std::string_view name);
+  CsvReader(std::string_view text, std::string_view name, const CsvDialect& dialect = {});
 
   const std::vector<std::string>& Columns() const { return columns_; }
   // The index of the column, or nothing.
@@ -44,9 +50,11 @@ class CsvReader {
   void ReadCells();
   std::string_view TakeQuoted();
   std::string_view TakePlain();
+  std::optional<double> ToNumber(std::string_view text) const;
 
   std::string_view rest_;
   std::string name_;
+  CsvDialect dialect_;
   int line_ = 0;       // of the row that was read last
   int next_line_ = 1;  // of what is left
   std::vector<std::string> columns_;

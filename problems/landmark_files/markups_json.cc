@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/landmark_files/markups_json.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_files/json_parts.h"
+
+namespace semblance {
+namespace {
+
+using json_parts::Json;
+
+std::string TextOf(const Json& json, const char* key, const char* otherwise) {
+  const auto found = json.find(key);
+  if (found == json.end()) {
+    return otherwise;
+  }
+  if (!found->is_string()) {
+    throw IoError(fmt::format("'{}' must be a text", key));
+  }
+  return found->get<std::string>();
+}
+
+// Files before version 1.0 have numbers.
+std::string AxesOf(const Json& markup) {
+  const auto found = markup.find("coordinateSystem");
+  if (found == markup.end()) {
+    throw IoError("there is no 'coordinateSystem'; it must say \"LPS\" or \"RAS\"");
+  }
+  const std::string axes = found->is_string() ? found->get<std::string>() : found->dump();
+  if (axes == "LPS" || axes == "1") {
+    return "LPS";
+  }
+  if (axes == "RAS" || axes == "0") {
+    return "RAS";
+  }
+  throw IoError(fmt::format("'coordinateSystem' is {}; it must be \"LPS\" or \"RAS\"", axes));
+}
+
+void RequireMillimetres(const Json& markup) {
+  const std::string units = TextOf(markup, "coordinateUnits", "mm");
+  if (units != "mm" && units.find("\"mm\"") == units.npos) {
+    throw IoError(fmt::format("'coordinateUnits' is {}; export in mm", units));
+  }
+}
+
+std::array<double, 3> PositionOf(const Json& point) {
+  const Json& row = json_parts::ListFromJson(point, "position");
+  json_parts::RequireSize(row, 3);
+  const Vec3 p = json_parts::VecFromJson(row, 0);
+  if (!p.allFinite()) {
+    throw IoError("a position is not finite");
+  }
+  return {p.x(), p.y(), p.z()};
+}
+
+void AddPoint(const Json& point, LandmarkFile& file) {
+  if (!point.is_object()) {
+    throw IoError("'controlPoints' must list objects");
+  }
+  Landmark landmark;
+  landmark.site = TextOf(point, "label", "");
+  if (TextOf(point, "positionStatus", "defined") == "undefined") {
+    file.absent.push_back({landmark.site, "not placed"});
+    return;
+  }
+  landmark.point = PositionOf(point);
+  landmark.note = TextOf(point, "description", "");
+  file.landmarks.push_back(landmark);
+}
+
+LandmarkFile FromJson(const Json& json) {
+  LandmarkFile file{.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
+  for (const Json& markup : json_parts::ListFromJson(json, "markups")) {
+    const std::string axes = AxesOf(markup);
+    if (!file.axes.empty() && file.axes != axes) {
+      throw IoError("its markups have different axes; export them one by one");
+    }
+    file.axes = axes;
+    RequireMillimetres(markup);
+    for (const Json& point : json_parts::ListFromJson(markup, "controlPoints")) {
+      AddPoint(point, file);
+    }
+  }
+  return file;
+}
+
+Json PointJson(const Landmark& landmark, std::size_t number) {
+  Json point;
+  point["id"] = std::to_string(number);
+  point["label"] = landmark.site;
+  point["description"] = landmark.note;
+  point["position"] = landmark.point;
+  point["positionStatus"] = "defined";
+  return point;
+}
+
+}  // namespace
+
+LandmarkFile ParseMarkupsJson(std::string_view text, std::string_view file) {
+  try {
+    return FromJson(json_parts::ParseWithoutRepeats(text));
+  } catch (const IoError& error) {
+    throw IoError(fmt::format("{}: {}", file, error.what()));
+  }
+}
+
+std::string MarkupsJson(const LandmarkFile& file) {
+  Json points = Json::array();
+  for (const Landmark& landmark : file.landmarks) {
+    points.push_back(PointJson(landmark, points.size() + 1));
+  }
+  Json markup;
+  markup["type"] = "Fiducial";
+  markup["coordinateSystem"] = "LPS";
+  markup["coordinateUnits"] = "mm";
+  markup["controlPoints"] = points;
+  Json json;
+  json["@schema"] =
+      "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/Resources/"
+      "Schema/markups-schema-v1.0.3.json#";
+  json["markups"] = Json::array({markup});
+  return json.dump(2) + "\n";
+}
+
+}  // namespace semblance

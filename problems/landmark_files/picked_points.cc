@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/landmark_files/picked_points.h"
+
+#include <fmt/format.h>
+
+#include <pugixml.hpp>
+#include <sstream>
+
+#include "problems/landmark_files/point_lines.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+LandmarkFile WithoutAxes() {
+  return {.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
+}
+
+char SeparatorOf(std::string_view line) {
+  return line.find(';') != line.npos ? ';' : line.find(',') != line.npos ? ',' : ' ';
+}
+
+// Without the empty ones that several blanks leave.
+std::vector<std::string> CellsOf(std::string_view line) {
+  std::string blanks(line);
+  std::replace(blanks.begin(), blanks.end(), '\t', ' ');
+  std::vector<std::string> cells = SplitCells(blanks, SeparatorOf(blanks));
+  std::erase(cells, "");
+  return cells;
+}
+
+Landmark PointOf(const PointLines& lines) {
+  const std::vector<std::string> cells = CellsOf(lines.line());
+  if (cells.size() == 3) {
+    lines.Fail("the point has no name; export the list with labels, as: label, x, y, z");
+  }
+  if (cells.size() != 4) {
+    lines.Fail(fmt::format("{} entries; a line must have a name, x, y and z", cells.size()));
+  }
+  Landmark landmark;
+  landmark.site = cells[0];
+  landmark.point = {lines.Number(cells[1]), lines.Number(cells[2]), lines.Number(cells[3])};
+  return landmark;
+}
+
+}  // namespace
+
+LandmarkFile ParseMeshLabPoints(std::string_view text, std::string_view file) {
+  pugi::xml_document document;
+  const pugi::xml_parse_result parsed = document.load_buffer(text.data(), text.size());
+  const pugi::xml_node root = document.child("PickedPoints");
+  if (!parsed || !root) {
+    throw IoError(fmt::format("{}: no PickedPoints of MeshLab{}; save the points anew", file,
+                              parsed ? "" : fmt::format(" ({})", parsed.description())));
+  }
+  const PointLines numbers(text, file);
+  LandmarkFile result = WithoutAxes();
+  for (const pugi::xml_node& point : root.children("point")) {
+    Landmark landmark;
+    landmark.site = point.attribute("name").as_string();
+    landmark.point = {numbers.Number(point.attribute("x").as_string()),
+                      numbers.Number(point.attribute("y").as_string()),
+                      numbers.Number(point.attribute("z").as_string())};
+    if (point.attribute("active").as_string("1") == std::string_view("0")) {
+      result.absent.push_back({landmark.site, "not active"});
+    } else {
+      result.landmarks.push_back(landmark);
+    }
+  }
+  return result;
+}
+
+std::string MeshLabPoints(const LandmarkFile& file) {
+  pugi::xml_document document;
+  document.append_child(pugi::node_doctype).set_value("PickedPoints");
+  pugi::xml_node root = document.append_child("PickedPoints");
+  for (const Landmark& landmark : file.landmarks) {
+    pugi::xml_node point = root.append_child("point");
+    constexpr const char* kAxes[] = {"x", "y", "z"};
+    for (int d = 0; d < 3; ++d) {
+      point.append_attribute(kAxes[d]) = fmt::format("{}", landmark.point[d]).c_str();
+    }
+    point.append_attribute("active") = "1";
+    point.append_attribute("name") = landmark.site.c_str();
+  }
+  std::ostringstream text;
+  document.save(text, " ", pugi::format_indent | pugi::format_no_declaration);
+  return text.str();
+}
+
+LandmarkFile ParsePointList(std::string_view text, std::string_view file) {
+  LandmarkFile result = WithoutAxes();
+  PointLines lines(text, file);
+  while (lines.Next()) {
+    if (!lines.line().starts_with('#') && !lines.line().starts_with("//")) {
+      result.landmarks.push_back(PointOf(lines));
+    }
+  }
+  return result;
+}
+
+}  // namespace semblance

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/landmark_files/read_landmarks.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <set>
+
+#include "problems/config/config.h"
+#include "problems/landmark_files/fcsv.h"
+#include "problems/landmark_files/landmark_table.h"
+#include "problems/landmark_files/markups_json.h"
+#include "problems/landmark_files/picked_points.h"
+#include "problems/subject/site_names.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Notes = std::vector<std::string>;
+
+LandmarkFile ParseTable(std::string_view text, std::string_view file, Notes& notes) {
+  std::vector<std::string> ignored;
+  LandmarkFile result = ParseLandmarkTable(text, file, ignored);
+  if (!ignored.empty()) {
+    notes.push_back(
+        fmt::format("{}: columns that mean nothing here: {}", file, fmt::join(ignored, ", ")));
+  }
+  return result;
+}
+
+// A kind of file: how it is read and written.
+struct Format {
+  std::string_view extension;
+  LandmarkFile (*parse)(std::string_view text, std::string_view file, Notes& notes);
+  std::string (*encode)(const LandmarkFile& file);
+  bool holds_measurements;  // normals, depths and certainties
+  bool holds_notes;
+};
+
+std::string CloudComparePoints(const LandmarkFile& file) {
+  std::string text;
+  for (const Landmark& l : file.landmarks) {
+    text += fmt::format("{},{},{},{}\n", l.site, l.point[0], l.point[1], l.point[2]);
+  }
+  return text;
+}
+
+template <LandmarkFile (*parse)(std::string_view, std::string_view)>
+LandmarkFile Plain(std::string_view text, std::string_view file, Notes&) {
+  return parse(text, file);
+}
+
+constexpr std::array kFormats = {
+    Format{".yaml", nullptr, &WriteConfig<LandmarkFile>, true, true},
+    Format{".yml", nullptr, &WriteConfig<LandmarkFile>, true, true},
+    Format{".mrk.json", &Plain<&ParseMarkupsJson>, &MarkupsJson, false, true},
+    Format{".fcsv", &Plain<&ParseFcsv>, &Fcsv, false, true},
+    Format{".pp", &Plain<&ParseMeshLabPoints>, &MeshLabPoints, false, false},
+    Format{".csv", &ParseTable, &LandmarkTable, true, true},
+    Format{".txt", &Plain<&ParsePointList>, &CloudComparePoints, false, false},
+    Format{".asc", &Plain<&ParsePointList>, &CloudComparePoints, false, false},
+};
+
+const Format& FormatOf(const fs::path& path) {
+  std::string name = path.filename().string();
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const Format& format : kFormats) {
+    if (name.ends_with(format.extension)) {
+      return format;
+    }
+  }
+  throw InputError(fmt::format(
+      "{}: no kind of landmark file; known are .yaml, .mrk.json and .fcsv (3D Slicer), .pp "
+      "(MeshLab), .txt and .asc (CloudCompare), .csv",
+      path.string()));
+}
+
+void Complain(const fs::path& path, const std::vector<std::string>& faults) {
+  if (!faults.empty()) {
+    throw InputError(fmt::format("{}: {}", path.string(),
+                                 fmt::join(faults, fmt::format("\n{}: ", path.string()))));
+  }
+}
+
+// Codes in place of names; points without one are left out where that is allowed.
+template <class Entry>
+void NameSites(const ReadLandmarksOptions& options, std::vector<Entry>& entries, Notes& notes,
+               std::vector<std::string>& faults) {
+  std::vector<Entry> known;
+  for (Entry& entry : entries) {
+    const NamedSite site = SiteCalled(entry.site);
+    if (!site.code.empty()) {
+      entry.site = site.code;
+      known.push_back(entry);
+    } else if (options.leave_out_unknown) {
+      notes.push_back(fmt::format("left out: {}", site.fault));
+    } else {
+      faults.push_back(site.fault);
+    }
+  }
+  entries = std::move(known);
+}
+
+void FindRepeats(const LandmarkFile& file, std::vector<std::string>& faults) {
+  std::set<std::string> sites;
+  const auto see = [&](const std::string& site) {
+    if (!sites.insert(site).second) {
+      faults.push_back(fmt::format("site {} stands twice; keep one", SiteInWords(site)));
+    }
+  };
+  std::ranges::for_each(file.landmarks, see, &Landmark::site);
+  std::ranges::for_each(file.absent, see, &AbsentLandmark::site);
+}
+
+std::string_view WordOf(PatientAxes axes) {
+  return EnumNames(axes)[static_cast<std::size_t>(axes)];
+}
+
+void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, LandmarkFile& file,
+                Notes& notes) {
+  if (file.axes.empty() && !options.axes) {
+    notes.push_back(
+        fmt::format("{}: the file does not say its axes; taken as LPS", path.filename().string()));
+  }
+  const std::string said(options.axes ? WordOf(*options.axes) : "");
+  if (!file.axes.empty() && !said.empty() && file.axes != said) {
+    throw InputError(fmt::format("{}: the file says {}, and {} was asked for; leave the axes out",
+                                 path.string(), file.axes, said));
+  }
+  if (file.axes.empty()) {
+    file.axes = said.empty() ? "LPS" : said;
+  }
+}
+
+void TurnToLps(const fs::path& path, LandmarkFile& file, Notes& notes) {
+  if (file.axes == "LPS") {
+    return;
+  }
+  const auto turn = [](std::array<double, 3>& v) { v = {-v[0], -v[1], v[2]}; };
+  for (Landmark& landmark : file.landmarks) {
+    turn(landmark.point);
+    if (landmark.normal) {
+      turn(*landmark.normal);
+    }
+  }
+  file.axes = "LPS";
+  notes.push_back(
+      fmt::format("{}: turned from RAS to LPS (x and y negated)", path.filename().string()));
+}
+
+LandmarkReading ReadForeign(const fs::path& path, const Format& format,
+                            const ReadLandmarksOptions& options) {
+  LandmarkReading reading;
+  LandmarkFile& file = reading.file;
+  file = format.parse(ReadFileBytes(path), path.string(), reading.notes);
+  file.subject = path.filename().string();
+  file.subject.resize(file.subject.size() - format.extension.size());
+  std::vector<std::string> faults;
+  NameSites(options, file.landmarks, reading.notes, faults);
+  NameSites(options, file.absent, reading.notes, faults);
+  FindRepeats(file, faults);
+  if (file.landmarks.empty() && faults.empty()) {
+    faults.emplace_back("there is no landmark; place at least one");
+  }
+  Complain(path, faults);
+  ChooseAxes(path, options, file, reading.notes);
+  TurnToLps(path, file, reading.notes);
+  return reading;
+}
+
+}  // namespace
+
+LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& options) {
+  const Format& format = FormatOf(path);
+  if (format.parse != nullptr) {
+    return ReadForeign(path, format, options);
+  }
+  LandmarkReading reading{.file = ReadLandmarkFile(path), .notes = {}};
+  ChooseAxes(path, options, reading.file, reading.notes);
+  return reading;
+}
+
+std::string EncodeLandmarks(const LandmarkFile& file, const fs::path& path) {
+  return FormatOf(path).encode(file);
+}
+
+std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) {
+  const Format& format = FormatOf(path);
+  const auto count = [&](auto&& has) { return std::ranges::count_if(file.landmarks, has); };
+  const auto measured = count([](const Landmark& l) {
+    return l.normal || l.depth_along_normal_mm || l.depth_closest_mm ||
+           l.certainty != Certainty::kMedium;
+  });
+  const auto noted = count([](const Landmark& l) { return !l.note.empty(); });
+  std::vector<std::string> lost;
+  const auto lose = [&](bool held, auto number, std::string_view what) {
+    if (!held && number > 0) {
+      lost.push_back(fmt::format("{} of {} landmarks", what, number));
+    }
+  };
+  lose(format.holds_measurements, measured, "normals, depths and certainties");
+  lose(format.holds_notes, noted, "notes");
+  if (format.parse != nullptr && !file.absent.empty()) {
+    lost.push_back(fmt::format("{} sites that are said to be absent", file.absent.size()));
+  }
+  return lost;
+}
+
+}  // namespace semblance

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Landmarks from whatever program placed them, and for it.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/subject/landmarks.h"
+
+namespace semblance {
+
+// The axes of a file's coordinates. RAS has x to the subject's right and y to the front.
+enum class PatientAxes { kLps, kRas };
+constexpr auto EnumNames(PatientAxes) { return std::to_array<std::string_view>({"LPS", "RAS"}); }
+
+struct ReadLandmarksOptions {
+  std::optional<PatientAxes> axes;  // of a file that does not say; none: LPS, and a note
+  bool leave_out_unknown = false;   // points whose name is no site, with a note each
+};
+
+// Landmarks in LPS and mm, and what people should know of how they were read.
+struct LandmarkReading {
+  LandmarkFile file;
+  std::vector<std::string> notes;
+};
+
+// The format follows the extension: .yaml or .yml (ours), .mrk.json and .fcsv (3D Slicer), .pp
+// (MeshLab), .txt and .asc (CloudCompare), .csv. Sites may go by any name that SiteCalled knows.
+// RAS is turned to LPS, and a note says so. Throws IoError if the file cannot be read or is not of
+// its format; InputError with a line per fault if a name is no site (and may not be left out), a
+// site stands twice, there is no landmark, or options.axes contradicts the file.
+LandmarkReading ReadLandmarks(const std::filesystem::path& path,
+                              const ReadLandmarksOptions& options = {});
+
+// The bytes of a file of that kind. Throws InputError for an extension that is none of those above.
+std::string EncodeLandmarks(const LandmarkFile& file, const std::filesystem::path& path);
+
+// What `file` holds that a file of that kind has no place for, a line each; empty if all goes in.
+std::vector<std::string> LostIn(const LandmarkFile& file, const std::filesystem::path& path);
+
+}  // namespace semblance

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands that work on landmarks alone: landmarks convert.
+#pragma once
+
+#include <span>
+
+#include "problems/program/commands.h"
+
+namespace semblance {
+
+std::span<const ProgramCommand> LandmarkCommands();
+
+}  // namespace semblance

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/landmark_files/read_landmarks.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "problems/subject/sites.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class LandmarkReadingTest : public ::testing::Test {
+ protected:
+  std::filesystem::path Write(const std::string& name, const std::string& text) {
+    WriteFileAtomically(folder_ / name, text);
+    return folder_ / name;
+  }
+  LandmarkReading Read(const std::string& name, const std::string& text,
+                       const ReadLandmarksOptions& options = {}) {
+    return ReadLandmarks(Write(name, text), options);
+  }
+  std::string Fault(const std::string& name, const std::string& text,
+                    const ReadLandmarksOptions& options = {}) {
+    try {
+      Read(name, text, options);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no fault";
+  }
+
+  testing::ScratchFolder folder_;
+};
+
+// All sites at odd points, with all that can be said of a landmark.
+LandmarkFile SampleFile() {
+  LandmarkFile file;
+  file.subject = "sample";
+  Random random(3);
+  for (const Site& site : StandardSites()) {
+    const Vec3 p = random.InBox(-100, 100);
+    file.landmarks.push_back({.site = site.code,
+                              .point = {p.x(), p.y(), p.z()},
+                              .normal = std::array{0.0, -0.6, 0.8},
+                              .depth_along_normal_mm = random.Uniform(1, 20),
+                              .depth_closest_mm = random.Uniform(1, 20),
+                              .certainty = Certainty::kLow,
+                              .note = "worn, see \"photo\" 3"});
+  }
+  return file;
+}
+
+class EveryKind : public LandmarkReadingTest, public ::testing::WithParamInterface<const char*> {};
+
+// What is written is read back, to the bit, but for what LostIn names.
+TEST_P(EveryKind, ReadsWhatItWrites) {
+  const LandmarkFile file = SampleFile();
+  const std::string name = fmt::format("sample{}", GetParam());
+  const LandmarkReading back = Read(name, EncodeLandmarks(file, name));
+  ASSERT_EQ(back.file.landmarks.size(), file.landmarks.size());
+  const bool keeps_all = LostIn(file, name).empty();
+  for (std::size_t k = 0; k < file.landmarks.size(); ++k) {
+    const Landmark &a = file.landmarks[k], &b = back.file.landmarks[k];
+    EXPECT_EQ(a.site, b.site);
+    EXPECT_EQ(a.point, b.point);
+    if (keeps_all) {
+      EXPECT_EQ(a.normal, b.normal);
+      EXPECT_EQ(a.depth_along_normal_mm, b.depth_along_normal_mm);
+      EXPECT_EQ(a.depth_closest_mm, b.depth_closest_mm);
+      EXPECT_EQ(a.certainty, b.certainty);
+      EXPECT_EQ(a.note, b.note);
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(, EveryKind,
+                         ::testing::Values(".yaml", ".yml", ".mrk.json", ".fcsv", ".pp", ".csv",
+                                           ".txt", ".asc"),
+                         [](const auto& kind) {
+                           std::string name = kind.param;
+                           std::erase(name, '.');
+                           return name;
+                         });
+
+TEST_F(LandmarkReadingTest, SaysWhatAFileHasNoPlaceFor) {
+  LandmarkFile file = SampleFile();
+  EXPECT_THAT(LostIn(file, "a.csv"), IsEmpty());
+  EXPECT_THAT(LostIn(file, "a.fcsv"),
+              ElementsAre("normals, depths and certainties of 32 landmarks"));
+  EXPECT_THAT(LostIn(file, "a.pp"), ElementsAre(HasSubstr("normals"), "notes of 32 landmarks"));
+  file.absent.push_back({"g", "gone"});
+  EXPECT_THAT(LostIn(file, "a.csv"), ElementsAre(HasSubstr("1 sites")));
+  EXPECT_THAT(LostIn(file, "a.yaml"), IsEmpty());
+}
+
+TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {
+  const auto markups = [](const char* axes) {
+    return fmt::format(
+        R"({{"@schema": "x", "markups": [{{"type": "Fiducial", "coordinateSystem": "{}",
+            "coordinateUnits": "mm", "controlPoints": [
+            {{"id": "1", "label": "nasion", "position": [1.5, 2, 3], "positionStatus": "defined"}},
+            {{"id": "2", "label": "left gonion", "position": [0, 0, 0], "positionStatus": "undefined"}}]}}]}})",
+        axes);
+  };
+  const LandmarkReading lps = Read("a.mrk.json", markups("LPS"));
+  EXPECT_EQ(lps.file.landmarks.at(0).site, "n");
+  EXPECT_EQ(lps.file.landmarks.at(0).point, (std::array{1.5, 2.0, 3.0}));
+  EXPECT_EQ(lps.file.absent.at(0).site, "go_l");
+  EXPECT_THAT(lps.notes, IsEmpty());
+  const LandmarkReading ras = Read("a.mrk.json", markups("RAS"));
+  EXPECT_EQ(ras.file.landmarks.at(0).point, (std::array{-1.5, -2.0, 3.0}));
+  EXPECT_THAT(ras.notes, ElementsAre(HasSubstr("turned from RAS to LPS")));
+  EXPECT_THAT(Fault("a.mrk.json", markups("LAS")), HasSubstr("must be \"LPS\" or \"RAS\""));
+  EXPECT_THAT(Fault("a.mrk.json", markups("LPS"), {.axes = PatientAxes::kRas}),
+              HasSubstr("the file says LPS, and RAS was asked for"));
+}
+
+TEST_F(LandmarkReadingTest, OldFiducialListsOfSlicer) {
+  const std::string head = "# Markups fiducial file version = 4.11\n# CoordinateSystem = {}\n";
+  const std::string rows =
+      "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
+      "1,-2.5,10,3e1,0,0,0,1,1,1,0,glabella,\"a, b\",vtkMRMLScalarVolumeNode1,2,0\r\n";
+  for (const char* axes : {"LPS", "1"}) {
+    const auto file = Read("a.fcsv", fmt::format(fmt::runtime(head), axes) + rows).file;
+    EXPECT_EQ(file.landmarks.at(0).point, (std::array{-2.5, 10.0, 30.0}));
+    EXPECT_EQ(file.landmarks.at(0).site, "g");
+    EXPECT_EQ(file.landmarks.at(0).note, "a, b");
+  }
+  for (const char* axes : {"RAS", "0"}) {
+    const auto file = Read("a.fcsv", fmt::format(fmt::runtime(head), axes) + rows).file;
+    EXPECT_EQ(file.landmarks.at(0).point, (std::array{2.5, -10.0, 30.0}));
+  }
+  EXPECT_THAT(Fault("a.fcsv", rows), HasSubstr("no line '# CoordinateSystem"));
+  EXPECT_THAT(Fault("a.fcsv", "# CoordinateSystem = LPS\n1,x,0,0,0,0,0,1,1,1,0,g,,\n"),
+              HasSubstr("a.fcsv:2: 'x' is not a finite decimal number"));
+}
+
+TEST_F(LandmarkReadingTest, PointsOfMeshLab) {
+  const LandmarkReading reading =
+      Read("a.pp",
+           "<!DOCTYPE PickedPoints>\n<PickedPoints>\n <DocumentData><User name=\"x\"/>"
+           "</DocumentData>\n <point x=\"1\" y=\"2\" z=\"3\" active=\"1\" name=\"3\"/>\n"
+           " <point x=\"0\" y=\"0\" z=\"0\" active=\"0\" name=\"g\"/>\n</PickedPoints>\n");
+  EXPECT_EQ(reading.file.landmarks.at(0).site, "n");
+  EXPECT_EQ(reading.file.absent.at(0).site, "g");
+  EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("taken as LPS")));
+  EXPECT_THAT(Fault("a.pp", "<Other/>"), HasSubstr("no PickedPoints of MeshLab"));
+  EXPECT_THAT(Fault("a.pp",
+                    "<PickedPoints><point x=\"1\" y=\"nan\" z=\"0\" name=\"g\"/>"
+                    "</PickedPoints>"),
+              HasSubstr("'nan' is not a finite decimal number"));
+}
+
+TEST_F(LandmarkReadingTest, ListsOfCloudCompare) {
+  for (const char* text :
+       {"g,1,2,3\nleft gonion,4,5,6\n", "g;1;2;3\ngo_l;4;5;6", "g 1 2 3\ngo_l\t4  5 6\n"}) {
+    const LandmarkFile file = Read("a.txt", text).file;
+    EXPECT_EQ(file.landmarks.at(1).site, "go_l") << text;
+    EXPECT_EQ(file.landmarks.at(1).point, (std::array{4.0, 5.0, 6.0}));
+  }
+  EXPECT_THAT(Fault("a.asc", "1,2,3\n"), HasSubstr("a.asc:1: the point has no name"));
+}
+
+TEST_F(LandmarkReadingTest, TablesWithCommasOrSemicolons) {
+  const LandmarkReading reading = Read(
+      "a.csv", "Label;Y;X;Z;Author;depth_along_normal_mm\ng;2,5;1,25;-3;ab;4,5\nn;0;0;0;ab;\n");
+  EXPECT_EQ(reading.file.landmarks.at(0).point, (std::array{1.25, 2.5, -3.0}));
+  EXPECT_EQ(reading.file.landmarks.at(0).depth_along_normal_mm, 4.5);
+  EXPECT_EQ(reading.file.landmarks.at(1).depth_along_normal_mm, std::nullopt);
+  EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("columns that mean nothing here: Author"),
+                                         HasSubstr("taken as LPS")));
+  EXPECT_THAT(Fault("a.csv", "name,x,y\ng,1,2\n"), HasSubstr("there is no column z or z_mm"));
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z\ng,1,2,inf\n"), HasSubstr("a.csv:2: column 'z'"));
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z\ng,\"1,5\",2,0\n"), HasSubstr("'1,5' is not a finite"));
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z,normal_x\ng,1,2,0,1\n"), HasSubstr("normal_z, or none"));
+  EXPECT_THAT(Fault("a.csv", "site;x;y;z\ng;1.000,5;2;0\n"), HasSubstr("'1.000,5' is not"));
+}
+
+TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
+  const std::string table = "site,x,y,z\nF-1,0,0,0\ngonion,0,0,0\ng,0,0,0\nglabella,1,1,1\n";
+  EXPECT_THAT(Fault("a.csv", table),
+              ::testing::AllOf(HasSubstr("'F-1' is no site"), HasSubstr("stands on both sides"),
+                               HasSubstr("site g (Glabella) stands twice")));
+  const LandmarkReading reading = Read("a.csv", "site,x,y,z\nF-1,0,0,0\ng,0,0,0\n",
+                                       {.axes = PatientAxes::kLps, .leave_out_unknown = true});
+  EXPECT_EQ(reading.file.landmarks.size(), 1U);
+  EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("left out: 'F-1' is no site")));
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z\n"), HasSubstr("there is no landmark"));
+  EXPECT_THAT(Fault("a.stl", ""), HasSubstr("no kind of landmark file"));
+}
+
+}  // namespace
+}  // namespace semblance

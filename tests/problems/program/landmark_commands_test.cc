@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The command landmarks as users meet it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "problems/landmark_files/read_landmarks.h"
+#include "tests/testing/program_call.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+
+class LandmarkCommands : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    WriteFileAtomically(folder_ / "in.csv", "site,x,y,z\nnasion,1,2,3\nleft gonion,4,5,6\n");
+  }
+  testing::ScratchFolder folder_;
+};
+
+TEST_F(LandmarkCommands, ConvertsThereAndBack) {
+  EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert in.csv a.mrk.json --axes RAS").code,
+            0);
+  EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert a.mrk.json b.yaml").code, 0);
+  const LandmarkFile file = ReadLandmarks(folder_ / "b.yaml").file;
+  EXPECT_EQ(file.landmarks.at(0).site, "n");
+  EXPECT_EQ(file.landmarks.at(1).point, (std::array{-4.0, -5.0, 6.0}));
+}
+
+TEST_F(LandmarkCommands, ReplacesNothingUnasked) {
+  WriteFileAtomically(folder_ / "a.pp", "mine");
+  const testing::Outcome refused = testing::CallProgram(folder_, "landmarks convert in.csv a.pp");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("it exists"));
+  EXPECT_EQ(ReadFileBytes(folder_ / "a.pp"), "mine");
+  EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert in.csv a.pp --force").code, 0);
+}
+
+TEST_F(LandmarkCommands, WritesNothingWhereANameIsNoSite) {
+  WriteFileAtomically(folder_ / "odd.csv", "site,x,y,z\nF-1,1,2,3\ng,0,0,0\n");
+  EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert odd.csv out.yaml").code, 2);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out.yaml"));
+  const testing::Outcome kept =
+      testing::CallProgram(folder_, "landmarks convert odd.csv out.yaml --leave-out-unknown");
+  EXPECT_EQ(kept.code, 0);
+  EXPECT_THAT(kept.err, HasSubstr("left out: 'F-1'"));
+}
+
+}  // namespace
+}  // namespace semblance
