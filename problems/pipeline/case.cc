@@ -123,8 +123,8 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
   }
   NoteDroppedAreas(subject);
   subject.inputs.push_back(experiment.network);
-  if (experiment.tissue.depths == DepthSource::kTable) {
-    subject.inputs.push_back(experiment.tissue.table);
+  for (const std::filesystem::path& table : TablesOf(experiment.tissue)) {
+    subject.inputs.push_back(table);
   }
   if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
     subject.inputs.push_back(map->file);

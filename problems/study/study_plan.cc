@@ -282,8 +282,8 @@ std::vector<fs::path> InputFilesOf(const Experiment& experiment) {
   std::vector<fs::path> files =
       std::visit([](const auto& subject) { return FilesOf(subject); }, experiment.subject);
   files.push_back(experiment.network);
-  if (experiment.tissue.depths == DepthSource::kTable) {
-    files.push_back(experiment.tissue.table);
+  for (const fs::path& table : TablesOf(experiment.tissue)) {
+    files.push_back(table);
   }
   if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
     files.push_back(map->file);

@@ -82,12 +82,55 @@ void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::s
   }
 }
 
-std::vector<std::string> SitesOf(const std::vector<Dowel*>& dowels) {
-  std::vector<std::string> sites;
-  for (const Dowel* dowel : dowels) {
-    sites.push_back(dowel->site);
+void SetDepth(const TissueTable& table, const TissueDepth& depth, Dowel& dowel, Notes& notes) {
+  dowel.depth_mm = depth.mean_mm;
+  dowel.sd_mm = depth.sd_mm.value_or(kNaN);
+  if (depth.flag == CellFlag::kSuspect) {
+    notes.push_back(fmt::format("site {}: the depth of {:.2f} mm in table '{}' is suspect: {}",
+                                SiteInWords(dowel.site), depth.mean_mm, table.id, depth.note));
   }
-  return sites;
+}
+
+// Sets the depths that the table has and returns the dowels that still need one.
+std::vector<Dowel*> ApplyTable(const TissueOptions& options, const TissueTable& table,
+                               const std::vector<Dowel*>& open, Notes& notes) {
+  std::vector<Dowel*> left;
+  std::vector<std::string> sites;
+  for (Dowel* dowel : open) {
+    if (const auto depth = FindDepth(table, options.sex, options.build, dowel->site)) {
+      SetDepth(table, *depth, *dowel, notes);
+      sites.push_back(dowel->site);
+    } else {
+      left.push_back(dowel);
+    }
+  }
+  NoteUnorderedRows(table, options.sex, sites, notes);
+  return left;
+}
+
+void NoteFilled(const TissueTable& lacking, const TissueTable& filling,
+                const std::vector<Dowel*>& open, Notes& notes) {
+  std::vector<std::string> sites;
+  for (const Dowel* dowel : open) {
+    if (!std::isnan(dowel->depth_mm)) {
+      sites.push_back(dowel->site);
+    }
+  }
+  if (!sites.empty()) {
+    notes.push_back(fmt::format("tissue table '{}' has no depth for {}: taken from '{}'",
+                                lacking.id, fmt::join(sites, ", "), filling.id));
+  }
+}
+
+void NoteLeftOut(const TissueOptions& options, const TissueTable& table,
+                 const std::vector<Dowel*>& left, Notes& notes) {
+  for (const Dowel* dowel : left) {
+    notes.push_back(fmt::format(
+        "site {}: no depth in tissue table '{}' ({}); dowel left out. Name another table in "
+        "`fill_from`, or a depth in `set_mm`, to keep it",
+        SiteInWords(dowel->site), table.id,
+        WhyNoDepth(table, options.sex, options.build, dowel->site)));
+  }
 }
 
 void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open, Notes& notes) {
@@ -100,18 +143,14 @@ void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open
         "configs/tables/rhine_caucasoid.yaml, or `depths: measured`");
   }
   const TissueTable table = ReadTissueTable(options.table);
-  const std::vector<std::string> sites = SitesOf(open);
-  RequireDepths(table, options.sex, options.build, sites);
-  for (Dowel* dowel : open) {
-    const TissueDepth depth = LookUpDepth(table, options.sex, options.build, dowel->site);
-    dowel->depth_mm = depth.mean_mm;
-    dowel->sd_mm = depth.sd_mm.value_or(kNaN);
-    if (depth.flag == CellFlag::kSuspect) {
-      notes.push_back(fmt::format("site {}: the depth of {:.2f} mm in table '{}' is suspect: {}",
-                                  SiteInWords(dowel->site), depth.mean_mm, table.id, depth.note));
-    }
+  std::vector<Dowel*> left = ApplyTable(options, table, open, notes);
+  if (!options.fill_from.empty()) {
+    const TissueTable filling = ReadTissueTable(options.fill_from);
+    const std::vector<Dowel*> lacking = left;
+    left = ApplyTable(options, filling, lacking, notes);
+    NoteFilled(table, filling, lacking, notes);
   }
-  NoteUnorderedRows(table, options.sex, sites, notes);
+  NoteLeftOut(options, table, left, notes);
 }
 
 const Landmark& LandmarkAt(const LandmarkFile& file, const std::string& site) {
@@ -163,9 +202,22 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
   return notes;
 }
 
+std::vector<std::filesystem::path> TablesOf(const TissueOptions& options) {
+  std::vector<std::filesystem::path> tables;
+  if (options.depths == DepthSource::kTable) {
+    tables = {options.table, options.fill_from};
+    std::erase(tables, std::filesystem::path());
+  }
+  return tables;
+}
+
 std::vector<std::string> DepthWarnings(const TissueOptions& options) {
-  const bool uses_table = options.depths == DepthSource::kTable && !options.table.empty();
-  return uses_table ? TableWarnings(ReadTissueTable(options.table)) : std::vector<std::string>();
+  Notes warnings;
+  for (const std::filesystem::path& path : TablesOf(options)) {
+    const Notes more = TableWarnings(ReadTissueTable(path));
+    warnings.insert(warnings.end(), more.begin(), more.end());
+  }
+  return warnings;
 }
 
 }  // namespace semblance

@@ -26,6 +26,7 @@ constexpr auto EnumNames(DepthSource) {
 struct TissueOptions {
   DepthSource depths = DepthSource::kTable;  // measured: those in the landmark file
   std::filesystem::path table;               // tissue table; for depths: table
+  std::filesystem::path fill_from;           // another table, for the sites that `table` lacks
   Sex sex = Sex::kMale;                      // of the subject; a pooled table does not ask
   Build build = Build::kNormal;              // of the subject; never interpolated between builds
   std::map<std::string, double> set_mm;      // by site, before all others
@@ -37,6 +38,10 @@ void Fields(Visitor& visit, TissueOptions& o) {
                   .doc = "table: those of a population; measured: those in the landmark file"},
         o.depths);
   visit(FieldInfo{.name = "table", .doc = "file of the tissue table; for depths: table"}, o.table);
+  visit(FieldInfo{.name = "fill_from",
+                  .doc = "another table, of the same sex and build, for the sites that `table` "
+                         "lacks; a site that both lack has no dowel"},
+        o.fill_from);
   visit(
       FieldInfo{.name = "sex", .doc = "of the subject; a table of pooled adults has no use for it"},
       o.sex);
@@ -54,16 +59,19 @@ void Fields(Visitor& visit, TissueOptions& o) {
 
 // Sets depth_mm and sd_mm of each dowel. A depth under set_mm comes first (that of "go_l" before
 // that of "go"). Measured depths are those along the normal, else to the closest skin. Dowels of
-// landmarks without any measured depth are removed.
+// landmarks without any measured depth, or without one in a table, are removed.
 //
 // Returns what people should know: suspect cells used, rows used whose depths do not grow with the
-// build, entries of set_mm used and unused, depths to the closest skin, dowels removed. Throws
-// InputError if a table is needed and not given or lacks a depth (all such sites are named), if
+// build, sites filled from the second table, entries of set_mm used and unused, depths to the
+// closest skin, dowels removed and why. Throws InputError if a table is needed and not given, if
 // set_mm names an unknown site, or if no dowel is left; IoError and ConfigError as ReadTissueTable.
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels);
 
-// TableWarnings of the table that the options name; nothing where they name none or do not use it.
+// The tables that the options name and use, in the order in which they are asked.
+std::vector<std::filesystem::path> TablesOf(const TissueOptions& options);
+
+// TableWarnings of TablesOf.
 // Throws as ReadTissueTable.
 std::vector<std::string> DepthWarnings(const TissueOptions& options);
 

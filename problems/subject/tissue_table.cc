@@ -153,28 +153,17 @@ TissueTable ReadTissueTable(const std::filesystem::path& path) {
   return ReadConfig<TissueTable>(path);
 }
 
-TissueDepth LookUpDepth(const TissueTable& table, Sex sex, Build build, const std::string& site) {
-  RequireDepths(table, sex, build, {&site, 1});
-  const TissueCell& cell = *FindCell(table, StratumOf(table, sex, build), site);
-  return {*cell.mean, cell.sd, cell.flag, cell.note};
+std::optional<TissueDepth> FindDepth(const TissueTable& table, Sex sex, Build build,
+                                     const std::string& site) {
+  const TissueCell* const cell = FindCell(table, StratumOf(table, sex, build), site);
+  if (!HasDepth(cell)) {
+    return std::nullopt;
+  }
+  return TissueDepth{*cell->mean, cell->sd, cell->flag, cell->note};
 }
 
-void RequireDepths(const TissueTable& table, Sex sex, Build build,
-                   std::span<const std::string> sites) {
-  const std::string stratum = StratumOf(table, sex, build);
-  std::vector<std::string> lacking;
-  for (const std::string& site : sites) {
-    if (const TissueCell* cell = FindCell(table, stratum, site); !HasDepth(cell)) {
-      lacking.push_back(fmt::format("{}: {}", SiteInWords(site), WhyNoDepth(cell)));
-    }
-  }
-  if (!lacking.empty()) {
-    throw InputError(fmt::format(
-        "tissue table '{}', stratum {}: no depth for {}. Set a depth in mm for the site under "
-        "set_mm, take another table or stratum, or list the site under `absent` in the landmark "
-        "file",
-        table.id, stratum, fmt::join(lacking, "; ")));
-  }
+std::string WhyNoDepth(const TissueTable& table, Sex sex, Build build, const std::string& site) {
+  return WhyNoDepth(FindCell(table, StratumOf(table, sex, build), site));
 }
 
 std::vector<std::string> UnorderedLandmarks(const TissueTable& table, Sex sex,

@@ -127,13 +127,13 @@ std::string StratumName(Sex sex, Build build);
 // another.
 TissueTable ReadTissueTable(const std::filesystem::path& path);
 
-// The depth at a site, with or without _l / _r; a pooled table ignores `sex` and `build`. Throws
-// InputError if the table has no such site or its cell is missing.
-TissueDepth LookUpDepth(const TissueTable& table, Sex sex, Build build, const std::string& site);
+// The depth at a site, with or without _l / _r; a pooled table ignores `sex` and `build`. None if
+// the table has no such site or its cell is missing.
+std::optional<TissueDepth> FindDepth(const TissueTable& table, Sex sex, Build build,
+                                     const std::string& site);
 
-// Throws one InputError that names all those of `sites` for which LookUpDepth would throw.
-void RequireDepths(const TissueTable& table, Sex sex, Build build,
-                   std::span<const std::string> sites);
+// Why there is none: "not in the table", or "missing" with the cell's note.
+std::string WhyNoDepth(const TissueTable& table, Sex sex, Build build, const std::string& site);
 
 // The rows, by their code and in the table's order, that hold one of `sites` and in which depth
 // does not grow from emaciated over normal to obese in this sex: a depth between two builds must

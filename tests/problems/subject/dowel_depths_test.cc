@@ -118,15 +118,31 @@ TEST(DepthWarnings, AreThoseOfTheTableThatIsUsed) {
   EXPECT_THAT(DepthWarnings({}), IsEmpty());
 }
 
-TEST(FillDepths, AMissingCellIsAnErrorUnlessSet) {
+TEST(FillDepths, ASiteThatTheTableLacksIsLeftOutUnlessSet) {
   Subject s({"g", "iM2_l", "iM2_r"});
   TissueOptions options = FromTable("rhine_caucasoid", Sex::kMale, Build::kEmaciated);
-  EXPECT_THAT(WordsOf<InputError>([&] { FillDepths(options, s.file, s.dowels); }),
-              AllOf(HasSubstr("stratum emaciated_male: no depth for iM2_l (Sub M2)"),
-                    HasSubstr("iM2_r (Sub M2)")));
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels),
+              ElementsAre(AllOf(HasSubstr("iM2_l (Sub M2): no depth"), HasSubstr("missing:"),
+                                HasSubstr("dowel left out")),
+                          HasSubstr("iM2_r (Sub M2): no depth")));
+  EXPECT_THAT(s.Depths(), ElementsAre(2.5));
+  Subject set({"g", "iM2_l", "iM2_r"});
   options.set_mm = {{"iM2", 10}};
-  FillDepths(options, s.file, s.dowels);
-  EXPECT_THAT(s.Depths(), ElementsAre(2.5, 10, 10));
+  FillDepths(options, set.file, set.dowels);
+  EXPECT_THAT(set.Depths(), ElementsAre(2.5, 10, 10));
+}
+
+TEST(FillDepths, ASecondTableFillsWhatTheFirstLacksAndNothingElse) {
+  Subject s({"g", "sg", "fe_l", "go_l"});
+  TissueOptions options = FromTable("t_table_2023", Sex::kMale, Build::kNormal);
+  options.fill_from = kTables + std::string("rhine_caucasoid.yaml");
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels),
+              ElementsAre("tissue table 't_table_2023' has no depth for sg, fe_l: taken from "
+                          "'rhine_caucasoid'"));
+  EXPECT_THAT(s.Depths(), ElementsAre(5.5, 4.25, 4.25, 12.5));
+  EXPECT_TRUE(std::isnan(s.dowels[1].sd_mm));
+  EXPECT_EQ(s.dowels[3].sd_mm, 6);
+  EXPECT_THAT(TablesOf(options), ElementsAre(options.table, options.fill_from));
 }
 
 TEST(FillDepths, ASidesOwnDepthComesBeforeThatOfThePair) {

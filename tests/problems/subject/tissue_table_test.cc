@@ -114,7 +114,7 @@ TEST(TissueTable, RowsOfTheThesisAreTheStandardSites) {
 
 TEST(TissueTable, SpotChecks) {
   const auto depth = [](const char* id, Sex sex, Build build, const char* site) {
-    return LookUpDepth(Shipped(id), sex, build, site).mean_mm;
+    return FindDepth(Shipped(id), sex, build, site)->mean_mm;
   };
   EXPECT_EQ(depth("rhine_caucasoid", Sex::kMale, Build::kEmaciated, "sg"), 2.25);
   EXPECT_EQ(depth("rhine_caucasoid", Sex::kFemale, Build::kObese, "me"), 9.00);
@@ -127,10 +127,10 @@ TEST(TissueTable, SpotChecks) {
 
 TEST(TissueTable, SubM2OfCaucasoids) {
   const TissueTable table = Shipped("rhine_caucasoid");
-  EXPECT_EQ(LookUpDepth(table, Sex::kMale, Build::kNormal, "iM2").mean_mm, 16.00);
-  EXPECT_EQ(LookUpDepth(table, Sex::kFemale, Build::kNormal, "iM2").mean_mm, 15.50);
-  EXPECT_EQ(LookUpDepth(table, Sex::kMale, Build::kObese, "iM2").mean_mm, 19.75);
-  EXPECT_EQ(LookUpDepth(table, Sex::kFemale, Build::kObese, "iM2").mean_mm, 18.75);
+  EXPECT_EQ(FindDepth(table, Sex::kMale, Build::kNormal, "iM2")->mean_mm, 16.00);
+  EXPECT_EQ(FindDepth(table, Sex::kFemale, Build::kNormal, "iM2")->mean_mm, 15.50);
+  EXPECT_EQ(FindDepth(table, Sex::kMale, Build::kObese, "iM2")->mean_mm, 19.75);
+  EXPECT_EQ(FindDepth(table, Sex::kFemale, Build::kObese, "iM2")->mean_mm, 18.75);
   for (const Sex sex : {Sex::kMale, Sex::kFemale}) {
     const TissueCell& cell = table.rows[20].values.at(StratumName(sex, Build::kEmaciated));
     EXPECT_EQ(cell.flag, CellFlag::kMissing);
@@ -139,32 +139,21 @@ TEST(TissueTable, SubM2OfCaucasoids) {
   }
 }
 
-TEST(TissueTable, AMissingDepthNamesTableSiteStratumAndRemedy) {
+TEST(TissueTable, SaysWhyASiteHasNoDepth) {
   const TissueTable table = Shipped("rhine_caucasoid");
-  EXPECT_EQ(
-      WordsOf<InputError>([&] { LookUpDepth(table, Sex::kFemale, Build::kEmaciated, "iM2_l"); }),
-      "tissue table 'rhine_caucasoid', stratum emaciated_female: no depth for iM2_l (Sub "
-      "M2): missing: the copy of the thesis has five values in this row; 9.50 belongs to one "
-      "of the two emaciated cells, the text does not say which. Set a depth in mm for the "
-      "site under set_mm, take another table or stratum, or list the site under `absent` in "
-      "the landmark file");
-}
-
-TEST(TissueTable, AllSitesWithoutDepthAreNamedAtOnce) {
-  const std::vector<std::string> sites = StandardSiteCodes();
-  const std::string words = WordsOf<InputError>(
-      [&] { RequireDepths(Shipped("t_table_2023"), Sex::kMale, Build::kNormal, sites); });
-  EXPECT_THAT(words, HasSubstr("table 't_table_2023', stratum adult: no depth for sg "
-                               "(Supraglabella): not in the table; fe_l (Frontal Eminence): not"));
-  EXPECT_THAT(words, AllOf(HasSubstr("im_r"), HasSubstr("lo_l"), HasSubstr("sgl_r")));
-  EXPECT_THAT(words, ::testing::Not(HasSubstr("Gonion")));
+  EXPECT_EQ(FindDepth(table, Sex::kFemale, Build::kEmaciated, "iM2_l"), std::nullopt);
+  EXPECT_EQ(WhyNoDepth(table, Sex::kFemale, Build::kEmaciated, "iM2_l"),
+            "missing: the copy of the thesis has five values in this row; 9.50 belongs to one of "
+            "the two emaciated cells, the text does not say which");
+  EXPECT_EQ(WhyNoDepth(Shipped("t_table_2023"), Sex::kMale, Build::kNormal, "sg"),
+            "not in the table");
 }
 
 TEST(TissueTable, APooledTableIgnoresSexAndBuild) {
   const TissueTable table = Shipped("t_table_2023");
   for (const Sex sex : {Sex::kMale, Sex::kFemale}) {
     for (const Build build : {Build::kEmaciated, Build::kNormal, Build::kObese}) {
-      const TissueDepth depth = LookUpDepth(table, sex, build, "go_l");
+      const TissueDepth depth = *FindDepth(table, sex, build, "go_l");
       EXPECT_EQ(depth.mean_mm, 12.5);
       EXPECT_EQ(depth.sd_mm, 6);
     }
