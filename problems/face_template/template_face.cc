@@ -194,13 +194,19 @@ TemplateFace MakeTemplateFace(const FormulaTemplate& options) {
     AddDetail(surface, level, options.detail_tolerance_mm);
   }
   TemplateFace face{.surface = std::move(surface), .site_uv = TemplateSites(), .features = {}};
-  for (const HeadFeature& f : kHeadFeatures) {
-    face.features.push_back({f.name, VerticesInside(face.surface, f.region), f.region});
-  }
+  face.features = FeaturesOfGenericHead(face.surface);
   if (options.site_error > 0) {
     Disturb(options.site_error, options.site_random_seed, face.site_uv);
   }
   return face;
+}
+
+std::vector<TemplateFeature> FeaturesOfGenericHead(const HSplineSurface& surface) {
+  std::vector<TemplateFeature> features;
+  for (const HeadFeature& f : kHeadFeatures) {
+    features.push_back({f.name, VerticesInside(surface, f.region), f.region});
+  }
+  return features;
 }
 
 std::vector<VertexId> FeatureVertices(const TemplateFace& face) {

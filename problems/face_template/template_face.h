@@ -84,6 +84,10 @@ struct TemplateFace {
 // option is out of range.
 TemplateFace MakeTemplateFace(const FormulaTemplate& options);
 
+// nose, mouth, eye_l and eye_r of a surface over the formula's own (u,v) and in its frame, which
+// may have more levels than FormulaTemplate makes.
+std::vector<TemplateFeature> FeaturesOfGenericHead(const HSplineSurface& surface);
+
 // The vertices of all features, each once, sorted: what a fit restores.
 std::vector<VertexId> FeatureVertices(const TemplateFace& face);
 

@@ -10,8 +10,9 @@
 #include <type_traits>
 #include <utility>
 
-#include "problems/output/files.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
@@ -20,7 +21,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFormat = "semblance template";
+constexpr const char* kFormat = "semblance template features";
 constexpr int kVersion = 1;
 
 // ---------------------------------------------------------------------------------------------
@@ -71,10 +72,6 @@ void CheckFeatures(const TemplateFace& face) {
 // Writing
 // ---------------------------------------------------------------------------------------------
 
-std::filesystem::path SurfaceName(const std::filesystem::path& path) {
-  return path.stem().string() + ".hspline.json";
-}
-
 Json ToJson(const TemplateFeature& feature) {
   Json vertices = Json::array();
   for (const VertexId& id : feature.vertices) {
@@ -88,20 +85,21 @@ Json ToJson(const TemplateFeature& feature) {
   return json;
 }
 
-Json ToJson(const TemplateFace& face, const std::string& surface_name) {
-  Json sites = Json::object();
-  for (const auto& [code, uv] : face.site_uv) {
-    sites[code] = {uv.x(), uv.y()};
-  }
+std::string FeaturesText(const TemplateFace& face) {
   Json features = Json::array();
   for (const TemplateFeature& feature : face.features) {
     features.push_back(ToJson(feature));
   }
-  return {{"format", kFormat},
-          {"version", kVersion},
-          {"surface", surface_name},
-          {"site_uv", std::move(sites)},
-          {"features", std::move(features)}};
+  const Json json{{"format", kFormat}, {"version", kVersion}, {"features", std::move(features)}};
+  return json.dump(1) + "\n";
+}
+
+std::string SitesText(const TemplateFace& face) {
+  CsvWriter csv({"site", "u", "v"});
+  for (const auto& [code, uv] : face.site_uv) {
+    csv.Row(code, uv.x(), uv.y());
+  }
+  return csv.Text();
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -145,63 +143,88 @@ void CheckFormat(const Json& json) {
   }
 }
 
-// All but the surface.
-TemplateFace FaceFrom(const Json& json, HSplineSurface surface) {
-  TemplateFace face{.surface = std::move(surface), .site_uv = {}, .features = {}};
-  for (const auto& [code, uv] : json.at("site_uv").items()) {
-    const auto [u, v] = Numbers<double, 2>(uv, fmt::format("site '{}'", code));
-    face.site_uv[code] = {u, v};
-  }
+std::vector<TemplateFeature> FeaturesFrom(const Json& json) {
+  CheckFormat(json);
+  std::vector<TemplateFeature> features;
   for (const Json& feature : json.at("features")) {
-    face.features.push_back(FeatureFrom(feature));
+    features.push_back(FeatureFrom(feature));
   }
-  CheckSites(face);
-  CheckFeatures(face);
-  return face;
+  return features;
 }
 
-std::filesystem::path SurfacePath(const std::filesystem::path& path, const Json& json) {
-  return path.parent_path() / json.at("surface").get<std::string>();
-}
-
-// What parse(json) makes of the file. Faults are told in one line that starts with its path.
-template <class Parse>
-auto ReadJson(const std::filesystem::path& path, const Parse& parse) {
+std::map<std::string, Vec2> ReadSites(const std::filesystem::path& path) {
   const std::string text = ReadFileBytes(path);
+  CsvReader csv(text, path.string());
+  const std::size_t site = csv.ColumnOf("site"), u = csv.ColumnOf("u"), v = csv.ColumnOf("v");
+  std::map<std::string, Vec2> sites;
+  while (csv.NextRow()) {
+    const std::string code(csv.Cell(site));
+    if (!sites.emplace(code, Vec2(csv.Number(u), csv.Number(v))).second) {
+      csv.Fail(fmt::format("site '{}' stands twice; keep one", code));
+    }
+  }
+  return sites;
+}
+
+// Faults are told in one line that starts with the file's path.
+template <class Action>
+void For(const std::filesystem::path& path, const Action& action) {
   try {
-    const Json json = Json::parse(text);
-    CheckFormat(json);
-    return parse(json);
+    action();
   } catch (const nlohmann::json::exception& error) {
-    throw InputError(fmt::format("{}: not a template file: {}", path.string(), error.what()));
+    throw InputError(fmt::format("{}: not a file of features: {}", path.string(), error.what()));
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", path.string(), error.what()));
   }
 }
 
+void CheckNamed(const FileTemplate& files) {
+  if (files.surface.empty() || files.sites.empty()) {
+    throw InputError(fmt::format(
+        "template.{}: no file is named; give surface, sites and features as `semblance template` "
+        "writes them, or `template: formula`",
+        files.surface.empty() ? "surface" : "sites"));
+  }
+}
+
 }  // namespace
 
-void WriteTemplate(const std::filesystem::path& path, const TemplateFace& face) {
-  try {
+FileTemplate WriteTemplate(const std::filesystem::path& folder, const TemplateFace& face) {
+  For(folder, [&] {
     CheckSites(face);
     CheckFeatures(face);
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: not written: {}", path.string(), error.what()));
-  }
-  const std::filesystem::path surface = SurfaceName(path);
-  WriteFileAtomically(path.parent_path() / surface, HSplineToJson(face.surface));
-  WriteFileAtomically(path, ToJson(face, surface.string()).dump(1) + "\n");
-}
-
-TemplateFace ReadTemplate(const std::filesystem::path& path) {
-  return ReadJson(path, [&](const Json& json) {
-    const std::filesystem::path surface = SurfacePath(path, json);
-    return FaceFrom(json, HSplineFromJson(ReadFileBytes(surface), surface.string()));
   });
+  FileTemplate files{.surface = folder / "head.hspline.json",
+                     .sites = folder / "sites.csv",
+                     .features = folder / "features.json"};
+  WriteHSpline(files.surface, face.surface);
+  WriteFileAtomically(files.sites, SitesText(face));
+  WriteFileAtomically(files.features, FeaturesText(face));
+  return files;
 }
 
-std::filesystem::path SurfaceFileOf(const std::filesystem::path& path) {
-  return ReadJson(path, [&](const Json& json) { return SurfacePath(path, json); });
+TemplateFace ReadTemplate(const FileTemplate& files) {
+  CheckNamed(files);
+  TemplateFace face{
+      .surface = ReadHSpline(files.surface), .site_uv = ReadSites(files.sites), .features = {}};
+  For(files.sites, [&] { CheckSites(face); });
+  if (!files.features.empty()) {
+    For(files.features, [&] {
+      face.features = FeaturesFrom(Json::parse(ReadFileBytes(files.features)));
+      CheckFeatures(face);
+    });
+  }
+  return face;
+}
+
+std::vector<std::filesystem::path> FilesOf(const FileTemplate& files) {
+  std::vector<std::filesystem::path> named;
+  for (const std::filesystem::path& file : {files.surface, files.sites, files.features}) {
+    if (!file.empty()) {
+      named.push_back(file);
+    }
+  }
+  return named;
 }
 
 }  // namespace semblance

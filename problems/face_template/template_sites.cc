@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/face_template/template_sites.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cassert>
 #include <iterator>
@@ -9,19 +11,20 @@
 
 #include "problems/face_template/head_formula.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
 // Where the soft-tissue point of a landmark lies on an average adult; of a pair, on the left.
-struct SkinLandmark {
-  std::string_view code;  // Site::landmark
+struct SkinPlace {
+  std::string_view code;  // without side, as Site::landmark
   Vec3 near_skin;         // of HeadPoint, mm
 };
 
 // Heights and widths after the definitions of the sites on the skull, moved out to the skin along
 // the direction in which the dowel of the site stands.
-const SkinLandmark kAverageSkin[] = {
+const SkinPlace kAverageSkin[] = {
     {"sg", {0, 0, 25}},       // the shallow above glabella
     {"g", {0, -2, 13}},       // most forward point of the brow
     {"n", {0, 1, 1}},         // the root of the nose
@@ -45,8 +48,21 @@ const SkinLandmark kAverageSkin[] = {
     {"iM2", {51, 33, -82}},   // the cheek over the second lower molar
 };
 
+// On the formula's own features; of a pair, on the left.
+const SkinPlace kFacialLandmarks[] = {
+    {"prn", {0, -45, -44}},   // from far in front: the tip itself
+    {"sn", {0, -7, -54.5}},   // where the septum meets the philtrum
+    {"sbal", {12, -8, -52}},  // under the wing
+    {"en", {18, 11, -7}},     // ends of the line between the lids
+    {"ex", {45, 25, -6}},     //
+    {"ch", {26, 6, -75.5}},   //
+    {"ls", {0, -8, -66}},     // borders of the lips, and the line between them
+    {"sto", {0, -6, -74.5}},  //
+    {"li", {0, -6, -85}},     //
+};
+
 const Vec3& NearSkin(const Site& site) {
-  const auto* const found = std::ranges::find(kAverageSkin, site.landmark, &SkinLandmark::code);
+  const auto* const found = std::ranges::find(kAverageSkin, site.landmark, &SkinPlace::code);
   assert(found != std::end(kAverageSkin));
   return found->near_skin;
 }
@@ -104,6 +120,47 @@ std::map<std::string, Vec2> TemplateSites() {
     }
   }
   return sites;
+}
+
+std::map<std::string, Vec2> FacialLandmarks() {
+  std::map<std::string, Vec2> landmarks;
+  for (const SkinPlace& place : kFacialLandmarks) {
+    const std::string code(place.code);
+    if (place.near_skin.x() == 0) {
+      landmarks[code] = Closest(place.near_skin, 0.5);
+    } else {
+      const Vec2 left = Closest(place.near_skin, 1);
+      landmarks[code + "_l"] = left;
+      landmarks[code + "_r"] = Vec2(1 - left.x(), left.y());
+    }
+  }
+  return landmarks;
+}
+
+std::vector<std::string> FacialLandmarkCodes() {
+  std::vector<std::string> codes;
+  for (const SkinPlace& place : kFacialLandmarks) {
+    const std::string code(place.code);
+    const bool midline = place.near_skin.x() == 0;
+    codes.push_back(midline ? code : code + "_l");
+    if (!midline) {
+      codes.push_back(code + "_r");
+    }
+  }
+  return codes;
+}
+
+Vec2 UvOnGenericHead(const std::string& code) {
+  static const std::map<std::string, Vec2> places = [] {
+    std::map<std::string, Vec2> all = TemplateSites();
+    all.merge(FacialLandmarks());
+    return all;
+  }();
+  const auto found = places.find(code);
+  if (found == places.end()) {
+    throw InputError(fmt::format("landmark '{}' is not known on the generic head", code));
+  }
+  return found->second;
 }
 
 }  // namespace semblance

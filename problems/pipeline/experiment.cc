@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <limits>
 #include <string>
 #include <utility>
 #include <variant>
@@ -20,16 +19,11 @@ struct TemplateLevels {
   std::string remedy;  // for a level beyond it
 };
 
-// Of a file that cannot be used: any level. What is wrong with the file the run says.
 TemplateLevels LevelsOf(const TemplateSource& source) {
   if (const auto* formula = std::get_if<FormulaTemplate>(&source)) {
     return {formula->max_level, "raise template.max_level"};
   }
-  try {
-    return {LoadTemplate(source).surface.shape().max_level, "take a template with more levels"};
-  } catch (const Error&) {
-    return {std::numeric_limits<int>::max(), ""};
-  }
+  return {LoadTemplate(source).surface.shape().max_level, "take a template with more levels"};
 }
 
 class LevelCheck {
@@ -58,7 +52,7 @@ class LevelCheck {
 
 }  // namespace
 
-std::vector<OptionFault> FaultsBetween(const Experiment& experiment) {
+std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   const TemplateLevels levels = LevelsOf(experiment.face_template);
   LevelCheck check(levels);
   check.Steps("first_fit", experiment.first_fit);
@@ -69,6 +63,8 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) {
         {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
   return faults;
+} catch (const Error& error) {  // of a template that cannot be used; its levels are not known
+  return {{"template", error.what()}};
 }
 
 }  // namespace semblance

@@ -12,6 +12,7 @@
 #include "problems/program/landmark_commands.h"
 #include "problems/program/run_commands.h"
 #include "problems/program/study_commands.h"
+#include "problems/program/template_commands.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/run_context.h"
 
@@ -42,7 +43,8 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   app.require_subcommand(1);
   CommandLine line{.stop = StopSource().get_token(), .chosen = {}};
-  for (const auto& commands : {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands()}) {
+  for (const auto& commands :
+       {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(), TemplateCommands()}) {
     Declare(commands, app, line);
   }
   try {

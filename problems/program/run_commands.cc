@@ -14,7 +14,6 @@
 #include <thread>
 #include <vector>
 
-#include "problems/face_template/template_io.h"
 #include "problems/metrics/face_metrics_json.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/points/point_fit.h"
@@ -186,16 +185,6 @@ int ImportCtCommand(const Arguments& arguments) {
   return kDone;
 }
 
-int TemplateCommand(const Arguments& arguments) {
-  const std::filesystem::path config = arguments.files.at(0);
-  const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
-  const OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string() + "_template");
-  const std::filesystem::path file = std::filesystem::absolute(folder.Root() / "template.json");
-  WriteTemplate(file, LoadTemplate(experiment.face_template));
-  fmt::print("template: {}\n", file.lexically_normal().string());
-  return kDone;
-}
-
 int EvaluateCommand(const Arguments& arguments) {
   const TriMesh face = ReadMesh(arguments.files.at(0)), truth = ReadMesh(arguments.files.at(1));
   CheckHeadMesh(face, arguments.files.at(0));
@@ -302,13 +291,6 @@ void DeclareOptions(CLI::App& command, CommandLine& line) {
   command.add_flag("--schema", a.schema, "as a JSON Schema for editors");
 }
 
-void DeclareTemplate(CLI::App& command, CommandLine& line) {
-  Arguments& a = *Bind(command, line, &TemplateCommand);
-  command.add_option("CONFIG", a.files, "YAML file of the experiment")->required()->expected(1);
-  AddSet(command, a);
-  AddOutput(command, a);
-}
-
 void DeclareEvaluate(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &EvaluateCommand);
   command.add_option("FACE TRUTH", a.files, "the reconstructed mesh and the true one")
@@ -333,8 +315,6 @@ constexpr std::array kCommands = {
     ProgramCommand{"check", "check configurations of experiments, studies and fits; run nothing",
                    &DeclareCheck},
     ProgramCommand{"options", "list every option: default, unit, range, meaning", &DeclareOptions},
-    ProgramCommand{"template", "write the generic face of a configuration as a file",
-                   &DeclareTemplate},
     ProgramCommand{"evaluate", "measure how far a face is from the true one, as JSON",
                    &DeclareEvaluate},
     ProgramCommand{"report", "build the report of a run or a study anew", &DeclareReport},

@@ -203,25 +203,27 @@ TEST(Run, SameBytesEachTimeAndForAnyNumberOfThreads) {
 TEST(Run, ATemplateFromAFileGivesTheSameFaceToTheBit) {
   const ScratchFolder folder;
   const Experiment formula = SmallPhantom();
-  const fs::path file = folder / "head.json";
-  WriteTemplate(file, LoadTemplate(formula.face_template));
-  const Experiment from_file =
-      SmallPhantom({fmt::format("template={{type: file, file: {}}}", file.string())});
+  const FileTemplate files = WriteTemplate(folder.Path(), LoadTemplate(formula.face_template));
+  const Experiment from_file = SmallPhantom(
+      {fmt::format("template={{type: file, surface: {}, sites: {}, features: {}}}",
+                   files.surface.string(), files.sites.string(), files.features.string())});
   const auto first = FilesOfRun(formula, folder / "formula", 2);
   const auto second = FilesOfRun(from_file, folder / "file", 2);
   for (const char* name : {"result.json", "face.hspline.json", "face.ply", "dowels.csv",
                            "seeds.csv", "implicit.ply", "scene.json"}) {
     EXPECT_EQ(first.at(name), second.at(name)) << name;
   }
-  EXPECT_THAT(second.at("manifest.json"),
-              AllOf(HasSubstr("head.json"), HasSubstr("head.hspline.json")));
+  EXPECT_THAT(
+      second.at("manifest.json"),
+      AllOf(HasSubstr("head.hspline.json"), HasSubstr("sites.csv"), HasSubstr("features.json")));
 }
 
 TEST(Run, ATemplateThatIsNotThereIsOneClearError) {
-  EXPECT_THAT(WordsOf<InputError>([] { semblance::Run(SmallPhantom({"template=file"}), {}); }),
-              HasSubstr("template.file: no file is named"));
-  EXPECT_THROW(semblance::Run(SmallPhantom({"template={type: file, file: /no/head.json}"}), {}),
-               IoError);
+  EXPECT_THAT(WordsOf<ConfigError>([] { SmallPhantom({"template=file"}); }),
+              HasSubstr("template.surface: no file is named"));
+  Experiment experiment = SmallPhantom({});
+  experiment.face_template = FileTemplate{"/no/head.hspline.json", "/no/sites.csv", {}};
+  EXPECT_THROW(semblance::Run(experiment, {}), IoError);
 }
 
 TEST(Run, TheFolderHoldsWhatItsManifestLists) {

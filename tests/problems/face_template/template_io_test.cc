@@ -3,13 +3,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
-#include "problems/output/files.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "tests/testing/scratch_folder.h"
 
 namespace semblance {
 namespace {
@@ -21,47 +23,50 @@ using ::testing::StartsWith;
 
 class TemplateIo : public ::testing::Test {
  protected:
-  TemplateIo()
-      : folder_(std::filesystem::temp_directory_path() /
-                (std::string("semblance_template_") +
-                 ::testing::UnitTest::GetInstance()->current_test_info()->name() +
-                 std::to_string(getpid()))),
-        path_(folder_ / "face.json") {
-    std::filesystem::create_directories(folder_);
-  }
-  ~TemplateIo() override { std::filesystem::remove_all(folder_); }
-
   static const TemplateFace& Face() {
     static const TemplateFace face = MakeTemplateFace({.max_level = 2});
     return face;
   }
 
-  // Writes the good template, changed by `edit`, and gives the message of reading it.
-  template <class Edit>
-  std::string MessageAfter(const Edit& edit) {
-    WriteTemplate(path_, Face());
-    auto json = nlohmann::json::parse(ReadFileBytes(path_));
-    edit(json);
-    WriteFileAtomically(path_, json.dump());
-    return MessageOfReading();
+  FileTemplate Written(const TemplateFace& face = Face()) const {
+    return WriteTemplate(folder_.Path(), face);
   }
 
-  std::string MessageOfReading() {
+  // The message of reading the good template, its features changed by `edit`.
+  template <class Edit>
+  std::string MessageAfter(const Edit& edit) const {
+    const FileTemplate files = Written();
+    auto json = nlohmann::json::parse(ReadFileBytes(files.features));
+    edit(json);
+    WriteFileAtomically(files.features, json.dump());
+    return MessageOfReading(files, files.features);
+  }
+  // The same with `from` in the table of sites replaced by `to`.
+  std::string MessageAfterSites(const std::string& from, const std::string& to) const {
+    const FileTemplate files = Written();
+    std::string text = ReadFileBytes(files.sites);
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    WriteFileAtomically(files.sites, text.replace(at, from.size(), to));
+    return MessageOfReading(files, files.sites);
+  }
+
+  static std::string MessageOfReading(const FileTemplate& files,
+                                      const std::filesystem::path& faulty) {
     try {
-      ReadTemplate(path_);
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), AllOf(StartsWith(path_.string() + ": "), Not(HasSubstr("\n"))));
+      ReadTemplate(files);
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), AllOf(StartsWith(faulty.string() + ":"), Not(HasSubstr("\n"))));
       return error.what();
     }
     return "accepted";
   }
 
-  std::filesystem::path folder_, path_;
+  testing::ScratchFolder folder_;
 };
 
 TEST_F(TemplateIo, RoundTripIsExact) {
-  WriteTemplate(path_, Face());
-  const TemplateFace read = ReadTemplate(path_);
+  const TemplateFace read = ReadTemplate(Written());
   EXPECT_EQ(read.site_uv, Face().site_uv);
   ASSERT_EQ(read.features.size(), Face().features.size());
   for (std::size_t k = 0; k < read.features.size(); ++k) {
@@ -76,30 +81,41 @@ TEST_F(TemplateIo, RoundTripIsExact) {
 }
 
 TEST_F(TemplateIo, SecondWritingGivesTheSameBytes) {
-  WriteTemplate(path_, Face());
-  const std::string first = ReadFileBytes(path_);
-  WriteTemplate(path_, ReadTemplate(path_));
-  EXPECT_EQ(ReadFileBytes(path_), first);
+  const FileTemplate files = Written();
+  std::vector<std::string> first, second;
+  for (const std::filesystem::path& file : FilesOf(files)) {
+    first.push_back(ReadFileBytes(file));
+  }
+  EXPECT_EQ(first.size(), 3);
+  for (const std::filesystem::path& file : FilesOf(Written(ReadTemplate(files)))) {
+    second.push_back(ReadFileBytes(file));
+  }
+  EXPECT_EQ(first, second);
 }
 
 TEST_F(TemplateIo, KeepsExtraSitesAndFeaturesWithoutRegion) {
   TemplateFace face = Face();
   face.site_uv["mmb_l"] = {0.7, 0.15};
   face.features[0].region.reset();
-  WriteTemplate(path_, face);
-  const TemplateFace read = ReadTemplate(path_);
+  const TemplateFace read = ReadTemplate(Written(face));
   EXPECT_EQ(read.site_uv.at("mmb_l"), Vec2(0.7, 0.15));
   EXPECT_FALSE(read.features[0].region.has_value());
 }
 
-TEST_F(TemplateIo, NamesAMissingSite) {
-  EXPECT_THAT(MessageAfter([](auto& json) { json["site_uv"].erase("zy_l"); }),
-              HasSubstr("site 'zy_l' is missing"));
+TEST_F(TemplateIo, AFaceNeedsNoFeatures) {
+  FileTemplate files = Written();
+  files.features.clear();
+  EXPECT_TRUE(ReadTemplate(files).features.empty());
+  EXPECT_EQ(FilesOf(files).size(), 2);
 }
 
-TEST_F(TemplateIo, NamesASiteOutsideTheDomain) {
-  EXPECT_THAT(MessageAfter([](auto& json) { json["site_uv"]["g"][1] = 1.5; }),
-              AllOf(HasSubstr("site 'g'"), HasSubstr("(0.5, 1.5)"), HasSubstr("[0, 1]")));
+TEST_F(TemplateIo, NamesASiteThatIsMissingOrTwiceOrOutsideTheDomain) {
+  EXPECT_THAT(MessageAfterSites("zy_l,", "zy_x,"), HasSubstr("site 'zy_l' is missing"));
+  EXPECT_THAT(MessageAfterSites("zy_l,", "zy_r,"), HasSubstr("site 'zy_r' stands twice"));
+  EXPECT_THAT(MessageAfterSites("\ng,0.5,", "\ng,1.5,"),
+              AllOf(HasSubstr("site 'g'"), HasSubstr("(1.5, "), HasSubstr("[0, 1]")));
+  EXPECT_THAT(MessageAfterSites("\ng,0.5,", "\ng,here,"), HasSubstr("here"));
+  EXPECT_THAT(MessageAfterSites("site,u,v", "site,u,w"), HasSubstr("'v'"));
 }
 
 TEST_F(TemplateIo, NamesAVertexThatTheSurfaceDoesNotHave) {
@@ -124,30 +140,29 @@ TEST_F(TemplateIo, NamesARadiusThatIsNotPositive) {
 
 TEST_F(TemplateIo, NamesWhatIsMissingOrOfTheWrongKind) {
   EXPECT_THAT(MessageAfter([](auto& json) { json.erase("features"); }), HasSubstr("features"));
-  EXPECT_THAT(MessageAfter([](auto& json) { json["site_uv"]["g"] = "here"; }),
-              HasSubstr("site 'g'"));
-  EXPECT_THAT(MessageAfter([](auto& json) {
-                json["site_uv"]["g"] = {0.5, 0.5, 0.5};
-              }),
-              HasSubstr("site 'g'"));
   EXPECT_THAT(MessageAfter([](auto& json) { json["format"] = "other"; }),
-              HasSubstr("semblance template"));
-  WriteFileAtomically(path_, "{\"format\": ");
-  EXPECT_THAT(MessageOfReading(), HasSubstr("not a template"));
+              HasSubstr("semblance template features"));
+  const FileTemplate files = Written();
+  WriteFileAtomically(files.features, "{\"format\": ");
+  EXPECT_THAT(MessageOfReading(files, files.features), HasSubstr("not a file of features"));
 }
 
-TEST_F(TemplateIo, AFileThatIsNotThereIsAnIoError) {
-  EXPECT_THROW(ReadTemplate(folder_ / "none.json"), IoError);
-  WriteTemplate(path_, Face());
-  std::filesystem::remove(folder_ / "face.hspline.json");
-  EXPECT_THROW(ReadTemplate(path_), IoError);
+TEST_F(TemplateIo, AFileThatIsNotNamedOrNotThereIsAClearError) {
+  EXPECT_THROW(ReadTemplate({}), InputError);
+  FileTemplate files = Written();
+  for (std::filesystem::path FileTemplate::*file :
+       {&FileTemplate::surface, &FileTemplate::sites, &FileTemplate::features}) {
+    FileTemplate wrong = files;
+    wrong.*file = folder_ / "none";
+    EXPECT_THROW(ReadTemplate(wrong), IoError);
+  }
 }
 
 TEST_F(TemplateIo, RefusesToWriteWhatItWouldNotRead) {
   TemplateFace face = Face();
   face.site_uv.erase("me");
-  EXPECT_THROW(WriteTemplate(path_, face), InputError);
-  EXPECT_FALSE(std::filesystem::exists(path_));
+  EXPECT_THROW(Written(face), InputError);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.Path()));
 }
 
 }  // namespace

@@ -148,16 +148,17 @@ TEST(Experiment, ASchemeCanBeSetByItsTypeAlone) {
       set("interp: {type: kriging}", {"interp.type=natural_neighbour"})));
 }
 
-TEST(Experiment, TheLevelsOfATemplateFromAFileAreThoseOfItsSurface) {
+TEST(Experiment, TheLevelsOfATemplateFromFilesAreThoseOfItsSurface) {
   const testing::ScratchFolder folder;
-  const std::filesystem::path file = folder / "head.json";
-  WriteTemplate(file, MakeTemplateFace({.max_level = 1}));
-  EXPECT_THAT(Faults(fmt::format("template: {{type: file, file: {}}}\n", file.string())),
-              AllOf(HasSubstr("schedule[2].level: level 2 is finer than the"),
-                    HasSubstr("take a template with more levels")));
-  Experiment missing;
-  missing.face_template = FileTemplate{folder / "none.json"};
-  EXPECT_THAT(FaultsBetween(missing), IsEmpty());
+  const FileTemplate files = WriteTemplate(folder.Path(), MakeTemplateFace({.max_level = 1}));
+  const std::string config =
+      fmt::format("template: {{type: file, surface: {}, sites: {}, features: {}}}\n",
+                  files.surface.string(), files.sites.string(), files.features.string());
+  EXPECT_THAT(Faults(config), AllOf(HasSubstr("schedule[2].level: level 2 is finer than the"),
+                                    HasSubstr("take a template with more levels")));
+  std::filesystem::remove(files.sites);
+  EXPECT_THAT(Faults(config), AllOf(HasSubstr("template: "), HasSubstr(files.sites.string())));
+  EXPECT_THAT(Faults("template: file\n"), HasSubstr("template.surface: no file is named"));
 }
 
 }  // namespace

@@ -238,9 +238,9 @@ TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
         "fit: {plan: {type: coarse_to_fine, finest: 1}}\n");
   const Outcome written = Call("template e.yaml --out generic");
   EXPECT_EQ(written.code, 0) << written.err;
-  EXPECT_TRUE(fs::exists(folder_ / "generic" / "template.hspline.json"));
   const std::string from_file =
-      "check e.yaml --set 'template={type: file, file: generic/template.json}'";
+      "check e.yaml --set 'template={type: file, surface: generic/head.hspline.json, "
+      "sites: generic/sites.csv, features: generic/features.json}'";
   EXPECT_EQ(Call(from_file).code, 0);
   EXPECT_THAT(Call(from_file + " --set fit.plan.finest=2").err,
               HasSubstr("take a template with more levels"));

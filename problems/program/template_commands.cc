@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/program/template_commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "problems/face_template/template_io.h"
+#include "problems/face_template/template_summary.h"
+#include "problems/output/files.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/program/exit_code.h"
+#include "problems/program/progress.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh_files/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the user typed.
+struct TemplateArguments {
+  fs::path input;
+  std::vector<fs::path> landmarks;
+  std::vector<std::string> overrides;
+  std::string out;
+  TemplateFitOptions fit;
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  bool force = false, quiet = false;
+  std::stop_token stop;
+};
+
+OutputFolder MakeFolder(const TemplateArguments& a) {
+  return {a.out.empty() ? fmt::format("out/{}_template", a.input.stem().string()) : a.out,
+          a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
+}
+
+void Write(const TemplateFace& face, const OutputFolder& folder) {
+  const FileTemplate files = WriteTemplate(folder.Root(), face);
+  fmt::print("template: {{type: file, surface: {}, sites: {}, features: {}}}\n",
+             files.surface.string(), files.sites.string(), files.features.string());
+}
+
+// The generic face that a configuration asks for.
+int FromConfig(const TemplateArguments& a) {
+  const auto experiment = ReadConfig<Experiment>(a.input, a.overrides);
+  Write(LoadTemplate(experiment.face_template), MakeFolder(a));
+  return kDone;
+}
+
+// One from a head. All that can be wrong with it is known before the folder is made.
+int FromHead(const TemplateArguments& a) {
+  if (!a.overrides.empty()) {
+    throw InputError("--set is for a configuration; a head takes --finest and --tolerance_mm");
+  }
+  RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
+  if (!a.quiet) {
+    context.on_event = ProgressPrinter(stderr);
+  }
+  const OuterHead head =
+      PrepareHead(ReadMesh(a.input), ReadSkinLandmarks(a.landmarks), a.input.string(), context);
+  OutputFolder folder = MakeFolder(a);
+  const TemplateFit fit = FitTemplate(head, a.fit, context);
+  folder.Write("template.json", TemplateJson(fit, head, a.fit));
+  folder.Write("template.png", EncodePng(TemplatePicture(fit, head, a.threads)));
+  for (const std::string& note : head.notes) {
+    fmt::print("note: {}\n", note);
+  }
+  fmt::print("{}", TemplateText(fit, a.fit));
+  Write(fit.face, folder);
+  return fit.met && fit.folds == 0 ? kDone : kNotUsable;
+}
+
+int Template(const TemplateArguments& a) {
+  return a.landmarks.empty() ? FromConfig(a) : FromHead(a);
+}
+
+void DeclareTemplate(CLI::App& command, CommandLine& line) {
+  TemplateArguments& a = *Bind(command, line, &Template);
+  a.stop = line.stop;
+  command
+      .add_option("MESH", a.input,
+                  "head (.ply .obj .stl .off), LPS in mm; or, without LANDMARKS, YAML file of an "
+                  "experiment, whose generic face is written")
+      ->required();
+  command.add_option("LANDMARKS", a.landmarks,
+                     "points on its skin (.csv: site,x,y,z or i_multipie,x,y,z), or those of its "
+                     "skull with depths (.yaml); one file or more");
+  command
+      .add_option("--tolerance_mm", a.fit.tolerance_mm,
+                  "root mean square distance from the skin, over the face, that ends the fit")
+      ->check(CLI::Range(1e-3, 10.0))
+      ->capture_default_str();
+  command.add_option("--finest", a.fit.finest, "finest level of the H-spline")
+      ->check(CLI::Range(3, 6))
+      ->capture_default_str();
+  command
+      .add_option("--set", a.overrides, "path=value, laid over the configuration; may be repeated")
+      ->allow_extra_args(false);
+  command.add_option("--out", a.out, "folder for the results");
+  command.add_flag("--force", a.force,
+                   "replace files of the same name in a folder that is not empty");
+  command.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  command.add_flag("--quiet", a.quiet, "no progress");
+}
+
+constexpr std::array kCommands = {
+    ProgramCommand{"template", "make a generic H-spline face of a head mesh with landmarks",
+                   &DeclareTemplate},
+};
+
+}  // namespace
+
+std::span<const ProgramCommand> TemplateCommands() { return kCommands; }
+
+}  // namespace semblance

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The command that makes generic faces: template.
+#pragma once
+
+#include <span>
+
+#include "problems/program/commands.h"
+
+namespace semblance {
+
+std::span<const ProgramCommand> TemplateCommands();
+
+}  // namespace semblance
