@@ -47,7 +47,7 @@ const std::map<std::string, Layers> kRooms = {
     {"interp", {{"dowels"}, {"on_surface"}, {"kriging"}, {"schemes"}, {kHall}, {"evaluation"}}},
     {"fitting",
      {{"least_squares", "problem"},
-      {"space"},
+      {"shape_model", "space"},
       {"terms"},
       {"level"},
       {"adaptive", "relaxation", "uncertainty"},

@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/shape_model/shape_fit.h"
+
+#include <ceres/loss_function.h>
+#include <ceres/normal_prior.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <optional>
+
+#include "fitting/shape_model/farthest_points.h"
+#include "fitting/shape_model/shape_cost.h"
+#include "fitting/shape_model/shape_posterior.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kPoseRounds = 2;         // rounds that move the pose alone
+constexpr int kFirstSurfaceRound = 3;  // from 0
+constexpr double kStillMm = 5e-3;      // a round that moves less is the last
+
+// ---------------------------------------------------------------------------------------------
+// Checks
+// ---------------------------------------------------------------------------------------------
+
+void CheckTips(const ShapeModel& model, const ShapeTarget& target) {
+  for (const ShapeTip& tip : target.tips) {
+    if (tip.at.triangle < 0 ||
+        static_cast<std::size_t>(tip.at.triangle) >= model.mean.triangles.size() ||
+        !tip.at.weights.allFinite()) {
+      throw InputError(
+          fmt::format("shape model: '{}' has no point on the model's mesh", tip.label));
+    }
+    if (!tip.position.allFinite() || !tip.direction.allFinite() || !(tip.along_sd_mm >= 0)) {
+      throw InputError(
+          fmt::format("shape model: the tip of '{}' is not finite; leave it out", tip.label));
+    }
+  }
+  if (!(target.start.scale > 0)) {
+    throw InputError(
+        fmt::format("shape model: scale {} of the start; it must be positive", target.start.scale));
+  }
+}
+
+// ---------------------------------------------------------------------------------------------
+// Points of the model that take part
+// ---------------------------------------------------------------------------------------------
+
+std::vector<int> AllPoints(const TriMesh& mesh) {
+  std::vector<int> all(mesh.points.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+std::vector<Vec3> FeaturePositions(const ShapeTarget& target) {
+  std::vector<Vec3> positions;
+  for (const ShapeFeature& feature : target.features) {
+    positions.push_back(feature.position);
+  }
+  return positions;
+}
+
+// Points of the mean that may be drawn to the surface: near a tip, and clear of the features.
+std::vector<int> SurfaceCandidates(const ShapeModel& model, const ShapeTarget& target,
+                                   const ShapeFitOptions& options) {
+  const auto near = [](const Vec3& p, const Vec3& q, double mm) {
+    return (p - q).squaredNorm() <= mm * mm;
+  };
+  std::vector<Vec3> tips;
+  for (const ShapeTip& tip : target.tips) {
+    tips.push_back(PositionOf(tip.at, model.mean, model.mean.points));
+  }
+  std::vector<int> candidates;
+  for (const int v : AllPoints(model.mean)) {
+    const Vec3& p = model.mean.points[v];
+    const bool in_range = tips.empty() || std::ranges::any_of(tips, [&](const Vec3& tip) {
+                            return near(p, tip, options.surface_range_mm);
+                          });
+    if (in_range && std::ranges::none_of(target.features, [&](const ShapeFeature& f) {
+          return near(p, f.position, f.clearance_mm);
+        })) {
+      candidates.push_back(v);
+    }
+  }
+  return candidates;
+}
+
+// ---------------------------------------------------------------------------------------------
+// The surface
+// ---------------------------------------------------------------------------------------------
+
+class DrawingSurface {
+ public:
+  DrawingSurface(const TriMesh& mesh, const ShapeFitOptions& options)
+      : mesh_(mesh),
+        normals_(VertexNormals(mesh)),
+        on_border_(mesh.points.size(), 0),
+        query_(mesh),
+        reach_mm_(options.surface_reach_mm),
+        least_cosine_(std::cos(options.surface_max_angle_deg * std::numbers::pi / 180)) {
+    for (const MeshEdge& edge : BorderEdges(mesh)) {
+      on_border_[edge[0]] = on_border_[edge[1]] = 1;
+    }
+  }
+
+  struct Foot {
+    Vec3 position, normal;
+  };
+  // Where a point with this normal is drawn to, if anywhere.
+  std::optional<Foot> FootOf(const Vec3& p, const Vec3& normal) const {
+    const MeshPoint at = query_.Closest(p);
+    const Triangle& t = mesh_.triangles[at.triangle];
+    if (at.distance_mm > reach_mm_ ||
+        std::ranges::any_of(t, [&](std::int32_t v) { return on_border_[v] != 0; })) {
+      return std::nullopt;
+    }
+    const Vec3 out = (at.weights[0] * normals_[t[0]] + at.weights[1] * normals_[t[1]] +
+                      at.weights[2] * normals_[t[2]])
+                         .normalized();
+    return out.dot(normal) >= least_cosine_ ? std::optional(Foot{at.position, out}) : std::nullopt;
+  }
+
+ private:
+  const TriMesh& mesh_;
+  std::vector<Vec3> normals_;
+  std::vector<char> on_border_;
+  MeshQuery query_;
+  double reach_mm_, least_cosine_;
+};
+
+// ---------------------------------------------------------------------------------------------
+// The estimate
+// ---------------------------------------------------------------------------------------------
+
+class ShapeEstimator {
+ public:
+  ShapeEstimator(const ShapeModel& model, const ShapeTarget& target, const ShapeFitOptions& options)
+      : model_(model),
+        target_(target),
+        options_(options),
+        prior_{.scale_sd = options.scale_sd},
+        frame_(StartFrame(model, target.start)) {
+    const std::vector<int> centres =
+        FarthestPoints(model.mean.points, AllPoints(model.mean), options.field.centres);
+    field_ = SmoothFieldFactor(model.mean.points, centres, FeaturePositions(target), options.field);
+    parameters_ = StartParameters(frame_, target.start, model.Modes(), std::ssize(centres));
+    start_pose_ = parameters_.pose;
+    if (target.surface != nullptr && options.surface_points > 0 && options.surface_worth > 0) {
+      surface_.emplace(*target.surface, options);
+      drawn_ = FarthestPoints(model.mean.points, SurfaceCandidates(model, target, options),
+                              options.surface_points);
+    }
+  }
+
+  void Round(int round);
+  ShapeEstimate Result(const RunContext& context);
+  bool Still(int round) const { return round > kFirstSurfaceRound && last_move_mm_ < kStillMm; }
+
+ private:
+  void Place();
+  void SeeTips();
+  void SeeSurface();
+  void Solve(bool pose_alone);
+  void AddPriors(ceres::Problem& problem);
+
+  const ShapeModel& model_;
+  const ShapeTarget& target_;
+  const ShapeFitOptions& options_;
+  ShapePrior prior_;
+  ShapeFrame frame_;
+  Eigen::MatrixXd field_;
+  std::optional<DrawingSurface> surface_;
+  std::vector<int> drawn_;  // points of the model
+
+  ShapeParameters parameters_;
+  std::array<double, 7> start_pose_;
+  TriMesh placed_;             // the shape as it stands
+  std::vector<Vec3> normals_;  // of its points
+  std::vector<ShapeObservation> seen_;
+  int surface_points_ = 0, rounds_ = 0;
+  double last_move_mm_ = kNaN;
+  bool usable_ = true;
+};
+
+void ShapeEstimator::Place() {
+  placed_ = {PlacedPoints(frame_, model_, field_, parameters_), model_.mean.triangles};
+  normals_ = VertexNormals(placed_);
+}
+
+Vec3 NormalAt(const ModelPoint& at, const TriMesh& mesh, const std::vector<Vec3>& normals) {
+  return PositionOf(at, mesh, normals).normalized();
+}
+
+void ShapeEstimator::SeeTips() {
+  for (const ShapeTip& tip : target_.tips) {
+    const PointSpread spread{.normal = NormalAt(tip.at, model_.mean, normals_),
+                             .normal_sd_mm = options_.tip_normal_sd_mm,
+                             .tangent_sd_mm = options_.tip_tangent_sd_mm,
+                             .direction = tip.direction,
+                             .along_sd_mm = tip.along_sd_mm};
+    seen_.push_back({RowAt(model_, field_, tip.at), tip.position, WhiteningOf(spread),
+                     options_.tip_loss_width});
+  }
+}
+
+void ShapeEstimator::SeeSurface() {
+  surface_points_ = 0;
+  const double weight = options_.surface_worth /
+                        (options_.surface_points * options_.surface_sd_mm * options_.surface_sd_mm);
+  for (const int v : drawn_) {
+    if (const auto foot = surface_->FootOf(placed_.points[v], normals_[v])) {
+      seen_.push_back({RowOfVertex(model_, field_, v), foot->position, foot->normal.transpose(),
+                       options_.surface_loss_width_mm, weight});
+      ++surface_points_;
+    }
+  }
+}
+
+void ShapeEstimator::AddPriors(ceres::Problem& problem) {
+  const auto add = [&](double* block, const Eigen::VectorXd& mean, const Eigen::VectorXd& sd) {
+    const Eigen::MatrixXd root = sd.cwiseInverse().asDiagonal();
+    problem.AddResidualBlock(new ceres::NormalPrior(root, mean), nullptr, block);
+  };
+  Eigen::VectorXd pose = Eigen::Map<const Eigen::VectorXd>(start_pose_.data(), 7);
+  pose[0] = 0;  // the model's own size
+  const Eigen::VectorXd sd = prior_.Deviations(parameters_.size());
+  add(parameters_.pose.data(), pose, sd.head(7));
+  const Eigen::Index k = parameters_.coefficients.size(), m = parameters_.field.size();
+  add(parameters_.coefficients.data(), Eigen::VectorXd::Zero(k), sd.segment(7, k));
+  if (m > 0) {
+    add(parameters_.field.data(), Eigen::VectorXd::Zero(m), sd.tail(m));
+  }
+}
+
+void ShapeEstimator::Solve(bool pose_alone) {
+  ceres::Problem problem;
+  AddPriors(problem);
+  for (const ShapeObservation& one : seen_) {
+    std::vector<double*> blocks = {parameters_.pose.data(), parameters_.coefficients.data()};
+    if (parameters_.field.size() > 0) {
+      blocks.push_back(parameters_.field.data());
+    }
+    auto* const loss = new ceres::ScaledLoss(new ceres::HuberLoss(one.loss_width), one.weight,
+                                             ceres::TAKE_OWNERSHIP);
+    problem.AddResidualBlock(new ShapeCost(frame_, one), loss, blocks);
+  }
+  if (pose_alone) {
+    problem.SetParameterBlockConstant(parameters_.coefficients.data());
+    if (parameters_.field.size() > 0) {
+      problem.SetParameterBlockConstant(parameters_.field.data());
+    }
+  }
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  solver.max_num_iterations = 4;  // what is seen changes with the next round
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  usable_ = usable_ && summary.IsSolutionUsable();
+}
+
+// The largest distance between the observed points of two rounds.
+double LargestMove(const std::vector<Vec3>& before, const std::vector<Vec3>& after) {
+  double most = 0;
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    most = std::max(most, (after[v] - before[v]).norm());
+  }
+  return most;
+}
+
+void ShapeEstimator::Round(int round) {
+  Place();
+  seen_.clear();
+  SeeTips();
+  if (surface_ && round >= kFirstSurfaceRound) {
+    SeeSurface();
+  }
+  Solve(round < kPoseRounds);
+  last_move_mm_ = LargestMove(placed_.points, PlacedPoints(frame_, model_, field_, parameters_));
+  rounds_ = round + 1;
+}
+
+double Rms(const Eigen::MatrixXd& rows) {
+  return rows.size() == 0 ? 0 : std::sqrt(rows.rowwise().squaredNorm().mean());
+}
+
+ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
+  Place();
+  std::vector<ShapeRow> rows;
+  for (const int v : AllPoints(model_.mean)) {
+    rows.push_back(RowOfVertex(model_, field_, v));
+  }
+  ShapeEstimate result;
+  result.subject_from_model = SimilarityOf(frame_, parameters_);
+  result.coefficients = parameters_.coefficients;
+  result.points = placed_.points;
+  const Eigen::MatrixXd information = InformationOf(frame_, parameters_, seen_, prior_);
+  result.sigma_mm =
+      DeviationsAlong(frame_, parameters_, information, rows, normals_, context.threads);
+  for (double& sigma : result.sigma_mm) {
+    sigma = std::hypot(sigma, options_.discrepancy_mm);
+  }
+  for (const ShapeTip& tip : target_.tips) {
+    result.tip_residual_mm.push_back(
+        (tip.position - PositionOf(tip.at, model_.mean, placed_.points))
+            .dot(NormalAt(tip.at, model_.mean, normals_)));
+  }
+  result.field_rms_mm = Rms(
+      field_ *
+      Eigen::Map<const Eigen::Matrix3Xd>(parameters_.field.data(), 3, field_.cols()).transpose());
+  result.surface_points = surface_points_;
+  result.rounds = rounds_;
+  result.last_move_mm = last_move_mm_;
+  result.usable = usable_;
+  return result;
+}
+
+}  // namespace
+
+ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,
+                            const ShapeFitOptions& options, const RunContext& context) {
+  CheckShapeModel(model, "shape model");
+  CheckTips(model, target);
+  ShapeEstimator estimator(model, target, options);
+  for (int round = 0; round < options.rounds && !estimator.Still(round); ++round) {
+    context.ThrowIfStopped();
+    context.Report("shape", fmt::format("round {} of at most {}", round + 1, options.rounds));
+    estimator.Round(round);
+  }
+  return estimator.Result(context);
+}
+
+}  // namespace semblance

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The most likely shape of a statistical model given a few points and a rough surface: similarity,
+// coefficients of the modes and a smooth rest, in one robust least-squares problem.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fitting/shape_model/shape_model.h"
+#include "fitting/shape_model/smooth_field.h"
+#include "surfaces/base/fields.h"
+#include "surfaces/base/run_context.h"
+
+namespace semblance {
+
+struct ShapeFitOptions {
+  double tip_normal_sd_mm = 0.5;
+  double tip_tangent_sd_mm = 4;
+  double tip_loss_width = 3;
+  double scale_sd = 0.03;
+  SmoothFieldOptions field;
+  int surface_points = 300;
+  double surface_worth = 80;
+  double surface_sd_mm = 2.5;
+  double surface_loss_width_mm = 2;
+  double surface_reach_mm = 15;
+  double surface_max_angle_deg = 60;
+  double surface_range_mm = 60;
+  int rounds = 12;
+  double discrepancy_mm = 1.25;
+};
+template <class Visitor>
+void Fields(Visitor& visit, ShapeFitOptions& o) {
+  visit(FieldInfo{.name = "tip_normal_sd_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 100,
+                  .doc = "standard deviation of a dowel's tip along the face's normal; between "
+                         "0.25 and 1.5 the result hardly changes"},
+        o.tip_normal_sd_mm);
+  visit(FieldInfo{.name = "tip_tangent_sd_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 100,
+                  .doc = "the same across the normal: how surely a site of the bone is a point of "
+                         "the model's face; as tight as along the normal it does harm"},
+        o.tip_tangent_sd_mm);
+  visit(FieldInfo{.name = "tip_loss_width",
+                  .min = 0.1,
+                  .max = 1e6,
+                  .doc = "in standard deviations; a tip farther off counts less (Huber's loss)"},
+        o.tip_loss_width);
+  visit(FieldInfo{.name = "scale_sd",
+                  .min = 1e-4,
+                  .max = 10,
+                  .doc = "standard deviation of the logarithm of the model's scale; the modes hold "
+                         "most of what differs in size"},
+        o.scale_sd);
+  visit(FieldInfo{.name = "field", .doc = "the smooth rest that the modes cannot express"},
+        o.field);
+  visit(FieldInfo{.name = "surface_points",
+                  .min = 0,
+                  .max = 100000,
+                  .doc = "points of the model, away from nose, mouth and eyes, that are drawn to "
+                         "the implicit face; 0: the dowels alone"},
+        o.surface_points);
+  visit(FieldInfo{.name = "surface_worth",
+                  .min = 0,
+                  .max = 100000,
+                  .doc = "how many independent points they count as together, as what is wrong "
+                         "with the implicit face is wrong over centimetres"},
+        o.surface_worth);
+  visit(FieldInfo{.name = "surface_sd_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 100,
+                  .doc = "standard deviation of the implicit face along its normal"},
+        o.surface_sd_mm);
+  visit(FieldInfo{.name = "surface_loss_width_mm",
+                  .unit = "mm",
+                  .min = 1e-3,
+                  .max = 1e6,
+                  .doc = "a point farther from the implicit face counts less (Huber's loss)"},
+        o.surface_loss_width_mm);
+  visit(FieldInfo{.name = "surface_reach_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 200,
+                  .doc = "a point farther from the implicit face is not drawn to it"},
+        o.surface_reach_mm);
+  visit(FieldInfo{.name = "surface_max_angle_deg",
+                  .unit = "deg",
+                  .min = 0,
+                  .max = 180,
+                  .doc = "nor is one whose normal differs by more than this"},
+        o.surface_max_angle_deg);
+  visit(FieldInfo{.name = "surface_range_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 1e6,
+                  .doc = "nor one farther than this from every dowel's point of the model, where "
+                         "the implicit face rests on no depth"},
+        o.surface_range_mm);
+  visit(FieldInfo{.name = "rounds",
+                  .min = 3,
+                  .max = 1000,
+                  .doc = "how often at most the points of the implicit face and the normals are "
+                         "taken anew; two rounds move the pose alone, and the implicit face comes "
+                         "in with the fourth"},
+        o.rounds);
+  visit(FieldInfo{.name = "discrepancy_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 50,
+                  .doc = "standard deviation of what neither modes nor the smooth rest can "
+                         "express; part of the stated sigma"},
+        o.discrepancy_mm);
+}
+
+// A dowel's tip and the point of the model that is expected there.
+struct ShapeTip {
+  std::string label;
+  ModelPoint at;
+  Vec3 position = Vec3::Constant(kNaN);  // mm
+  Vec3 direction = Vec3::Zero();         // unit, along which it may be off besides
+  double along_sd_mm = 0;                // by this
+};
+
+// Points of the model nearer to it than this are not drawn to the surface.
+struct ShapeFeature {
+  Vec3 position = Vec3::Constant(kNaN);  // of the mean, mm
+  double clearance_mm = 15;
+};
+
+struct ShapeTarget {
+  Similarity start;                  // subject_from_model
+  std::vector<ShapeTip> tips;        // may be empty
+  const TriMesh* surface = nullptr;  // outward, in the subject's frame; none: the tips alone
+  std::vector<ShapeFeature> features;
+};
+
+struct ShapeEstimate {
+  Similarity subject_from_model;
+  Eigen::VectorXd coefficients;         // one per mode
+  std::vector<Vec3> points;             // one per point of the model, in the subject's frame, mm
+  std::vector<double> sigma_mm;         // one per point: along its normal, with the discrepancy
+  std::vector<double> tip_residual_mm;  // one per tip: from the point of the shape to the tip, > 0
+                                        // outside, along the shape's normal
+  double field_rms_mm = kNaN;           // of the smooth rest over the points
+  int surface_points = -1;              // that were drawn to the surface in the last round
+  int rounds = -1;
+  double last_move_mm = kNaN;  // of an observed point, in the last round
+  bool usable = false;
+};
+
+// Minimises, in Ceres, over s, R, t, w and a of shape_parameters.h
+//   sum_tips Huber_width(r' C^-1 r) + worth / (points * sd^2) sum_surface Huber_width((n . (c -
+//   x))^2)
+//     + |w|^2 + |a|^2 + (ln s / scale_sd)^2,
+// C of shape_observation.h with the shape's own normal, c the surface's closest point to x and n
+// its normal; and a prior of 1 rad and 100 mm on the pose, so weak that it matters only where
+// nothing else speaks. Points and normals are taken anew in each round. The posterior is the normal
+// distribution of the last linearisation. One thread apart from sigma; same bytes whatever their
+// number. Throws InputError as CheckShapeModel (name: "shape model"), for a tip that is not on the
+// model or not finite, and for a start without a positive scale; Cancelled.
+ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,
+                            const ShapeFitOptions& options, const RunContext& context);
+
+}  // namespace semblance
