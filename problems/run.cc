@@ -8,8 +8,12 @@
 #include <iterator>
 #include <memory>
 
+#include "problems/metrics/quantile.h"
 #include "problems/pipeline/cut_planes.h"
 #include "problems/pipeline/stage_key.h"
+#include "problems/prior/prior_target.h"
+#include "surfaces/base/thin_plate.h"
+#include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -153,6 +157,124 @@ FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, cons
   return std::move(*result);
 }
 
+// ---------------------------------------------------------------------------------------------
+// The ways to the face
+// ---------------------------------------------------------------------------------------------
+
+// A prior, laid on the template of its mean.
+struct LoadedPrior {
+  FacePrior face;
+  PriorOnTemplate on_template;
+};
+
+struct FaceInput {
+  const Experiment& experiment;
+  const TemplateFace& generic;
+  const LoadedPrior* prior;  // null without one
+  const Case& subject;
+  const TriMesh& implicit;  // what of it may be seeded
+  const TriMesh& shell;
+};
+
+struct MadeFace {
+  PlacedTemplate placed;
+  FaceFit fitted;
+  std::optional<ShapeEstimate> prior;
+};
+
+// A face that no fit has touched, in the form of a fit's result.
+FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {
+  FitResult fit{.surface = std::move(surface)};
+  double sum = 0;
+  for (const FitPoint& point : dowels.points) {
+    fit.uv.push_back(point.uv);
+    fit.residual_mm.push_back((fit.surface.Point(point.uv) - point.position).norm());
+    sum += fit.residual_mm.back() * fit.residual_mm.back();
+  }
+  fit.dowel_rms_mm = fit.point_rms_mm = std::sqrt(sum / static_cast<double>(fit.uv.size()));
+  fit.restored_features = 0;
+  fit.usable = true;
+  return {{.points = {}, .masked = 0, .missed = 0, .folded = 0}, dowels, std::move(fit)};
+}
+
+HSplineSurface UnderThinPlate(const HSplineSurface& surface, const FitTarget& dowels,
+                              double stiffness_mm) {
+  std::vector<Vec3> from, to, samples;
+  for (const FitPoint& point : dowels.points) {
+    from.push_back(surface.Point(point.uv));
+    to.push_back(point.position);
+  }
+  const ThinPlate plate = FitThinPlate(from, to, {}, {.stiffness_mm = stiffness_mm});
+  const DomainGrid grid = GridOf(surface.shape());
+  for (std::size_t k = 0; k < grid.size(); ++k) {
+    samples.push_back(plate(surface.Point(grid.UvAt(k))));
+  }
+  return SurfaceThrough(surface.shape(), grid, samples);
+}
+
+// The prior's most likely face as a placed template.
+MadeFace MostLikelyFace(const ShapeFitOptions& estimate, const TableDepthOptions& table_depths,
+                        PlacedTemplate placed, const FaceInput& in, const RunContext& context) {
+  const bool from_table = in.experiment.tissue.depths == DepthSource::kTable;
+  const LoadedPrior& prior = *in.prior;
+  ShapeEstimate shape =
+      EstimateShape(prior.face.model,
+                    PriorTarget(prior.face, in.subject.dowels_on_bone,
+                                from_table ? &table_depths : nullptr, &in.implicit),
+                    estimate, context);
+  placed.face_from_template =
+      Composed(shape.subject_from_model, prior.on_template.mean_from_template);
+  placed.face = InSubjectFrame(in.generic, placed.face_from_template);
+  placed.face.surface = SurfaceOf(shape, prior.face, prior.on_template, in.generic.surface.shape());
+  FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
+  unfitted.fit.usable = shape.usable;
+  return {std::move(placed), std::move(unfitted), std::move(shape)};
+}
+
+MadeFace MakeFace(const PlacedFace&, PlacedTemplate placed, const FaceInput&, const RunContext&) {
+  FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
+  return {std::move(placed), std::move(unfitted), {}};
+}
+
+MadeFace MakeFace(const ThinPlateFace& o, PlacedTemplate placed, const FaceInput&,
+                  const RunContext&) {
+  FaceFit unfitted =
+      Unfitted(UnderThinPlate(placed.face.surface, placed.dowels, o.stiffness_mm), placed.dowels);
+  return {std::move(placed), std::move(unfitted), {}};
+}
+
+MadeFace MakeFace(const FittedTemplate&, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  FaceFit fitted = FitFace(in.experiment, placed, in.implicit, in.shell, context);
+  return {std::move(placed), std::move(fitted), {}};
+}
+
+MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  return MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
+}
+
+MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  MadeFace made = MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
+  for (FitPoint& point : made.placed.dowels.points) {
+    point.uv = ProjectFrom(made.placed.face.surface, point.position, point.uv).uv;
+  }
+  made.fitted = FitFace(in.experiment, made.placed, in.implicit, in.shell, context);
+  return made;
+}
+
+// The posterior's sigma, which knows the discrepancy of the model, in place of the fit's.
+FaceUncertainty PriorUncertainty(const LoadedPrior& prior, const ShapeEstimate& estimate,
+                                 const Tessellation& face) {
+  FaceUncertainty result;
+  result.sigma_mm = SigmaAt(face.uv, estimate, prior.face, prior.on_template);
+  const std::vector<WeightedValue> by_area = SortedValues(result.sigma_mm, VertexAreas(face.mesh));
+  result.median_mm = Quantile(by_area, 0.5);
+  result.p95_mm = Quantile(by_area, 0.95);
+  return result;
+}
+
 bool TakesTableAsExact(const Experiment& experiment, const Case& subject) {
   return experiment.tissue.depths == DepthSource::kTable &&
          experiment.uncertainty.dowel_sd_mm == 0 &&
@@ -209,6 +331,36 @@ std::shared_ptr<const TemplateFace> GenericFace(const TemplateSource& source, St
                                  [&source] { return LoadTemplate(source); });
 }
 
+std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
+                                              const TemplateFace& generic, StageCache& cache,
+                                              const RunContext& context) {
+  if (!AsksPrior(experiment.face)) {
+    return nullptr;
+  }
+  return cache.Get<LoadedPrior>(StageKey("prior", experiment.prior, experiment.face_template), [&] {
+    LoadedPrior prior{.face = LoadPrior(experiment.prior), .on_template = {}};
+    prior.on_template = LayOnTemplate(prior.face, generic, context);
+    return prior;
+  });
+}
+
+// As the face was made: none of one that was only placed or bent.
+std::optional<FaceUncertainty> UncertaintyOf(const Experiment& experiment, const DepthStage& bone,
+                                             const LoadedPrior* prior, const MadeFace& made,
+                                             const Tessellation& face, Case& subject,
+                                             const RunContext& context) {
+  if (made.prior) {
+    return experiment.uncertainty.sigma ? std::optional(PriorUncertainty(*prior, *made.prior, face))
+                                        : std::nullopt;
+  }
+  if (!std::holds_alternative<FittedTemplate>(experiment.face)) {
+    return std::nullopt;
+  }
+  return EstimateUncertainty(experiment, bone,
+                             {made.placed.face.surface, made.fitted.target, made.fitted.fit, face},
+                             subject, context);
+}
+
 }  // namespace
 
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache) {
@@ -222,29 +374,38 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const auto generic =
       step("make template", [&] { return GenericFace(experiment.face_template, shared); });
   std::ranges::copy(TemplateFiles(experiment.face_template), std::back_inserter(subject.inputs));
-  PlacedTemplate placed = Place(*generic, subject.dowels_on_bone, experiment.placement);
+  const auto prior = GivenPrior(experiment, *generic, shared, context);
+  std::ranges::copy(prior ? PriorFiles(experiment.prior) : std::vector<std::filesystem::path>(),
+                    std::back_inserter(subject.inputs));
   const TriMesh seedable = SeedableFace(experiment, subject, skull->implicit.dense);
-  FaceFit fitted =
-      step("fit", [&] { return FitFace(experiment, placed, seedable, bone.shell, context); });
+  const FaceInput input{experiment, *generic, prior.get(), subject, seedable, bone.shell};
+  MadeFace made = step("fit", [&] {
+    PlacedTemplate placed = Place(*generic, subject.dowels_on_bone, experiment.placement);
+    return std::visit(
+        [&](const auto& way) { return MakeFace(way, std::move(placed), input, context); },
+        experiment.face);
+  });
   Tessellation face =
-      step("tessellate", [&] { return Tessellate(fitted.fit.surface, kQuadsPerPatch); });
+      step("tessellate", [&] { return Tessellate(made.fitted.fit.surface, kQuadsPerPatch); });
   std::optional<FaceUncertainty> uncertainty = step("uncertainty", [&] {
-    return EstimateUncertainty(
-        experiment, bone, {placed.face.surface, fitted.target, fitted.fit, face}, subject, context);
+    return UncertaintyOf(experiment, bone, prior.get(), made, face, subject, context);
   });
   std::optional<TruthComparison> truth = step("measure", [&] {
-    return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(placed.face), context);
+    return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(made.placed.face),
+                   context);
   });
-  std::vector<FeatureDistortion> features = MeasureFeatures(placed.face, fitted.fit.surface);
+  std::vector<FeatureDistortion> features =
+      MeasureFeatures(made.placed.face, made.fitted.fit.surface);
   return {.subject = std::move(subject),
           .shell = bone.shell,
           .depth = bone.depth,
           .implicit = skull->implicit,
-          .face_from_template = placed.face_from_template,
-          .placed = std::move(placed.face),
-          .seeding = std::move(fitted.seeding),
-          .target = std::move(fitted.target),
-          .fit = std::move(fitted.fit),
+          .face_from_template = made.placed.face_from_template,
+          .placed = std::move(made.placed.face),
+          .prior = std::move(made.prior),
+          .seeding = std::move(made.fitted.seeding),
+          .target = std::move(made.fitted.target),
+          .fit = std::move(made.fitted.fit),
           .face = std::move(face),
           .uncertainty = std::move(uncertainty),
           .truth = std::move(truth),

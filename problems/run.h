@@ -12,6 +12,7 @@
 #include "problems/pipeline/depth_comparison.h"
 #include "problems/pipeline/skull_stage.h"
 #include "problems/pipeline/uncertainty.h"
+#include "problems/prior/prior_surface.h"
 #include "surfaces/hspline_query/tessellate.h"
 
 namespace semblance {
@@ -31,11 +32,13 @@ struct RunResult {
   DepthField depth;  // of the shell's vertices
   ImplicitFace implicit;
   Similarity face_from_template;
-  TemplateFace placed;  // the generic face brought to the dowels
-  SeedResult seeding;   // of the last round
-  FitTarget target;     // of the last round: dowel tips at their (u,v), then seeds
-  FitResult fit;        // of the last round
-  Tessellation face;    // of fit.surface
+  TemplateFace placed;  // the generic face brought to the dowels; the prior's most likely face
+                        // where it was asked for
+  std::optional<ShapeEstimate> prior;  // where it was asked for
+  SeedResult seeding;                  // of the last round
+  FitTarget target;                    // of the last round: dowel tips at their (u,v), then seeds
+  FitResult fit;                       // of the last round
+  Tessellation face;                   // of fit.surface
   std::optional<FaceUncertainty> uncertainty;  // where it was asked for
   std::optional<TruthComparison> truth;
   std::vector<FeatureDistortion> features;
@@ -45,9 +48,9 @@ struct RunResult {
 };
 
 // Loads the case, fills the skull, interpolates depth, lays the implicit face, places the generic
-// face, seeds, fits, measures. Throws as LoadSubject does, and Cancelled. What experiments have in
-// common (the subject, its shell, the implicit face, the generic face) is taken from `cache`, where
-// one is given; the result does not depend on it.
+// face, makes the subject's face of it as experiment.face says, measures. Throws as LoadSubject
+// does, and Cancelled. What experiments have in common (the subject, its shell, the implicit face,
+// the generic face) is taken from `cache`, where one is given; the result does not depend on it.
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache = nullptr);
 
 }  // namespace semblance

@@ -57,7 +57,7 @@ const std::map<std::string, Layers> kRooms = {
      {{"config", "ct", "output"},
       {"pictures", "subject"},
       {"face_template", "landmark_files"},
-      {"metrics"},
+      {"metrics", "prior"},
       {"pipeline"},
       {kHall},
       {"report"},

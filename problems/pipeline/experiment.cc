@@ -62,6 +62,11 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back(
         {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
+  if (AsksPrior(experiment.face) && std::holds_alternative<NoPrior>(experiment.prior)) {
+    faults.push_back({"face",
+                      "it asks a prior, and there is none; name one under `prior`, or take "
+                      "`face: fit`"});
+  }
   return faults;
 } catch (const Error& error) {  // of a template that cannot be used; its levels are not known
   return {{"template", error.what()}};

@@ -20,6 +20,7 @@
 #include "problems/face_template/template_source.h"
 #include "problems/metrics/face_region.h"
 #include "problems/pipeline/uncertainty_options.h"
+#include "problems/prior/face_source.h"
 #include "problems/subject/dowel_depths.h"
 #include "problems/subject/landmarks.h"
 #include "problems/subject/phantom.h"
@@ -94,6 +95,8 @@ struct Experiment {
   ImplicitFaceOptions implicit;   // the implicit surface and its polygons
   TemplateSource face_template;   // `template`: the generic face
   PlacementOptions placement;     // how it is brought to the dowels
+  PriorSource prior;              // a statistical model of faces
+  FaceSource face;                // the way to the face
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;             // no seeds nearer to where the scan ends
@@ -125,6 +128,16 @@ void Fields(Visitor& visit, Experiment& o) {
         o.face_template);
   visit(FieldInfo{.name = "placement", .doc = "how the generic face is brought to the dowels"},
         o.placement);
+  visit(FieldInfo{.name = "prior",
+                  .doc = "a statistical model of faces: mean and modes on one mesh; `template` is "
+                         "then the H-spline of its mean"},
+        o.prior);
+  visit(FieldInfo{.name = "face",
+                  .doc = "the way to the face; placed: the template, brought to the dowels; "
+                         "thin_plate: bent to their tips; fit: fitted to tips and implicit face "
+                         "level by level; prior: the most likely face of the prior, given tips and "
+                         "implicit face; prior_then_fit: that face as the template of the fit"},
+        o.face);
   visit(FieldInfo{.name = "first_fit",
                   .doc = "levels fitted to the dowels alone before seeds are taken; may be empty"},
         o.first_fit);

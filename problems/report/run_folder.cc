@@ -96,6 +96,29 @@ Json UncertaintyJson(const RunResult& result) {
   return json;
 }
 
+// What the prior made of the dowels and the implicit face.
+Json PriorJson(const ShapeEstimate& estimate) {
+  const auto rms = [](auto&& values) {
+    double sum = 0;
+    for (const double value : values) {
+      sum += value * value;
+    }
+    return std::sqrt(sum / static_cast<double>(std::size(values)));
+  };
+  return {{"coefficients",
+           std::vector<double>(estimate.coefficients.begin(), estimate.coefficients.end())},
+          {"coefficients_rms", rms(estimate.coefficients)},
+          {"scale", estimate.subject_from_model.scale},
+          {"field_rms_mm", estimate.field_rms_mm},
+          {"sigma_rms_mm", rms(estimate.sigma_mm)},
+          {"dowels", estimate.tip_residual_mm.size()},
+          {"dowel_rms_mm", rms(estimate.tip_residual_mm)},
+          {"surface_points", estimate.surface_points},
+          {"rounds", estimate.rounds},
+          {"last_move_mm", estimate.last_move_mm},
+          {"usable", estimate.usable}};
+}
+
 // Where a dowel stands in the fit's target; -1 if it is not fitted.
 int TargetIndex(const FitTarget& target, const std::string& site) {
   const auto found = std::find_if(target.points.begin(), target.points.end(),
@@ -234,6 +257,9 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
   json["depth_truth"] = result.truth ? ComparisonToJson(result.truth->depth) : Json(nullptr);
   json["implicit"] = ImplicitJson(result.implicit);
   json["fit"] = FitJson(result);
+  if (result.prior) {
+    json["prior"] = PriorJson(*result.prior);
+  }
   json["uncertainty"] = UncertaintyJson(result);
   json["notes"] = result.subject.notes;
   for (const std::string& note : result.implicit.notes) {

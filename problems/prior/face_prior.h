@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A statistical model of faces, and which of its points belong to the sites of the skull.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "fitting/shape_model/shape_fit.h"
+#include "surfaces/base/fields.h"
+
+namespace semblance {
+
+struct NoPrior {
+  static constexpr std::string_view kName = "none";
+};
+template <class Visitor>
+void Fields(Visitor&, NoPrior&) {}
+
+struct ModesPrior {
+  static constexpr std::string_view kName = "modes";
+  std::filesystem::path mean;
+  std::filesystem::path modes;
+  std::filesystem::path sites;
+  std::filesystem::path features;
+  double scale = 1;
+  int count = 100;
+};
+template <class Visitor>
+void Fields(Visitor& visit, ModesPrior& o) {
+  visit(FieldInfo{.name = "mean", .doc = "mesh of the mean face: PLY, OBJ, STL or OFF; mm, LPS"},
+        o.mean);
+  visit(FieldInfo{.name = "modes",
+                  .doc = "NumPy array (.npy) of the modes, k x n x 3, n the points of the mean in "
+                         "their order: the face is mean + scale * sum of w_k mode_k, w_k "
+                         "independent N(0,1)"},
+        o.modes);
+  visit(FieldInfo{.name = "sites",
+                  .doc = "CSV file of the sites' points on the mean: columns site, x_mm, y_mm, "
+                         "z_mm; sites that are not there take no part"},
+        o.sites);
+  visit(
+      FieldInfo{.name = "features",
+                .doc = "CSV file of the 68 facial landmarks on the mean, numbered as in Multi-PIE: "
+                       "columns i_multipie, x, y, z; of these 28 to 36 are the nose, 37 to 48 "
+                       "the eyes, 49 to 68 the mouth"},
+      o.features);
+  visit(FieldInfo{.name = "scale",
+                  .min = 1e-9,
+                  .max = 1e9,
+                  .doc = "mm per unit of the modes, e.g. 0.001 where they are in micrometres"},
+        o.scale);
+  visit(FieldInfo{.name = "count", .min = 1, .max = 10000, .doc = "modes that are used, at most"},
+        o.count);
+}
+
+using PriorSource = std::variant<NoPrior, ModesPrior>;
+
+struct FacePrior {
+  ShapeModel model;
+  std::map<std::string, ModelPoint> sites;  // by site code
+  std::vector<ShapeFeature> features;
+};
+
+// Throws InputError or IoError in one line: a file that is not named or cannot be read, no prior, a
+// mean and modes that disagree, a site that is none or lies farther than 5 mm from the mean.
+FacePrior LoadPrior(const PriorSource& source);
+
+// The files that LoadPrior reads, for the manifest.
+std::vector<std::filesystem::path> PriorFiles(const PriorSource& source);
+
+}  // namespace semblance

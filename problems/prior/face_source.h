@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The ways to a subject's face, once depth and implicit face are there.
+#pragma once
+
+#include <string_view>
+#include <variant>
+
+#include "problems/prior/prior_target.h"
+#include "surfaces/base/fields.h"
+
+namespace semblance {
+
+// The template, brought to the dowels and no more.
+struct PlacedFace {
+  static constexpr std::string_view kName = "placed";
+};
+template <class Visitor>
+void Fields(Visitor&, PlacedFace&) {}
+
+// The placed template under the thin plate that brings its sites to the dowels' tips (Bookstein
+// 1989).
+struct ThinPlateFace {
+  static constexpr std::string_view kName = "thin_plate";
+  double stiffness_mm = 10;
+};
+template <class Visitor>
+void Fields(Visitor& visit, ThinPlateFace& o) {
+  visit(FieldInfo{.name = "stiffness_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 1e6,
+                  .doc = "weight of bending against the tips' misfit; 0 meets all tips"},
+        o.stiffness_mm);
+}
+
+// The H-spline fit of the placed template to dowels and implicit face (thesis ch. 4).
+struct FittedTemplate {
+  static constexpr std::string_view kName = "fit";
+};
+template <class Visitor>
+void Fields(Visitor&, FittedTemplate&) {}
+
+// What every face that asks the prior has.
+template <class Visitor>
+void PriorUseFields(Visitor& visit, ShapeFitOptions& estimate, TableDepthOptions& table_depths) {
+  visit(FieldInfo{.name = "estimate", .doc = "how the most likely face of the prior is found"},
+        estimate);
+  visit(FieldInfo{.name = "table_depths",
+                  .doc = "how sure depths are that come from a table; measured ones are taken as "
+                         "exact along the dowel"},
+        table_depths);
+}
+
+// The most likely face of the prior.
+struct PriorFace {
+  static constexpr std::string_view kName = "prior";
+  ShapeFitOptions estimate;
+  TableDepthOptions table_depths;
+};
+template <class Visitor>
+void Fields(Visitor& visit, PriorFace& o) {
+  PriorUseFields(visit, o.estimate, o.table_depths);
+}
+
+// The same as the template of the H-spline fit; each dowel is fitted where its tip is nearest to
+// that face.
+struct PriorThenFit {
+  static constexpr std::string_view kName = "prior_then_fit";
+  ShapeFitOptions estimate;
+  TableDepthOptions table_depths;
+};
+template <class Visitor>
+void Fields(Visitor& visit, PriorThenFit& o) {
+  PriorUseFields(visit, o.estimate, o.table_depths);
+}
+
+using FaceSource = std::variant<FittedTemplate, PlacedFace, ThinPlateFace, PriorFace, PriorThenFit>;
+
+inline bool AsksPrior(const FaceSource& face) {
+  return std::holds_alternative<PriorFace>(face) || std::holds_alternative<PriorThenFit>(face);
+}
+
+}  // namespace semblance

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A prior whose mean is the built-in template, so that all can be compared with it.
+#include "problems/prior/face_prior.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "problems/prior/prior_surface.h"
+#include "problems/prior/prior_target.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/csv.h"
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+
+const TemplateFace& Face() {
+  static const TemplateFace face = MakeTemplateFace({});
+  return face;
+}
+
+std::string ModesFile(const TriMesh& mean, int modes) {
+  std::vector<float> values;
+  for (int k = 0; k < modes; ++k) {
+    for (const Vec3& p : mean.points) {
+      const auto s = static_cast<float>(std::sin(0.02 * (k + 1) * p.z()));
+      values.insert(values.end(), {300 * s, 0, 200 * s});
+    }
+  }
+  const std::string header =
+      fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}, 3), }}\n", modes,
+                  mean.points.size());
+  std::string bytes = "\x93NUMPY";
+  bytes += {'\1', '\0', static_cast<char>(header.size()), '\0'};
+  return bytes + header +
+         std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+}
+
+// The files of a prior with two modes.
+ModesPrior WritePrior(const fs::path& folder) {
+  const TriMesh mean = Tessellate(Face().surface, 2).mesh;
+  CsvWriter sites({"site", "x_mm", "y_mm", "z_mm"}), features({"i_multipie", "x", "y", "z"});
+  for (const auto& [site, uv] : Face().site_uv) {
+    const Vec3 p = Face().surface.Point(uv);
+    sites.Row(site, p.x(), p.y(), p.z());
+  }
+  features.Row(5, 0, 0, 0);
+  features.Row(31, 0, -30, -36);
+  features.Row(50, 0, -15, -74);
+  const ModesPrior prior{.mean = folder / "mean.ply",
+                         .modes = folder / "modes.npy",
+                         .sites = folder / "sites.csv",
+                         .features = folder / "features.csv",
+                         .scale = 0.01};
+  WriteFileAtomically(prior.mean, EncodeMesh(mean, ".ply"));
+  WriteFileAtomically(prior.modes, ModesFile(mean, 2));
+  WriteFileAtomically(prior.sites, sites.Text());
+  WriteFileAtomically(prior.features, features.Text());
+  return prior;
+}
+
+TEST(FacePrior, ItsFilesAreRead) {
+  const ScratchFolder folder;
+  const FacePrior prior = LoadPrior(WritePrior(folder.Path()));
+  EXPECT_EQ(prior.model.Modes(), 2);
+  const Vec3& p = prior.model.mean.points[700];
+  EXPECT_NEAR(prior.model.modes(2100, 1), 3 * std::sin(0.04 * p.z()), 1e-3);
+  EXPECT_EQ(prior.sites.size(), 32u);
+  EXPECT_EQ(prior.features.size(), 2u);  // a landmark of the outline is none
+  ModesPrior first = WritePrior(folder.Path());
+  first.count = 1;
+  EXPECT_EQ(LoadPrior(first).model.Modes(), 1);
+}
+
+TEST(FacePrior, WhatCannotBeUsedIsNamed) {
+  const ScratchFolder folder;
+  const auto fault = [&](const std::function<void(ModesPrior&)>& spoil) -> std::string {
+    ModesPrior prior = WritePrior(folder.Path());
+    spoil(prior);
+    try {
+      LoadPrior(prior);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_EQ(fault([](ModesPrior&) {}), "none");
+  EXPECT_THAT(fault([](ModesPrior& p) { p.sites.clear(); }), HasSubstr("prior.sites"));
+  EXPECT_THAT(fault([&](ModesPrior& p) {
+                const TriMesh other = Tessellate(Face().surface, 1).mesh;
+                WriteFileAtomically(p.mean, EncodeMesh(other, ".ply"));
+              }),
+              HasSubstr("both must be of one mesh"));
+  EXPECT_THAT(fault([](ModesPrior& p) {
+                WriteFileAtomically(p.sites, "site,x_mm,y_mm,z_mm\ng,0,0,900\n");
+              }),
+              HasSubstr("sites.csv:2: site 'g' lies"));
+  EXPECT_THAT(fault([](ModesPrior& p) {
+                WriteFileAtomically(p.sites, "site,x_mm,y_mm,z_mm\nglab,0,0,0\n");
+              }),
+              HasSubstr("glab"));
+  EXPECT_THAT(
+      fault([](ModesPrior& p) { WriteFileAtomically(p.features, "i_multipie,x,y,z\n70,0,0,0\n"); }),
+      HasSubstr("none of the 68"));
+}
+
+TEST(DomainGrid, SurfaceThroughItsOwnSamplesIsTheSurface) {
+  const HSplineSurface& surface = Face().surface;
+  const DomainGrid grid = GridOf(surface.shape());
+  std::vector<Vec3> samples;
+  for (std::size_t k = 0; k < grid.size(); ++k) {
+    samples.push_back(surface.Point(grid.UvAt(k)));
+  }
+  const HSplineSurface again = SurfaceThrough(surface.shape(), grid, samples);
+  for (std::size_t k = 0; k < grid.size(); k += 97) {
+    EXPECT_LT((again.Point(grid.UvAt(k)) - samples[k]).norm(), 0.05);
+    EXPECT_EQ(grid.NearestTo(grid.UvAt(k)), k);
+  }
+}
+
+TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
+  const ScratchFolder folder;
+  const FacePrior prior = LoadPrior(WritePrior(folder.Path()));
+  const PriorOnTemplate on_template = LayOnTemplate(prior, Face(), {});
+  EXPECT_LT(on_template.rms_mm, 0.5);
+  EXPECT_NEAR(on_template.mean_from_template.scale, 1, 1e-3);
+  ShapeEstimate estimate;
+  estimate.subject_from_model.rotation = Eigen::AngleAxisd(0.4, Vec3::UnitX()).toRotationMatrix();
+  for (const Vec3& p : ShapeAt(prior.model, Eigen::Vector2d(1, -1))) {
+    estimate.points.push_back(estimate.subject_from_model * p);
+  }
+  estimate.sigma_mm.assign(estimate.points.size(), 1.5);
+  const HSplineSurface surface = SurfaceOf(estimate, prior, on_template, Face().surface.shape());
+  for (const Vec2& uv : {Vec2(0.3, 0.4), Vec2(0.5, 0.5), Vec2(0.62, 0.7)}) {
+    const Vec3 p = Face().surface.Point(uv);
+    const double s = std::sin(0.02 * p.z()) - std::sin(0.04 * p.z());
+    const Vec3 expected = estimate.subject_from_model * Vec3(p + Vec3(3 * s, 0, 2 * s));
+    EXPECT_LT((surface.Point(uv) - expected).norm(), 0.3);
+  }
+  const std::vector<Vec2> middle = {Vec2(0.5, 0.5)};
+  EXPECT_NEAR(SigmaAt(middle, estimate, prior, on_template)[0], 1.5, 1e-12);
+}
+
+TEST(PriorSurface, ATemplateOfAnotherFaceIsRefused) {
+  const ScratchFolder folder;
+  const FacePrior prior = LoadPrior(WritePrior(folder.Path()));
+  TemplateFace other = Face();
+  ControlNet net = other.surface.Net(0);
+  for (Vec3& p : net.vertices) {
+    p.y() += 0.004 * p.z() * p.z();
+  }
+  other.surface.SetNet(0, net);
+  EXPECT_THROW(LayOnTemplate(prior, other, {}), InputError);
+}
+
+TEST(PriorTarget, TableDepthsAreLessSureAlongTheDowel) {
+  const ScratchFolder folder;
+  const FacePrior prior = LoadPrior(WritePrior(folder.Path()));
+  std::vector<Dowel> dowels;
+  const auto add = [&](const std::string& site, const Vec3& tip, const Vec3& direction) {
+    Dowel dowel;
+    dowel.site = site;
+    dowel.base = tip - 5 * direction;
+    dowel.direction = direction;
+    dowel.depth_mm = 5;
+    dowels.push_back(dowel);
+  };
+  for (const auto& [site, uv] : Face().site_uv) {
+    add(site, Face().surface.Point(uv), Face().surface.Normal(uv));
+  }
+  add("of_none", Vec3::Zero(), Vec3::UnitX());
+  const ShapeTarget measured = PriorTarget(prior, dowels, nullptr, nullptr);
+  EXPECT_EQ(measured.tips.size(), 32u);
+  EXPECT_EQ(measured.tips[0].along_sd_mm, 0);
+  EXPECT_NEAR(measured.start.scale, 1, 0.01);
+  const TableDepthOptions table;
+  EXPECT_NEAR(PriorTarget(prior, dowels, &table, nullptr).tips[3].along_sd_mm, std::hypot(1, 1),
+              1e-12);
+  dowels.resize(2);
+  EXPECT_THROW(PriorTarget(prior, dowels, nullptr, nullptr), InputError);
+}
+
+}  // namespace
+}  // namespace semblance
