@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The face prior on real heads, on its mesh alone: how far the most likely face of a statistical
 // model, given measured depths, is from the outer skin. A line of figures per head. The heads and
-// the model are beside the project, not in it.
+// the model are beside the project, not in it. With arguments HEAD FACE...: the figures of meshes
+// that a run has written.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -91,6 +92,23 @@ double Coverage(const FaceMetrics& metrics, const Case& subject, const ShapeEsti
   return held / all;
 }
 
+// A head of configs/heads with its implicit face, and the skin that is scored.
+struct Scored {
+  std::shared_ptr<const SkullStage> skull;
+  FaceRegion region;
+};
+
+Scored ScoredHead(const std::string& head, const RunContext& context) {
+  const auto experiment = ReadConfig<Experiment>(kSource / ("configs/heads/" + head + ".yaml"), {});
+  StageCache cache(8, std::make_shared<DiskCache>(
+                          std::filesystem::temp_directory_path() / "semblance_prior_heads",
+                          std::uintmax_t{4} << 30));
+  StepClock step(context);
+  auto skull = MakeSkullStage(experiment, cache, step, context);
+  FaceRegion region = OuterRegion(skull->depth_stage->subject, experiment, context);
+  return {std::move(skull), std::move(region)};
+}
+
 struct Variant {
   const char* name;
   ShapeFitOptions options;
@@ -98,12 +116,8 @@ struct Variant {
 
 void Measure(const std::string& head, const FacePrior& prior, const std::vector<Variant>& variants,
              const std::string& out, const RunContext& context) {
-  const auto experiment = ReadConfig<Experiment>(kSource / ("configs/heads/" + head + ".yaml"), {});
-  StageCache cache(8, std::make_shared<DiskCache>("/tmp/semblance_prior_heads", 4ull << 30));
-  StepClock step(context);
-  const auto skull = MakeSkullStage(experiment, cache, step, context);
+  const auto [skull, region] = ScoredHead(head, context);
   const Case& subject = skull->depth_stage->subject;
-  const FaceRegion region = OuterRegion(subject, experiment, context);
   fmt::print("{}:\n", head);
   Print("implicit", CompareFaces(*subject.skin, region, skull->implicit.mesh, context));
   const ShapeTarget target =
@@ -156,13 +170,21 @@ std::vector<Variant> Variants() {
 int main(int argc, char** argv) {
   using namespace semblance;
   try {
-    const FacePrior prior = LoadPrior({.mean = kData / "template/ict_head_lps_mm.ply",
-                                       .modes = kData / "ict_face/identity_modes_um_int16.npy",
-                                       .sites = kData / "ict_face/sites_on_mean.csv",
-                                       .features = kData / "template/landmarks68_lps_mm.csv",
-                                       .scale = 0.001});
     RunContext context;
-    context.threads = 1;
+    if (argc > 2) {  // HEAD FACE...: faces that are already there
+      const Scored scored = ScoredHead(argv[1], context);
+      for (int k = 2; k < argc; ++k) {
+        Print(argv[k], CompareFaces(*scored.skull->depth_stage->subject.skin, scored.region,
+                                    ReadMesh(argv[k]), context));
+      }
+      return 0;
+    }
+    const FacePrior prior =
+        LoadPrior(ModesPrior{.mean = kData / "template/ict_head_lps_mm.ply",
+                             .modes = kData / "ict_face/identity_modes_um_int16.npy",
+                             .sites = kData / "ict_face/sites_on_mean.csv",
+                             .features = kData / "template/landmarks68_lps_mm.csv",
+                             .scale = 0.001});
     for (const std::string head : {"vhm", "cthead"}) {
       Measure(head, prior, Variants(), argc > 1 ? argv[1] : "", context);
     }
