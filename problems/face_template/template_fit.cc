@@ -42,7 +42,7 @@ LevelPlan PlanOf(int level) {
 
 // The ears: the formula has none, and matches there would drag the cheek along.
 bool InEar(const Vec2& uv) {
-  constexpr double kMiddleY = 106, kMiddleZ = -42, kHalfWidth = 19, kHalfHeight = 42;  // mm
+  constexpr double kMiddleY = 110, kMiddleZ = -40, kHalfWidth = 24, kHalfHeight = 56;  // mm
   const Vec3 p = HeadPoint(uv.x(), uv.y());
   return std::hypot((p.y() - kMiddleY) / kHalfWidth, (p.z() - kMiddleZ) / kHalfHeight) < 1;
 }
@@ -108,6 +108,7 @@ class TemplateFitter {
   }
 
   const HSplineSurface& surface() const { return surface_; }
+  bool usable() const { return usable_; }  // every solution so far
 
  private:
   // Returns the part of the samples that found skin.
@@ -127,7 +128,9 @@ class TemplateFitter {
       target.points.insert(target.points.end(), facial_.begin(), facial_.end());
     }
     const RunContext silent{.on_event = {}, .stop_token = {}, .threads = context_.threads};
-    surface_ = Fit(surface_, rest_, target, {}, OptionsOf(level, landmarks), silent).surface;
+    FitResult fit = Fit(surface_, rest_, target, {}, OptionsOf(level, landmarks), silent);
+    usable_ = usable_ && fit.usable;
+    surface_ = std::move(fit.surface);
     return matched;
   }
 
@@ -136,6 +139,7 @@ class TemplateFitter {
   SkinMatcher matcher_;
   std::vector<FitPoint> facial_;
   HSplineSurface rest_, surface_;
+  bool usable_ = true;
 };
 
 // Without offsets that move the surface less than anyone sees, and without empty levels.
@@ -200,48 +204,63 @@ std::vector<Vec2> SitePlaces() {
   return places;
 }
 
+// Fits levels until one meets the tolerance, or all.
+std::vector<TemplateLevel> FitLevels(const TemplateFitOptions& options,
+                                     const TemplateDistance& distance, const RunContext& context,
+                                     TemplateFitter& fitter) {
+  std::vector<TemplateLevel> levels;
+  for (int level = 0; level <= options.finest; ++level) {
+    levels.push_back(fitter.FitLevel(level));
+    const SkinDistance& to_skin = levels.back().face_to_skin =
+        distance.FaceToSkin(fitter.surface(), context.threads);
+    context.Report("template",
+                   fmt::format("level {}: RMS {:.3f} mm over the face", level, to_skin.rms_mm),
+                   (level + 1.0) / (options.finest + 1));
+    if (level >= kCoarsestEnd && to_skin.rms_mm <= options.tolerance_mm &&
+        distance.SkinToFace(fitter.surface(), context.threads).rms_mm <= options.tolerance_mm) {
+      break;
+    }
+  }
+  return levels;
+}
+
+// What is measured of the face when it is done.
+void Measure(const OuterHead& head, const TemplateFitOptions& options,
+             const TemplateDistance& distance, int threads, TemplateFit& fit) {
+  const HSplineSurface& surface = fit.face.surface;
+  for (TemplateLevel& level : fit.levels) {
+    level.vertices = static_cast<int>(level.level == 0 ? surface.Net(0).vertices.size()
+                                                       : surface.Offsets(level.level).size());
+  }
+  fit.sites = PlaceSites(surface, head);
+  for (const auto& [code, site] : fit.sites) {
+    fit.face.site_uv[code] = site.uv;
+  }
+  fit.face_to_skin = distance.FaceToSkin(surface, threads);
+  fit.skin_to_face = distance.SkinToFace(surface, threads);
+  fit.folds = CountFolds(surface, threads);
+  fit.met = fit.face_to_skin.rms_mm <= options.tolerance_mm &&
+            fit.skin_to_face.rms_mm <= options.tolerance_mm;
+}
+
 }  // namespace
 
 TemplateFit FitTemplate(const OuterHead& head, const TemplateFitOptions& options,
                         const RunContext& context) {
   CheckOptions(options);
   TemplateFace start = WarpedGenericHead(head, options.finest);
-  const std::vector<TemplateFeature> features = start.features;
+  std::vector<TemplateFeature> features = start.features;
   TemplateFitter fitter(head, std::move(start), context);
   const TemplateDistance distance(head.skin, SitePlaces());
-  std::vector<TemplateLevel> levels;
-  SkinDistance to_skin, from_skin;
-  for (int level = 0; level <= options.finest; ++level) {
-    levels.push_back(fitter.FitLevel(level));
-    to_skin = levels.back().face_to_skin = distance.FaceToSkin(fitter.surface(), context.threads);
-    context.Report("template",
-                   fmt::format("level {}: RMS {:.3f} mm over the face", level, to_skin.rms_mm),
-                   (level + 1.0) / (options.finest + 1));
-    if (level >= kCoarsestEnd && to_skin.rms_mm <= options.tolerance_mm) {
-      from_skin = distance.SkinToFace(fitter.surface(), context.threads);
-      if (from_skin.rms_mm <= options.tolerance_mm) {
-        break;
-      }
-    }
-  }
+  std::vector<TemplateLevel> levels = FitLevels(options, distance, context, fitter);
   const int finest = levels.back().level;
-  HSplineSurface surface = Thinned(fitter.surface(), finest);
-  for (TemplateLevel& level : levels) {
-    level.vertices = static_cast<int>(level.level == 0 ? surface.Net(0).vertices.size()
-                                                       : surface.Offsets(level.level).size());
-  }
-  TemplateFit fit{
-      .face = {.surface = surface, .site_uv = {}, .features = UpToLevel(features, finest)},
-      .levels = std::move(levels),
-      .sites = PlaceSites(surface, head)};
-  for (const auto& [code, site] : fit.sites) {
-    fit.face.site_uv[code] = site.uv;
-  }
-  fit.face_to_skin = distance.FaceToSkin(surface, context.threads);
-  fit.skin_to_face = distance.SkinToFace(surface, context.threads);
-  fit.folds = CountFolds(surface, context.threads);
-  fit.met = fit.face_to_skin.rms_mm <= options.tolerance_mm &&
-            fit.skin_to_face.rms_mm <= options.tolerance_mm;
+  TemplateFit fit{.face = {.surface = Thinned(fitter.surface(), finest),
+                           .site_uv = {},
+                           .features = UpToLevel(std::move(features), finest)},
+                  .levels = std::move(levels),
+                  .sites = {},
+                  .usable = fitter.usable()};
+  Measure(head, options, distance, context.threads, fit);
   return fit;
 }
 

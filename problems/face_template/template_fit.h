@@ -44,8 +44,9 @@ struct TemplateFit {
   std::map<std::string, TemplateSite> sites;  // the 32
   // The face is the convex hull of the 32 sites in (u,v), so without ears and neck.
   SkinDistance face_to_skin = {}, skin_to_face = {};
-  int folds = -1;    // CountFolds
-  bool met = false;  // the tolerance, both ways
+  int folds = -1;       // CountFolds
+  bool usable = false;  // every solution was
+  bool met = false;     // the tolerance, both ways
 };
 
 // Level by level, from 0 on, points of the surface are matched with the skin (skin_matcher.h) and

@@ -13,6 +13,7 @@
 
 #include "fitting/problem/placement.h"
 #include "interp/dowels/site_code.h"
+#include "problems/face_template/head_formula.h"
 #include "problems/face_template/template_sites.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
@@ -49,6 +50,9 @@ std::vector<Box3> PieceBoxes(const TriMesh& mesh) {
 
 // Inner layers lie inside the largest piece's box; a second head does not.
 void CheckOneHead(const TriMesh& mesh, const std::string& name) {
+  if (mesh.triangles.empty()) {
+    return;  // CheckHeadMesh says so
+  }
   const std::vector<Box3> boxes = PieceBoxes(mesh);
   const auto size = [](const Box3& box) { return box.diagonal().norm(); };
   const Box3& largest =
@@ -102,9 +106,10 @@ struct Correspondence {
   std::vector<Vec3> generic, head;
   std::vector<double> weights;
 
-  Correspondence(const HSplineSurface& formula, const std::vector<SkinLandmark>& points) {
+  explicit Correspondence(const std::vector<SkinLandmark>& points) {
     for (const SkinLandmark& landmark : points) {
-      generic.push_back(formula.Point(UvOnGenericHead(landmark.code)));
+      const Vec2 uv = UvOnGenericHead(landmark.code);
+      generic.push_back(HeadPoint(uv.x(), uv.y()));
       head.push_back(landmark.point);
       weights.push_back(ComplaintAboutSite(landmark.code).empty() ? kSiteWeight : 1);
     }
@@ -207,12 +212,11 @@ HSplineSurface Warped(const HSplineSurface& surface, const Map& map) {
 
 OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const std::string& name,
                       const RunContext& context) {
+  CheckOneHead(head, name);  // first, as two are too large for one
   OuterHead outer{.skin = {}, .points = {}, .notes = CheckHeadMesh(head, name)};
   std::ranges::copy(landmarks.notes, std::back_inserter(outer.notes));
-  CheckOneHead(head, name);
   CheckEnough(landmarks.points, name);
-  const Correspondence pairs(MakeTemplateFace({.max_level = kFormulaLevel}).surface,
-                             landmarks.points);
+  const Correspondence pairs(landmarks.points);
   CheckHandedness(pairs, name);
   CheckScale(pairs.HeadFromGeneric().scale, name);
   context.Report("skin", "what is seen from outside");
@@ -223,7 +227,7 @@ OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const
 
 TemplateFace WarpedGenericHead(const OuterHead& head, int max_level) {
   TemplateFace face = GenericHead(max_level);
-  const Correspondence pairs(face.surface, head.points);
+  const Correspondence pairs(head.points);
   const Similarity head_from_generic = pairs.HeadFromGeneric();
   std::vector<Vec3> placed;
   for (const Vec3& p : pairs.generic) {

@@ -75,7 +75,7 @@ int FromHead(const TemplateArguments& a) {
   }
   fmt::print("{}", TemplateText(fit, a.fit));
   Write(fit.face, folder);
-  return fit.met && fit.folds == 0 ? kDone : kNotUsable;
+  return fit.usable && fit.met && fit.folds == 0 ? kDone : kNotUsable;
 }
 
 int Template(const TemplateArguments& a) {
