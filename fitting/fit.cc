@@ -7,9 +7,10 @@
 #include <set>
 #include <utility>
 
-#include "fitting/adaptive/adaptive_solve.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
+#include "fitting/solve/space_solve.h"
+#include "surfaces/hspline_files/feature.h"
 
 namespace semblance {
 namespace {
@@ -124,12 +125,14 @@ class Fitter {
     }
   }
 
+  // Those that a term holds.
+  std::span<const VertexId> Held() const {
+    return FeaturePriorWeight(options_.features) > 0 ? features_ : std::span<const VertexId>();
+  }
+
   LevelView View(int level, const FitTarget& target) const {
-    const bool resist = FeaturePriorWeight(options_.features) > 0;
-    return ViewOfLevel(
-        result_.surface, rest_, target, level,
-        {.aim = AimOf(options_.plan),
-         .held = resist ? std::span<const VertexId>(features_) : std::span<const VertexId>()});
+    return ViewOfLevel(result_.surface, rest_, target, level,
+                       {.aim = AimOf(options_.plan), .held = Held()});
   }
 
   LevelSummary SolveLevel(const ScheduleStep& step, std::span<const Term> terms) {
@@ -147,18 +150,19 @@ class Fitter {
   }
 
   void Follow(const AdaptivePlan& plan) {
-    AdaptiveSolve all(result_.surface, rest_, driver_.target(), driver_.terms(), options_.solver,
-                      context_.threads);
-    const auto see_points = [&] {
-      if (driver_.MovesPoints()) {
-        all.SeePoints();
-      }
-    };
+    const Feature features = ExtractFeature(result_.surface, "features", features_);
+    SpaceSolve all({.start = result_.surface,
+                    .rest = rest_,
+                    .target = driver_.target(),
+                    .terms = driver_.terms(),
+                    .held = Held(),
+                    .solver = options_.solver,
+                    .threads = context_.threads});
     const auto solve = [&](std::span<const Term>) {
-      see_points();
+      SeePoints(all);
       const LevelSummary summary = all.Solve(SolveTolerance::kLoose);
       if (driver_.MovesPoints()) {
-        result_.surface = all.Surface();
+        Take(all, features);
       }
       return summary;
     };
@@ -166,13 +170,33 @@ class Fitter {
       context_.ThrowIfStopped();
       context_.Report("fit", fmt::format("{} vertices to level {}", all.dofs(), all.finest()));
       driver_.Take({.solve = solve});
-      see_points();
+      SeePoints(all);
     }
     driver_.Solve({.solve = [&](std::span<const Term>) {
-      const LevelSummary summary = all.Settle();
-      result_.surface = all.Surface();
+      LevelSummary summary = all.Settle();
+      if (Take(all, features)) {
+        summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
+      }
       return summary;
     }});
+  }
+
+  void SeePoints(SpaceSolve& all) const {
+    if (driver_.MovesPoints()) {
+      all.SeePoints();
+    }
+  }
+
+  // Of frozen features a term has held the detail as it stands in space; their offsets stay to the
+  // bit, and so turn with the coarser surface. Returns whether there are any.
+  bool Take(const SpaceSolve& all, const Feature& features) {
+    const bool frozen =
+        std::holds_alternative<FrozenFeatures>(options_.features) && !features_.empty();
+    result_.surface = all.Surface();
+    if (frozen) {
+      RestoreFeature(features, features_, result_.surface);
+    }
+    return frozen;
   }
 
   const HSplineSurface& rest_;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/least_squares/sparse_factor.h"
 
+#include <dlfcn.h>
+
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
-
-#include "fitting/least_squares/blas_threads.h"
 
 namespace semblance {
 
@@ -77,6 +77,18 @@ int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
   constexpr double kIndependent = 1e-6;
   const Eigen::VectorXd pivots = Pivots(Scaled(lower), 1e-13, kIndependent);
   return static_cast<int>(std::min<Eigen::Index>((pivots.array() > kIndependent).count(), rows));
+}
+
+void UseOneBlasThread() {
+  static const bool done = [] {
+    using SetThreads = void (*)(int);
+    void* const symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
+    if (symbol != nullptr) {
+      reinterpret_cast<SetThreads>(symbol)(1);
+    }
+    return true;
+  }();
+  static_cast<void>(done);
 }
 
 }  // namespace semblance

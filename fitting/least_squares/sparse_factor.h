@@ -2,12 +2,12 @@
 // The sparse Cholesky factor of symmetric matrices.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/SparseCore>
 #include <memory>
 
-#include "fitting/least_squares/normal_equations.h"
-
 namespace semblance {
+
+using SparseMatrix = Eigen::SparseMatrix<double>;
 
 // Of `lower` (the lower triangle of a positive semidefinite matrix) + shift times the identity;
 // CHOLMOD, one thread.
@@ -30,5 +30,10 @@ Eigen::VectorXd Pivots(const SparseMatrix& lower, double shift, double enough);
 
 // Estimated rank of the matrix whose normal matrix `lower` is; it has so many rows.
 int NumericalRank(const SparseMatrix& lower, std::size_t rows);
+
+// OpenBLAS, where the sparse Cholesky uses it, sums in an order that depends on its number of
+// threads, and so on the machine. One thread gives the same bytes everywhere (and small blocks gain
+// nothing from more); looked up at run time, for other BLAS libraries have no such function.
+void UseOneBlasThread();
 
 }  // namespace semblance

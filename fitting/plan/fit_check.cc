@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "fitting/level/auto_weight.h"
+#include "fitting/solve/auto_weight.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 
@@ -41,8 +41,7 @@ class FaultFinder {
   std::vector<FitFault> Take() {
     std::visit([&](const auto& plan) { Plan(plan); }, options_.plan);
     if (adaptive_) {
-      AdaptiveTerms();
-      AdaptiveFeatures();
+      NeedPoints("the adaptive plan has no term 'points' with a weight; add one", "terms");
     }
     AutoWeights();
     FindRelaxation();
@@ -89,28 +88,19 @@ class FaultFinder {
   }
   void Plan(const AdaptivePlan& plan) { Level("plan.finest", plan.finest); }
 
-  void AdaptiveTerms() {
-    int points = 0;
-    for (std::size_t k = 0; k < options_.terms.size(); ++k) {
-      const Term& term = options_.terms[k];
-      if (WeightOf(term) <= 0) {
-        continue;
-      }
-      if (std::holds_alternative<SymmetryTerm>(term)) {
-        Add(fmt::format("terms[{}]", k),
-            "the term 'symmetry' pairs control vertices, and the adaptive plan may have finer ones "
-            "on one side alone; leave it out or take another plan");
-      }
-      if (std::holds_alternative<PointTerm>(term) && ++points > 1) {
-        Add(fmt::format("terms[{}]", k), "a second term 'points' with a weight; give one");
+  // The first of the terms `points` with a weight; without any there is a fault.
+  const PointTerm* NeedPoints(std::string what, std::string path) {
+    for (const Term& term : options_.terms) {
+      const auto* const points = std::get_if<PointTerm>(&term);
+      if (points != nullptr && points->weight > 0) {
+        return points;
       }
     }
-    if (points == 0) {
-      Add("terms", "the adaptive plan has no term 'points' with a weight; add one");
-    }
+    Add(std::move(path), std::move(what));
+    return nullptr;
   }
 
-  // Generalised cross-validation needs one matrix for x, y and z, and nothing that changes it.
+  // Generalised cross-validation needs one matrix for x, y and z.
   void AutoWeights() {
     int automatic = -1;
     for (int k = 0; k < std::ssize(options_.terms); ++k) {
@@ -125,34 +115,12 @@ class FaultFinder {
       automatic = k;
     }
     for (int k = 0; automatic >= 0 && k < std::ssize(options_.terms); ++k) {
-      if (k != automatic && !GoesWithAuto(options_.terms[k])) {
+      if (!IsAssembled(options_.terms[k])) {
         Add(fmt::format("terms[{}]", k),
-            fmt::format("weight: auto cannot be chosen beside the term '{}' {}; give a number{}",
-                        TermName(options_.terms[k]),
-                        adaptive_ ? "in the adaptive plan" : "with a loss or coupled coordinates",
-                        adaptive_ ? "" : ", or (points with a loss) take plan: adaptive"));
+            fmt::format("weight: auto cannot be chosen beside the term '{}', which does not treat "
+                        "x, y and z alike; give a number",
+                        TermName(options_.terms[k])));
       }
-    }
-  }
-
-  bool GoesWithAuto(const Term& term) const {
-    if (WeightOf(term) <= 0) {
-      return true;
-    }
-    if (adaptive_) {
-      return std::holds_alternative<PointTerm>(term) ||
-             std::holds_alternative<SmoothnessTerm>(term) ||
-             std::holds_alternative<MembraneTerm>(term);
-    }
-    return std::visit([](const auto& t) { return IsSeparable(t); }, term);
-  }
-
-  void AdaptiveFeatures() {
-    if (std::holds_alternative<WeightedFeatures>(options_.features) ||
-        std::holds_alternative<FrozenFeatures>(options_.features)) {
-      Add("features",
-          "features that are weighted or frozen need a plan that goes level by level; with the "
-          "adaptive plan take restore or free");
     }
   }
 
@@ -164,15 +132,10 @@ class FaultFinder {
     }
     const std::string_view name =
         std::visit([](const auto& chosen) { return chosen.kName; }, options_.relaxation);
-    const auto& terms = options_.terms;
-    const auto points = std::find_if(terms.begin(), terms.end(), [](const Term& term) {
-      const auto* const p = std::get_if<PointTerm>(&term);
-      return p != nullptr && p->weight > 0;
-    });
-    if (points == terms.end()) {
-      Add("relaxation",
-          fmt::format("the relaxation {} needs a term 'points' with a weight; add one", name));
-    } else if (slides && std::get<PointTerm>(*points).loss != RobustLoss::kNone) {
+    const PointTerm* const points = NeedPoints(
+        fmt::format("the relaxation {} needs a term 'points' with a weight; add one", name),
+        "relaxation");
+    if (points != nullptr && slides && points->loss != RobustLoss::kNone) {
       Add("relaxation",
           fmt::format("the relaxation {} lets points slide without a loss; write loss: none for "
                       "the term 'points', or take alternating or joint",

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
-#include "fitting/level/auto_weight.h"
 #include "fitting/relaxation/joint_relaxation.h"
+#include "fitting/solve/auto_weight.h"
 #include "surfaces/hspline_files/feature.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 

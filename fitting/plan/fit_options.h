@@ -4,7 +4,6 @@
 
 #include <vector>
 
-#include "fitting/level/level_fit.h"
 #include "fitting/problem/feature_rule.h"
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/relaxation/relaxation.h"
@@ -17,7 +16,7 @@ struct FitOptions {
   std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};
   FeatureRule features = RestoreFeatures{};
   Relaxation relaxation = NoRelaxation{};
-  LevelSolver solver = LevelSolver::kCeres;
+  Solver solver = Solver::kCeres;
 };
 template <class Visitor>
 void Fields(Visitor& visit, FitOptions& o) {
@@ -47,8 +46,7 @@ void Fields(Visitor& visit, FitOptions& o) {
                 .doc = "ceres: each solve of any plan is a ceres::Problem whose parameter blocks "
                        "are the control vertices, in tiles of 3 x 3 where the terms treat x, y and "
                        "z alike; fastest: one direct factorisation of the same least squares where "
-                       "the terms treat x, y and z alike (in the adaptive plan: where they are "
-                       "points, smoothness and membrane), else as ceres; the same surface to "
+                       "the terms treat x, y and z alike, else as ceres; the same surface to "
                        "rounding"},
       o.solver);
 }

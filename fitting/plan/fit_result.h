@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "fitting/level/level_fit.h"
 #include "fitting/relaxation/relaxation.h"
+#include "fitting/solve/level_fit.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {

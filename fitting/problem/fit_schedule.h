@@ -164,6 +164,13 @@ void Fields(Visitor& visit, AdaptivePlan& o) {
         o.min_points);
 }
 
+// How every plan goes to the minimum of its terms.
+enum class Solver {
+  kCeres,   // ceres::Problems, whose parameter blocks are the control vertices
+  kFastest  // a direct factorisation where the terms allow it, else Ceres; the same minimiser
+};
+constexpr auto EnumNames(Solver) { return std::to_array<std::string_view>({"ceres", "fastest"}); }
+
 using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan, AdaptivePlan>;
 
 // The steps of one pass of a plan that goes level by level; none of the adaptive plan.

@@ -13,7 +13,7 @@
 #include <memory>
 #include <vector>
 
-#include "fitting/least_squares/blas_threads.h"
+#include "fitting/least_squares/sparse_factor.h"
 #include "fitting/relaxation/relaxer.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"

@@ -5,8 +5,8 @@
 #include <functional>
 #include <span>
 
-#include "fitting/level/level_fit.h"
 #include "fitting/relaxation/relaxation.h"
+#include "fitting/solve/level_fit.h"
 
 namespace semblance {
 

@@ -10,6 +10,9 @@
 namespace semblance {
 namespace {
 
+// Points of a leaf below which its sums are made point by point.
+constexpr std::size_t kFew = 32;
+
 PatchMatrix MatrixOf(const std::array<Vec3, 16>& vertices) {
   PatchMatrix matrix;
   for (int k = 0; k < 16; ++k) {
@@ -38,9 +41,11 @@ Vec3 RefinedPlace(const HSplineSurface& surface, const VertexId& v) {
   return RefinePatch(surface.PatchVertices(parent), slot.patch.i % 2, slot.patch.j % 2)[slot.index];
 }
 
-Vec3 PlaceOf(const HSplineSurface& surface, const VertexId& v) {
+// What a vertex has as a dof.
+Vec3 ValueIn(const HSplineSurface& surface, const VertexId& v) {
   const PatchSlot slot = SlotOf(surface.shape(), v);
-  return surface.PatchVertices(slot.patch)[slot.index];
+  const Vec3 place = surface.PatchVertices(slot.patch)[slot.index];
+  return v.level == 0 ? place : Vec3(place - RefinedPlace(surface, v));
 }
 
 }  // namespace
@@ -70,7 +75,7 @@ HierarchicalSplineSpace::HierarchicalSplineSpace(const HSplineSurface& start,
   Edit(edits);
   for (ControlDof& dof : dofs_) {
     if (dof.vertex.level > 0) {
-      dof.value = PlaceOf(start, dof.vertex) - RefinedPlace(start, dof.vertex);
+      dof.value = ValueIn(start, dof.vertex);
     }
   }
   Refresh();
@@ -95,6 +100,11 @@ int HierarchicalSplineSpace::AddDof(const VertexId& vertex, const Vec3& value) {
 
 bool HierarchicalSplineSpace::IsEdited(const VertexId& vertex) const {
   return dof_of_.contains(KeyOf(vertex.level, vertex.i, vertex.j));
+}
+
+int HierarchicalSplineSpace::RowOf(const VertexId& vertex) const {
+  const auto found = dof_of_.find(KeyOf(vertex.level, vertex.i, vertex.j));
+  return found == dof_of_.end() ? -1 : dofs_[found->second].row;
 }
 
 int HierarchicalSplineSpace::AddNode(const PatchId& patch, int parent,
@@ -168,8 +178,9 @@ bool HierarchicalSplineSpace::IsCovered(const VertexId& v) const {
 }
 
 void HierarchicalSplineSpace::LinkDofs() {
+  rows_ = 0;
   for (ControlDof& dof : dofs_) {
-    dof.covered = IsCovered(dof.vertex);
+    dof.row = IsCovered(dof.vertex) ? -1 : rows_++;
   }
   for (QuadtreeNode& node : nodes_) {
     const PatchId& p = node.patch;
@@ -200,19 +211,22 @@ void HierarchicalSplineSpace::Refresh() {
   }
 }
 
-void HierarchicalSplineSpace::Move(const Eigen::MatrixX3d& step) {
-  for (std::size_t k = 0; k < dofs_.size(); ++k) {
-    dofs_[k].value += step.row(static_cast<Eigen::Index>(k)).transpose();
+void HierarchicalSplineSpace::SetValues(const ControlNet& net) {
+  for (ControlDof& dof : dofs_) {
+    if (dof.row >= 0) {
+      dof.value = net.vertices[dof.row];
+    }
   }
   Refresh();
 }
 
-void HierarchicalSplineSpace::Measure(std::span<const double> factors, int threads,
+void HierarchicalSplineSpace::Measure(std::vector<double> factors, int threads,
                                       std::vector<double>* squares) {
+  factors_ = std::move(factors);
   std::vector<int> stale;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     const QuadtreeNode& node = nodes_[k];
-    if (node.children < 0 && (!node.measured || !factors.empty() || squares != nullptr)) {
+    if (node.children < 0 && (!node.measured || !factors_.empty() || squares != nullptr)) {
       stale.push_back(static_cast<int>(k));
     }
   }
@@ -221,18 +235,32 @@ void HierarchicalSplineSpace::Measure(std::span<const double> factors, int threa
   }
   ParallelFor(stale.size(), threads, 1, [&](std::size_t k) {
     QuadtreeNode& node = nodes_[stale[k]];
-    const bool moments = !node.has_moments || !factors.empty();
+    const bool moments = node.range.size() >= kFew && (!node.has_moments || !factors_.empty());
     PatchMoments sums;
     if (!moments) {
       std::copy(&node.sums.moments[0][0], &node.sums.moments[0][0] + 56, &sums.moments[0][0]);
     }
-    AddPoints(cloud_.Of(node.range), node.patch, node.vertices, moments,
-              {.factors = factors.empty() ? nullptr : factors.data() + node.range.begin,
-               .squares = squares == nullptr ? nullptr : squares->data() + node.range.begin},
-              sums);
+    AddMoments(cloud_.Of(node.range), node.patch, node.vertices, moments,
+               {.factors = factors_.empty() ? nullptr : factors_.data() + node.range.begin,
+                .squares = squares == nullptr ? nullptr : squares->data() + node.range.begin},
+               sums);
     node.sums = sums;
-    node.has_moments = node.measured = true;
+    node.has_moments = factors_.empty();
+    node.measured = true;
   });
+}
+
+PatchSystem HierarchicalSplineSpace::SystemOf(const QuadtreeNode& leaf) const {
+  return SystemOfPoints(cloud_.Of(leaf.range), leaf.patch, leaf.vertices,
+                        factors_.empty() ? nullptr : factors_.data() + leaf.range.begin);
+}
+
+Matrix16 HierarchicalSplineSpace::GramOf(const QuadtreeNode& leaf) const {
+  return leaf.range.size() < kFew ? SystemOf(leaf).gram : GramOfMoments(leaf.sums);
+}
+
+PatchMatrix HierarchicalSplineSpace::ResidualOf(const QuadtreeNode& leaf) const {
+  return leaf.range.size() < kFew ? SystemOf(leaf).residual : ResidualOfMoments(leaf.sums);
 }
 
 int HierarchicalSplineSpace::LeafAt(const Vec2& uv) const {
@@ -246,13 +274,24 @@ int HierarchicalSplineSpace::LeafAt(const Vec2& uv) const {
   return node;
 }
 
-std::vector<Vec3> HierarchicalSplineSpace::RestValues() const {
-  std::vector<Vec3> values;
+ControlNet HierarchicalSplineSpace::Values() const {
+  ControlNet net{.columns = rows_, .rows = 1, .vertices = {}};
   for (const ControlDof& dof : dofs_) {
-    const Vec3 place = PlaceOf(rest_, dof.vertex);
-    values.push_back(dof.vertex.level == 0 ? place : Vec3(place - RefinedPlace(rest_, dof.vertex)));
+    if (dof.row >= 0) {
+      net.vertices.push_back(dof.value);
+    }
   }
-  return values;
+  return net;
+}
+
+ControlNet HierarchicalSplineSpace::RestValues() const {
+  ControlNet net{.columns = rows_, .rows = 1, .vertices = {}};
+  for (const ControlDof& dof : dofs_) {
+    if (dof.row >= 0) {
+      net.vertices.push_back(ValueIn(rest_, dof.vertex));
+    }
+  }
+  return net;
 }
 
 void HierarchicalSplineSpace::Rebin() {

@@ -20,7 +20,8 @@ namespace semblance {
 struct ControlDof {
   VertexId vertex;
   Vec3 value = Vec3::Zero();  // mm
-  bool covered = false;       // the finer vertices that it is a sum of are all dofs: it may stay
+  int row = -1;               // among the unknowns; -1: it stays, for the finer vertices that it is
+                              // a sum of are all dofs
 };
 
 struct QuadtreeNode {
@@ -38,30 +39,36 @@ struct QuadtreeNode {
 
 class HierarchicalSplineSpace {
  public:
-  // start and rest: of one shape. All offsets of `start` are dofs.
+  // start and rest: of one shape. All offsets of both are dofs. A level alone is the space of a
+  // surface that has no other (PatchGrid::Shape). Keeps references to rest and cloud.
   HierarchicalSplineSpace(const HSplineSurface& start, const HSplineSurface& rest,
                           const PointCloud& cloud);
 
   const HSplineShape& shape() const { return shape_; }
   const std::vector<ControlDof>& dofs() const { return dofs_; }
   const std::vector<QuadtreeNode>& nodes() const { return nodes_; }
-  int finest() const;  // level with an dof
+  int rows() const { return rows_; }  // unknowns
+  int finest() const;                 // level with a dof
 
   // Makes vertices of levels >= 1 dofs, if they are not yet; the surface stays. Patches are
   // split down to the finest vertex whose support they share.
   void Edit(std::span<const VertexId> vertices);
   bool IsEdited(const VertexId& vertex) const;
-  int LeafAt(const Vec2& uv) const;  // node whose patch holds it
+  int RowOf(const VertexId& vertex) const;  // -1: none, or it stays
+  int LeafAt(const Vec2& uv) const;         // node whose patch holds it
 
-  // Adds a row (mm) to each dof.
-  void Move(const Eigen::MatrixX3d& step);
-  // The values that the dofs have in the template.
-  std::vector<Vec3> RestValues() const;
+  // The unknowns by row, as a net of one row: as they stand, and in the template.
+  void SetValues(const ControlNet& net);
+  ControlNet Values() const;
+  ControlNet RestValues() const;
 
   // Brings the sums of the leaves up to date. factors: of the points' weights, in the cloud's
   // order, or empty; with factors moments are taken anew. squares: null, or |e|^2 of each point.
-  void Measure(std::span<const double> factors, int threads, std::vector<double>* squares);
+  void Measure(std::vector<double> factors, int threads, std::vector<double>* squares);
   double Squares() const;  // of w |e|^2 over all points
+  // What a leaf's points, as measured, add to the normal equations of its sixteen vertices.
+  Matrix16 GramOf(const QuadtreeNode& leaf) const;
+  PatchMatrix ResidualOf(const QuadtreeNode& leaf) const;
 
   // After the cloud was made anew, of points that have moved.
   void Rebin();
@@ -81,11 +88,14 @@ class HierarchicalSplineSpace {
   bool IsCovered(const VertexId& vertex) const;
   void LinkDofs();
   void Refresh();
+  PatchSystem SystemOf(const QuadtreeNode& leaf) const;
 
   HSplineShape shape_;
   const HSplineSurface& rest_;
   const PointCloud& cloud_;
   std::vector<ControlDof> dofs_;
+  int rows_ = 0;
+  std::vector<double> factors_;  // of the last measurement
   std::unordered_map<Key, int> dof_of_;
   std::vector<QuadtreeNode> nodes_;
   std::unordered_map<Key, int> node_of_;

@@ -131,14 +131,14 @@ Matrix16 MakeRefinement(int right, int upper) {
 
 }  // namespace
 
-void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
-               const PatchMatrix& vertices, bool moments, const PointFactors& each,
-               PatchMoments& sums) {
+void AddMoments(std::span<const CloudPoint> points, const PatchId& patch,
+                const PatchMatrix& vertices, bool moments, const PointFactors& each,
+                PatchMoments& sums) {
   Accumulate({points.data(), points.size(), each.factors, each.squares, moments},
              PolynomialOf(patch, vertices), sums);
 }
 
-Matrix16 GramOf(const PatchMoments& sums) {
+Matrix16 GramOfMoments(const PatchMoments& sums) {
   Matrix16 of_powers;
   for (int k = 0; k < 16; ++k) {
     for (int l = 0; l < 16; ++l) {
@@ -148,12 +148,34 @@ Matrix16 GramOf(const PatchMoments& sums) {
   return PowersOfVertices() * of_powers * PowersOfVertices().transpose();
 }
 
-PatchMatrix ResidualOf(const PatchMoments& sums) {
+PatchMatrix ResidualOfMoments(const PatchMoments& sums) {
   PatchMatrix of_powers;
   for (int k = 0; k < 16; ++k) {
     of_powers.row(k) << sums.residual[k][0], sums.residual[k][1], sums.residual[k][2];
   }
   return PowersOfVertices() * of_powers;
+}
+
+PatchSystem SystemOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
+                           const PatchMatrix& vertices, const double* factors) {
+  PatchSystem system;
+  const double scale = 1 << patch.level;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const CloudPoint& p = points[k];
+    const auto along_u = CubicWeights(p.x * scale - patch.i, 0),
+               along_v = CubicWeights(p.y * scale - patch.j, 0);
+    Eigen::Matrix<double, 16, 1> weights;
+    for (int v = 0; v < 16; ++v) {
+      weights[v] = along_u[v % 4] * along_v[v / 4];
+    }
+    const Eigen::RowVector3d position(p.position[0], p.position[1], p.position[2]);
+    const Eigen::RowVector3d e = position - weights.transpose() * vertices;
+    const Eigen::Matrix<double, 16, 1> weighted =
+        (factors == nullptr ? p.weight : p.weight * factors[k]) * weights;
+    system.gram += weighted * weights.transpose();
+    system.residual += weighted * e;
+  }
+  return system;
 }
 
 const Matrix16& RefinementMatrix(int right, int upper) {

@@ -21,7 +21,7 @@ struct PatchMoments {
   double largest = 0;                       // |e|^2, of points whose factor is 0.5 or more
 };
 
-// What AddPoints takes and gives per point; each may be null.
+// What AddMoments takes and gives per point; each may be null.
 struct PointFactors {
   const double* factors = nullptr;  // of the points' weights
   double* squares = nullptr;        // |e|^2
@@ -29,13 +29,22 @@ struct PointFactors {
 
 // Adds the points of `patch`, whose surface is the bicubic B-spline of `vertices`.
 // moments: whether they too are wanted (they do not change with the vertices).
-void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
-               const PatchMatrix& vertices, bool moments, const PointFactors& each,
-               PatchMoments& sums);
+void AddMoments(std::span<const CloudPoint> points, const PatchId& patch,
+                const PatchMatrix& vertices, bool moments, const PointFactors& each,
+                PatchMoments& sums);
 
 // Sum of w N_k N_l, and of w N_k e, N_k being the weight of vertex k.
-Matrix16 GramOf(const PatchMoments& sums);
-PatchMatrix ResidualOf(const PatchMoments& sums);
+Matrix16 GramOfMoments(const PatchMoments& sums);
+PatchMatrix ResidualOfMoments(const PatchMoments& sums);
+
+struct PatchSystem {
+  Matrix16 gram = Matrix16::Zero();
+  PatchMatrix residual = PatchMatrix::Zero();
+};
+// The same point by point: faster for few points, and where a point's weight is nothing or next to
+// nothing the sums are so too. factors: of the points' weights, or null.
+PatchSystem SystemOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
+                           const PatchMatrix& vertices, const double* factors);
 
 // The vertices of the child (right, upper: 0 or 1) of a patch: RefinePatch as a matrix.
 const Matrix16& RefinementMatrix(int right, int upper);

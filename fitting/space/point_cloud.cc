@@ -35,7 +35,8 @@ std::uint64_t PatchOf(const HSplineShape& shape, const PatchPoint& at) {
 
 Key KeyOf(const HSplineShape& shape, const Vec2& uv, std::size_t index) {
   const PatchPoint at = PatchPointAt(shape, 0, uv);
-  const std::uint64_t z = Spread(Cell(at.s)) | Spread(Cell(at.t)) << 1;
+  const std::uint64_t s = Cell(at.s), t = Cell(at.t),
+                      z = shape.max_level == 0 ? s << kBits | t : Spread(s) | Spread(t) << 1;
   return {PatchOf(shape, at) << (2 * kBits) | z, static_cast<std::uint32_t>(index)};
 }
 
@@ -64,9 +65,9 @@ void RadixSort(std::vector<Key>& keys) {
 }
 
 // Points of one cell: by their values.
-void SortTies(const FitTarget& target, std::vector<Key>& keys) {
+void SortTies(const auto& points, std::vector<Key>& keys) {
   const auto value = [&](const Key& key) {
-    const FitPoint& p = target.points[key.index];
+    const auto& p = points[key.index];
     return std::tuple(p.uv.x(), p.uv.y(), p.position.x(), p.position.y(), p.position.z(), p.weight);
   };
   for (std::size_t begin = 0, end = 0; begin < keys.size(); begin = end) {
@@ -81,7 +82,7 @@ void SortTies(const FitTarget& target, std::vector<Key>& keys) {
   }
 }
 
-CloudPoint MakePoint(const HSplineShape& shape, const FitPoint& p) {
+CloudPoint MakePoint(const HSplineShape& shape, const auto& p) {
   const PatchPoint at = PatchPointAt(shape, 0, p.uv);
   return {.x = at.patch.i + at.s,
           .y = at.patch.j + at.t,
@@ -91,26 +92,37 @@ CloudPoint MakePoint(const HSplineShape& shape, const FitPoint& p) {
 
 }  // namespace
 
-PointCloud::PointCloud(const HSplineShape& shape, const FitTarget& target) : shape_(shape) {
+template <class Points>
+void PointCloud::Fill(const Points& given) {
   std::vector<Key> keys;
-  keys.reserve(target.points.size());
-  for (std::size_t k = 0; k < target.points.size(); ++k) {
-    keys.push_back(KeyOf(shape, target.points[k].uv, k));
+  keys.reserve(given.size());
+  for (std::size_t k = 0; k < given.size(); ++k) {
+    keys.push_back(KeyOf(shape_, given[k].uv, k));
   }
   RadixSort(keys);
-  SortTies(target, keys);
+  SortTies(given, keys);
   points_.reserve(keys.size());
   given_.reserve(keys.size());
-  starts_.reserve(static_cast<std::size_t>(shape.patches_u) * shape.patches_v + 1);
+  const std::size_t patches = static_cast<std::size_t>(shape_.patches_u) * shape_.patches_v;
+  starts_.reserve(patches + 1);
   for (const Key& key : keys) {
     while (starts_.size() <= key.value >> (2 * kBits)) {
       starts_.push_back(points_.size());
     }
-    points_.push_back(MakePoint(shape, target.points[key.index]));
+    points_.push_back(MakePoint(shape_, given[key.index]));
     given_.push_back(key.index);
     weight_sum_ += points_.back().weight;
   }
-  starts_.resize(static_cast<std::size_t>(shape.patches_u) * shape.patches_v + 1, points_.size());
+  starts_.resize(patches + 1, points_.size());
+}
+
+PointCloud::PointCloud(const HSplineShape& shape, const FitTarget& target) : shape_(shape) {
+  Fill(target.points);
+}
+
+PointCloud::PointCloud(const HSplineShape& shape, std::span<const Observation> observations)
+    : shape_(shape) {
+  Fill(observations);
 }
 
 PointCloud::Range PointCloud::PatchOfLevel0(int i, int j) const {

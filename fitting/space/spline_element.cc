@@ -4,8 +4,7 @@
 namespace semblance {
 namespace {
 
-SplineElement ElementOf(const HierarchicalSplineSpace& space, int leaf,
-                        const std::vector<int>& dof_of_space) {
+SplineElement ElementOf(const HierarchicalSplineSpace& space, int leaf) {
   const std::vector<QuadtreeNode>& nodes = space.nodes();
   SplineElement element;
   element.patch = nodes[leaf].patch;
@@ -20,10 +19,11 @@ SplineElement ElementOf(const HierarchicalSplineSpace& space, int leaf,
       if (dof < 0) {
         continue;
       }
-      if (dof_of_space[dof] < 0) {
-        element.fixed += refinement.col(k) * space.dofs()[dof].value.transpose();
+      const ControlDof& unknown = space.dofs()[dof];
+      if (unknown.row < 0) {
+        element.fixed += refinement.col(k) * unknown.value.transpose();
       } else {
-        element.dofs.push_back(dof_of_space[dof]);
+        element.dofs.push_back(unknown.row);
         columns.emplace_back(refinement.col(k));
       }
     }
@@ -49,46 +49,17 @@ PatchMatrix SplineElement::Vertices(const ControlNet& net) const {
 
 SplineElements::SplineElements(const HierarchicalSplineSpace& space)
     : space_(space), element_of_(space.nodes().size(), -1) {
-  std::vector<int> dof_of_space(space.dofs().size(), -1);
-  for (std::size_t k = 0; k < space.dofs().size(); ++k) {
-    if (!space.dofs()[k].covered) {
-      dof_of_space[k] = dofs();
-      of_space_.push_back(static_cast<int>(k));
+  for (const ControlDof& dof : space.dofs()) {
+    if (dof.row >= 0) {
+      vertices_.push_back(dof.vertex);
     }
   }
   for (std::size_t k = 0; k < space.nodes().size(); ++k) {
     if (space.nodes()[k].children < 0) {
       element_of_[k] = size();
-      elements_.push_back(ElementOf(space, static_cast<int>(k), dof_of_space));
+      elements_.push_back(ElementOf(space, static_cast<int>(k)));
     }
   }
-}
-
-ControlNet SplineElements::NetOf(const std::vector<Vec3>& of_all) const {
-  ControlNet net{.columns = dofs(), .rows = 1, .vertices = {}};
-  for (const int k : of_space_) {
-    net.vertices.push_back(of_all[k]);
-  }
-  return net;
-}
-
-ControlNet SplineElements::Values() const {
-  std::vector<Vec3> values;
-  for (const ControlDof& dof : space_.dofs()) {
-    values.push_back(dof.value);
-  }
-  return NetOf(values);
-}
-
-ControlNet SplineElements::RestValues() const { return NetOf(space_.RestValues()); }
-
-Eigen::MatrixX3d SplineElements::StepTo(const ControlNet& values) const {
-  Eigen::MatrixX3d step =
-      Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(space_.dofs().size()), 3);
-  for (std::size_t k = 0; k < of_space_.size(); ++k) {
-    step.row(of_space_[k]) = values.vertices[k] - space_.dofs()[of_space_[k]].value;
-  }
-  return step;
 }
 
 }  // namespace semblance

@@ -14,7 +14,7 @@ struct SplineElement {
   PatchId patch;
   int patches_u = 0;  // of its level
   int patches_v = 0;
-  std::vector<int> dofs;  // columns of the extraction; one may stand twice
+  std::vector<int> dofs;  // unknowns: columns of the extraction; one may stand twice
   // The patch's vertices are extraction * dofs + fixed. 16 x dofs; 16 x 0 stands for the identity.
   Eigen::Matrix<double, 16, Eigen::Dynamic> extraction{16, 0};
   PatchMatrix fixed = PatchMatrix::Zero();  // mm; of dofs that do not take part
@@ -24,7 +24,7 @@ struct SplineElement {
   PatchMatrix Vertices(const ControlNet& net) const;  // net: the values of all dofs
 };
 
-// The leaves of a space as it stands, over those of its dofs that are not covered.
+// The leaves of a space as it stands, over its unknowns.
 class SplineElements {
  public:
   // Keeps a reference to the space, which must not be edited.
@@ -35,21 +35,13 @@ class SplineElements {
   int At(const Vec2& uv) const { return element_of_[space_.LeafAt(uv)]; }
 
   const HSplineShape& shape() const { return space_.shape(); }
-  int dofs() const { return static_cast<int>(of_space_.size()); }
-  const VertexId& Vertex(int dof) const { return space_.dofs()[of_space_[dof]].vertex; }
-  // The values of the dofs as a net of one row: where the space has them, and in the template.
-  ControlNet Values() const;
-  ControlNet RestValues() const;
-  // What takes the space's dofs to these values: rows of HierarchicalSplineSpace::Move.
-  Eigen::MatrixX3d StepTo(const ControlNet& values) const;
+  const VertexId& Vertex(int row) const { return vertices_[row]; }
 
  private:
-  ControlNet NetOf(const std::vector<Vec3>& of_all) const;
-
   const HierarchicalSplineSpace& space_;
   std::vector<SplineElement> elements_;
-  std::vector<int> element_of_;  // of each node, or -1
-  std::vector<int> of_space_;    // each dof's index in the space
+  std::vector<int> element_of_;     // of each node, or -1
+  std::vector<VertexId> vertices_;  // of each unknown
 };
 
 }  // namespace semblance

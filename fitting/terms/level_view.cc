@@ -10,15 +10,15 @@
 #include "surfaces/base/error.h"
 
 namespace semblance {
+namespace {
 
+// The point as it stands.
 Observation Observe(const FitPoint& point) {
   return {.uv = point.uv,
           .position = point.position,
           .weight = point.weight,
           .landmark = point.role == PointRole::kLandmark};
 }
-
-namespace {
 
 // The detail that finer levels add at uv is taken off the point that the level aims at.
 Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
@@ -150,12 +150,21 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
   return view;
 }
 
+void SortObservations(const PointCloud& cloud, std::vector<Observation>& observations) {
+  std::vector<Observation> sorted;
+  sorted.reserve(observations.size());
+  for (std::size_t k = 0; k < observations.size(); ++k) {
+    sorted.push_back(observations[cloud.Given(k)]);
+  }
+  observations = std::move(sorted);
+}
+
 LevelView ViewOfSpace(const HierarchicalSplineSpace& space, const PointCloud& cloud,
                       const FitTarget& target, const Vec2& lengths_mm) {
   const auto elements = std::make_shared<const SplineElements>(space);
   LevelView view{.grid = {},
-                 .start = elements->Values(),
-                 .rest = elements->RestValues(),
+                 .start = space.Values(),
+                 .rest = space.RestValues(),
                  .lengths_mm = lengths_mm,
                  .observations = {},
                  .space = elements};

@@ -19,14 +19,6 @@
 
 namespace semblance {
 
-// One point that the level should meet: its plain B-spline at uv is to be `position`.
-struct Observation {
-  Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
-  Vec3 position = Vec3::Constant(kNaN);  // mm
-  double weight = 1;                     // > 0, relative to the other points
-  bool landmark = false;                 // a standard one, for LandmarkTerm
-};
-
 // A point whose foot on the bone is known; all less what finer levels add to it.
 struct BoneObservation {
   Observation point;
@@ -86,9 +78,6 @@ struct LevelView {
 void AddElementRows(const SplineElement& element, std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                     RowSink& sink);
 
-// The point as it stands.
-Observation Observe(const FitPoint& point);
-
 struct ViewOptions {
   FitAim aim = FitAim::kSurface;
   std::span<const VertexId> held = {};  // of any level
@@ -99,6 +88,10 @@ struct ViewOptions {
 // shape. Throws InputError for a level that the surface does not have, or another shape.
 LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
                       const FitTarget& target, int level, const ViewOptions& options = {});
+
+// In the order of the cloud that was made of them: those of a patch together, and the order in
+// which they were given without effect.
+void SortObservations(const PointCloud& cloud, std::vector<Observation>& observations);
 
 // All levels as they stand, with the points of the target in the order of its cloud, in which those
 // of a leaf stand together. lengths_mm: of the template. Keeps a reference to the space, which must

@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <vector>
@@ -120,12 +121,74 @@ double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNe
   return Energy(term, view, net);
 }
 
+VertexId MirrorOf(const HSplineShape& shape, const VertexId& vertex) {
+  const int columns = shape.Columns(vertex.level);
+  const int mirrored = shape.closure == Closure::kPeriodicU ? (columns + 2 - vertex.i) % columns
+                                                            : columns - 1 - vertex.i;
+  return {vertex.level, mirrored, vertex.j};
+}
+
 namespace {
 
-int MirrorOf(const PatchGrid& grid, int vertex) {
-  const int columns = grid.Columns(), i = vertex % columns;
-  const int mirrored = grid.periodic_u ? (columns + 2 - i) % columns : columns - 1 - i;
-  return vertex - i + mirrored;
+// A control vertex of an element, as a weighted sum of the unknowns.
+struct Control {
+  int twin = -1;     // the index of its mirror
+  double share = 1;  // of the domain, relative
+  Vec3 rest = Vec3::Zero(), fixed = Vec3::Zero();
+  std::vector<int> dofs;
+  Eigen::RowVectorXd weights;
+
+  Vec3 At(const ControlNet& net) const {
+    Vec3 sum = fixed;
+    for (std::size_t k = 0; k < dofs.size(); ++k) {
+      sum += weights[static_cast<Eigen::Index>(k)] * net.vertices[dofs[k]];
+    }
+    return sum;
+  }
+};
+
+Control ControlOf(const SplineElement& element, int k) {
+  Control control{.share = std::pow(0.25, element.patch.level),
+                  .rest = element.rest.row(k),
+                  .fixed = element.fixed.row(k),
+                  .dofs = element.dofs,
+                  .weights = {}};
+  if (element.IsIdentity()) {
+    control.dofs = {element.dofs[k]};
+    control.weights = Eigen::RowVectorXd::Ones(1);
+  } else {
+    control.weights = element.extraction.row(k);
+  }
+  return control;
+}
+
+// Each vertex of each patch's own level once.
+std::vector<Control> ControlsOf(const LevelView& view) {
+  const HSplineShape shape = view.space != nullptr ? view.space->shape() : view.grid.Shape();
+  std::map<VertexId, int> index;
+  std::vector<Control> controls;
+  for (int e = 0; e < view.elements(); ++e) {
+    const SplineElement element = view.Element(e);
+    const PatchId& p = element.patch;
+    for (int k = 0; k < 16; ++k) {
+      const VertexId vertex{p.level, shape.Column(p.level, p.i + k % 4), p.j + k / 4};
+      if (index.try_emplace(vertex, static_cast<int>(controls.size())).second) {
+        controls.push_back(ControlOf(element, k));
+      }
+    }
+  }
+  for (const auto& [vertex, k] : index) {
+    controls[k].twin = index.at(MirrorOf(shape, vertex));
+  }
+  return controls;
+}
+
+double ShareOf(const std::vector<Control>& controls) {
+  double sum = 0;
+  for (const Control& control : controls) {
+    sum += control.share;
+  }
+  return sum;
 }
 
 struct Mirror {
@@ -135,16 +198,16 @@ struct Mirror {
 
 // The reflection that takes the template's vertices nearest to their mirrors: its normal n makes
 // n . sum_k x_k y_k^T n least, x and y being a vertex and its mirror from their common centre.
-Mirror MirrorOf(const LevelView& view) {
-  const std::vector<Vec3>& rest = view.rest.vertices;
+Mirror MirrorOf(const std::vector<Control>& controls) {
+  const double all = ShareOf(controls);
   Mirror mirror;
-  for (const Vec3& v : rest) {
-    mirror.point += v / static_cast<double>(rest.size());
+  for (const Control& control : controls) {
+    mirror.point += control.share / all * control.rest;
   }
   Mat3 sum = Mat3::Zero();
-  for (std::size_t k = 0; k < rest.size(); ++k) {
-    const Vec3& twin = rest[MirrorOf(view.grid, static_cast<int>(k))];
-    sum += (rest[k] - mirror.point) * (twin - mirror.point).transpose();
+  for (const Control& control : controls) {
+    const Vec3& twin = controls[control.twin].rest;
+    sum += control.share * (control.rest - mirror.point) * (twin - mirror.point).transpose();
   }
   const Mat3 symmetric = sum + sum.transpose();
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(symmetric);
@@ -154,8 +217,8 @@ Mirror MirrorOf(const LevelView& view) {
 }
 
 // Where a vertex's f is zero.
-Vec3 Origin(const SymmetryTerm& term, const LevelView& view, const Mirror& mirror, int vertex) {
-  return term.of == SmoothnessOf::kDisplacement ? view.rest.vertices[vertex] : mirror.point;
+Vec3 Origin(const SymmetryTerm& term, const Mirror& mirror, const Control& control) {
+  return term.of == SmoothnessOf::kDisplacement ? control.rest : mirror.point;
 }
 
 }  // namespace
@@ -163,32 +226,43 @@ Vec3 Origin(const SymmetryTerm& term, const LevelView& view, const Mirror& mirro
 // Both vertices of a pair have the same misfit, so one stands for both.
 void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem) {
-  const Mirror mirror = MirrorOf(view);
-  const double scale = term.weight / static_cast<double>(net.vertices.size());
-  for (int k = 0; k < static_cast<int>(net.vertices.size()); ++k) {
-    const int twin = MirrorOf(view.grid, k);
-    if (twin < k) {
+  const std::vector<Control> controls = ControlsOf(view);
+  const Mirror mirror = MirrorOf(controls);
+  const double all = ShareOf(controls);
+  for (int k = 0; k < static_cast<int>(controls.size()); ++k) {
+    const Control &control = controls[k], &twin = controls[control.twin];
+    if (control.twin < k) {
       continue;
     }
-    const double factor = std::sqrt(twin == k ? scale : 2 * scale);
-    Eigen::MatrixXd a(3, 6);
-    a << factor * Mat3::Identity(), -factor * mirror.reflection;
-    Eigen::VectorXd origins(6);
-    origins << Origin(term, view, mirror, k), Origin(term, view, mirror, twin);
-    AddCoupledResidual(a, a * origins, std::array{k, twin}, net, problem);
+    const double factor =
+        std::sqrt((control.twin == k ? 1 : 2) * term.weight * control.share / all);
+    const Eigen::Index own = control.weights.size();
+    Eigen::MatrixXd a(3, 3 * (own + twin.weights.size()));
+    for (Eigen::Index d = 0; d < own; ++d) {
+      a.middleCols<3>(3 * d) = factor * control.weights[d] * Mat3::Identity();
+    }
+    for (Eigen::Index d = 0; d < twin.weights.size(); ++d) {
+      a.middleCols<3>(3 * (own + d)) = -factor * twin.weights[d] * mirror.reflection;
+    }
+    const Vec3 f = control.fixed - Origin(term, mirror, control),
+               g = twin.fixed - Origin(term, mirror, twin);
+    std::vector<int> dofs = control.dofs;
+    dofs.insert(dofs.end(), twin.dofs.begin(), twin.dofs.end());
+    AddCoupledResidual(a, -factor * (f - mirror.reflection * g), dofs, net, problem);
   }
 }
 
 double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net) {
-  const Mirror mirror = MirrorOf(view);
+  const std::vector<Control> controls = ControlsOf(view);
+  const Mirror mirror = MirrorOf(controls);
   double sum = 0;
-  for (int k = 0; k < static_cast<int>(net.vertices.size()); ++k) {
-    const int twin = MirrorOf(view.grid, k);
-    const Vec3 f = net.vertices[k] - Origin(term, view, mirror, k);
-    const Vec3 g = net.vertices[twin] - Origin(term, view, mirror, twin);
-    sum += (f - mirror.reflection * g).squaredNorm();
+  for (const Control& control : controls) {
+    const Control& twin = controls[control.twin];
+    const Vec3 f = control.At(net) - Origin(term, mirror, control),
+               g = twin.At(net) - Origin(term, mirror, twin);
+    sum += control.share * (f - mirror.reflection * g).squaredNorm();
   }
-  return term.weight * sum / static_cast<double>(net.vertices.size());
+  return term.weight * sum / ShareOf(controls);
 }
 
 namespace {

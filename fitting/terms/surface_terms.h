@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "fitting/terms/term_weight.h"
+#include "surfaces/hspline/hspline_shape.h"
 
 namespace semblance {
 
@@ -92,7 +93,9 @@ void Fields(Visitor& visit, MembraneTerm& o) {
 // Left and right alike: weight * mean over the level's control vertices of
 // |f(i,j) - R f(mirror of (i,j))|^2, mm^2; f is the displacement from the template (its own
 // asymmetry survives) or the vertex itself. The mirror of a vertex has 1 - u; R reflects at the
-// template's mid-sagittal plane, the plane that best maps its control vertices to their mirrors.
+// template's mid-sagittal plane, the plane that best maps its control vertices to their mirrors. Of
+// all levels at once: of the vertices of each patch's own level, weighted by the patch's share of
+// the domain; where a vertex is edited its mirror is too.
 struct SymmetryTerm {
   static constexpr std::string_view kName = "symmetry";
   double weight = 0.01;
@@ -105,6 +108,9 @@ void Fields(Visitor& visit, SymmetryTerm& o) {
                   .doc = "what is symmetric: displacement from the template, or surface"},
         o.of);
 }
+
+// The vertex at 1 - u.
+VertexId MirrorOf(const HSplineShape& shape, const VertexId& vertex);
 
 enum class DistortionOf { kMetric, kArea };
 constexpr auto EnumNames(DistortionOf) {

@@ -7,16 +7,14 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <map>
+#include <optional>
 #include <utility>
 #include <variant>
 
-#include "fitting/least_squares/noise_sink.h"
-#include "fitting/least_squares/normal_equations.h"
-#include "fitting/level/auto_weight.h"
-#include "fitting/level/reweighting.h"
-#include "fitting/terms/level_view.h"
+#include "fitting/least_squares/sparse_factor.h"
+#include "fitting/solve/space_solve.h"
 #include "fitting/terms/term_cost.h"
-#include "fitting/uncertainty/subspace.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
@@ -30,64 +28,39 @@ bool IsOfPoints(const Term& term) {
          std::holds_alternative<TangentPointTerm>(term);
 }
 
-bool IsOfRows(const Term& term) {
-  return std::visit([]<class T>(const T&) { return RowTerm<T>; }, term);
-}
-
-// The terms with a weight that are not of the points, and are rows.
+// The terms with a weight that are not of the points.
 std::vector<Term> OthersAmong(std::span<const Term> terms) {
   std::vector<Term> others;
-  std::copy_if(terms.begin(), terms.end(), std::back_inserter(others), [](const Term& term) {
-    return WeightOf(term) > 0 && IsOfRows(term) && !IsOfPoints(term);
-  });
+  std::copy_if(terms.begin(), terms.end(), std::back_inserter(others),
+               [](const Term& term) { return WeightOf(term) > 0 && !IsOfPoints(term); });
   return others;
-}
-
-double CostOf(std::span<const Term> terms, const LevelView& view) {
-  double sum = 0;
-  for (const Term& term : terms) {
-    sum += std::visit([&](const auto& t) { return TermCost(t, view, view.start); }, term);
-  }
-  return sum;
 }
 
 std::vector<std::string_view> LeftOut(std::span<const Term> terms) {
   std::vector<std::string_view> names;
   for (const Term& term : terms) {
-    if (WeightOf(term) > 0 && !IsOfRows(term) && !IsOfPoints(term)) {
+    if (!IsAssembled(term) && !IsOfPoints(term)) {
       names.push_back(TermName(term));
     }
   }
   return names;
 }
 
-// The terms with numbers for `weight: auto`, which is chosen as if the points had no loss and no
-// term coupled x, y and z.
-std::vector<Term> WithNumbers(std::span<const Term> given, const LevelView& view) {
-  std::vector<Term> terms(given.begin(), given.end());
-  const int chosen = AutoTerm(terms);
-  if (chosen < 0) {
-    return terms;
+// Those that are solved for: tangent_points as points, and nothing of what couples x, y and z.
+std::vector<Term> Solved(std::span<const Term> terms) {
+  std::vector<Term> solved;
+  for (const Term& term : terms) {
+    if (const auto* const tangent = std::get_if<TangentPointTerm>(&term); tangent != nullptr) {
+      solved.emplace_back(PointTerm{.weight = tangent->weight});
+    } else if (IsAssembled(term)) {
+      solved.push_back(term);
+    }
   }
-  std::vector<Term> plain = terms;
-  for (Term& term : plain) {
-    std::visit(
-        []<class T>(T& t) {
-          if constexpr (std::is_same_v<T, PointTerm>) {
-            t.loss = RobustLoss::kNone;
-          } else if constexpr (!RowTerm<T>) {
-            t.weight = 0;
-          }
-        },
-        term);
-  }
-  double weight = kNaN;
-  terms[chosen] = WithChosenWeight(view, plain, weight)[chosen];
-  return terms;
+  return solved;
 }
 
-void Check(const LevelView& view, const PointErrors& errors, const std::vector<double>& weights) {
-  const std::size_t count = view.observations.size();
+void Check(const FitTarget& target, const PointErrors& errors, const std::vector<double>& weights) {
+  const std::size_t count = target.points.size();
   if (errors.directions.size() != count || errors.root.rows() != static_cast<Eigen::Index>(count)) {
     throw InputError(
         fmt::format("uncertainty: {} directions and {} rows of errors for {} points; give one each",
@@ -128,153 +101,238 @@ Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd left, double share) {
 
 namespace {
 
-double Sum(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) {
-    sum += value;
+// The points less what levels finer than `level` add.
+FitTarget LessFiner(const HSplineSurface& surface, const HSplineSurface& rest,
+                    const FitTarget& target, int level) {
+  const LevelView view = ViewOfLevel(surface, rest, target, level);
+  FitTarget moved = target;
+  moved.anchors.clear();
+  for (std::size_t k = 0; k < moved.points.size(); ++k) {
+    moved.points[k].position = view.observations[k].position;
   }
-  return sum;
+  return moved;
 }
 
-// All rows: the points as one term at the weights that they have in the cost.
-void AddAll(std::span<const Term> terms, const LevelView& view, const std::vector<double>& weights,
-            RowSink& sink) {
-  LevelView points = view;
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    points.observations[k].weight = weights[k];
-  }
-  AddRows(PointTerm{.weight = Sum(weights)}, points, sink);
-  AddRows(OthersAmong(terms), view, sink);
-}
-
-SparseMatrix NormalOf(const LevelView& view, const auto& add_rows) {
-  NormalMatrix matrix(view.grid);
-  add_rows(matrix);
-  return matrix.Lower();
-}
-
-// A'W times the points' errors along one coordinate.
-Eigen::MatrixXd Pull(const LevelView& view, const std::vector<double>& weights,
-                     const PointErrors& errors, int coordinate) {
-  Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(view.start.vertices.size(), errors.root.cols());
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    const Stencil s = view.grid.StencilAt(view.observations[k].uv);
-    for (int v = 0; v < 16; ++v) {
-      pull.row(s.index[v]) +=
-          weights[k] * s.weight[v] * errors.directions[k][coordinate] * errors.root.row(k);
+HSplineSurface UpTo(int level, const HSplineSurface& surface) {
+  HSplineShape shape = surface.shape();
+  shape.max_level = level;
+  HSplineSurface coarse(shape, surface.Net(0));
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  for (const auto& [vertex, offset] : surface.Offsets()) {
+    if (vertex.level <= level) {
+      offsets.emplace(vertex, offset);
     }
   }
-  return pull;
+  coarse.SetOffsets(offsets);
+  return coarse;
 }
 
-// trace(M^-1 A'WA), a point at a time.
-double Determined(const LevelView& view, const std::vector<double>& weights,
-                  const SubspaceSolver& factor) {
-  const auto count = static_cast<Eigen::Index>(weights.size());
-  const auto vertices = static_cast<Eigen::Index>(view.start.vertices.size());
-  double trace = 0;
-  for (Eigen::Index begin = 0; begin < count; begin += kAtOnce) {
-    const Eigen::Index part = std::min(kAtOnce, count - begin);
-    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(vertices, part);
-    for (Eigen::Index k = 0; k < part; ++k) {
-      const Stencil s = view.grid.StencilAt(view.observations[begin + k].uv);
-      for (int v = 0; v < 16; ++v) {
-        rows(s.index[v], k) += std::sqrt(weights[begin + k]) * s.weight[v];
-      }
-    }
-    trace += rows.cwiseProduct(factor.Solve(rows)).sum();
-  }
-  return trace;
+// Whether the level was fitted with finer vertices only in places.
+bool IsFinerInPlaces(const HSplineSurface& surface, int level) {
+  const std::size_t edited = surface.Offsets(level).size(),
+                    all = static_cast<std::size_t>(surface.Columns(level)) * surface.Rows(level);
+  return level > 0 && edited > 0 && edited < all;
 }
+
+// Sum of A^T z over the rows, z random of unit variance: its covariance is that of the rows' normal
+// matrix (perturb and solve; Papandreou & Yuille 2010).
+class NoiseSink final : public RowSink {
+ public:
+  NoiseSink(Eigen::Index vertices, Random& random)
+      : random_(random), sum_(Eigen::MatrixX3d::Zero(vertices, 3)) {}
+
+  void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 /*b*/,
+           std::span<const int> vertices) override {
+    Rows3 noise(a->rows(), 3);
+    for (Eigen::Index k = 0; k < noise.size(); ++k) {
+      noise(k / 3, k % 3) = random_.Normal();
+    }
+    const Eigen::MatrixX3d pull = a->transpose() * noise;
+    for (std::size_t k = 0; k < vertices.size(); ++k) {
+      sum_.row(vertices[k]) += pull.row(static_cast<Eigen::Index>(k));
+    }
+  }
+  const Eigen::MatrixX3d& Sum() const { return sum_; }  // vertices x 3
+
+ private:
+  Random& random_;
+  Eigen::MatrixX3d sum_;
+};
+
+// A point of the surface as a weighted sum of the unknowns.
+struct PointRow {
+  std::vector<int> index;
+  std::vector<double> weight;
+  PointRow(const LevelView& view, const Vec2& uv) {
+    const DofStencil stencil = view.StencilAt(uv);
+    index.assign(stencil.dofs().begin(), stencil.dofs().end());
+    weight.assign(stencil.weight.begin(), stencil.weight.begin() + stencil.count);
+  }
+};
 
 }  // namespace
 
 struct ErrorPropagation::Model {
   HSplineSurface surface;
   int level;
-  LevelView view;
-  std::vector<Term> terms;
-  std::vector<double> weights;                 // of the points, in the cost
-  std::vector<Term> others;                    // of the terms, those that make P
-  SparseMatrix others_normal;                  // P, lower
-  SparseMatrix normal;                         // M, lower
-  SubspaceSolver factor;                       // of M
+  FitTarget target;  // for all levels up to `level`
+  bool in_places;
+  std::vector<Term> given;
+  std::unique_ptr<SpaceSolve> solve;
+  std::vector<PointRow> rows = {};             // of the points, in the order given
+  std::vector<double> weights = {};            // of the points, in the cost
+  std::vector<Term> others = {};               // of the terms, those that make P
+  SparseMatrix others_normal = {};             // P, lower
+  SparseMatrix normal = {};                    // M, lower
+  std::unique_ptr<SparseFactor> factor = {};   // of M
   std::array<Eigen::MatrixXd, 3> points = {};  // M^-1 A'W root of each coordinate, transposed
-  Eigen::MatrixXd undone = {};                 // vertices x 3, mm
+  Eigen::MatrixXd undone = {};                 // unknowns x 3, mm
   double determined = kNaN;
   double prior_sd = 0;
 
-  Model(const HSplineSurface& fitted, const HSplineSurface& rest, const FitTarget& target,
-        int fitted_level, std::span<const Term> given)
+  Model(const HSplineSurface& fitted, const HSplineSurface& rest, const FitTarget& points_given,
+        int fitted_level, std::span<const Term> terms)
       : surface(fitted),
         level(fitted_level),
-        view(ViewOfLevel(fitted, rest, target, fitted_level)),
-        terms(WithNumbers(given, view)),
-        weights(CostWeights(view, terms, view.start)),
-        others(OthersAmong(terms)),
-        others_normal(NormalOf(view, [&](RowSink& sink) { AddRows(others, view, sink); })),
-        normal(NormalOf(view, [&](RowSink& sink) { AddAll(terms, view, weights, sink); })),
-        factor(normal, SubspaceBasis(fitted, fitted_level)) {}
-
-  void Solve(const PointErrors& errors) {
-    for (int c = 0; c < 3; ++c) {
-      points[c] = factor.Solve(Pull(view, weights, errors, c)).transpose();
+        target(LessFiner(fitted, rest, points_given, fitted_level)),
+        in_places(IsFinerInPlaces(fitted, fitted_level)),
+        given(terms.begin(), terms.end()) {
+    const std::vector<Term> solved = Solved(terms);
+    if (in_places) {
+      const HSplineSurface coarse = UpTo(level, fitted), coarse_rest = UpTo(level, rest);
+      solve = std::make_unique<SpaceSolve>(SpaceProblem{.start = coarse,
+                                                        .rest = coarse_rest,
+                                                        .target = target,
+                                                        .terms = solved,
+                                                        .settled = true});
+    } else {
+      solve = std::make_unique<SpaceSolve>(ViewOfLevel(fitted, rest, points_given, level), solved,
+                                           Solver::kFastest);
     }
-    NormalResidual residual(view.start);
-    AddAll(terms, view, weights, residual);
-    undone = factor.Solve(residual.Sum());
-    determined = Determined(view, weights, factor);
-    prior_sd = determined > 0 ? std::sqrt(CostOf(others, view) / (3 * determined)) : 0;
+    weights = solve->PointWeights();
+    for (const FitPoint& point : target.points) {
+      rows.emplace_back(solve->View(), point.uv);
+    }
   }
 
-  std::vector<char> Touched() const {
-    const Eigen::VectorXd diagonal = normal.diagonal();
-    std::vector<char> touched;
-    for (const double d : diagonal) {
-      touched.push_back(d > 1e-12 * diagonal.maxCoeff() ? 1 : 0);
+  void Solve(const PointErrors& errors) {
+    solve->ChooseSmoothness();
+    others = OthersAmong(solve->terms());
+    others_normal = solve->System(others).lower;
+    NormalSystem system = solve->System(solve->terms());
+    normal = std::move(system.lower);
+    factor = std::make_unique<SparseFactor>(normal,
+                                            1e-11 * std::max(normal.diagonal().maxCoeff(), 1e-12));
+    if (!factor->usable()) {
+      throw InputError(
+          "uncertainty: the normal matrix has no factor; add a prior or smoothness term");
     }
-    return touched;
+    for (int c = 0; c < 3; ++c) {
+      points[c] = factor->Solve(Pull(errors, c)).transpose();
+    }
+    undone = factor->Solve(system.right);
+    determined = Determined();
+    prior_sd = determined > 0 ? std::sqrt(CostOfOthers() / (3 * determined)) : 0;
+  }
+
+  double CostOfOthers() const {
+    const LevelView& view = solve->View();
+    double sum = 0;
+    for (const Term& term : others) {
+      sum += std::visit([&](const auto& t) { return TermCost(t, view, view.start); }, term);
+    }
+    return sum;
+  }
+
+  // A'W times the points' errors along one coordinate.
+  Eigen::MatrixXd Pull(const PointErrors& errors, int coordinate) const {
+    Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(normal.rows(), errors.root.cols());
+    for (std::size_t k = 0; k < weights.size(); ++k) {
+      for (std::size_t v = 0; v < rows[k].index.size(); ++v) {
+        pull.row(rows[k].index[v]) +=
+            weights[k] * rows[k].weight[v] * errors.directions[k][coordinate] * errors.root.row(k);
+      }
+    }
+    return pull;
+  }
+
+  // trace(M^-1 A'WA), some points at a time.
+  double Determined() const {
+    const auto count = static_cast<Eigen::Index>(weights.size());
+    double trace = 0;
+    for (Eigen::Index begin = 0; begin < count; begin += kAtOnce) {
+      const Eigen::Index part = std::min(kAtOnce, count - begin);
+      Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(normal.rows(), part);
+      for (Eigen::Index k = 0; k < part; ++k) {
+        const PointRow& row = rows[begin + k];
+        for (std::size_t v = 0; v < row.index.size(); ++v) {
+          columns(row.index[v], k) += std::sqrt(weights[begin + k]) * row.weight[v];
+        }
+      }
+      trace += columns.cwiseProduct(factor->Solve(columns)).sum();
+    }
+    return trace;
   }
 
   // Of the points' errors and of what is undone, along the normal.
-  double VarianceOfPoints(const Stencil& s, const Vec3& normal_there) const {
+  double VarianceOfPoints(const PointRow& row, const Vec3& normal_there) const {
     Eigen::VectorXd along = Eigen::VectorXd::Zero(points[0].rows());
     double left = 0;
-    for (int v = 0; v < 16; ++v) {
+    for (std::size_t v = 0; v < row.index.size(); ++v) {
       for (int c = 0; c < 3; ++c) {
-        along += s.weight[v] * normal_there[c] * points[c].col(s.index[v]);
-        left += s.weight[v] * normal_there[c] * undone(s.index[v], c);
+        along += row.weight[v] * normal_there[c] * points[c].col(row.index[v]);
+        left += row.weight[v] * normal_there[c] * undone(row.index[v], c);
       }
     }
     return along.squaredNorm() + left * left;
   }
 
-  // s' M^-1 P M^-1 s of each stencil, a slab of columns of the matrix at a time.
-  std::vector<double> VarianceOfOthers(const std::vector<Stencil>& stencils) const {
-    std::vector<std::vector<std::pair<int, int>>> uses(normal.rows());  // stencil, its entry
-    for (std::size_t k = 0; k < stencils.size(); ++k) {
-      for (int v = 0; v < 16; ++v) {
-        uses[stencils[k].index[v]].emplace_back(static_cast<int>(k), v);
+  // s' M^-1 P M^-1 s of each row, a slab of columns of the matrix at a time.
+  std::vector<double> VarianceOfOthers(const std::vector<PointRow>& at) const {
+    std::vector<std::vector<std::pair<int, int>>> uses(normal.rows());  // row, its entry
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      for (std::size_t v = 0; v < at[k].index.size(); ++v) {
+        uses[at[k].index[v]].emplace_back(static_cast<int>(k), static_cast<int>(v));
       }
     }
-    std::vector<double> variances(stencils.size(), 0);
+    std::vector<double> variances(at.size(), 0);
     for (Eigen::Index begin = 0; begin < normal.rows(); begin += kAtOnce) {
       const Eigen::Index part = std::min(kAtOnce, normal.rows() - begin);
-      const Eigen::MatrixXd inverse = factor.Solve(UnitColumns(normal.rows(), begin, part));
+      const Eigen::MatrixXd inverse = factor->Solve(UnitColumns(normal.rows(), begin, part));
       const Eigen::MatrixXd columns =
-          factor.Solve(others_normal.selfadjointView<Eigen::Lower>() * inverse);
+          factor->Solve(others_normal.selfadjointView<Eigen::Lower>() * inverse);
       for (Eigen::Index column = 0; column < part; ++column) {
         for (const auto& [k, entry] : uses[begin + column]) {
-          const Stencil& s = stencils[k];
           double sum = 0;
-          for (int v = 0; v < 16; ++v) {
-            sum += s.weight[v] * columns(s.index[v], column);
+          for (std::size_t v = 0; v < at[k].index.size(); ++v) {
+            sum += at[k].weight[v] * columns(at[k].index[v], column);
           }
-          variances[k] += s.weight[entry] * sum;
+          variances[k] += at[k].weight[entry] * sum;
         }
       }
     }
     return variances;
+  }
+
+  // Whether some term says something of each unknown that makes a point.
+  bool IsKnown(const PointRow& row, const Eigen::VectorXd& diagonal) const {
+    const double least = 1e-12 * diagonal.maxCoeff();
+    for (std::size_t v = 0; v < row.index.size(); ++v) {
+      if (!(diagonal[row.index[v]] > least) && row.weight[v] != 0) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  HSplineSurface After(const Eigen::MatrixX3d& step) const {
+    HSplineSurface moved = surface;
+    ControlNet net = solve->View().start;
+    for (Eigen::Index k = 0; !in_places && k < step.rows(); ++k) {
+      net.vertices[k] += step.row(k).transpose();
+    }
+    moved.SetNet(level, in_places ? solve->SurfaceAfter(step).Net(level) : net);
+    return moved;
   }
 };
 
@@ -282,11 +340,7 @@ ErrorPropagation::ErrorPropagation(const HSplineSurface& surface, const HSplineS
                                    const FitTarget& target, int level, std::span<const Term> terms,
                                    const PointErrors& errors) {
   auto model = std::make_unique<Model>(surface, rest, target, level, terms);
-  Check(model->view, errors, model->weights);
-  if (!model->factor.usable()) {
-    throw InputError(
-        "uncertainty: the normal matrix has no factor; add a prior or smoothness term");
-  }
+  Check(target, errors, model->weights);
   model->Solve(errors);
   model_ = std::move(model);
 }
@@ -296,51 +350,41 @@ ErrorPropagation::ErrorPropagation(ErrorPropagation&&) noexcept = default;
 std::vector<double> ErrorPropagation::Sigma(std::span<const Vec2> uv,
                                             std::span<const Vec3> normals) const {
   const Model& m = *model_;
-  std::vector<Stencil> stencils;
+  std::vector<PointRow> rows;
   for (const Vec2& at : uv) {
-    stencils.push_back(m.view.grid.StencilAt(at));
+    rows.emplace_back(m.solve->View(), at);
   }
-  std::vector<double> sigma = m.VarianceOfOthers(stencils);
-  const std::vector<char> touched = m.Touched();
-  for (std::size_t k = 0; k < stencils.size(); ++k) {
-    const Stencil& s = stencils[k];
-    bool known = true;
-    for (int v = 0; v < 16; ++v) {
-      known = known && (touched[s.index[v]] != 0 || s.weight[v] == 0);
-    }
-    sigma[k] = known ? std::sqrt(m.prior_sd * m.prior_sd * std::max(sigma[k], 0.0) +
-                                 m.VarianceOfPoints(s, normals[k]))
-                     : kNaN;
+  std::vector<double> sigma = m.VarianceOfOthers(rows);
+  const Eigen::VectorXd diagonal = m.normal.diagonal();
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    sigma[k] = m.IsKnown(rows[k], diagonal)
+                   ? std::sqrt(m.prior_sd * m.prior_sd * std::max(sigma[k], 0.0) +
+                               m.VarianceOfPoints(rows[k], normals[k]))
+                   : kNaN;
   }
   return sigma;
 }
 
 std::vector<HSplineSurface> ErrorPropagation::Samples(int count, std::uint64_t random_seed) const {
   const Model& m = *model_;
-  const auto vertices = static_cast<Eigen::Index>(m.view.start.vertices.size());
   Random random(random_seed);
   std::vector<HSplineSurface> samples;
   for (int sample = 0; sample < count; ++sample) {
-    NoiseSink noise(vertices, random);
-    AddRows(m.others, m.view, noise);
-    Eigen::MatrixXd step = m.prior_sd * m.factor.Solve(noise.Sum()) + random.Normal() * m.undone;
+    NoiseSink noise(m.normal.rows(), random);
+    AddRows(m.others, m.solve->View(), noise);
+    Eigen::MatrixXd step = m.prior_sd * m.factor->Solve(noise.Sum()) + random.Normal() * m.undone;
     const Eigen::VectorXd z = Eigen::VectorXd::NullaryExpr(
         m.points[0].rows(), [&](Eigen::Index) { return random.Normal(); });
     for (int c = 0; c < 3; ++c) {
       step.col(c) += m.points[c].transpose() * z;
     }
-    ControlNet net = m.view.start;
-    for (Eigen::Index k = 0; k < vertices; ++k) {
-      net.vertices[k] += step.row(k).transpose();
-    }
-    samples.push_back(m.surface);
-    samples.back().SetNet(m.level, net);
+    samples.push_back(m.After(step));
   }
   return samples;
 }
 
 double ErrorPropagation::prior_sd() const { return model_->prior_sd; }
 double ErrorPropagation::determined() const { return model_->determined; }
-std::vector<std::string_view> ErrorPropagation::left_out() const { return LeftOut(model_->terms); }
+std::vector<std::string_view> ErrorPropagation::left_out() const { return LeftOut(model_->given); }
 
 }  // namespace semblance

@@ -34,10 +34,10 @@ Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd covariance, double share = 1e-3);
 //   M^-1 (A'W p + P c0) - c, what the schedule has left undone; known, but taken as a deviation.
 // prior_sd^2 is what the other terms cost at the solution, by coordinate, over the number of
 // parameters that the points determine, trace(M^-1 A'WA) (MacKay 1992).
-// Where only some of the level's vertices are edited (adaptive fits) M^-1 stays within what those
-// and the coarser ones can do (subspace.h). Points with a robust loss count with the weights
-// that they have at the solution, and tangent_points as points. Terms that couple x, y and z
-// otherwise are left out, as if nothing were known of what they say: the errors are then
+// Where only some of the level's vertices are edited (adaptive fits) the net is that of all levels
+// up to it, and M^-1 is within what their vertices can do. Points with a robust loss count with the
+// weights that they have at the solution, and tangent_points as points. Terms that couple x, y and
+// z otherwise are left out, as if nothing were known of what they say: the errors are then
 // overestimated rather than under.
 class ErrorPropagation {
  public:

@@ -24,7 +24,7 @@ struct PointFitOptions {
   FitOptions fit = {
       .plan = AdaptivePlan{},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
-      .solver = LevelSolver::kFastest};
+      .solver = Solver::kFastest};
   double chord_mm = 0.05;
 };
 template <class Visitor>

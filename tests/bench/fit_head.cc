@@ -16,7 +16,7 @@ Measured MeasureHead(int count, double tolerance) {
   const FitResult result = Fit(start, target, {},
                                {.plan = AdaptivePlan{.tolerance_mm = tolerance, .finest = 5},
                                 .terms = {PointTerm{}},
-                                .solver = LevelSolver::kFastest},
+                                .solver = Solver::kFastest},
                                {});
   Measured measured;
   measured.seconds = CpuSecondsSoFar() - begin;

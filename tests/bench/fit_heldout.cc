@@ -88,7 +88,7 @@ Measured FitScene(const Scene& scene, const SchedulePlan& plan) {
   const SmoothnessTerm smooth{
       .weight = AutoOr<double>::Auto(), .of = SmoothnessOf::kSurface, .length_mm = 1};
   const FitOptions options{
-      .plan = plan, .terms = {PointTerm{}, smooth}, .solver = LevelSolver::kFastest};
+      .plan = plan, .terms = {PointTerm{}, smooth}, .solver = Solver::kFastest};
   const double begin = CpuSecondsSoFar();
   const FitResult result = Fit(testing::PlainStart(shape), scene.fitted, {}, options, {});
   return Score(scene, begin, [&](const Vec2& uv) { return result.surface.Point(uv).z(); });

@@ -101,7 +101,7 @@ double SolveDirectly(const HSplineSurface& sheet, const FitTarget& target) {
 
 const std::vector<Term> kPoints = {PointTerm{}};
 
-double SolveLevel(const HSplineSurface& sheet, const FitTarget& target, LevelSolver solver) {
+double SolveLevel(const HSplineSurface& sheet, const FitTarget& target, Solver solver) {
   return FitLevel(ViewOf(sheet, target), kPoints, solver).summary.rms_after_mm;
 }
 
@@ -109,7 +109,7 @@ double SolveFit(const HSplineSurface& sheet, const FitTarget& target) {
   return Fit(sheet, target, {},
              {.plan = ListedPlan{.schedule = {{0, 1}}},
               .terms = kPoints,
-              .solver = LevelSolver::kFastest},
+              .solver = Solver::kFastest},
              {})
       .point_rms_mm;
 }
@@ -135,12 +135,8 @@ Measured MeasureWay(int count, const Way& way) {
 
 void RunLinear() {
   const Way fit = SolveFit, peer = SolveDirectly;
-  const Way level = [](const auto& s, const auto& t) {
-    return SolveLevel(s, t, LevelSolver::kFastest);
-  };
-  const Way ceres = [](const auto& s, const auto& t) {
-    return SolveLevel(s, t, LevelSolver::kCeres);
-  };
+  const Way level = [](const auto& s, const auto& t) { return SolveLevel(s, t, Solver::kFastest); };
+  const Way ceres = [](const auto& s, const auto& t) { return SolveLevel(s, t, Solver::kCeres); };
   const Way none = [](const auto&, const auto&) { return 0.0; };
   constexpr int kMany = 1000000;
   const double data_mb = MeasureWay(kMany, none).peak_mb;

@@ -25,9 +25,8 @@ Measured MeasureRelaxation(int rounds) {
     const double u = p.uv.x() + random.Uniform(-0.005, 0.005);
     p.uv = Vec2(u - std::floor(u), std::clamp(p.uv.y() + random.Uniform(-0.005, 0.005), 0.0, 1.0));
   }
-  FitOptions options{.plan = ListedPlan{.schedule = {{0, 1}}},
-                     .terms = {PointTerm{}},
-                     .solver = LevelSolver::kFastest};
+  FitOptions options{
+      .plan = ListedPlan{.schedule = {{0, 1}}}, .terms = {PointTerm{}}, .solver = Solver::kFastest};
   TangentDistanceRelaxation sliding{{{.rounds = 2, .damping = 0, .max_move_mm = 0.1}}};
   sliding.barrier = false;
   sliding.bunching = sliding.distortion = 0;

@@ -185,8 +185,8 @@ TEST(Fit, EveryStepComesNearer) {
 TEST(Fit, TheSolverIsTheOneAskedForAndChangesNoSurface) {
   const HSplineSurface start = RandomSurface(Shape(), 2);
   const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 400);
-  const FitResult ceres = Fit(start, target, {}, {.solver = LevelSolver::kCeres}, {});
-  const FitResult direct = Fit(start, target, {}, {.solver = LevelSolver::kFastest}, {});
+  const FitResult ceres = Fit(start, target, {}, {.solver = Solver::kCeres}, {});
+  const FitResult direct = Fit(start, target, {}, {.solver = Solver::kFastest}, {});
   for (std::size_t k = 0; k < ceres.levels.size(); ++k) {
     EXPECT_EQ(ceres.levels[k].solver, "ceres");
     EXPECT_EQ(direct.levels[k].solver, "direct");

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "fitting/level/level_fit.h"
+#include "fitting/solve/level_fit.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
@@ -49,7 +49,7 @@ inline LevelView View(const ControlNet& start, std::vector<Observation> observat
                  .lengths_mm = {},
                  .observations = std::move(observations)};
   view.lengths_mm = MeanLengths(view.grid, view.rest);
-  SortObservations(view.grid, view.observations);
+  SortObservations(PointCloud(view.grid.Shape(), view.observations), view.observations);
   return view;
 }
 

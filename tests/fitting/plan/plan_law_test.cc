@@ -6,7 +6,6 @@
 
 #include "fitting/fit.h"
 #include "fitting/plan/fit_check.h"
-#include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
 #include "tests/testing/splines.h"
@@ -49,7 +48,7 @@ bool HasLoss(const Term& term) {
 }
 
 // The term beside points and a little smoothness, which hold what it leaves free.
-FitOptions Options(const SchedulePlan& plan, const Term& term, LevelSolver solver) {
+FitOptions Options(const SchedulePlan& plan, const Term& term, Solver solver) {
   FitOptions options{.plan = plan,
                      .terms = {SmoothnessTerm{.weight = 1e-3}, MembraneTerm{.weight = 1e-2}},
                      .solver = solver};
@@ -89,31 +88,26 @@ std::string NameOf(const SchedulePlan& plan) {
 TEST(PlanLaws, BothSolversFindTheSameSurface) {
   const HSplineSurface start = SmoothSurface(kShape, 2);
   const FitTarget target = Target();
-  int refused = 0;
   for (const SchedulePlan& plan : kPlans) {
     for (const Term& term : AllTerms()) {
       SCOPED_TRACE(NameOf(plan) + ", " + std::string(TermName(term)));
-      const FitOptions options = Options(plan, term, LevelSolver::kCeres);
-      if (!FaultsOf(options, kShape.max_level).empty()) {
-        EXPECT_THROW(Fit(start, target, {}, options, {}), InputError);
-        ++refused;
-        continue;
-      }
+      const FitOptions options = Options(plan, term, Solver::kCeres);
+      ASSERT_TRUE(FaultsOf(options, kShape.max_level).empty());
       const FitResult ceres = Fit(start, target, {}, options, {}),
-                      fastest =
-                          Fit(start, target, {}, Options(plan, term, LevelSolver::kFastest), {});
+                      fastest = Fit(start, target, {}, Options(plan, term, Solver::kFastest), {});
       EXPECT_TRUE(ceres.usable && fastest.usable);
       EXPECT_EQ(ceres.levels.back().solver, "ceres");
       if (std::holds_alternative<PointTerm>(term) || std::holds_alternative<SmoothnessTerm>(term)) {
         EXPECT_EQ(fastest.levels.back().solver, "direct");
       }
       EXPECT_EQ(ceres.surface.Offsets().size(), fastest.surface.Offsets().size());
-      EXPECT_LT(LargestDistance(ceres.surface, fastest.surface), HasLoss(term) ? 1e-3 : 1e-6);
+      // A surface that is held to where a solve starts keeps a trace of the solves before.
+      const double near = std::holds_alternative<PriorTerm>(term) ? 1e-5 : 1e-6;
+      EXPECT_LT(LargestDistance(ceres.surface, fastest.surface), HasLoss(term) ? 1e-3 : near);
       EXPECT_NEAR(CostAfter(ceres), CostAfter(fastest), 1e-6 * CostAfter(fastest));
       EXPECT_GT(LargestDistance(ceres.surface, start), 0.1);
     }
   }
-  EXPECT_EQ(refused, 2);  // symmetry of two kinds in the adaptive plan
 }
 
 TEST(PlanLaws, NoSolveMakesTheTermsDearer) {
@@ -122,10 +116,7 @@ TEST(PlanLaws, NoSolveMakesTheTermsDearer) {
   for (const SchedulePlan& plan : kPlans) {
     for (const Term& term : AllTerms()) {
       SCOPED_TRACE(NameOf(plan) + ", " + std::string(TermName(term)));
-      const FitOptions options = Options(plan, term, LevelSolver::kCeres);
-      if (!FaultsOf(options, kShape.max_level).empty()) {
-        continue;
-      }
+      const FitOptions options = Options(plan, term, Solver::kCeres);
       const FitResult result = Fit(start, target, {}, options, {});
       ASSERT_FALSE(result.levels.empty());
       for (const LevelSummary& level : result.levels) {
@@ -149,11 +140,8 @@ TEST(PlanLaws, TheAdaptivePlanWeighsATermAsALevelDoes) {
   for (const Term& term : AllTerms()) {
     SCOPED_TRACE(TermName(term));
     const FitOptions adaptive =
-        Options(AdaptivePlan{.tolerance_mm = 100, .finest = 0}, term, LevelSolver::kCeres);
-    if (!FaultsOf(adaptive, 0).empty()) {
-      continue;
-    }
-    const FitOptions level = Options(ListedPlan{.schedule = {{0, 1}}}, term, LevelSolver::kCeres);
+        Options(AdaptivePlan{.tolerance_mm = 100, .finest = 0}, term, Solver::kCeres);
+    const FitOptions level = Options(ListedPlan{.schedule = {{0, 1}}}, term, Solver::kCeres);
     const FitResult a = Fit(start, target, {}, adaptive, {}), b = Fit(start, target, {}, level, {});
     // A second solve starts anew: what is held to its start, or looks along normals, goes on.
     const bool goes_on =

@@ -65,7 +65,7 @@ struct Scene {
     return Fit(rest, points, {},
                {.plan = ListedPlan{.schedule = {{.level = 1, .fraction = 1}}},
                 .terms = terms,
-                .solver = LevelSolver::kFastest},
+                .solver = Solver::kFastest},
                {})
         .surface;
   }

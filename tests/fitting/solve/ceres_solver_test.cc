@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The ways to solve a level agree.
-#include "fitting/level/blocked_solver.h"
+#include "fitting/solve/ceres_solver.h"
 
 #include <gtest/gtest.h>
 
@@ -35,22 +35,23 @@ double CostOf(const std::vector<Term>& terms, const LevelView& view, const Contr
 }
 
 void ExpectAllAgree(const LevelView& view, const std::vector<Term>& terms, double tolerance_mm) {
-  ControlNet tiles = view.start, vertices = view.start, direct = view.start;
+  ControlNet tiles = view.start, vertices = view.start;
   const SolverOutcome a = SolveBlocked(view, terms, tiles);
   const SolverOutcome b = SolveByCeres(view, terms, vertices);
-  const SolverOutcome c = SolveDirectly(view, terms, direct);
-  EXPECT_TRUE(a.usable && b.usable && c.usable);
+  const LevelSolution direct = FitLevel(view, terms, Solver::kFastest);
+  EXPECT_TRUE(a.usable && b.usable && direct.summary.usable);
   EXPECT_EQ(a.free_vertices, b.free_vertices);
   EXPECT_EQ(a.termination, "convergence");
   EXPECT_LT(Distance(tiles, vertices), tolerance_mm);
-  const double cost = CostOf(terms, view, direct);  // says little of vertices that are hardly held
+  const double cost =
+      CostOf(terms, view, direct.net);  // says little of vertices that are hardly held
   EXPECT_NEAR(CostOf(terms, view, tiles), cost, 1e-9 * cost + 1e-15);
 }
 
 TEST(TileSolver, FindsWhatSingleVerticesFind) {
   std::vector<Term> separable;
   for (const Term& term : AllTerms()) {
-    if (std::visit([](const auto& t) { return IsSeparable(t); }, term)) {
+    if (AllSeparable(std::span(&term, 1))) {
       separable.push_back(term);
     }
   }
@@ -84,7 +85,7 @@ TEST(TileSolver, TilesCoverNetsOfAnySize) {
         const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 0.6));
         view.observations.push_back({.uv = uv, .position = truth.Point(uv)});
       }
-      SortObservations(view.grid, view.observations);
+      SortObservations(PointCloud(view.grid.Shape(), view.observations), view.observations);
       ExpectAllAgree(view, {PointTerm{}}, 1e-5);
       ControlNet net = view.start;
       EXPECT_LT(SolveBlocked(view, std::vector<Term>{PointTerm{}}, net).free_vertices,

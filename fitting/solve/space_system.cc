@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/adaptive/space_system.h"
+#include "fitting/solve/space_system.h"
 
 #include <algorithm>
 #include <utility>
@@ -13,30 +13,32 @@ namespace {
 struct PatchPart {
   ElementStiffness matrix = ElementStiffness::Zero();
   PatchMatrix right = PatchMatrix::Zero();
-  std::vector<int> finer;  // dofs of finer levels that reach into the patch
+  std::vector<int> finer;  // unknowns of finer levels that reach into the patch
   Eigen::Matrix<double, 16, Eigen::Dynamic> cross{16, 0};  // against those
 };
 
 class Assembler {
  public:
   Assembler(const HierarchicalSplineSpace& space, double point_scale,
-            std::span<const LevelStiffness> forms)
+            std::span<const LevelStiffness> forms, SystemPart part)
       : space_(space),
         point_scale_(point_scale),
         forms_(forms),
-        column_of_(space.dofs().size(), -1) {
-    system_.right = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(space.dofs().size()), 3);
+        both_(part == SystemPart::kBoth),
+        column_of_(space.rows(), -1) {
+    system_.right = Eigen::MatrixX3d::Zero(space.rows(), 3);
   }
 
   NormalSystem Run() {
     for (std::size_t k = 0; k < space_.nodes().size() && space_.nodes()[k].parent < 0; ++k) {
       Collect(static_cast<int>(k));
     }
-    const auto n = static_cast<Eigen::Index>(space_.dofs().size());
-    Flush();
-    system_.lower.resize(n, n);
-    for (SparseMatrix& part : parts_) {
-      system_.lower = system_.lower.nonZeros() == 0 ? std::move(part) : system_.lower + part;
+    if (both_) {
+      Flush();
+      system_.lower = std::move(parts_.front());
+      for (std::size_t k = 1; k < parts_.size(); ++k) {
+        system_.lower += parts_[k];
+      }
     }
     return std::move(system_);
   }
@@ -52,8 +54,10 @@ class Assembler {
   PatchPart Leaf(const QuadtreeNode& node) const {
     PatchPart part;
     if (point_scale_ > 0 && node.range.size() > 0) {
-      part.matrix = point_scale_ * GramOf(node.sums);
-      part.right = point_scale_ * ResidualOf(node.sums);
+      if (both_) {
+        part.matrix = point_scale_ * space_.GramOf(node);
+      }
+      part.right = point_scale_ * space_.ResidualOf(node);
     }
     if (!forms_.empty()) {
       const LevelStiffness& forms = forms_[node.patch.level];
@@ -72,32 +76,40 @@ class Assembler {
     PatchPart part;
     for (int c = 0; c < 4; ++c) {
       const ElementStiffness& refine = RefinementMatrix(c % 2, c / 2);
-      part.matrix += refine.transpose() * children[c].matrix * refine;
       part.right += refine.transpose() * children[c].right;
-      for (const int dof : space_.nodes()[node.children + c].dofs) {
-        Note(dof, part);
-      }
-      for (const int dof : children[c].finer) {
-        Note(dof, part);
+      if (both_) {
+        part.matrix += refine.transpose() * children[c].matrix * refine;
+        for (const int dof : space_.nodes()[node.children + c].dofs) {
+          Note(RowOf(dof), part);
+        }
+        for (const int row : children[c].finer) {
+          Note(row, part);
+        }
       }
     }
+    if (both_) {
+      Cross(node, children, part);
+    }
+    return part;
+  }
+
+  void Cross(const QuadtreeNode& node, const std::array<PatchPart, 4>& children, PatchPart& part) {
     part.cross = Eigen::MatrixXd::Zero(16, static_cast<Eigen::Index>(part.finer.size()));
     for (int c = 0; c < 4; ++c) {
       AddCross(space_.nodes()[node.children + c], children[c], RefinementMatrix(c % 2, c / 2),
                part);
     }
-    for (const int dof : part.finer) {
-      column_of_[dof] = -1;
+    for (const int row : part.finer) {
+      column_of_[row] = -1;
     }
-    return part;
   }
 
-  bool Counts(int dof) const { return dof >= 0 && !space_.dofs()[dof].covered; }
+  int RowOf(int dof) const { return dof >= 0 ? space_.dofs()[dof].row : -1; }
 
-  void Note(int dof, PatchPart& part) {
-    if (Counts(dof) && column_of_[dof] < 0) {
-      column_of_[dof] = static_cast<int>(part.finer.size());
-      part.finer.push_back(dof);
+  void Note(int row, PatchPart& part) {
+    if (row >= 0 && column_of_[row] < 0) {
+      column_of_[row] = static_cast<int>(part.finer.size());
+      part.finer.push_back(row);
     }
   }
 
@@ -105,8 +117,8 @@ class Assembler {
                 const ElementStiffness& refine, PatchPart& part) const {
     const ElementStiffness own = refine.transpose() * of_child.matrix;
     for (int k = 0; k < 16; ++k) {
-      if (Counts(child.dofs[k])) {
-        part.cross.col(column_of_[child.dofs[k]]) += own.col(k);
+      if (const int row = RowOf(child.dofs[k]); row >= 0) {
+        part.cross.col(column_of_[row]) += own.col(k);
       }
     }
     if (of_child.finer.empty()) {
@@ -119,19 +131,21 @@ class Assembler {
   }
 
   void Scatter(const QuadtreeNode& node, const PatchPart& part) {
+    std::array<int, 16> rows;
+    std::transform(node.dofs.begin(), node.dofs.end(), rows.begin(),
+                   [&](int dof) { return RowOf(dof); });
     for (int k = 0; k < 16; ++k) {
-      const int row = node.dofs[k];
-      if (!Counts(row)) {
+      if (rows[k] < 0) {
         continue;
       }
-      system_.right.row(row) += part.right.row(k);
-      for (int l = 0; l < 16; ++l) {
-        if (Counts(node.dofs[l]) && row >= node.dofs[l]) {
-          triplets_.emplace_back(row, node.dofs[l], part.matrix(k, l));
+      system_.right.row(rows[k]) += part.right.row(k);
+      for (int l = 0; both_ && l < 16; ++l) {
+        if (rows[l] >= 0 && rows[k] >= rows[l]) {
+          triplets_.emplace_back(rows[k], rows[l], part.matrix(k, l));
         }
       }
       for (std::size_t f = 0; f < part.finer.size(); ++f) {
-        const auto [low, high] = std::minmax(row, part.finer[f]);
+        const auto [low, high] = std::minmax(rows[k], part.finer[f]);
         triplets_.emplace_back(high, low, part.cross(k, static_cast<Eigen::Index>(f)));
       }
     }
@@ -142,8 +156,7 @@ class Assembler {
   }
 
   void Flush() {
-    const auto n = static_cast<Eigen::Index>(space_.dofs().size());
-    SparseMatrix& part = parts_.emplace_back(n, n);
+    SparseMatrix& part = parts_.emplace_back(space_.rows(), space_.rows());
     part.setFromTriplets(triplets_.begin(), triplets_.end());
     triplets_.clear();
   }
@@ -151,7 +164,8 @@ class Assembler {
   const HierarchicalSplineSpace& space_;
   double point_scale_;
   std::span<const LevelStiffness> forms_;
-  std::vector<int> column_of_;  // of an dof in the part at hand
+  bool both_;
+  std::vector<int> column_of_;  // of an unknown in the part at hand
   std::vector<Eigen::Triplet<double>> triplets_;
   std::vector<SparseMatrix> parts_;
   NormalSystem system_;
@@ -160,7 +174,7 @@ class Assembler {
 }  // namespace
 
 std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::span<const Term> terms,
-                                             const Vec2& lengths_mm, double scale) {
+                                             const Vec2& lengths_mm) {
   std::vector<LevelStiffness> forms(shape.max_level + 1);
   for (int level = 0; level <= shape.max_level; ++level) {
     for (const Term& term : terms) {
@@ -168,7 +182,7 @@ std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::spa
           [&]<class T>(const T& t) {
             if constexpr (std::is_same_v<T, SmoothnessTerm> || std::is_same_v<T, MembraneTerm>) {
               const ElementStiffness form =
-                  scale * StiffnessOf(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
+                  StiffnessOf(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
               (t.of == SmoothnessOf::kSurface ? forms[level].surface : forms[level].displacement) +=
                   form;
             }
@@ -193,8 +207,8 @@ double EnergyOf(const HierarchicalSplineSpace& space, std::span<const LevelStiff
 }
 
 NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
-                      std::span<const LevelStiffness> forms) {
-  return Assembler(space, point_scale, forms).Run();
+                      std::span<const LevelStiffness> forms, SystemPart part) {
+  return Assembler(space, point_scale, forms, part).Run();
 }
 
 }  // namespace semblance

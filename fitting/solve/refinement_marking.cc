@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/adaptive/refinement_marking.h"
+#include "fitting/solve/refinement_marking.h"
 
 #include <algorithm>
 #include <map>

@@ -2,13 +2,11 @@
 // The least-squares fit of one level of an H-spline, seen as a plain B-spline.
 #pragma once
 
-#include <array>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "fitting/least_squares/patch_energy.h"
+#include "fitting/problem/fit_schedule.h"
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 #include "surfaces/hspline/control_net.h"
@@ -55,38 +53,16 @@ struct LevelSolution {
   LevelSummary summary;
 };
 
-enum class LevelSolver {
-  kCeres,   // one ceres::Problem, whose parameter blocks are the level's control vertices
-  kFastest  // a direct factorisation where the terms allow it, else Ceres; the same minimiser
-};
-constexpr auto EnumNames(LevelSolver) {
-  return std::to_array<std::string_view>({"ceres", "fastest"});
-}
-
 // Minimises the sum of the terms over the level's control vertices: by Ceres, one thread (a
 // parameter block is a vertex, or, if all terms are linear and treat x, y and z alike, one
 // coordinate of 3 x 3 vertices); or, if the fastest way is asked for and all terms are linear and
 // treat x, y and z alike, with one sparse Cholesky factor for the three. A loss makes either a
-// sequence of such solves (reweighting.h) unless another term couples x, y and z. Where the terms
+// sequence of such solves (space_solve.h) unless another term couples x, y and z. Where the terms
 // leave vertices undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word
 // on it; the steps are damped by a multiple of the identity, a proximal-point iteration, which
 // converges to it). Observations are used in a canonical order, so their order has no effect.
 // Throws InputError if nothing can be solved: sizes that disagree, a template without extent for a
 // term that needs it, or points without a foot on bone for one that looks at bone.
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms,
-                       LevelSolver solver = LevelSolver::kCeres);
-
-// Throws InputError for a term that needs the template's extent where it has none.
-void CheckExtent(const Vec2& lengths_mm, std::span<const Term> terms);
-
-// Throws InputError for a term that has nothing to look at: no extent of the template, no foot on
-// bone, no landmark.
-void CheckTerms(const LevelView& view, std::span<const Term> terms);
-
-// The canonical order, patch by patch.
-void SortObservations(const PatchGrid& grid, std::vector<Observation>& observations);
-
-// Weighted root mean square distance of the observations from the net, mm; NaN without any.
-double ObservationRms(const LevelView& view, const ControlNet& net);
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver = Solver::kCeres);
 
 }  // namespace semblance

@@ -3,10 +3,8 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
-#include "fitting/least_squares/normal_equations.h"
-#include "fitting/level/level_solver.h"
+#include "fitting/solve/space_system.h"
 #include "fitting/terms/term.h"
 
 namespace semblance {
@@ -34,22 +32,6 @@ struct WeightChoice {
 // thousand (8 while it goes by decades). near: a weight to search around (a decade up and down); 0:
 // everywhere.
 WeightChoice ChooseWeight(const WeightProblem& problem, double near = 0);
-
-// The same for one of separable terms.
-struct WeightQuestion {
-  std::span<const Term> terms;
-  int at = -1;             // the index of that one
-  double misfit = kNaN;    // of the points where the surface stands, mm^2
-  std::size_t points = 0;  // their number
-};
-WeightChoice ChooseWeight(TermEquations& equations, const WeightQuestion& question,
-                          double near = 0);
-
-// The terms with numbers for `auto`, for the solve of `view`. At most one may be `auto`, and then
-// the points have no loss and no term couples x, y and z; else InputError. chosen: what it became;
-// NaN if no term is `auto`.
-std::vector<Term> WithChosenWeight(const LevelView& view, std::span<const Term> terms,
-                                   double& chosen);
 
 // The index of the term that is `auto`, or -1; InputError for more than one.
 int AutoTerm(std::span<const Term> terms);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/level/level_fit.h"
+#include "fitting/solve/level_fit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -265,14 +265,13 @@ TEST(ScheduleStep, ReducedPointsAndTheDirectPathKeepTheMinimiser) {
   const std::vector<Term> held = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}, PriorTerm{}};
   for (const LevelView& view : ViewsOfEveryRank()) {
     SCOPED_TRACE(view.observations.size());
-    const LevelSolution direct = FitLevel(view, points, LevelSolver::kFastest),
-                        ceres = FitLevel(view, points, LevelSolver::kCeres);
+    const LevelSolution direct = FitLevel(view, points, Solver::kFastest),
+                        ceres = FitLevel(view, points, Solver::kCeres);
     const ControlNet reference = DenseMinimiser(view);
     EXPECT_LT(ObservationDistance(view, direct.net, reference), 1e-9);
     EXPECT_LT(ObservationDistance(view, ceres.net, reference), 1e-7);
     EXPECT_EQ(direct.summary.free_vertices, ceres.summary.free_vertices);
-    EXPECT_LT(Distance(FitLevel(view, held, LevelSolver::kFastest).net, FitLevel(view, held).net),
-              1e-8);
+    EXPECT_LT(Distance(FitLevel(view, held, Solver::kFastest).net, FitLevel(view, held).net), 1e-8);
   }
 }
 

@@ -1,22 +1,72 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/level/blocked_solver.h"
+#include "fitting/solve/ceres_solver.h"
 
 #include <ceres/cost_function.h>
 #include <ceres/problem.h>
+#include <ceres/solver.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <map>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "fitting/least_squares/qr_compression.h"
-#include "fitting/level/level_cost.h"
+#include "fitting/least_squares/sparse_factor.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
 namespace {
+
+constexpr int kMaxIterations = 50;
+constexpr double kStepTolerance = 1e-13;  // of the norm of all vertices
+
+// What the eigenvalues of the normal equations are measured by: residuals are means over points or
+// vertices, so a vertex that is well held has about weight / vertices on the diagonal.
+double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
+  double sum = 0;
+  for (const Term& term : terms) {
+    const auto* const prior = std::get_if<PriorTerm>(&term);
+    sum += prior != nullptr && prior->held_only ? 0 : WeightOf(term);
+  }
+  return sum / static_cast<double>(vertices);
+}
+
+// Of the trust region.
+double Radius(std::span<const Term> terms, std::size_t vertices) {
+  return std::min(1e8 / TypicalStiffness(terms, vertices), 1e16);
+}
+
+// Ceres damps by D / radius with D clamped to [min, max]; both at 1 give the identity, and a fixed
+// radius the proximal-point iteration x <- argmin cost(y) + |y - x|^2 / radius, which goes to the
+// least-squares solution nearest to the start. Damping by the diagonal, Ceres' default, would
+// instead move the least-held vertices most. Determined directions converge in two or three steps.
+ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t vertices) {
+  UseOneBlasThread();
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  options.jacobi_scaling = false;
+  options.min_lm_diagonal = options.max_lm_diagonal = 1;
+  options.initial_trust_region_radius = Radius(terms, vertices);
+  options.max_trust_region_radius = options.initial_trust_region_radius;
+  options.max_num_iterations = kMaxIterations;
+  options.function_tolerance = 1e-15;
+  options.gradient_tolerance = 0;  // blind to weakly determined directions
+  options.parameter_tolerance = kStepTolerance;
+  return options;
+}
+
+std::string TerminationName(ceres::TerminationType type) {
+  std::string text = ceres::TerminationTypeToString(type);
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
 
 constexpr int kSide = 3, kTile = kSide * kSide;
 
@@ -164,6 +214,33 @@ ceres::Solver::Summary SolveCoordinate(const BlockedRowSink& sink, const Tiles& 
 }
 
 }  // namespace
+
+double ProximalShift(std::span<const Term> terms, std::size_t vertices) {
+  return 1 / Radius(terms, vertices);
+}
+
+SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
+  ceres::Problem problem;
+  for (const Term& term : terms) {
+    if (WeightOf(term) > 0) {
+      std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
+    }
+  }
+  SolverOutcome outcome{.free_vertices = problem.NumParameterBlocks()};
+  if (outcome.free_vertices == 0) {
+    return outcome;
+  }
+  const ControlNet before = net;
+  ceres::Solver::Summary summary;
+  ceres::Solve(CeresOptions(terms, net.vertices.size()), &problem, &summary);
+  outcome.iterations = static_cast<int>(summary.iterations.size()) - 1;
+  outcome.termination = TerminationName(summary.termination_type);
+  outcome.usable = summary.IsSolutionUsable();
+  if (!outcome.usable) {
+    net = before;
+  }
+  return outcome;
+}
 
 SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
   const Tiles tiles(view);

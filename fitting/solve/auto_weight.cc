@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/level/auto_weight.h"
+#include "fitting/solve/auto_weight.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "fitting/least_squares/sparse_factor.h"
-#include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
@@ -84,23 +82,6 @@ class WeightSearch {
   WeightChoice best_;
 };
 
-void CheckSeparable(std::span<const Term> terms) {
-  for (const Term& term : terms) {
-    const bool fine =
-        WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsSeparable(t); }, term);
-    if (!fine) {
-      throw InputError(
-          fmt::format("weight: auto cannot be chosen beside the term '{}' with a loss or coupled "
-                      "coordinates; give a number, or (points with a loss) take plan: adaptive",
-                      TermName(term)));
-    }
-  }
-}
-
-}  // namespace
-
-namespace {
-
 // The best decade, from smooth to rough until the score has plainly turned: where points are many,
 // rougher is dearer to try and no longer in question.
 double BestDecade(const WeightProblem& problem, double near) {
@@ -148,23 +129,6 @@ WeightChoice ChooseWeight(const WeightProblem& problem, double near) {
   return SmoothestAsGood(search);
 }
 
-WeightChoice ChooseWeight(TermEquations& equations, const WeightQuestion& question, double near) {
-  std::vector<Term> points, smooth(1, question.terms[question.at]), others;
-  SetWeight(1, smooth[0]);
-  for (int k = 0; k < static_cast<int>(question.terms.size()); ++k) {
-    const Term& term = question.terms[k];
-    if (k != question.at) {
-      (std::holds_alternative<PointTerm>(term) ? points : others).push_back(term);
-    }
-  }
-  return ChooseWeight({.points = equations.System(points),
-                       .smooth = equations.System(smooth),
-                       .fixed = equations.System(others),
-                       .misfit = question.misfit,
-                       .count = static_cast<double>(question.points)},
-                      near);
-}
-
 int AutoTerm(std::span<const Term> terms) {
   int found = -1;
   for (std::size_t k = 0; k < terms.size(); ++k) {
@@ -194,32 +158,6 @@ void SetWeight(double weight, Term& term) {
         }
       },
       term);
-}
-
-std::vector<Term> WithChosenWeight(const LevelView& view, std::span<const Term> terms,
-                                   double& chosen) {
-  chosen = kNaN;
-  std::vector<Term> result(terms.begin(), terms.end());
-  const int at = AutoTerm(terms);
-  if (at < 0) {
-    return result;
-  }
-  CheckSeparable(terms);
-  double misfit = 0;
-  for (const Term& term : terms) {
-    const auto* const points = std::get_if<PointTerm>(&term);
-    misfit += points != nullptr ? TermCost(*points, view, view.start) : 0;
-  }
-  ControlNet net = view.start;
-  LevelEquations equations(view, net);
-  chosen = ChooseWeight(equations, {terms, at, misfit, view.observations.size()}).weight;
-  if (std::isnan(chosen)) {
-    throw InputError(
-        "weight: auto: no weight has a usable solve; more points than directions they determine "
-        "are needed, or give a number");
-  }
-  SetWeight(chosen, result[at]);
-  return result;
 }
 
 }  // namespace semblance

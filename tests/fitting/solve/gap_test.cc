@@ -64,7 +64,7 @@ HSplineSurface FitDrawn(const FitTarget& target, const SchedulePlan& plan, AutoO
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 3};
   const SmoothnessTerm smooth{.weight = weight, .of = SmoothnessOf::kSurface, .length_mm = 1};
   return Fit(testing::PlainStart(shape), target, {},
-             {.plan = plan, .terms = {PointTerm{}, smooth}, .solver = LevelSolver::kFastest}, {})
+             {.plan = plan, .terms = {PointTerm{}, smooth}, .solver = Solver::kFastest}, {})
       .surface;
 }
 
