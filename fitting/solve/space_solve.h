@@ -33,7 +33,8 @@ struct SpaceProblem {
 
 // Two ways to the same minimum. With `fastest`, and terms that have a part in the normal equations
 // (IsAssembled), damped Gauss-Newton steps by one sparse Cholesky factor, assembled from moments of
-// each leaf's points; else Ceres, with a view of the space. Either goes with a loss by iterative
+// each leaf's points; else Ceres, with a view of the space, which takes rows: those are reduced by
+// QR and keep the condition that moments square. Either goes with a loss by iterative
 // reweighting, unless a term couples x, y and z.
 class SpaceSolve {
  public:

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "fitting/fit.h"
+#include "fitting/plan/fit_driver.h"
 #include "fitting/problem/placement.h"
 #include "fitting/solve/space_system.h"
 #include "surfaces/base/error.h"
@@ -293,6 +294,64 @@ TEST(AdaptiveFit, FeaturesGetTheirOffsetsBack) {
   EXPECT_NEAR(result.residual_mm[5],
               (result.surface.Point(target.points[5].uv) - target.points[5].position).norm(),
               1e-12);
+}
+
+// Points that bulge on one side alone: both sides share it, and finer vertices come in pairs.
+TEST(AdaptiveFit, SymmetryMakesBothSidesAlikeOnAllLevels) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
+  const auto bump = [](const Vec2& uv) {
+    return Vec3(uv.x(), uv.y(), 0.1 * std::exp(-(uv - Vec2(0.75, 0.5)).squaredNorm() / 0.02));
+  };
+  const FitTarget target = Scattered(bump, 5000, 0, 9);
+  const SymmetryTerm symmetry{.weight = 1e4, .of = SmoothnessOf::kSurface};
+  const HSplineSurface surface =
+      Fit(PlainStart(shape), target, {}, Adaptive(1e-2, 2, {PointTerm{}, symmetry}), {}).surface;
+  ASSERT_FALSE(surface.Offsets(1).empty());
+  for (const auto& [vertex, offset] : surface.Offsets()) {
+    EXPECT_TRUE(surface.Offset(MirrorOf(shape, vertex)).has_value());
+  }
+  double highest = 0;
+  for (int k = 0; k < 400; ++k) {
+    const Vec2 uv((k % 20 + 0.5) / 20, (k / 20 + 0.5) / 20);
+    const Vec3 here = surface.Point(uv), there = surface.Point({1 - uv.x(), uv.y()});
+    EXPECT_LT((Vec3(1 - here.x(), here.y(), here.z()) - there).norm(), 1e-3);
+    highest = std::max(highest, here.z());
+  }
+  EXPECT_NEAR(highest, 0.05, 0.01);  // the mean of a bulge and none
+}
+
+TEST(AdaptiveFit, FrozenFeaturesKeepTheirOffsetsAndTheOthersMakeDo) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 2};
+  const HSplineSurface start = RandomSurface(shape, 2);
+  std::vector<VertexId> features;
+  for (const auto& [vertex, offset] : start.Offsets(2)) {
+    features.push_back(vertex);
+  }
+  ASSERT_GT(features.size(), 3u);
+  const FitTarget target = PointsOf(RandomSurface(shape, 1), 3000);
+  const auto fit = [&](const FeatureRule& rule, Solver solver = Solver::kFastest) {
+    FitOptions options = Adaptive(100, 2);
+    options.features = rule;
+    options.solver = solver;
+    return Fit(start, target, features, options, {});
+  };
+  const auto moved = [&](const FitResult& result) {
+    double sum = 0;
+    for (const VertexId& f : features) {
+      sum += (*result.surface.Offset(f) - *start.Offset(f)).norm();
+    }
+    return sum;
+  };
+  for (const Solver solver : {Solver::kFastest, Solver::kCeres}) {
+    const FitResult frozen = fit(FrozenFeatures{}, solver);
+    EXPECT_EQ(moved(frozen), 0);
+    EXPECT_EQ(frozen.restored_features, static_cast<int>(features.size()));
+    EXPECT_LT(frozen.point_rms_mm, fit(RestoreFeatures{}, solver).point_rms_mm);
+    EXPECT_NEAR(frozen.point_rms_mm, PointRms(frozen.surface, target, 1), 1e-12);
+  }
+  const double freely = moved(fit(FreeFeatures{}));
+  EXPECT_LT(moved(fit(WeightedFeatures{.weight = 1e3})), 0.5 * freely);
+  EXPECT_NEAR(moved(fit(WeightedFeatures{.weight = 1e-9})), freely, 1e-3 * freely);
 }
 
 TEST(AdaptiveFit, WrongInputIsNamed) {

@@ -11,6 +11,7 @@
 #include "fitting/fit.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -239,6 +240,54 @@ TEST(ErrorPropagation, APointThatALossLeavesOutSaysNothing) {
       scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
   for (std::size_t k = 0; k < scene.uv.size(); ++k) {
     EXPECT_NEAR(tamed[k], without[k], 1e-9);
+  }
+}
+
+// Finer vertices in places: draws of the points' noise fitted on the same vertices, again and again.
+TEST(ErrorPropagation, OfAnAdaptiveFitItIsHowFarItsNoiseTakesIt) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
+  constexpr double kNoise_mm = 0.01;
+  constexpr int kCount = 800;
+  const auto bump = [](const Vec2& uv) {
+    return Vec3(uv.x(), uv.y(), 0.1 * std::exp(-(uv - Vec2(0.7, 0.3)).squaredNorm() / 0.02));
+  };
+  const FitTarget clean = testing::Scattered(bump, kCount, 0, 9);
+  const HSplineSurface rest = testing::PlainStart(shape);
+  const auto fitted = [&](const HSplineSurface& start, const FitTarget& target, double tolerance) {
+    const AdaptivePlan plan{.tolerance_mm = tolerance, .finest = 2};
+    return Fit(start, rest, target, {},
+               {.plan = plan, .terms = {PointTerm{}}, .solver = Solver::kFastest}, {})
+        .surface;
+  };
+  const HSplineSurface surface = fitted(rest, clean, 1e-2);
+  ASSERT_FALSE(surface.Offsets(1).empty());
+  ASSERT_LT(static_cast<int>(surface.Offsets(1).size()), surface.Columns(1) * surface.Rows(1));
+  PointErrors errors{std::vector<Vec3>(kCount, Vec3::UnitZ()),
+                     kNoise_mm * Eigen::MatrixXd::Identity(kCount, kCount)};
+  const int level = surface.Offsets(2).empty() ? 1 : 2;
+  const std::vector<Vec2> uv = {{0.2, 0.3}, {0.45, 0.5}, {0.7, 0.3}, {0.72, 0.4}};
+  const ErrorPropagation spread(surface, rest, clean, level, std::vector<Term>{PointTerm{}},
+                                errors);
+  const std::vector<double> sigma = spread.Sigma(uv, std::vector<Vec3>(4, Vec3::UnitZ()));
+  Random random(7);
+  constexpr int kDraws = 200;  // the estimate's own deviation is 5 %
+  std::vector<double> squares(uv.size(), 0), sampled(uv.size(), 0);
+  const std::vector<HSplineSurface> samples = spread.Samples(kDraws, 1);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    FitTarget noisy = clean;
+    for (FitPoint& p : noisy.points) {
+      p.position.z() += kNoise_mm * random.Normal();
+    }
+    const HSplineSurface other = fitted(surface, noisy, 1e3);
+    for (std::size_t k = 0; k < uv.size(); ++k) {
+      const double here = surface.Point(uv[k]).z();
+      squares[k] += std::pow(other.Point(uv[k]).z() - here, 2) / kDraws;
+      sampled[k] += std::pow(samples[draw].Point(uv[k]).z() - here, 2) / kDraws;
+    }
+  }
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    EXPECT_NEAR(std::sqrt(squares[k]), sigma[k], 0.15 * sigma[k]) << k;
+    EXPECT_NEAR(std::sqrt(sampled[k]), sigma[k], 0.15 * sigma[k]) << k;
   }
 }
 
