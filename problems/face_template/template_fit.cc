@@ -79,7 +79,7 @@ FitOptions OptionsOf(int level, bool landmarks) {
                 MembraneTerm{.weight = kMembrane, .length_mm = kLength_mm}},
       .features = FreeFeatures{},
       .relaxation = NoRelaxation{},
-      .solver = LevelSolver::kFastest};
+      .solver = Solver::kFastest};
   if (landmarks) {
     options.terms.push_back(LandmarkTerm{.weight = kFacialWeight});
   }
