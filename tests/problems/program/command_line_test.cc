@@ -247,6 +247,19 @@ TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
   EXPECT_EQ(Call("template e.yaml --out generic").code, 2);
 }
 
+TEST_F(CommandLine, AHeadThatCannotBecomeATemplateLeavesNothingBehind) {
+  Write("ball.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 90, 20), ".ply"));
+  Write("few.csv", "site,x,y,z\ng,0,-90,0\nn,0,-89,-10\n");
+  const Outcome outcome = Call("template ball.ply few.csv --out made --quiet");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("semblance: ball.ply: its landmarks are 2 in the "
+                                           "midline and 0 pairs"),
+                                 HasSubstr("missing sites: sg, rhi")));
+  EXPECT_FALSE(fs::exists(folder_ / "made"));
+  EXPECT_EQ(Call("template ball.ply none.csv --out made").code, 2);
+  EXPECT_THAT(Call("template ball.ply few.csv --set a=b").err, HasSubstr("--finest"));
+}
+
 TEST_F(CommandLine, OptionsNameEveryKeyAndTheSchemaIsJson) {
   const std::string options = Call("options").out;
   for (const char* key : {"subject", "emitter", "fraction", "tail_error", "random_seed"}) {
