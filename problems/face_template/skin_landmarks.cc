@@ -6,12 +6,13 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <string_view>
 
 #include "problems/face_template/template_sites.h"
-#include "problems/subject/landmarks.h"
+#include "problems/landmark_files/read_landmarks.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
@@ -79,8 +80,10 @@ std::optional<double> DepthOf(const Landmark& landmark) {
 
 Vec3 ToVec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-void ReadYaml(const fs::path& file, SkinLandmarks& landmarks) {
-  const LandmarkFile skull = ReadLandmarkFile(file);
+void ReadOfSkull(const fs::path& file, SkinLandmarks& landmarks) {
+  LandmarkReading reading = ReadLandmarks(file);
+  std::ranges::move(reading.notes, std::back_inserter(landmarks.notes));
+  const LandmarkFile& skull = reading.file;
   const bool on_skin = std::ranges::none_of(
       skull.landmarks, [](const Landmark& landmark) { return DepthOf(landmark).has_value(); });
   for (const Landmark& landmark : skull.landmarks) {
@@ -117,7 +120,7 @@ SkinLandmarks ReadSkinLandmarks(std::span<const fs::path> files) {
     if (file.extension() == ".csv") {
       ReadCsv(file, landmarks);
     } else {
-      ReadYaml(file, landmarks);
+      ReadOfSkull(file, landmarks);
     }
   }
   if (landmarks.points.empty()) {

@@ -25,11 +25,12 @@ struct SkinLandmarks {
 //   .csv with columns site,x,y,z (or x_mm,y_mm,z_mm), others ignored: points on the skin, mm;
 //   .csv with columns i_multipie,x,y,z: the 68 points of Multi-PIE (Gross et al. 2010) by number, 1
 //     to 68, of which those are used that FacialLandmarks() knows;
-//   .yaml, the landmarks of a skull (landmarks.h): point + depth * normal, by the depth along the
-//     normal, else by the closest depth; those without a depth or a normal are left out. Where no
-//     landmark of the file has a depth, its points are taken to lie on the skin.
-// Throws IoError or ConfigError as the readers do; InputError for an unknown code, a code that
-// stands twice, or no landmark at all.
+//   any other ending that ReadLandmarks (read_landmarks.h) takes, the landmarks of a skull: point +
+//     depth * normal, by the depth along the normal, else by the closest depth; those without a
+//     depth or a normal are left out. Where no landmark of the file has a depth, its points are
+//     taken to lie on the skin.
+// Throws IoError, ConfigError or InputError as the readers do; InputError for a code that stands
+// twice, or no landmark at all.
 SkinLandmarks ReadSkinLandmarks(std::span<const std::filesystem::path> files);
 
 }  // namespace semblance

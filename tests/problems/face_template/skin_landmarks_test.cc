@@ -85,6 +85,13 @@ TEST_F(SkinLandmarkFiles, WithoutAnyDepthThePointsAreTheSkins) {
   EXPECT_EQ(read.points[0].point, Vec3(1, 2, 3));
 }
 
+TEST_F(SkinLandmarkFiles, PointsPickedInAProgramAreRead) {
+  const SkinLandmarks read = Read({File("a.txt", "glabella,1,2,3\nleft zygion,70,5,6\n")});
+  ASSERT_GE(read.points.size(), 1);
+  EXPECT_EQ(read.points[0].code, "g");
+  EXPECT_EQ(read.points[0].point, Vec3(1, 2, 3));
+}
+
 TEST_F(SkinLandmarkFiles, WhatIsWrongIsSaidWithItsPlace) {
   EXPECT_THAT(FaultOf({File("a.csv", "site,x,y,z\nnose,1,2,3\n")}),
               AllOf(HasSubstr("a.csv:2"), HasSubstr("'nose'"), HasSubstr("prn")));
