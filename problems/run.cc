@@ -11,6 +11,7 @@
 #include "problems/metrics/quantile.h"
 #include "problems/pipeline/cut_planes.h"
 #include "problems/pipeline/stage_key.h"
+#include "problems/prior/hspline_prior.h"
 #include "problems/prior/prior_target.h"
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/hspline_project.h"
@@ -260,7 +261,9 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
   for (FitPoint& point : made.placed.dowels.points) {
     point.uv = ProjectFrom(made.placed.face.surface, point.position, point.uv).uv;
   }
-  made.fitted = FitFace(in.experiment, made.placed, in.implicit, in.shell, context);
+  Experiment softer = in.experiment;
+  softer.seeds.weight = o.seed_weight;
+  made.fitted = FitFace(softer, made.placed, in.implicit, in.shell, context);
   return made;
 }
 
@@ -338,7 +341,7 @@ std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
     return nullptr;
   }
   return cache.Get<LoadedPrior>(StageKey("prior", experiment.prior, experiment.face_template), [&] {
-    LoadedPrior prior{.face = LoadPrior(experiment.prior), .on_template = {}};
+    LoadedPrior prior{.face = LoadPrior(experiment.prior, generic), .on_template = {}};
     prior.on_template = LayOnTemplate(prior.face, generic, context);
     return prior;
   });

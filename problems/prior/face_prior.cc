@@ -95,11 +95,9 @@ std::vector<ShapeFeature> ReadFeatures(const ModesPrior& source) {
   return features;
 }
 
-FacePrior Load(const NoPrior&) {
-  throw InputError("prior: none is named; a face of type prior needs one");
-}
+}  // namespace
 
-FacePrior Load(const ModesPrior& source) {
+FacePrior LoadPrior(const ModesPrior& source) {
   FacePrior prior;
   prior.model.mean = ReadMesh(Named(source.mean, "mean"));
   prior.model.modes = ReadModes(source, prior.model.mean.points.size());
@@ -107,19 +105,6 @@ FacePrior Load(const ModesPrior& source) {
   prior.sites = ReadSites(source, prior.model.mean);
   prior.features = ReadFeatures(source);
   return prior;
-}
-
-}  // namespace
-
-FacePrior LoadPrior(const PriorSource& source) {
-  return std::visit([](const auto& given) { return Load(given); }, source);
-}
-
-std::vector<std::filesystem::path> PriorFiles(const PriorSource& source) {
-  const auto* const modes = std::get_if<ModesPrior>(&source);
-  return modes == nullptr ? std::vector<std::filesystem::path>()
-                          : std::vector<std::filesystem::path>{modes->mean, modes->modes,
-                                                               modes->sites, modes->features};
 }
 
 }  // namespace semblance

@@ -57,7 +57,23 @@ void Fields(Visitor& visit, ModesPrior& o) {
         o.count);
 }
 
-using PriorSource = std::variant<NoPrior, ModesPrior>;
+// The modes of `template` as H-splines.
+struct HSplinePrior {
+  static constexpr std::string_view kName = "hspline";
+  std::filesystem::path modes;
+  int count = 100;
+};
+template <class Visitor>
+void Fields(Visitor& visit, HSplinePrior& o) {
+  visit(FieldInfo{.name = "modes",
+                  .doc = "file (.json) of the modes, as `semblance prior` writes it; `template` is "
+                         "the face that it was made for"},
+        o.modes);
+  visit(FieldInfo{.name = "count", .min = 1, .max = 10000, .doc = "modes that are used, at most"},
+        o.count);
+}
+
+using PriorSource = std::variant<NoPrior, ModesPrior, HSplinePrior>;
 
 struct FacePrior {
   ShapeModel model;
@@ -65,11 +81,8 @@ struct FacePrior {
   std::vector<ShapeFeature> features;
 };
 
-// Throws InputError or IoError in one line: a file that is not named or cannot be read, no prior, a
+// Throws InputError or IoError in one line: a file that is not named or cannot be read, a
 // mean and modes that disagree, a site that is none or lies farther than 5 mm from the mean.
-FacePrior LoadPrior(const PriorSource& source);
-
-// The files that LoadPrior reads, for the manifest.
-std::vector<std::filesystem::path> PriorFiles(const PriorSource& source);
+FacePrior LoadPrior(const ModesPrior& source);
 
 }  // namespace semblance

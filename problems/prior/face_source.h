@@ -63,14 +63,22 @@ void Fields(Visitor& visit, PriorFace& o) {
 }
 
 // The same as the template of the H-spline fit; each dowel is fitted where its tip is nearest to
-// that face.
+// that face. The implicit face has had its say in the prior's face, so its seeds weigh less here.
 struct PriorThenFit {
   static constexpr std::string_view kName = "prior_then_fit";
+  double seed_weight = 0.01;
   ShapeFitOptions estimate;
   TableDepthOptions table_depths;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorThenFit& o) {
+  visit(
+      FieldInfo{.name = "seed_weight",
+                .min = 1e-6,
+                .max = 1e6,
+                .doc = "of a seed in the fit, in place of seeds.weight; more follows the implicit "
+                       "face, away from what the prior holds for likely"},
+      o.seed_weight);
   PriorUseFields(visit, o.estimate, o.table_depths);
 }
 

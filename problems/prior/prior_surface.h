@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "problems/face_template/template_face.h"
-#include "problems/prior/face_prior.h"
 #include "problems/prior/domain_grid.h"
+#include "problems/prior/face_prior.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "problems/config/config.h"
+#include "problems/face_template/template_io.h"
+#include "problems/prior/hspline_prior.h"
 #include "problems/program/edit_script.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/face_export.h"
@@ -31,6 +33,9 @@ struct FaceArguments {
   std::optional<double> chord_mm;
   std::array<double, 2> u = {0, 1}, v = {0, 1};
   std::array<int, 2> levels = {1, 8};
+  ModesPrior prior;
+  std::string template_folder;
+  int level = 2;
   int threads = 1;
   bool force = false;
 };
@@ -122,6 +127,33 @@ int ListCommand(const FaceArguments& a) {
   return kDone;
 }
 
+// The face that `semblance template` has written into a folder.
+TemplateFace TemplateIn(const fs::path& folder) {
+  return ReadTemplate({.surface = folder / "head.hspline.json",
+                       .sites = folder / "sites.csv",
+                       .features = folder / "features.json"});
+}
+
+int PriorCommand(const FaceArguments& a) {
+  RefuseToReplace(a.out, a);
+  const TemplateFace face = TemplateIn(a.template_folder);
+  const FacePrior prior = LoadPrior(a.prior);
+  RunContext context;
+  context.threads = a.threads;
+  const PriorOnTemplate on_template = LayOnTemplate(prior, face, context);
+  ModesMisfit misfit;
+  const HSplineModes modes =
+      ModesOnTemplate(prior, on_template, face, a.level, a.prior.count, &misfit);
+  const std::string bytes = HSplineModesToJson(modes);
+  WriteFileAtomically(a.out, bytes);
+  fmt::print(
+      "{}: {} modes of level {}, {} bytes; from the mean {:.3f} mm RMS, from the modes {:.3f} mm "
+      "RMS, at most {:.3f} mm\n",
+      a.out, modes.modes.size(), modes.level, bytes.size(), on_template.rms_mm, misfit.rms_mm,
+      misfit.max_mm);
+  return kDone;
+}
+
 void AddForce(CLI::App& command, FaceArguments& a) {
   command.add_flag("--force", a.force, "replace a file of the same name");
 }
@@ -195,6 +227,29 @@ void DeclareList(CLI::App& list, CommandLine& line) {
   list.add_option("LIBRARY", a.library, "folder")->required();
 }
 
+void DeclarePrior(CLI::App& prior, CommandLine& line) {
+  FaceArguments& a = *Bind(prior, line, &PriorCommand);
+  prior.add_option("MEAN", a.prior.mean, "mesh of the mean face")->required();
+  prior.add_option("MODES", a.prior.modes, "its modes, k x n x 3 (.npy)")->required();
+  prior.add_option("--sites", a.prior.sites, "sites on the mean (.csv: site,x_mm,y_mm,z_mm)")
+      ->required();
+  prior
+      .add_option("--features", a.prior.features,
+                  "the 68 facial landmarks on the mean (.csv: i_multipie,x,y,z)")
+      ->required();
+  prior.add_option("--template", a.template_folder, "what `semblance template MEAN` has written")
+      ->required();
+  prior.add_option("--out", a.out, "file for the modes (.json)")->required();
+  prior.add_option("--scale", a.prior.scale, "mm per unit of the modes [1]");
+  prior.add_option("--modes", a.prior.count, "how many, at most [60]")->check(CLI::Range(1, 10000));
+  prior.add_option("--level", a.level, "of the B-splines that hold them [2]")
+      ->check(CLI::Range(0, 8));
+  prior.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  a.prior.count = 60;
+  AddForce(prior, a);
+}
+
 constexpr std::array kFeatureCommands = {
     ProgramCommand{"extract", "take detail from a face", &DeclareExtract},
     ProgramCommand{"apply", "give features to a face", &DeclareApply},
@@ -211,6 +266,8 @@ void DeclareFeature(CLI::App& feature, CommandLine& line) {
 constexpr std::array kCommands = {
     ProgramCommand{"edit", "move vertices of an H-spline face as a script says", &DeclareEdit},
     ProgramCommand{"export", "write an H-spline face for other programs", &DeclareExport},
+    ProgramCommand{"prior", "put the modes of a face model onto the H-spline of its mean",
+                   &DeclarePrior},
     ProgramCommand{"feature", "carry detail from one face to another (thesis 4.3)",
                    &DeclareFeature},
 };

@@ -10,7 +10,7 @@
 #include <functional>
 #include <string>
 
-#include "problems/prior/prior_surface.h"
+#include "problems/prior/hspline_prior.h"
 #include "problems/prior/prior_target.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
@@ -151,6 +151,49 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
   }
   const std::vector<Vec2> middle = {Vec2(0.5, 0.5)};
   EXPECT_NEAR(SigmaAt(middle, estimate, prior, on_template)[0], 1.5, 1e-12);
+}
+
+TEST(HSplinePrior, ModesOnTheTemplateMoveItAsTheMeshsModesDo) {
+  const ScratchFolder folder;
+  const ModesPrior source = WritePrior(folder.Path());
+  const FacePrior on_mesh = LoadPrior(source);
+  ModesMisfit misfit;
+  const HSplineModes modes =
+      ModesOnTemplate(on_mesh, LayOnTemplate(on_mesh, Face(), {}), Face(), 2, 2, &misfit);
+  EXPECT_LT(misfit.rms_mm, 0.05);
+  const HSplineModes again = HSplineModesFromJson(HSplineModesToJson(modes), "modes.json");
+  EXPECT_EQ(again.features.size(), 2u);
+  const FacePrior prior = PriorOf(again, Face(), 100);
+  EXPECT_EQ(prior.model.Modes(), 2);
+  EXPECT_EQ(prior.sites.size(), 32u);
+  EXPECT_LT((prior.features[0].position - Vec3(0, -30, -36)).norm(), 8);  // near the nose's skin
+  for (std::size_t v = 0; v < prior.model.mean.points.size(); v += 313) {
+    const double s = std::sin(0.04 * prior.model.mean.points[v].z());
+    const Vec3 move = prior.model.modes.block<3, 1>(3 * static_cast<Eigen::Index>(v), 1);
+    EXPECT_LT((move - Vec3(3 * s, 0, 2 * s)).norm(), 0.2);
+  }
+}
+
+TEST(HSplinePrior, WhatCannotBeUsedIsNamed) {
+  const auto fault = [](const std::string& text) -> std::string {
+    try {
+      HSplineModesFromJson(text, "modes.json");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  const std::string head =
+      R"({"format": "semblance face prior", "version": 1, "patches_u": 4, "patches_v": 4, "level": 0,)";
+  EXPECT_THAT(fault("{"), HasSubstr("modes.json: not a file of modes"));
+  EXPECT_THAT(fault(R"({"format": "x", "version": 1})"), HasSubstr("format and version"));
+  EXPECT_THAT(fault(head + R"("features": [], "modes": [[1, 2]]})"), HasSubstr("has 2 numbers"));
+  EXPECT_THAT(fault(head + R"("features": [], "modes": []})"), HasSubstr("no mode"));
+  EXPECT_THAT(fault(head + R"("features": [{"uv": [2, 0], "clearance_mm": 1}], "modes": []})"),
+              HasSubstr("outside [0,1]"));
+  HSplineModes modes{.shape = {.patches_u = 4, .patches_v = 4, .max_level = 0}, .level = 0};
+  EXPECT_THROW(PriorOf(modes, Face(), 1), InputError);
+  EXPECT_THROW(LoadPrior(NoPrior{}, Face()), InputError);
 }
 
 TEST(PriorSurface, ATemplateOfAnotherFaceIsRefused) {
