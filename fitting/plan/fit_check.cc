@@ -115,7 +115,7 @@ class FaultFinder {
       automatic = k;
     }
     for (int k = 0; automatic >= 0 && k < std::ssize(options_.terms); ++k) {
-      if (!IsAssembled(options_.terms[k])) {
+      if (!SeparableButForLoss(std::span(&options_.terms[k], 1))) {
         Add(fmt::format("terms[{}]", k),
             fmt::format("weight: auto cannot be chosen beside the term '{}', which does not treat "
                         "x, y and z alike; give a number",

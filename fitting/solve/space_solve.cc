@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <iterator>
 #include <tuple>
 #include <utility>
 
@@ -217,8 +217,8 @@ LevelSummary SpaceSolve::Settle() {
 }
 
 LevelSummary SpaceSolve::Solve(SolveTolerance until) {
-  const double auto_weight = ChooseSmoothness();
   Begin();
+  const double auto_weight = ChooseSmoothness();
   const bool direct = GoesDirectly();
   const Standing before = Stand();
   const SolverOutcome outcome = direct ? Descend(until) : SolveWithCeres(until);
@@ -292,43 +292,24 @@ double SpaceSolve::ChooseSmoothness() {
 }
 
 bool SpaceSolve::GoesDirectly() const {
-  return solver_ == Solver::kFastest && std::all_of(terms_.begin(), terms_.end(), IsAssembled);
+  return solver_ == Solver::kFastest && SeparableButForLoss(terms_);
 }
 
-NormalSystem SpaceSolve::System(std::span<const Term> terms, SystemPart part) const {
+NormalSystem SpaceSolve::System(std::span<const Term> terms, SystemPart part) {
   std::vector<LevelStiffness> forms;
   if (std::any_of(terms.begin(), terms.end(), IsSmoothness)) {
     forms = StiffnessByLevel(space_.shape(), terms, lengths_mm_);
   }
   const bool points = std::any_of(terms.begin(), terms.end(), IsOfPoints);
   NormalSystem system = Assemble(space_, points ? Scale() : 0, forms, part);
-  for (const Term& term : terms) {
-    if (const auto* const prior = std::get_if<PriorTerm>(&term); prior && prior->weight > 0) {
-      AddPrior(*prior, part, system);
-    }
+  std::vector<Term> others;
+  std::copy_if(terms.begin(), terms.end(), std::back_inserter(others), [](const Term& term) {
+    return IsActive(term) && !IsOfPoints(term) && !IsSmoothness(term);
+  });
+  if (!others.empty()) {
+    AddRowsOf(others, View(), space_.Values(), part, system);
   }
   return system;
-}
-
-void SpaceSolve::AddPrior(const PriorTerm& term, SystemPart part, NormalSystem& system) const {
-  const ControlNet values = space_.Values(),
-                   anchor = term.towards == PriorTowards::kStart ? start_ : space_.RestValues();
-  const double factor = term.weight / space_.rows();
-  std::vector<int> rows = HeldRows();
-  if (!term.held_only) {
-    rows.resize(space_.rows());
-    std::iota(rows.begin(), rows.end(), 0);
-  }
-  std::vector<Eigen::Triplet<double>> diagonal;
-  for (const int row : rows) {
-    system.right.row(row) += factor * (anchor.vertices[row] - values.vertices[row]).transpose();
-    diagonal.emplace_back(row, row, factor);
-  }
-  if (part == SystemPart::kBoth) {
-    SparseMatrix more(space_.rows(), space_.rows());
-    more.setFromTriplets(diagonal.begin(), diagonal.end());
-    system.lower += more;
-  }
 }
 
 std::vector<int> SpaceSolve::HeldRows() const {

@@ -31,11 +31,11 @@ struct SpaceProblem {
   bool settled = false;  // from the start; see Settle
 };
 
-// Two ways to the same minimum. With `fastest`, and terms that have a part in the normal equations
-// (IsAssembled), damped Gauss-Newton steps by one sparse Cholesky factor, assembled from moments of
-// each leaf's points; else Ceres, with a view of the space, which takes rows: those are reduced by
-// QR and keep the condition that moments square. Either goes with a loss by iterative
-// reweighting, unless a term couples x, y and z.
+// Two ways to the same minimum. With `fastest`, and terms that treat x, y and z alike, damped
+// Gauss-Newton steps by one sparse Cholesky factor, assembled from moments of each leaf's points;
+// else Ceres, with a view of the space, which takes rows: those are reduced by QR and keep the
+// condition that moments square. Either goes with a loss by iterative reweighting, unless a term
+// couples x, y and z.
 class SpaceSolve {
  public:
   // Throw InputError for sizes that disagree, more than one `weight: auto`, and a term that has
@@ -61,7 +61,7 @@ class SpaceSolve {
   // time; NaN if no term is `auto`.
   double ChooseSmoothness();
   // Of some of the terms, at the surface as it stands.
-  NormalSystem System(std::span<const Term> terms, SystemPart part = SystemPart::kBoth) const;
+  NormalSystem System(std::span<const Term> terms, SystemPart part = SystemPart::kBoth);
   // What the squared misfit of each point is multiplied by in the cost, with the factors that the
   // losses give it where the surface stands; in the order in which the points were given.
   std::vector<double> PointWeights() const;
@@ -82,7 +82,6 @@ class SpaceSolve {
 
   void Begin();
   void EditMirrors();
-  void AddPrior(const PriorTerm& term, SystemPart part, NormalSystem& system) const;
   double Shift(const NormalSystem& system) const;
   double Move(const Eigen::MatrixX3d& step, const Eigen::MatrixX3d& right);
   double Take(const ControlNet& net);

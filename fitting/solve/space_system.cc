@@ -171,6 +171,42 @@ class Assembler {
   NormalSystem system_;
 };
 
+// The misfit is taken row by row, which is more precise than the difference of A^T B and A^T A X.
+class RowSystem final : public RowSink {
+ public:
+  RowSystem(const ControlNet& net, NormalSystem& system) : net_(net), system_(system) {}
+
+  void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
+           std::span<const int> vertices) override {
+    Eigen::MatrixX3d x(vertices.size(), 3);
+    for (std::size_t k = 0; k < vertices.size(); ++k) {
+      x.row(k) = net_.vertices[vertices[k]];
+    }
+    b -= *a * x;
+    const Eigen::MatrixX3d right = a->transpose() * b;
+    const Eigen::MatrixXd gram = a->transpose() * *a;
+    for (std::size_t k = 0; k < vertices.size(); ++k) {
+      system_.right.row(vertices[k]) += right.row(k);
+      for (std::size_t l = 0; l < vertices.size(); ++l) {
+        if (vertices[k] >= vertices[l]) {
+          triplets_.emplace_back(vertices[k], vertices[l], gram(k, l));
+        }
+      }
+    }
+  }
+
+  void AddMatrix() const {
+    SparseMatrix more(system_.lower.rows(), system_.lower.cols());
+    more.setFromTriplets(triplets_.begin(), triplets_.end());
+    system_.lower += more;
+  }
+
+ private:
+  const ControlNet& net_;
+  NormalSystem& system_;
+  std::vector<Eigen::Triplet<double>> triplets_;
+};
+
 }  // namespace
 
 std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::span<const Term> terms,
@@ -209,6 +245,15 @@ double EnergyOf(const HierarchicalSplineSpace& space, std::span<const LevelStiff
 NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
                       std::span<const LevelStiffness> forms, SystemPart part) {
   return Assembler(space, point_scale, forms, part).Run();
+}
+
+void AddRowsOf(std::span<const Term> terms, const LevelView& view, const ControlNet& net,
+               SystemPart part, NormalSystem& system) {
+  RowSystem rows(net, system);
+  AddRows(terms, view, rows);
+  if (part == SystemPart::kBoth) {
+    rows.AddMatrix();
+  }
 }
 
 }  // namespace semblance

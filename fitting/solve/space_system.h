@@ -7,6 +7,7 @@
 
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/space/hierarchical_spline_space.h"
+#include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 
 namespace semblance {
@@ -40,5 +41,9 @@ enum class SystemPart { kBoth, kRight };
 // forms: one per level, or none. kRight leaves the matrix 0 x 0.
 NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
                       std::span<const LevelStiffness> forms, SystemPart part = SystemPart::kBoth);
+
+// Adds the rows of other terms that treat x, y and z alike, as they stand to a net of the unknowns.
+void AddRowsOf(std::span<const Term> terms, const LevelView& view, const ControlNet& net,
+               SystemPart part, NormalSystem& system);
 
 }  // namespace semblance

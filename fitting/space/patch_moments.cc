@@ -73,6 +73,15 @@ struct Batch {
          p.power[4 * b];
 }
 
+[[gnu::always_inline]] inline void AddPowers(Vec4 low, Vec4 high, double y, Vec4 (&moments)[7][2]) {
+  for (int q = 0; q < 7; ++q) {
+    moments[q][0] += low;
+    moments[q][1] += high;
+    low = low * y;
+    high = high * y;
+  }
+}
+
 SEMBLANCE_KERNEL void Accumulate(const Batch& batch, const Polynomial& p, PatchMoments& sums) {
   Vec4 moments[7][2], residual[16];
   __builtin_memcpy(moments, sums.moments, sizeof moments);
@@ -103,13 +112,8 @@ SEMBLANCE_KERNEL void Accumulate(const Batch& batch, const Polynomial& p, PatchM
       along = along * y;
     }
     if (batch.moments) {
-      Vec4 low = Vec4{1, z, z2, z3} * w, high = low * (z2 * z2);
-      for (int q = 0; q < 7; ++q) {
-        moments[q][0] += low;
-        moments[q][1] += high;
-        low = low * y;
-        high = high * y;
-      }
+      const Vec4 low = Vec4{1, z, z2, z3} * w;
+      AddPowers(low, low * (z2 * z2), y, moments);
     }
   }
   __builtin_memcpy(sums.moments, moments, sizeof moments);

@@ -63,13 +63,6 @@ inline bool SeparableButForLoss(std::span<const Term> terms) {
   });
 }
 
-// Of terms that have a part in the normal equations (space_system.h), or no weight.
-inline bool IsAssembled(const Term& term) {
-  return WeightOf(term) <= 0 || std::holds_alternative<PointTerm>(term) ||
-         std::holds_alternative<LandmarkTerm>(term) || std::holds_alternative<PriorTerm>(term) ||
-         std::holds_alternative<SmoothnessTerm>(term) || std::holds_alternative<MembraneTerm>(term);
-}
-
 // What the term costs on one patch of a level of patches_u x patches_v, mm^2: x^T form x for each
 // coordinate x of the patch's sixteen f. lengths_mm: what [0,1] stands for along u and v.
 ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,

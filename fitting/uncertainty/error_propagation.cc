@@ -28,6 +28,8 @@ bool IsOfPoints(const Term& term) {
          std::holds_alternative<TangentPointTerm>(term);
 }
 
+bool TreatsAxesAlike(const Term& term) { return SeparableButForLoss(std::span(&term, 1)); }
+
 // The terms with a weight that are not of the points.
 std::vector<Term> OthersAmong(std::span<const Term> terms) {
   std::vector<Term> others;
@@ -39,7 +41,7 @@ std::vector<Term> OthersAmong(std::span<const Term> terms) {
 std::vector<std::string_view> LeftOut(std::span<const Term> terms) {
   std::vector<std::string_view> names;
   for (const Term& term : terms) {
-    if (!IsAssembled(term) && !IsOfPoints(term)) {
+    if (!TreatsAxesAlike(term) && !IsOfPoints(term)) {
       names.push_back(TermName(term));
     }
   }
@@ -52,7 +54,7 @@ std::vector<Term> Solved(std::span<const Term> terms) {
   for (const Term& term : terms) {
     if (const auto* const tangent = std::get_if<TangentPointTerm>(&term); tangent != nullptr) {
       solved.emplace_back(PointTerm{.weight = tangent->weight});
-    } else if (IsAssembled(term)) {
+    } else if (TreatsAxesAlike(term)) {
       solved.push_back(term);
     }
   }
@@ -79,27 +81,6 @@ Eigen::MatrixXd UnitColumns(Eigen::Index rows, Eigen::Index first, Eigen::Index 
   }
   return unit;
 }
-
-}  // namespace
-
-Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd left, double share) {
-  const Eigen::Index n = left.rows();
-  Eigen::MatrixXd root(n, n);
-  Eigen::Index rank = 0;
-  const double enough = n > 0 ? share * left.diagonal().maxCoeff() : 0;
-  for (; rank < n; ++rank) {
-    Eigen::Index pivot = 0;
-    const double largest = left.diagonal().maxCoeff(&pivot);
-    if (!(largest > enough)) {
-      break;
-    }
-    root.col(rank) = left.col(pivot) / std::sqrt(largest);
-    left.noalias() -= root.col(rank) * root.col(rank).transpose();
-  }
-  return root.leftCols(rank);
-}
-
-namespace {
 
 // The points less what levels finer than `level` add.
 FitTarget LessFiner(const HSplineSurface& surface, const HSplineSurface& rest,

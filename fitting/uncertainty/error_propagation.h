@@ -19,12 +19,8 @@ namespace semblance {
 struct PointErrors {
   std::vector<Vec3> directions;  // unit, one per point: along which it may be off
   Eigen::MatrixXd root;          // points x any number; root root^T is the covariance, mm^2
+                                 // (pivoted_root.h)
 };
-
-// A root as PointErrors takes it of a positive semidefinite matrix: its Cholesky factor with
-// pivots, cut off where what is left of each variance is below `share` of the largest (Harbrecht,
-// Peters & Schneider 2012).
-Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd covariance, double share = 1e-3);
 
 // The surface's error is a sum of three, taken as independent. With the level's normal matrix
 // M = A'WA + P, of points and other terms at the weights of the fit:
@@ -32,8 +28,8 @@ Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd covariance, double share = 1e-3);
 //   M^-1 P (c - c0), what the other terms hold back: the true net is off the one that they draw to
 //     by their own distribution, of the precision P / prior_sd^2;
 //   M^-1 (A'W p + P c0) - c, what the schedule has left undone; known, but taken as a deviation.
-// What a surface with too few vertices leaves of a misfit is in none of them: an adaptive fit with a
-// tolerance of more than about three times the points' noise is off by more than sigma.
+// What a surface with too few vertices leaves of a misfit is in none of them: an adaptive fit with
+// a tolerance of more than about three times the points' noise is off by more than sigma.
 // prior_sd^2 is what the other terms cost at the solution, by coordinate, over the number of
 // parameters that the points determine, trace(M^-1 A'WA) (MacKay 1992).
 // Where only some of the level's vertices are edited (adaptive fits) the net is that of all levels

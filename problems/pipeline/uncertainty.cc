@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "fitting/uncertainty/error_propagation.h"
+#include "fitting/uncertainty/pivoted_root.h"
 #include "interp/evaluation/calibration.h"
 #include "interp/kriging/kriging_process.h"
 #include "problems/metrics/quantile.h"

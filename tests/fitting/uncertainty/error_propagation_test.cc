@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "fitting/uncertainty/pivoted_root.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/scattered_data.h"
@@ -243,7 +244,8 @@ TEST(ErrorPropagation, APointThatALossLeavesOutSaysNothing) {
   }
 }
 
-// Finer vertices in places: draws of the points' noise fitted on the same vertices, again and again.
+// Finer vertices in places: draws of the points' noise fitted on the same vertices, again and
+// again.
 TEST(ErrorPropagation, OfAnAdaptiveFitItIsHowFarItsNoiseTakesIt) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
   constexpr double kNoise_mm = 0.01;
