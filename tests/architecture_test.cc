@@ -322,7 +322,7 @@ TEST(Architecture, TheReadmeShowsTheConsumersProgram) {
 TEST(Architecture, OnlyTheAgreedEntriesStandAtTheTop) {
   const std::set<std::string> allowed = {"CMakeLists.txt", "fitting", "surfaces", "interp",
                                          "problems", "tests", "configs", "README.md", "LICENSE",
-                                         "Makefile", "CMakePresets.json", ".clang-format",
+                                         "NOTICE", "Makefile", "CMakePresets.json", ".clang-format",
                                          ".clang-tidy", ".gitignore", ".ci", "docs",
                                          // not part of the project, and ignored by git
                                          ".git", "build", "build-debug", "build-sanitize",

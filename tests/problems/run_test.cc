@@ -75,6 +75,42 @@ TEST(Run, ThePhantomsImplicitFaceIsWithinAMillimetreOfTheTruth) {
   EXPECT_TRUE(result.usable());
 }
 
+TEST(Run, TheThinPlateNearsTheTipsAndThePlacedTemplateStays) {
+  const RunResult placed = semblance::Run(SmallPhantom({"face=placed"}), {});
+  const RunResult bent =
+      semblance::Run(SmallPhantom({"face={type: thin_plate, stiffness_mm: 0}"}), {});
+  EXPECT_EQ(placed.fit.surface.Offsets(), placed.placed.surface.Offsets());
+  EXPECT_GT(placed.fit.dowel_rms_mm, 1);
+  EXPECT_LT(
+      bent.fit.dowel_rms_mm,
+      0.5 * placed.fit.dowel_rms_mm);  // the plate has a kink at each tip, which the spline rounds
+  EXPECT_TRUE(placed.usable() && bent.usable());
+  EXPECT_FALSE(placed.uncertainty);
+}
+
+TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
+  const std::string ict = (kConfigs / "faces/ict/").string();
+  const Experiment experiment = SmallPhantom(
+      {fmt::format("template={{type: file, surface: {0}head.hspline.json, sites: {0}sites.csv, "
+                   "features: {0}features.json}}",
+                   ict),
+       fmt::format("prior={{type: hspline, modes: {}modes.json, count: 20}}", ict), "face=prior"});
+  const RunResult result = semblance::Run(experiment, {});
+  ASSERT_TRUE(result.prior && result.uncertainty);
+  EXPECT_TRUE(result.usable());
+  EXPECT_EQ(result.prior->coefficients.size(), 20);
+  EXPECT_GE(result.uncertainty->median_mm, 1.25);  // the discrepancy at least
+  for (const double off : result.prior->tip_residual_mm) {
+    EXPECT_LT(std::abs(off), 6);
+  }
+  EXPECT_THAT(ResultJson(experiment, result), HasSubstr("coefficients_rms"));
+}
+
+TEST(Run, AFaceOfAPriorNeedsOne) {
+  EXPECT_THAT([] { SmallPhantom({"face=prior"}); },
+              ::testing::ThrowsMessage<ConfigError>(HasSubstr("name one under `prior`")));
+}
+
 // The largest angle between the normals of two triangles that share an edge; 180 is a fold.
 double SharpestEdge_deg(const TriMesh& mesh) {
   std::map<std::array<int, 2>, Vec3> normals;  // of the first triangle at an edge
