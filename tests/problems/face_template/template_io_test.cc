@@ -158,6 +158,22 @@ TEST_F(TemplateIo, AFileThatIsNotNamedOrNotThereIsAClearError) {
   }
 }
 
+TEST(EmbeddedFace, IsAFaceInMillimetresWithAllItsParts) {
+  const std::filesystem::path folder = SEMBLANCE_SOURCE_DIR "/configs/faces/ict";
+  const TemplateFace face =
+      ReadTemplate({folder / "head.hspline.json", folder / "sites.csv", folder / "features.json"});
+  const auto at = [&](const char* site) { return face.surface.Point(face.site_uv.at(site)); };
+  EXPECT_NEAR((at("zy_l") - at("zy_r")).norm(), 140, 15);  // bizygomatic breadth over skin
+  EXPECT_NEAR((at("n") - at("me")).norm(), 120, 15);       // height of the face
+  EXPECT_GT(at("zy_l").x(), at("zy_r").x());
+  EXPECT_LT(face.surface.Normal(face.site_uv.at("g")).y(), -0.8);
+  ASSERT_EQ(face.features.size(), 4);
+  for (const TemplateFeature& feature : face.features) {
+    EXPECT_GT(feature.vertices.size(), 50) << feature.name;
+    EXPECT_TRUE(feature.region.has_value()) << feature.name;
+  }
+}
+
 TEST_F(TemplateIo, RefusesToWriteWhatItWouldNotRead) {
   TemplateFace face = Face();
   face.site_uv.erase("me");
