@@ -53,12 +53,26 @@ void DropTurned(MatchGrid& grid) {
 
 }  // namespace
 
-SkinMatcher::SkinMatcher(const TriMesh& skin)
-    : skin_(skin), query_(skin), normals_(VertexNormals(skin)), on_border_(skin.points.size()) {
-  for (const MeshEdge& edge : BorderEdges(skin)) {
-    on_border_[edge[0]] = on_border_[edge[1]] = true;
+std::vector<Vec2> CellMiddles(int columns, int rows) {
+  std::vector<Vec2> uv;
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      uv.emplace_back((i + 0.5) / columns, (j + 0.5) / rows);
+    }
   }
+  return uv;
 }
+
+std::vector<bool> OnBorder(const TriMesh& mesh) {
+  std::vector<bool> on_border(mesh.points.size());
+  for (const MeshEdge& edge : BorderEdges(mesh)) {
+    on_border[edge[0]] = on_border[edge[1]] = true;
+  }
+  return on_border;
+}
+
+SkinMatcher::SkinMatcher(const TriMesh& skin)
+    : skin_(skin), query_(skin), normals_(VertexNormals(skin)), on_border_(OnBorder(skin)) {}
 
 bool SkinMatcher::Belongs(const MeshPoint& at, const Vec3& normal, double reach_mm) const {
   if (!(at.distance_mm <= reach_mm)) {
@@ -97,13 +111,12 @@ std::optional<SkinMatch> SkinMatcher::Find(const Vec3& point, const Vec3& normal
 
 MatchGrid MatchToSkin(const HSplineSurface& surface, const SkinMatcher& skin, int columns, int rows,
                       double reach_mm, int threads) {
-  MatchGrid grid{
-      .columns = columns, .rows = rows, .uv = {}, .points = {}, .normals = {}, .skin = {}};
-  for (int j = 0; j < rows; ++j) {
-    for (int i = 0; i < columns; ++i) {
-      grid.uv.emplace_back((i + 0.5) / columns, (j + 0.5) / rows);
-    }
-  }
+  MatchGrid grid{.columns = columns,
+                 .rows = rows,
+                 .uv = CellMiddles(columns, rows),
+                 .points = {},
+                 .normals = {},
+                 .skin = {}};
   SurfaceSamples samples = HSplineBatch(surface).PointsAndNormals(grid.uv, threads);
   grid.points = std::move(samples.points);
   grid.normals = std::move(samples.normals);

@@ -34,10 +34,16 @@ class SkinMatcher {
   std::vector<bool> on_border_;  // per vertex
 };
 
+// The middles of the cells of a columns x rows grid over the domain, i + columns * j.
+std::vector<Vec2> CellMiddles(int columns, int rows);
+
+// Per vertex: whether it is on a border of the mesh.
+std::vector<bool> OnBorder(const TriMesh& mesh);
+
 // A regular grid over the domain: its (u,v), and what the skin has there.
 struct MatchGrid {
   int columns = 0, rows = 0;
-  std::vector<Vec2> uv;                        // i + columns * j, at the middles of the cells
+  std::vector<Vec2> uv;                        // CellMiddles
   std::vector<Vec3> points, normals;           // of the surface
   std::vector<std::optional<SkinMatch>> skin;  // where it was found
 };

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <utility>
 
+#include "problems/face_template/skin_matcher.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 #include "surfaces/hspline_query/tessellate.h"
@@ -65,17 +66,6 @@ std::vector<Vec2> ConvexHull(const std::vector<Vec2>& points) {
   return corners;
 }
 
-// The middles of the cells of a grid over the domain.
-std::vector<Vec2> CellMiddles(int columns, int rows) {
-  std::vector<Vec2> uv;
-  for (int j = 0; j < rows; ++j) {
-    for (int i = 0; i < columns; ++i) {
-      uv.emplace_back((i + 0.5) / columns, (j + 0.5) / rows);
-    }
-  }
-  return uv;
-}
-
 }  // namespace
 
 TemplateDistance::TemplateDistance(const TriMesh& skin, std::vector<Vec2> face)
@@ -83,12 +73,8 @@ TemplateDistance::TemplateDistance(const TriMesh& skin, std::vector<Vec2> face)
       query_(skin),
       normals_(VertexNormals(skin)),
       areas_(VertexAreas(skin)),
-      on_border_(skin.points.size()),
-      hull_(ConvexHull(face)) {
-  for (const MeshEdge& edge : BorderEdges(skin)) {
-    on_border_[edge[0]] = on_border_[edge[1]] = true;
-  }
-}
+      on_border_(OnBorder(skin)),
+      hull_(ConvexHull(face)) {}
 
 bool TemplateDistance::InFace(const Vec2& uv) const {
   for (std::size_t k = 0; k < hull_.size(); ++k) {

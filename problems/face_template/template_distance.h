@@ -2,8 +2,6 @@
 // How well a template's face meets the skin that it was made from.
 #pragma once
 
-#include <map>
-#include <string>
 #include <vector>
 
 #include "surfaces/hspline/hspline_surface.h"
