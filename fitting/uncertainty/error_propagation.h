@@ -29,7 +29,7 @@ struct PointErrors {
 //     by their own distribution, of the precision P / prior_sd^2;
 //   M^-1 (A'W p + P c0) - c, what the schedule has left undone; known, but taken as a deviation.
 // What a surface with too few vertices leaves of a misfit is in none of them: an adaptive fit with
-// a tolerance of more than about three times the points' noise is off by more than sigma.
+// a tolerance of several times the points' noise may be off by more than sigma.
 // prior_sd^2 is what the other terms cost at the solution, by coordinate, over the number of
 // parameters that the points determine, trace(M^-1 A'WA) (MacKay 1992).
 // Where only some of the level's vertices are edited (adaptive fits) the net is that of all levels
