@@ -9,12 +9,12 @@
 #include <memory>
 
 #include "problems/metrics/quantile.h"
-#include "problems/pipeline/cut_planes.h"
 #include "problems/pipeline/stage_key.h"
 #include "problems/prior/hspline_prior.h"
 #include "problems/prior/prior_target.h"
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/hspline_project.h"
+#include "surfaces/mesh/cut_planes.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/pipeline/skull_stage.h"
 
-#include "problems/pipeline/cut_planes.h"
 #include "problems/pipeline/dowel_projection.h"
 #include "problems/pipeline/implicit_cache.h"
 #include "problems/pipeline/stage_key.h"
+#include "surfaces/mesh/cut_planes.h"
 
 namespace semblance {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/pipeline/cut_planes.h"
+#include "surfaces/mesh/cut_planes.h"
 
 #include <fmt/format.h>
 
@@ -22,22 +22,50 @@ double LengthAlong(const CutPlane& plane, const TriMesh& mesh,
   return length;
 }
 
-}  // namespace
+double LidArea_mm2(const CutPlane& plane, const TriMesh& mesh) {
+  constexpr double kNear_mm = 0.5, kLeastCosine = 0.985;  // 10 degrees
+  double area = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const bool near = std::ranges::all_of(
+        t, [&](auto v) { return plane.Beyond_mm(mesh.points[v]) >= -kNear_mm; });
+    if (near) {
+      const Vec3 facing = TriangleAreaVector(mesh, t);
+      area += plane.sign * facing[plane.axis] >= kLeastCosine * facing.norm() ? facing.norm() : 0;
+    }
+  }
+  return area;
+}
 
-std::vector<CutPlane> FindCutPlanes(const TriMesh& skull) {
-  constexpr double kLeastBorder_mm = 100;
-  const std::vector<MeshEdge> border = BorderEdges(skull);
-  const Box3 box = Bounds(skull);
+// Of the six sides of the bounding box.
+template <class Accept>
+std::vector<CutPlane> SidesWhere(const TriMesh& mesh, const Accept& accept) {
+  const Box3 box = Bounds(mesh);
   std::vector<CutPlane> planes;
   for (int axis = 0; axis < 3; ++axis) {
     for (const int sign : {-1, 1}) {
       const CutPlane plane{axis, sign, sign < 0 ? box.min()[axis] : box.max()[axis]};
-      if (LengthAlong(plane, skull, border) >= kLeastBorder_mm) {
+      if (accept(plane)) {
         planes.push_back(plane);
       }
     }
   }
   return planes;
+}
+
+}  // namespace
+
+std::vector<CutPlane> FindCutPlanes(const TriMesh& skull) {
+  constexpr double kLeastBorder_mm = 100;
+  const std::vector<MeshEdge> border = BorderEdges(skull);
+  return SidesWhere(skull, [&](const CutPlane& plane) {
+    return LengthAlong(plane, skull, border) >= kLeastBorder_mm;
+  });
+}
+
+std::vector<CutPlane> FindLids(const TriMesh& mesh) {
+  constexpr double kLeastLid_mm2 = 500;
+  return SidesWhere(
+      mesh, [&](const CutPlane& plane) { return LidArea_mm2(plane, mesh) >= kLeastLid_mm2; });
 }
 
 std::string InWords(const CutPlane& plane) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/pipeline/cut_planes.h"
+#include "surfaces/mesh/cut_planes.h"
 
 #include <gtest/gtest.h>
 

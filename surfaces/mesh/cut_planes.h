@@ -23,6 +23,11 @@ struct CutPlane {
 // within 1 mm, for 100 mm or more in all.
 std::vector<CutPlane> FindCutPlanes(const TriMesh& skull);
 
+// A side of the bounding box is also the end of a scan if a lid lies in it: triangles that face
+// that way within 10 degrees and lie within 0.5 mm of it, 5 cm^2 or more in all. (A ball of 80 mm
+// has half of that at its top.)
+std::vector<CutPlane> FindLids(const TriMesh& mesh);
+
 // In words, e.g. "z = 0.0 mm (lower end)".
 std::string InWords(const CutPlane& plane);
 
