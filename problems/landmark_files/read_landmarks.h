@@ -11,12 +11,8 @@
 
 namespace semblance {
 
-// The axes of a file's coordinates. RAS has x to the subject's right and y to the front.
-enum class PatientAxes { kLps, kRas };
-constexpr auto EnumNames(PatientAxes) { return std::to_array<std::string_view>({"LPS", "RAS"}); }
-
 struct ReadLandmarksOptions {
-  std::optional<PatientAxes> axes;  // of a file that does not say; none: LPS, and a note
+  std::optional<Axes> axes;  // of a file that does not say; none: LPS, and a note
   bool leave_out_unknown = false;   // points whose name is no site, with a note each
 };
 

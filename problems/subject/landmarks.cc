@@ -2,20 +2,31 @@
 #include "problems/subject/landmarks.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <set>
 
 #include "problems/config/config.h"
 #include "problems/subject/averaged_normal.h"
 #include "problems/subject/sites.h"
-#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
 
 constexpr double kUnitTolerance = 0.01;  // files hold rounded normals
 
+// The value of that name, if there is one.
+template <class Enum>
+std::optional<Enum> Named(std::string_view name) {
+  const auto names = EnumNames(Enum{});
+  const auto found = std::ranges::find(names, name);
+  return found == names.end() ? std::nullopt
+                              : std::optional(static_cast<Enum>(found - names.begin()));
+}
+
 Vec3 ToVec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+std::array<double, 3> ToArray(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 std::string OfSubject(const LandmarkFile& file) {
   return file.subject.empty() ? "landmarks" : fmt::format("landmarks of {}", file.subject);
@@ -76,12 +87,13 @@ void CheckValue(Report& report, const AbsentLandmark& absent) {
 
 template <class Report>
 void CheckValue(Report& report, const LandmarkFile& file) {
-  if (file.units != "mm") {
-    report("units", fmt::format("must be mm, not '{}'; convert the points", file.units));
+  if (!Named<LengthUnit>(file.units)) {
+    report("units", fmt::format("must be one of {}, not '{}'",
+                                fmt::join(EnumNames(LengthUnit{}), ", "), file.units));
   }
-  if (file.axes != "LPS") {
-    report("axes", fmt::format("must be LPS (+x subject left, +y posterior, +z up), not '{}'; "
-                               "convert the points and the skull",
+  if (!Named<Axes>(file.axes)) {
+    report("axes", fmt::format("must be LPS (+x subject left, +y posterior, +z up) or RAS (x and y "
+                               "the other way), not '{}'",
                                file.axes));
   }
   if (file.landmarks.empty()) {
@@ -101,12 +113,27 @@ void CheckValue(Report& report, const LandmarkFile& file) {
 }
 
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path) {
-  return ReadConfig<LandmarkFile>(path);
+  auto file = ReadConfig<LandmarkFile>(path);
+  const Axes axes = *Named<Axes>(file.axes);
+  const LengthUnit unit = *Named<LengthUnit>(file.units);
+  for (Landmark& landmark : file.landmarks) {
+    landmark.point = ToArray(ToLpsMm(ToVec3(landmark.point), axes, unit));
+    if (landmark.normal) {
+      landmark.normal = ToArray(ToLps(ToVec3(*landmark.normal), axes));
+    }
+  }
+  file.axes = "LPS";
+  file.units = "mm";
+  return file;
 }
 
 std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
                                const PlaceOptions& options) {
-  const MeshQuery query(skull);
+  return PlaceDowels(file, skull, MeshQuery(skull), options);
+}
+
+std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
+                               const MeshQuery& query, const PlaceOptions& options) {
   std::vector<Dowel> dowels;
   for (const Landmark& landmark : file.landmarks) {
     const MeshPoint nearest = query.Closest(ToVec3(landmark.point));

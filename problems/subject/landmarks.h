@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "interp/dowels/dowel.h"
+#include "problems/subject/length_unit.h"
 #include "surfaces/base/fields.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
@@ -40,8 +42,8 @@ struct AbsentLandmark {
 
 struct LandmarkFile {
   std::string subject;
-  std::string units = "mm";
-  std::string axes = "LPS";
+  std::string units = "mm";  // of the points, as EnumNames(LengthUnit); depths are in mm
+  std::string axes = "LPS";  // of points and normals, as EnumNames(Axes); "": the file does not say
   std::vector<Landmark> landmarks;
   std::vector<AbsentLandmark> absent;
 };
@@ -49,6 +51,7 @@ struct LandmarkFile {
 struct PlaceOptions {
   double max_distance_mm = 3;   // of a landmark from the skull; more is an error
   double normal_radius_mm = 3;  // of the mean normal where a landmark has none
+  double max_misfit_mm = 25;    // of a landmark from where the others foresee it; more is an error
 };
 
 template <class Visitor>
@@ -84,8 +87,12 @@ void Fields(Visitor& visit, AbsentLandmark& o) {
 template <class Visitor>
 void Fields(Visitor& visit, LandmarkFile& o) {
   visit(FieldInfo{.name = "subject", .doc = "whose skull it is; for messages"}, o.subject);
-  visit(FieldInfo{.name = "units", .doc = "mm"}, o.units);
-  visit(FieldInfo{.name = "axes", .doc = "LPS: +x subject left, +y posterior, +z up"}, o.axes);
+  visit(FieldInfo{.name = "units", .doc = "of the points; depths are in mm whatever it is"},
+        o.units);
+  visit(FieldInfo{.name = "axes",
+                  .doc = "of points and normals; LPS: +x subject left, +y posterior, +z up; RAS: x "
+                         "and y the other way"},
+        o.axes);
   visit(FieldInfo{.name = "landmarks", .doc = "those that were placed"}, o.landmarks);
   visit(FieldInfo{.name = "absent", .doc = "those that cannot be placed, with the reason"},
         o.absent);
@@ -107,10 +114,18 @@ void Fields(Visitor& visit, PlaceOptions& o) {
                   .doc = "where a landmark has no normal, the skull's mean normal within this "
                          "radius; more smooths rough bone, and rounds rims"},
         o.normal_radius_mm);
+  visit(FieldInfo{.name = "max_misfit_mm",
+                  .unit = "mm",
+                  .min = 5,
+                  .max = 1000,
+                  .doc = "a landmark further than this from where the others and an average skull "
+                         "foresee it is an error; in mm of the average skull"},
+        o.max_misfit_mm);
 }
 
-// The one way to read such a file, as the checks are made here. Throws IoError if the file cannot
-// be read; ConfigError, with a line for each fault, if its units or axes are others, it has no
+// The one way to read such a file, as the checks are made here; points and normals come in mm and
+// LPS whatever the file is in. Throws IoError if the file cannot
+// be read; ConfigError, with a line for each fault, if it has no
 // landmark, a site is not one of StandardSiteCodes() or stands twice (also once as absent), a point
 // lacks, or a normal is not of length 1 within 1 %.
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
@@ -120,6 +135,9 @@ LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
 // the skull within the radius: of the bone that hangs together with the base there and faces within
 // 80 degrees of it, so that the inner side of a thin wall has no say. Throws InputError if a
 // landmark is too far from the skull, or the skull has no area there.
+// query: of the skull.
+std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
+                               const MeshQuery& query, const PlaceOptions& options);
 std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
                                const PlaceOptions& options);
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "surfaces/base/error.h"
@@ -19,12 +20,16 @@ void CheckUnit(double size, const std::string& name) {
   if (size >= kSmallest_mm && size <= kLargest_mm) {
     return;
   }
+  constexpr double kUsual_mm = 230;  // of a skull or a head
   std::string guess = "check its unit";
+  double least = std::numeric_limits<double>::infinity();
   for (const auto& [unit, factor] : {std::pair("metres", 1000.0), std::pair("centimetres", 10.0),
                                      std::pair("inches", 25.4), std::pair("micrometres", 0.001)}) {
-    if (size * factor >= 1.5 * kSmallest_mm && size * factor <= 0.8 * kLargest_mm) {
-      guess = fmt::format("it looks like {}; multiply by {}", unit, factor);
-      break;
+    const double off = std::abs(std::log(size * factor / kUsual_mm));
+    if (size * factor >= 1.5 * kSmallest_mm && size * factor <= 0.8 * kLargest_mm && off < least) {
+      least = off;
+      guess = fmt::format("it looks like {}; multiply by {}, or say its unit (subject.units)", unit,
+                          factor);
     }
   }
   throw InputError(

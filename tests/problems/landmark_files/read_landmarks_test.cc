@@ -119,7 +119,7 @@ TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {
   EXPECT_EQ(ras.file.landmarks.at(0).point, (std::array{-1.5, -2.0, 3.0}));
   EXPECT_THAT(ras.notes, ElementsAre(HasSubstr("turned from RAS to LPS")));
   EXPECT_THAT(Fault("a.mrk.json", markups("LAS")), HasSubstr("must be \"LPS\" or \"RAS\""));
-  EXPECT_THAT(Fault("a.mrk.json", markups("LPS"), {.axes = PatientAxes::kRas}),
+  EXPECT_THAT(Fault("a.mrk.json", markups("LPS"), {.axes = Axes::kRas}),
               HasSubstr("the file says LPS, and RAS was asked for"));
 }
 
@@ -190,7 +190,7 @@ TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
               ::testing::AllOf(HasSubstr("'F-1' is no site"), HasSubstr("stands on both sides"),
                                HasSubstr("site g (Glabella) stands twice")));
   const LandmarkReading reading = Read("a.csv", "site,x,y,z\nF-1,0,0,0\ng,0,0,0\n",
-                                       {.axes = PatientAxes::kLps, .leave_out_unknown = true});
+                                       {.axes = Axes::kLps, .leave_out_unknown = true});
   EXPECT_EQ(reading.file.landmarks.size(), 1U);
   EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("left out: 'F-1' is no site")));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z\n"), HasSubstr("there is no landmark"));

@@ -17,6 +17,7 @@ namespace semblance {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::Plate;
 using testing::ScratchFile;
@@ -64,11 +65,20 @@ TEST(LandmarkFile, ReadsWhatIsWritten) {
   EXPECT_EQ(file.absent[0].reason, "no mandible");
 }
 
-TEST(LandmarkFile, RefusesOtherUnitsAndAxes) {
-  EXPECT_THAT(Complaints(std::string(kGood) + "units: cm\naxes: RAS\n"),
-              AllOf(HasSubstr("units: must be mm, not 'cm'; convert the points"),
-                    HasSubstr("axes: must be LPS (+x subject left, +y posterior, +z up), not "
-                              "'RAS'; convert the points and the skull")));
+TEST(LandmarkFile, RefusesUnknownUnitsAndAxes) {
+  EXPECT_THAT(Complaints(std::string(kGood) + "units: feet\naxes: LAS\n"),
+              AllOf(HasSubstr("units:"), HasSubstr("mm"), HasSubstr("axes:"), HasSubstr("RAS")));
+}
+
+TEST(LandmarkFile, ComesInMillimetresAndLps) {
+  const LandmarkFile file = ReadLandmarkFile(
+      ScratchFile("units: m\naxes: RAS\n"
+                  "landmarks: [{site: g, point: [0.25, -0.5, 1], normal: [0.6, -0.8, 0], "
+                  "depth_along_normal_mm: 5}]\n"));
+  const Landmark& g = file.landmarks.at(0);
+  EXPECT_THAT(g.point, ElementsAre(-250, 500, 1000));
+  EXPECT_THAT(*g.normal, ElementsAre(-0.6, 0.8, 0));
+  EXPECT_EQ(g.depth_along_normal_mm, 5);
 }
 
 TEST(LandmarkFile, RefusesUnknownSites) {

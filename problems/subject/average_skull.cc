@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/average_skull.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fitting/problem/placement.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+struct AverageLandmark {
+  std::string_view code;  // Site::landmark
+  double x, y, z;         // of a pair, on the left
+};
+
+constexpr AverageLandmark kAverageSkull[] = {
+    {"sg", 0, 3, 27},     {"g", 0, -2, 13},    {"n", 0, 0, 0},       {"rhi", 0, -11, -14},
+    {"mp", 0, 0, -62},    {"pr", 0, -1, -67},  {"id", 0, 4, -91},    {"sm", 0, 10, -102},
+    {"pg", 0, 10, -112},  {"me", 0, 19, -121}, {"fe", 31, 20, 44},   {"mso", 29, 6, 11},
+    {"mio", 35, 12, -29}, {"im", 41, 20, -41}, {"lo", 46, 21, -36},  {"zy", 63, 57, -29},
+    {"sgl", 60, 81, -27}, {"go", 48, 71, -89}, {"sM2", 29, 35, -61}, {"mr", 45, 61, -71},
+    {"iM2", 34, 38, -89},
+};
+
+Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
+
+// Where the average skull has the sites, and where the subject has them.
+struct Pairs {
+  std::vector<Vec3> average, skull;
+};
+
+Pairs PairsOf(std::span<const SitePoint> sites, Handedness hand) {
+  Pairs pairs;
+  for (const SitePoint& s : sites) {
+    const Vec3 average = AverageSite(s.site);
+    pairs.average.push_back(hand == Handedness::kMirrored ? Mirrored(average) : average);
+    pairs.skull.push_back(s.point);
+  }
+  return pairs;
+}
+
+std::vector<double> Residuals(const Pairs& pairs, const Similarity& skull_from_average) {
+  std::vector<double> residuals;
+  for (std::size_t k = 0; k < pairs.skull.size(); ++k) {
+    residuals.push_back((skull_from_average * pairs.average[k] - pairs.skull[k]).norm() /
+                        skull_from_average.scale);
+  }
+  return residuals;
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Whether three points span a triangle that says how a skull lies.
+bool Spans(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return (b - a).cross(c - a).norm() >
+         1e-6 * std::max((b - a).squaredNorm(), (c - a).squaredNorm());
+}
+
+bool SpansABroadTriangle(const Pairs& pairs, const std::array<std::size_t, 3>& t) {
+  constexpr double kLeastDoubleArea_mm2 = 400;  // less says too little of the rotation
+  const auto& a = pairs.average;
+  return (a[t[1]] - a[t[0]]).cross(a[t[2]] - a[t[0]]).norm() > kLeastDoubleArea_mm2 &&
+         Spans(pairs.skull[t[0]], pairs.skull[t[1]], pairs.skull[t[2]]);
+}
+
+Similarity OfTriple(const Pairs& pairs, const std::array<std::size_t, 3>& t) {
+  const std::array average = {pairs.average[t[0]], pairs.average[t[1]], pairs.average[t[2]]};
+  const std::array skull = {pairs.skull[t[0]], pairs.skull[t[1]], pairs.skull[t[2]]};
+  return PlaceTemplate(average, skull);
+}
+
+Similarity LeastMedian(const Pairs& pairs) {
+  Similarity best;
+  double least = std::numeric_limits<double>::infinity();
+  const std::size_t n = pairs.skull.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i + 1; j < n; ++j) {
+      for (std::size_t k = j + 1; k < n; ++k) {
+        if (!SpansABroadTriangle(pairs, {i, j, k})) {
+          continue;
+        }
+        const Similarity candidate = OfTriple(pairs, {i, j, k});
+        const double median = Median(Residuals(pairs, candidate));
+        if (median < least) {
+          least = median;
+          best = candidate;
+        }
+      }
+    }
+  }
+  if (!std::isfinite(least)) {
+    throw InputError(
+        fmt::format("landmarks: three that are apart and not on a line are needed to say how the "
+                    "skull lies; place more than these {}",
+                    n));
+  }
+  return best;
+}
+
+Similarity Reweighted(const Pairs& pairs, Similarity pose) {
+  constexpr double kWidth_mm = 8, kAtRest_mm = 1e-9;
+  constexpr int kMostSteps = 500;
+  double last = std::numeric_limits<double>::infinity();
+  for (int step = 0; step < kMostSteps; ++step) {
+    std::vector<double> weights;
+    double cost = 0;
+    for (const double r : Residuals(pairs, pose)) {
+      weights.push_back(1 / (1 + std::pow(r / kWidth_mm, 2)));
+      cost += std::log1p(std::pow(r / kWidth_mm, 2));
+    }
+    if (std::abs(last - cost) <= kAtRest_mm) {
+      break;
+    }
+    last = cost;
+    pose = PlaceTemplate(pairs.average, pairs.skull, weights);
+  }
+  return pose;
+}
+
+}  // namespace
+
+Vec3 AverageSite(std::string_view site) {
+  const std::string landmark = WithoutSide(site);
+  const auto* const found = std::ranges::find(kAverageSkull, landmark, &AverageLandmark::code);
+  if (found == std::end(kAverageSkull)) {
+    throw InputError(fmt::format("average skull: {}", ComplaintAboutSite(site)));
+  }
+  const bool right = site.ends_with("_r");
+  return {right ? -found->x : found->x, found->y, found->z};
+}
+
+Vec3 SkullFit::Foreseen(std::string_view site) const {
+  const Vec3 average = AverageSite(site);
+  return skull_from_average * (mirrored ? Mirrored(average) : average);
+}
+
+SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand) {
+  const Pairs pairs = PairsOf(sites, hand);
+  SkullFit fit;
+  fit.mirrored = hand == Handedness::kMirrored;
+  fit.skull_from_average = Reweighted(pairs, LeastMedian(pairs));
+  fit.residual_mm = Residuals(pairs, fit.skull_from_average);
+  fit.median_mm = Median(fit.residual_mm);
+  return fit;
+}
+
+Vec3 SkullSites::InAverage(const Vec3& point) const {
+  return skull_from_average.rotation.transpose() * (point - skull_from_average.translation) /
+         skull_from_average.scale;
+}
+
+SkullSites CompleteSites(std::span<const SitePoint> sites) {
+  const SkullFit fit = FitAverageSkull(sites);
+  SkullSites complete{fit.skull_from_average, {}};
+  for (const std::string& site : StandardSiteCodes()) {
+    complete.points[site] = fit.Foreseen(site);
+  }
+  for (const SitePoint& s : sites) {
+    complete.points[s.site] = s.point;
+  }
+  return complete;
+}
+
+}  // namespace semblance

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/landmark_mistakes.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+
+#include "problems/subject/average_skull.h"
+#include "problems/subject/sites.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kWorstFit_mm = 12;  // median residual of sites that are a skull's
+constexpr double kLeastScale = 0.7, kMostScale = 1.4;  // of a skull over the average one
+
+std::vector<SitePoint> PointsOf(const LandmarkFile& file) {
+  std::vector<SitePoint> sites;
+  for (const Landmark& l : file.landmarks) {
+    sites.push_back({l.site, {l.point[0], l.point[1], l.point[2]}});
+  }
+  return sites;
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+bool OfMandible(std::string_view site) {
+  constexpr std::array<std::string_view, 7> kMandible = {"id", "sm", "pg", "me", "go", "mr", "iM2"};
+  return std::ranges::find(kMandible, WithoutSide(site)) != kMandible.end();
+}
+
+// A change that people forget, and what to say of it.
+struct Change {
+  std::string what, remedy;
+  std::function<Vec3(const Vec3&)> apply;
+  double factor = 1;  // by which it enlarges
+};
+
+std::vector<Change> ForgottenChanges(const TriMesh& skull) {
+  const char* const kRas =
+      "one of the files is RAS and the other LPS; say `axes: RAS` where it is, in the landmarks' "
+      "file or under `subject`";
+  std::vector<Change> changes = {
+      {"x and y negated", kRas, [](const Vec3& p) { return Vec3(-p.x(), -p.y(), p.z()); }}};
+  for (const auto& [unit, name] :
+       {std::pair(LengthUnit::kCentimetre, "cm"), std::pair(LengthUnit::kInch, "in"),
+        std::pair(LengthUnit::kMetre, "m")}) {
+    const double factor = Millimetres(unit);
+    changes.push_back(
+        {fmt::format("multiplied by {}", factor),
+         fmt::format("the landmarks' file is not in mm; say `units: {}` in it (in YAML, which "
+                     "`semblance landmarks convert` writes)",
+                     name),
+         [factor](const Vec3& p) { return Vec3(factor * p); }, factor});
+  }
+  const Vec3 middle = Bounds(skull).center();
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double about : {0.0, middle[axis]}) {
+      changes.push_back(
+          {fmt::format("{} mirrored{}", "xyz"[axis], about == 0 ? "" : " at the skull's middle"),
+           "either the landmarks or the skull is a mirror image; take both from the same volume",
+           [axis, about](Vec3 p) {
+             p[axis] = 2 * about - p[axis];
+             return p;
+           }});
+    }
+  }
+  return changes;
+}
+
+class Search {
+ public:
+  Search(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& query,
+         const PlaceOptions& options)
+      : file_(file),
+        skull_(skull),
+        query_(query),
+        options_(options),
+        sites_(PointsOf(file)),
+        who_(file.subject.empty() ? "landmarks" : fmt::format("landmarks of {}", file.subject)) {
+    for (const SitePoint& s : sites_) {
+      air_mm_.push_back(query.Closest(s.point).distance_mm);
+    }
+  }
+
+  LandmarkMistakes Run() {
+    if (SamePoints()) {
+      return std::move(found_);
+    }
+    if (sites_.size() >= 6) {
+      fit_ = FitAverageSkull(sites_);
+    }
+    if (!(fit_ && (AnotherFrame() || NoSkull()))) {
+      if (fit_) {
+        FarOff();
+      }
+      if (!MandibleInTheAir()) {
+        InTheAir();
+      }
+      NoteMissingMandible();
+    }
+    return std::move(found_);
+  }
+
+ private:
+  template <class... Args>
+  bool Error(fmt::format_string<Args...> format, Args&&... args) {
+    found_.errors.push_back(
+        fmt::format("{}: {}", who_, fmt::format(format, std::forward<Args>(args)...)));
+    return true;
+  }
+
+  bool SamePoints() {
+    Box3 box;
+    for (const SitePoint& s : sites_) {
+      box.extend(s.point);
+    }
+    // Files in metres have all points within a millimetre of each other.
+    const double same_mm = std::min(0.5, 0.002 * box.diagonal().norm());
+    std::vector<bool> told(sites_.size(), false);
+    for (std::size_t i = 0; i < sites_.size(); ++i) {
+      std::vector<std::string> same = {SiteInWords(sites_[i].site)};
+      for (std::size_t j = i + 1; j < sites_.size(); ++j) {
+        if (!told[j] && (sites_[i].point - sites_[j].point).norm() <= same_mm) {
+          same.push_back(SiteInWords(sites_[j].site));
+          told[j] = true;
+        }
+      }
+      if (same.size() > 1) {
+        Error("sites {} have the same point; place all but one anew", fmt::join(same, ", "));
+      }
+    }
+    return !found_.errors.empty();
+  }
+
+  double MedianAirAfter(const Change& change) const {
+    std::vector<double> air_mm;
+    for (const SitePoint& s : sites_) {
+      air_mm.push_back(query_.Closest(change.apply(s.point)).distance_mm);
+    }
+    return Median(air_mm);
+  }
+
+  std::optional<Change> BestChange() const {
+    std::optional<Change> best;
+    double least_mm = options_.max_distance_mm;
+    for (const Change& change : ForgottenChanges(skull_)) {
+      const double mm = OfASkullsSize(change.factor) ? MedianAirAfter(change) : kNaN;
+      if (mm < least_mm) {
+        least_mm = mm;
+        best = change;
+      }
+    }
+    return best;
+  }
+
+  bool OfASkullsSize(double factor = 1) const {
+    const double scale = factor * fit_->skull_from_average.scale;
+    return scale >= kLeastScale && scale <= kMostScale;
+  }
+
+  bool AnotherFrame() {
+    const auto far = std::ranges::count_if(
+        air_mm_, [&](double mm) { return !(mm <= options_.max_distance_mm); });
+    const bool in_air = 2 * far > std::ssize(air_mm_);
+    if (!in_air && OfASkullsSize()) {
+      return false;
+    }
+    const std::string where =
+        in_air
+            ? fmt::format("{} of {} sites are further than {} mm from the skull (median {:.1f} mm)",
+                          far, sites_.size(), options_.max_distance_mm, Median(air_mm_))
+            : fmt::format("the sites lie as on a skull of {:.3f} times the usual size",
+                          fit_->skull_from_average.scale);
+    if (const std::optional<Change> change = BestChange()) {
+      return Error("{}; {} they fit within {:.1f} mm (median): {}", where, change->what,
+                   MedianAirAfter(*change), change->remedy);
+    }
+    return in_air &&
+           Error("{}; check that landmarks and skull share one frame and one unit", where);
+  }
+
+  // Whether the sites, taken together, are not those of a skull as it should stand.
+  bool NoSkull() {
+    const SkullFit mirrored = FitAverageSkull(sites_, Handedness::kMirrored);
+    if (mirrored.median_mm <= kWorstFit_mm && mirrored.median_mm <= 0.6 * fit_->median_mm) {
+      return Error(
+          "left and right are swapped: mirrored, the sites fit an average skull within {:.1f} mm "
+          "(median), and as they are within {:.1f} mm; exchange _l and _r in the landmarks' file, "
+          "or, if the volume is a mirror image, negate x of skull, skin and landmarks",
+          mirrored.median_mm, fit_->median_mm);
+    }
+    return WrongSize() || WrongPose();
+  }
+
+  bool WrongSize() {
+    return !OfASkullsSize() &&
+           Error(
+               "the skull is {:.2f} times as large as an average one ({} to {} are taken); check "
+               "the unit of skull and landmarks, and the voxels' size",
+               fit_->skull_from_average.scale, kLeastScale, kMostScale);
+  }
+
+  bool WrongPose() {
+    constexpr double kMost_deg = 60;
+    const Mat3& turned = fit_->skull_from_average.rotation;
+    const auto degrees = [](const Mat3& r) {
+      return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi;
+    };
+    if (degrees(turned) <= kMost_deg) {
+      return false;
+    }
+    const Mat3 ras = Vec3(-1, -1, 1).asDiagonal();
+    if (degrees(ras * turned) <= kMost_deg) {
+      return Error(
+          "the face looks to +y: x and y negated the sites fit an average skull within {:.1f} mm "
+          "(median): skull and landmarks are RAS; say `axes: RAS` under `subject` and in the "
+          "landmarks' file",
+          fit_->median_mm);
+    }
+    const Vec3 front = turned * Vec3(0, -1, 0), up = turned * Vec3(0, 0, 1);
+    return Error(
+        "the face looks to ({:.1f}, {:.1f}, {:.1f}) and its top to ({:.1f}, {:.1f}, {:.1f}); turn "
+        "skull, skin and landmarks so that it looks to -y and its top to +z (LPS)",
+        front.x(), front.y(), front.z(), up.x(), up.y(), up.z());
+  }
+
+  // The site that is foreseen where this one lies, if its own landmark is not there.
+  std::string TakenFor(const SitePoint& off) const {
+    constexpr double kNear_mm = 12;
+    for (const std::string& site : StandardSiteCodes()) {
+      const auto own = std::ranges::find(sites_, site, &SitePoint::site);
+      const Vec3 foreseen = fit_->Foreseen(site);
+      const bool free = own == sites_.end() || (own->point - foreseen).norm() > 2 * kNear_mm;
+      if (site != off.site && free && (off.point - foreseen).norm() <= kNear_mm) {
+        return fmt::format("; it lies where {} is foreseen, so the names may be exchanged",
+                           SiteInWords(site));
+      }
+    }
+    return "";
+  }
+
+  void FarOff() {
+    for (std::size_t k = 0; k < sites_.size(); ++k) {
+      const double off_mm = fit_->residual_mm[k];
+      if (off_mm > options_.max_misfit_mm) {
+        Error(
+            "site {} is {:.0f} mm from where the other sites foresee it, and at most {} mm are "
+            "allowed (max_misfit_mm); correct its point or its name{}",
+            SiteInWords(sites_[k].site), off_mm, options_.max_misfit_mm, TakenFor(sites_[k]));
+      }
+    }
+  }
+
+  bool InAir(std::size_t k) const { return !(air_mm_[k] <= options_.max_distance_mm); }
+
+  bool MandibleInTheAir() {
+    int of_mandible = 0, in_air = 0, others_in_air = 0;
+    for (std::size_t k = 0; k < sites_.size(); ++k) {
+      const bool mandible = OfMandible(sites_[k].site);
+      of_mandible += mandible;
+      in_air += mandible && InAir(k);
+      others_in_air += !mandible && InAir(k);
+    }
+    return in_air >= 3 && in_air == of_mandible && others_in_air == 0 &&
+           Error(
+               "all {} sites of the mandible are in the air, and no other is: the mandible is "
+               "missing from the skull's mesh; add it, or list its sites under `absent`",
+               in_air);
+  }
+
+  void InTheAir() {
+    for (std::size_t k = 0; k < sites_.size(); ++k) {
+      if (InAir(k)) {
+        Error(
+            "site {} is {:.1f} mm from the skull, and at most {} mm are allowed "
+            "(max_distance_mm); correct its point",
+            SiteInWords(sites_[k].site), air_mm_[k], options_.max_distance_mm);
+      }
+    }
+  }
+
+  void NoteMissingMandible() {
+    constexpr double kNoBone_mm = 20;
+    const auto of_mandible = [](const auto& entry) { return OfMandible(entry.site); };
+    if (!fit_ || std::ranges::any_of(sites_, of_mandible) ||
+        std::ranges::any_of(file_.absent, of_mandible)) {
+      return;
+    }
+    for (const char* site : {"pg", "go_l", "go_r"}) {
+      if (query_.Closest(fit_->Foreseen(site)).distance_mm <= kNoBone_mm) {
+        return;
+      }
+    }
+    found_.notes.push_back(fmt::format(
+        "{}: there is no bone where chin and angles of the mandible are foreseen: add the mandible "
+        "to the skull's mesh, or list its sites under `absent`; the lower face is the generic "
+        "one's",
+        who_));
+  }
+
+  const LandmarkFile& file_;
+  const TriMesh& skull_;
+  const MeshQuery& query_;
+  const PlaceOptions& options_;
+  std::vector<SitePoint> sites_;
+  std::string who_;
+  std::vector<double> air_mm_;  // of each site from the bone
+  std::optional<SkullFit> fit_;
+  LandmarkMistakes found_;
+};
+
+}  // namespace
+
+LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
+                                      const MeshQuery& query, const PlaceOptions& options) {
+  return Search(file, skull, query, options).Run();
+}
+
+}  // namespace semblance

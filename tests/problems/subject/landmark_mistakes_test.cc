@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/landmark_mistakes.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "problems/subject/phantom.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+struct Subject {
+  LandmarkFile file;
+  TriMesh skull;
+};
+
+LandmarkMistakes Find(const Subject& s) {
+  return FindLandmarkMistakes(s.file, s.skull, MeshQuery(s.skull), PlaceOptions{});
+}
+
+Subject PhantomSubject() {
+  const Phantom phantom = MakePhantom({.rings = 40});
+  Subject subject{.file = {}, .skull = phantom.skull};
+  subject.file.subject = "P";
+  for (const PhantomSite& s : phantom.sites) {
+    subject.file.landmarks.push_back(
+        {.site = s.site, .point = {s.base.x(), s.base.y(), s.base.z()}});
+  }
+  return subject;
+}
+
+// The landmarks of a real head, and of its skull a speck of bone at each.
+Subject RealSubject(const std::string& name) {
+  Subject subject;
+  subject.file = ReadLandmarkFile(SEMBLANCE_SOURCE_DIR "/configs/landmarks/" + name + ".yaml");
+  for (const Landmark& l : subject.file.landmarks) {
+    const auto first = static_cast<std::int32_t>(subject.skull.points.size());
+    const Vec3 p(l.point[0], l.point[1], l.point[2]);
+    for (const Vec3& off : {Vec3(1, 0, 0), Vec3(-1, 1, 0), Vec3(0, -1, 1)}) {
+      subject.skull.points.push_back(p + off);
+    }
+    subject.skull.triangles.push_back({first, first + 1, first + 2});
+  }
+  return subject;
+}
+
+std::vector<Subject> Sound() {
+  return {PhantomSubject(), RealSubject("cthead"), RealSubject("vhm"), RealSubject("cranium")};
+}
+
+using Move = std::function<Vec3(const Vec3&)>;
+
+void MoveSites(Subject& s, const Move& move) {
+  for (Landmark& l : s.file.landmarks) {
+    const Vec3 p = move({l.point[0], l.point[1], l.point[2]});
+    l.point = {p.x(), p.y(), p.z()};
+  }
+}
+void MoveSkull(Subject& s, const Move& move) {
+  for (Vec3& p : s.skull.points) {
+    p = move(p);
+  }
+}
+
+Vec3 OtherAxes(const Vec3& p) { return {-p.x(), -p.y(), p.z()}; }
+Vec3 MirroredX(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
+
+void SwapSides(Subject& s) {
+  for (Landmark& l : s.file.landmarks) {
+    const bool left = l.site.ends_with("_l"), right = l.site.ends_with("_r");
+    if (left || right) {
+      l.site.back() = left ? 'r' : 'l';
+    }
+  }
+}
+
+Landmark& At(Subject& s, const std::string& site) {
+  return *std::ranges::find(s.file.landmarks, site, &Landmark::site);
+}
+
+TEST(LandmarkMistakes, ASoundSubjectHasNone) {
+  for (const Subject& subject : Sound()) {
+    EXPECT_THAT(Find(subject).errors, IsEmpty()) << subject.file.subject;
+    EXPECT_THAT(Find(subject).notes, IsEmpty()) << subject.file.subject;
+  }
+}
+
+struct Mistake {
+  const char* name;
+  std::function<void(Subject&)> make;
+  std::vector<const char*> words;  // of the first error
+  std::size_t lines;
+};
+
+const Mistake kMistakes[] = {
+    {"sides swapped", SwapSides, {"left and right are swapped", "exchange _l and _r"}, 1},
+    {"mirrored volume",
+     [](Subject& s) {
+       MoveSites(s, MirroredX);
+       MoveSkull(s, MirroredX);
+     },
+     {"if the volume is a mirror image, negate x"},
+     1},
+    {"all in RAS",
+     [](Subject& s) {
+       MoveSites(s, OtherAxes);
+       MoveSkull(s, OtherAxes);
+     },
+     {"the face looks to +y", "x and y negated", "are RAS; say `axes: RAS`"},
+     1},
+    {"landmarks in RAS",
+     [](Subject& s) { MoveSites(s, OtherAxes); },
+     {"further than 3 mm from the skull", "x and y negated they fit within", "say `axes: RAS`"},
+     1},
+    {"skull in RAS",
+     [](Subject& s) { MoveSkull(s, OtherAxes); },
+     {"x and y negated they fit within", "say `axes: RAS`"},
+     1},
+    {"landmarks in metres",
+     [](Subject& s) { MoveSites(s, [](const Vec3& p) { return Vec3(p / 1000); }); },
+     {"multiplied by 1000 they fit within", "say `units: m`"},
+     1},
+    {"landmarks in inches",
+     [](Subject& s) { MoveSites(s, [](const Vec3& p) { return Vec3(p / 25.4); }); },
+     {"multiplied by 25.4 they fit within", "say `units: in`"},
+     1},
+    {"landmarks of the mirrored volume",
+     [](Subject& s) {
+       const double middle = Bounds(s.skull).center().x();
+       MoveSites(s,
+                 [middle](const Vec3& p) { return Vec3(2 * middle - p.x() + 0.01, p.y(), p.z()); });
+     },
+     {"swapped"},
+     1},
+    {"too large",
+     [](Subject& s) {
+       MoveSites(s, [](const Vec3& p) { return Vec3(1.7 * p); });
+       MoveSkull(s, [](const Vec3& p) { return Vec3(1.7 * p); });
+     },
+     {"times as large as an average one"},
+     1},
+    {"face down",
+     [](Subject& s) {
+       const auto down = [](const Vec3& p) { return Vec3(p.x(), -p.z(), p.y()); };
+       MoveSites(s, down);
+       MoveSkull(s, down);
+     },
+     {"the face looks to", "looks to -y and its top to +z"},
+     1},
+    {"nowhere near",
+     [](Subject& s) { MoveSites(s, [](const Vec3& p) { return Vec3(p + Vec3(400, 0, 90)); }); },
+     {"share one frame and one unit"},
+     1},
+    {"a pair exchanged",
+     [](Subject& s) { std::swap(At(s, "fe_l").site, At(s, "zy_l").site); },
+     {"mm from where the other sites foresee it", "max_misfit_mm", "the names may be exchanged"},
+     2},
+    {"the same point twice",
+     [](Subject& s) { At(s, "g").point = At(s, "n").point; },
+     {"have the same point"},
+     1},
+    {"all at one point",
+     [](Subject& s) { MoveSites(s, [](const Vec3&) { return Vec3(1, 2, 3); }); },
+     {"have the same point"},
+     1},
+    {"one in the air",
+     [](Subject& s) { At(s, "g").point[1] -= 12; },
+     {"site g (Glabella) is 1", "mm from the skull, and at most 3 mm are allowed"},
+     1},
+};
+
+TEST(LandmarkMistakes, EachGetsItsWords) {
+  for (const Mistake& mistake : kMistakes) {
+    for (Subject subject : Sound()) {
+      if (std::string(mistake.name) == "landmarks of the mirrored volume" &&
+          subject.file.subject != "P") {
+        continue;  // specks of bone are not symmetric
+      }
+      mistake.make(subject);
+      const LandmarkMistakes found = Find(subject);
+      ASSERT_EQ(found.errors.size(), mistake.lines)
+          << mistake.name << ", " << subject.file.subject
+          << (found.errors.empty() ? "" : ": " + found.errors.front());
+      for (const char* words : mistake.words) {
+        EXPECT_THAT(found.errors.front(), HasSubstr(words)) << subject.file.subject;
+      }
+    }
+  }
+}
+
+// All bone within 26 mm of the mandible's sites is gone.
+void RemoveMandible(Subject& s) {
+  std::vector<Vec3> sites;
+  for (const Landmark& l : s.file.landmarks) {
+    if (l.site == "id" || l.site == "sm" || l.site == "pg" || l.site == "me" ||
+        l.site.starts_with("go") || l.site.starts_with("mr") || l.site.starts_with("iM2")) {
+      sites.emplace_back(l.point[0], l.point[1], l.point[2]);
+    }
+  }
+  std::vector<bool> keep;
+  for (const Triangle& t : s.skull.triangles) {
+    const Vec3 c = TriangleCentroid(s.skull, t);
+    keep.push_back(std::ranges::none_of(sites, [&](const Vec3& p) { return (c - p).norm() < 26; }));
+  }
+  s.skull = Submesh(s.skull, keep);
+}
+
+TEST(LandmarkMistakes, AMissingMandibleIsToldOnce) {
+  for (Subject subject : {RealSubject("cthead"), RealSubject("vhm")}) {
+    RemoveMandible(subject);
+    std::erase_if(subject.file.landmarks, [](const Landmark& l) {  // those near it
+      return l.site == "pr" || l.site == "mp" || l.site.starts_with("sM2");
+    });
+    EXPECT_THAT(Find(subject).errors,
+                ElementsAre(AllOf(HasSubstr("the mandible is missing from the skull's mesh"),
+                                  HasSubstr("list its sites under `absent`"))));
+    Subject without = subject;
+    std::erase_if(without.file.landmarks, [](const Landmark& l) {
+      return !(l.site.starts_with("fe") || l.site.starts_with("mso") || l.site.starts_with("mio") ||
+               l.site.starts_with("lo") || l.site.starts_with("zy") || l.site == "g" ||
+               l.site == "n");
+    });
+    EXPECT_THAT(Find(without).errors, IsEmpty());
+    EXPECT_THAT(Find(without).notes, ElementsAre(HasSubstr("add the mandible")));
+    without.file.absent = {{"pg", "not there"}};
+    EXPECT_THAT(Find(without).notes, IsEmpty());
+  }
+}
+
+}  // namespace
+}  // namespace semblance
