@@ -316,15 +316,16 @@ std::optional<TruthComparison> Measure(const Experiment& experiment, const Skull
   if (!subject.skin) {
     return std::nullopt;
   }
+  const TriMesh& skin = *subject.skin;
   TruthComparison truth;
-  truth.region =
-      FindFaceRegion(*subject.skin, subject.dowels_on_bone, subject.network, experiment.region);
-  truth.face = CompareFaces(*subject.skin, truth.region, face, context);
-  truth.implicit = CompareFaces(*subject.skin, truth.region, skull.implicit.mesh, context);
+  truth.skin = FindScoredSkin(subject, experiment.region);
+  truth.face = CompareFaces(skin, truth.skin.region, face, context);
+  truth.details = MeasureDetails(skin, truth.skin, subject.basis, face, context);
+  truth.implicit = CompareFaces(skin, truth.skin.region, skull.implicit.mesh, context);
   truth.depth = CompareDepths(experiment, *skull.depth_stage, context);
   if (uncertainty && experiment.uncertainty.sigma) {
-    truth.sigma = MeasureCoverage(*subject.skin, truth.face.signed_mm, face, uncertainty->sigma_mm,
-                                  masks, context);
+    truth.sigma =
+        MeasureCoverage(skin, truth.face.signed_mm, face, uncertainty->sigma_mm, masks, context);
   }
   return truth;
 }
@@ -367,7 +368,6 @@ std::optional<FaceUncertainty> UncertaintyOf(const Experiment& experiment, const
 }  // namespace
 
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache) {
-  constexpr int kQuadsPerPatch = 4;
   StepClock step(context);
   StageCache own_cache(4);
   StageCache& shared = cache ? *cache : own_cache;
@@ -389,7 +389,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
         experiment.face);
   });
   Tessellation face =
-      step("tessellate", [&] { return Tessellate(made.fitted.fit.surface, kQuadsPerPatch); });
+      step("tessellate", [&] { return Tessellate(made.fitted.fit.surface, kFaceQuadsPerPatch); });
   std::optional<FaceUncertainty> uncertainty = step("uncertainty", [&] {
     return UncertaintyOf(experiment, bone, prior.get(), made, face, subject, context);
   });

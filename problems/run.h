@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/metrics/face_metrics.h"
+#include "problems/metrics/face_details.h"
 #include "problems/metrics/feature_distortion.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/depth_comparison.h"
@@ -17,10 +17,14 @@
 
 namespace semblance {
 
+// Of the mesh on which a face is measured, along each side of a patch of its finest level.
+inline constexpr int kFaceQuadsPerPatch = 4;
+
 // Against the true skin, where it is known.
 struct TruthComparison {
-  FaceRegion region;  // of the skin's vertices
+  ScoredSkin skin;
   FaceMetrics face;
+  FaceDetails details;  // of the face
   FaceMetrics implicit;
   DepthComparison depth;  // of the shell's vertices
   SigmaCoverage sigma;    // outside the features' regions; empty without an uncertainty

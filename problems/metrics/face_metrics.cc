@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numbers>
 
 #include "problems/metrics/quantile.h"
 #include "surfaces/base/parallel.h"
@@ -69,20 +71,63 @@ std::vector<double> Quantiles(const std::vector<Sample>& samples) {
   return quantiles;
 }
 
-// Distance of each wanted point to the mesh, positive where the mesh lies on the outer side of the
-// point's normal.
-std::vector<double> SignedDistances(const TriMesh& from, const std::vector<bool>& wanted,
-                                    const MeshQuery& to, const RunContext& context) {
-  const std::vector<Vec3> normals = VertexNormals(from);
-  std::vector<double> distances(from.points.size(), kNaN);
+// The nearest points of a mesh to the wanted ones of another's vertices.
+struct Nearest {
+  std::vector<MeshPoint> points;  // one per vertex; as constructed where not wanted
+  std::vector<double> signed_mm;  // positive where the mesh lies on the outer side of the vertex's
+                                  // normal; NaN where not wanted
+};
+
+Nearest FindNearest(const TriMesh& from, const std::vector<Vec3>& normals,
+                    const std::vector<bool>& wanted, const MeshQuery& to,
+                    const RunContext& context) {
+  Nearest nearest{std::vector<MeshPoint>(from.points.size()),
+                  std::vector<double>(from.points.size(), kNaN)};
   ParallelFor(from.points.size(), context.threads, 256, [&](std::size_t v) {
     if (wanted[v]) {
-      const MeshPoint nearest = to.Closest(from.points[v]);
-      const double side = (nearest.position - from.points[v]).dot(normals[v]);
-      distances[v] = side < 0 ? -nearest.distance_mm : nearest.distance_mm;
+      const MeshPoint found = to.Closest(from.points[v]);
+      const double side = (found.position - from.points[v]).dot(normals[v]);
+      nearest.points[v] = found;
+      nearest.signed_mm[v] = side < 0 ? -found.distance_mm : found.distance_mm;
     }
   });
-  return distances;
+  return nearest;
+}
+
+std::vector<Vec3> Displacements(const TriMesh& from, const Nearest& nearest) {
+  std::vector<Vec3> moves;
+  for (std::size_t v = 0; v < from.points.size(); ++v) {
+    moves.push_back(nearest.points[v].position - from.points[v]);
+  }
+  return moves;
+}
+
+Vec3 NormalAt(const TriMesh& mesh, const std::vector<Vec3>& normals, const MeshPoint& point) {
+  const Triangle& t = mesh.triangles[point.triangle];
+  return point.weights[0] * normals[t[0]] + point.weights[1] * normals[t[1]] +
+         point.weights[2] * normals[t[2]];
+}
+
+AngleSummary CompareNormals(const std::vector<Vec3>& normals, const std::vector<double>& areas_mm2,
+                            const Nearest& nearest, const TriMesh& face) {
+  const std::vector<Vec3> face_normals = VertexNormals(face);
+  std::vector<double> angles_deg, weights;
+  double sum = 0, area = 0;
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    if (nearest.points[v].triangle < 0) {
+      continue;
+    }
+    const Vec3 other = NormalAt(face, face_normals, nearest.points[v]);
+    if (normals[v].norm() > 0 && other.norm() > 0) {
+      const double angle = std::atan2(normals[v].cross(other).norm(), normals[v].dot(other));
+      angles_deg.push_back(angle * 180 / std::numbers::pi);
+      weights.push_back(areas_mm2[v]);
+      sum += areas_mm2[v] * angles_deg.back();
+      area += areas_mm2[v];
+    }
+  }
+  const std::vector<WeightedValue> sorted = SortedValues(angles_deg, weights);
+  return {area > 0 ? sum / area : kNaN, Quantile(sorted, 0.5), Quantile(sorted, 0.95)};
 }
 
 std::vector<Sample> TakeSamples(const std::vector<double>& signed_mm,
@@ -97,15 +142,31 @@ std::vector<Sample> TakeSamples(const std::vector<double>& signed_mm,
   return samples;
 }
 
-std::vector<bool> FaceOverScoredSkin(const TriMesh& truth, const FaceRegion& region,
-                                     const MeshQuery& truth_query, const TriMesh& face,
+std::vector<bool> FaceOverScoredSkin(const TriMesh& outer, const FaceRegion& region,
+                                     const MeshQuery& outer_query, const TriMesh& face,
                                      const RunContext& context) {
-  const std::vector<bool> comparable = ComparableTriangles(truth, region);
+  const std::vector<bool> comparable = ComparableTriangles(outer, region);
   std::vector<char> over(face.points.size(), 0);
   ParallelFor(face.points.size(), context.threads, 256, [&](std::size_t v) {
-    over[v] = comparable[truth_query.Closest(face.points[v]).triangle];
+    over[v] = comparable[outer_query.Closest(face.points[v]).triangle];
   });
   return {over.begin(), over.end()};
+}
+
+// Both with half of the weight; of one alone where the other has no area.
+std::vector<Sample> EvenlyWeighted(std::vector<Sample> a, const std::vector<Sample>& b) {
+  const auto area = [](const std::vector<Sample>& samples) {
+    double sum = 0;
+    for (const Sample& s : samples) {
+      sum += s.area_mm2;
+    }
+    return sum;
+  };
+  const double area_a = area(a), area_b = area(b);
+  for (const Sample& s : b) {
+    a.push_back({s.signed_mm, s.area_mm2 * (area_b > 0 ? area_a / area_b : 0)});
+  }
+  return a;
 }
 
 void RequireScored(const FaceRegion& region) {
@@ -118,13 +179,25 @@ void RequireScored(const FaceRegion& region) {
 
 }  // namespace
 
-std::vector<bool> ComparableTriangles(const TriMesh& truth, const FaceRegion& region) {
+TriMesh OuterSurface(const TriMesh& truth, const FaceRegion& region) {
+  if (region.outer.empty()) {
+    return truth;
+  }
+  TriMesh outer{truth.points, {}};
+  std::ranges::copy_if(truth.triangles, std::back_inserter(outer.triangles),
+                       [&](const Triangle& t) {
+                         return region.outer[t[0]] && region.outer[t[1]] && region.outer[t[2]];
+                       });
+  return outer;
+}
+
+std::vector<bool> ComparableTriangles(const TriMesh& outer_surface, const FaceRegion& region) {
   std::vector<bool> usable = region.scored;
-  for (const MeshEdge& edge : BorderEdges(truth)) {
+  for (const MeshEdge& edge : BorderEdges(outer_surface)) {
     usable[edge[0]] = usable[edge[1]] = false;
   }
   std::vector<bool> comparable;
-  for (const Triangle& t : truth.triangles) {
+  for (const Triangle& t : outer_surface.triangles) {
     comparable.push_back(usable[t[0]] && usable[t[1]] && usable[t[2]]);
   }
   return comparable;
@@ -157,24 +230,36 @@ FaceRegion WholeSurface(const TriMesh& truth) {
 FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                          const RunContext& context) {
   RequireScored(region);
-  const MeshQuery face_query(face), truth_query(truth);
+  const TriMesh outer = OuterSurface(truth, region);
+  const MeshQuery face_query(face), outer_query(outer);
   const std::vector<double> truth_areas = VertexAreas(truth);
+  const std::vector<Vec3> truth_normals = VertexNormals(truth);
+  const auto any = [](std::size_t) { return true; };
   FaceMetrics metrics;
-  metrics.signed_mm = SignedDistances(truth, region.scored, face_query, context);
-  const std::vector<Sample> all =
-      TakeSamples(metrics.signed_mm, truth_areas, [](std::size_t) { return true; });
-  metrics.truth_to_face = Summarize(all);
-  metrics.quantiles_mm = Quantiles(all);
-  metrics.regions = SummarizeParts(metrics.signed_mm, truth_areas, region);
-  const std::vector<bool> over = FaceOverScoredSkin(truth, region, truth_query, face, context);
+  const Nearest forth = FindNearest(truth, truth_normals, region.scored, face_query, context);
+  const std::vector<Sample> there = TakeSamples(forth.signed_mm, truth_areas, any);
+  metrics.truth_to_face = Summarize(there);
+  metrics.quantiles_mm = Quantiles(there);
+  metrics.regions = SummarizeParts(forth.signed_mm, truth_areas, region);
+  metrics.normals = CompareNormals(truth_normals, truth_areas, forth, face);
+  const VolumeByPart volume =
+      MeasureEnclosed(truth, Displacements(truth, forth), forth.signed_mm, region.part);
+  metrics.volume = volume.all;
+  for (const auto& [part, enclosed] : volume.parts) {
+    metrics.region_volumes[kFaceParts[part]] = enclosed;
+  }
+  const std::vector<bool> over = FaceOverScoredSkin(outer, region, outer_query, face, context);
   // Seen from the face, the truth lies outside where the face lies inside: the sign turns.
-  std::vector<double> back = SignedDistances(face, over, truth_query, context);
+  std::vector<double> back =
+      FindNearest(face, VertexNormals(face), over, outer_query, context).signed_mm;
   std::transform(back.begin(), back.end(), back.begin(), [](double d) { return -d; });
-  metrics.face_to_truth =
-      SummarizeDistances(back, VertexAreas(face), [](std::size_t) { return true; });
+  const std::vector<Sample> here = TakeSamples(back, VertexAreas(face), any);
+  metrics.face_to_truth = Summarize(here);
+  metrics.symmetric = Summarize(EvenlyWeighted(there, here));
   metrics.hausdorff_mm = std::fmax(metrics.truth_to_face.max_mm, metrics.face_to_truth.max_mm);
   metrics.volume_between_cm3 =
       metrics.truth_to_face.mean_abs_mm * metrics.truth_to_face.area_cm2 / 10;
+  metrics.signed_mm = forth.signed_mm;
   return metrics;
 }
 

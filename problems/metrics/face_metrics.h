@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "problems/metrics/enclosed_volume.h"
 #include "problems/metrics/face_region.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
@@ -39,15 +40,26 @@ std::map<std::string, DistanceSummary> SummarizeParts(const std::vector<double>&
                                                       const std::vector<double>& areas_mm2,
                                                       const FaceRegion& region);
 
+// Between the normals of the two surfaces at corresponding points, weighted by area.
+struct AngleSummary {
+  double mean_deg = kNaN;
+  double median_deg = kNaN;
+  double p95_deg = kNaN;
+};
+
 struct FaceMetrics {
   DistanceSummary
       truth_to_face;  // from each scored vertex of the true skin to the nearest point of the face
-  DistanceSummary face_to_truth;  // from each face vertex whose nearest point of the true skin lies
-                                  // in a comparable triangle, to that point
+  DistanceSummary face_to_truth;  // from each face vertex whose nearest point of the outer skin
+                                  // lies in a comparable triangle, to that point
+  DistanceSummary symmetric;      // both directions together, half of the weight each
   double hausdorff_mm = kNaN;     // the larger of the two maxima
+  AngleSummary normals;           // of each scored vertex and the nearest point of the face
   double volume_between_cm3 =
-      kNaN;  // integral of the absolute distance over the scored skin (thesis 5.3)
-  std::map<std::string, DistanceSummary> regions;  // truth_to_face by part of the face
+      kNaN;  // the mean absolute distance times the area: no volume where surfaces curve
+  EnclosedVolume volume;                                 // between the surfaces (thesis 5.3)
+  std::map<std::string, DistanceSummary> regions;        // truth_to_face by part of the face
+  std::map<std::string, EnclosedVolume> region_volumes;  // by part of the face
   std::vector<double> quantiles_mm;  // of the absolute truth_to_face, by area: the k-th of 21 is
                                      // not exceeded on k/20 of it
   std::vector<double> signed_mm;     // one per vertex of the true skin, NaN where not scored
@@ -58,10 +70,14 @@ struct FaceMetrics {
 FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                          const RunContext& context);
 
-// One entry per triangle of the true skin: whether what is nearest to it can be compared with it.
-// All three corners are scored and none is on an open border, where a scan ends and the face goes
-// on.
-std::vector<bool> ComparableTriangles(const TriMesh& truth, const FaceRegion& region);
+// The true skin without triangles that have a corner which is not outer; all its points, so that
+// their indices stay.
+TriMesh OuterSurface(const TriMesh& truth, const FaceRegion& region);
+
+// One entry per triangle of the outer surface: whether what is nearest to it can be compared with
+// it. All three corners are scored and none is on an open border, where a scan ends and the face
+// goes on.
+std::vector<bool> ComparableTriangles(const TriMesh& outer_surface, const FaceRegion& region);
 
 // All of `truth` as one region without parts.
 FaceRegion WholeSurface(const TriMesh& truth);

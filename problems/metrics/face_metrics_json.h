@@ -8,8 +8,8 @@
 
 namespace semblance {
 
-// {mean_abs_mm, rms_mm, median_mm, p95_mm, hausdorff_mm, within_2_5mm, volume_between_cm3, ...,
-// reverse{...}, regions{...}}; null for NaN.
+// {mean_abs_mm, rms_mm, median_mm, p95_mm, hausdorff_mm, within_2_5mm, volume_between_cm3,
+// enclosed_volume_cm3, ..., normals{}, reverse{}, symmetric{}, regions{}}; null for NaN.
 nlohmann::ordered_json SummaryToJson(const DistanceSummary& summary);
 nlohmann::ordered_json MetricsToJson(const FaceMetrics& metrics);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "interp/dowels/site_code.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -62,29 +63,12 @@ class BorderRule {
   std::vector<MeshEdge> border_;
 };
 
-std::vector<Sphere> ExcludedSpheres(std::span<const Dowel> dowels,
-                                    const std::vector<ExcludedZone>& zones) {
-  std::vector<Sphere> spheres;
-  for (const ExcludedZone& zone : zones) {
-    const auto dowel = std::find_if(dowels.begin(), dowels.end(),
-                                    [&](const Dowel& d) { return d.site == zone.site; });
-    if (dowel == dowels.end()) {
-      throw InputError(
-          fmt::format("face region: excluded site '{}' has no dowel on this skull; name a site "
-                      "that has one, or remove the zone",
-                      zone.site));
-    }
-    spheres.push_back({dowel->base, zone.radius_mm});
+std::map<std::string, Vec3> WithDowels(std::map<std::string, Vec3> points,
+                                       std::span<const Dowel> dowels) {
+  for (const Dowel& dowel : dowels) {
+    points[dowel.site] = dowel.base;
   }
-  return spheres;
-}
-
-int NearestPart(const Vec3& p, std::span<const Dowel> dowels) {
-  const auto nearest =
-      std::min_element(dowels.begin(), dowels.end(), [&](const Dowel& a, const Dowel& b) {
-        return (a.base - p).squaredNorm() < (b.base - p).squaredNorm();
-      });
-  return FacePartOfSite(nearest->site);
+  return points;
 }
 
 }  // namespace
@@ -103,8 +87,29 @@ int FacePartOfSite(const std::string& site) {
   return found->second;
 }
 
-FaceRegion FindFaceRegion(const TriMesh& skin, std::span<const Dowel> dowels,
-                          const DowelNetwork& network, const FaceRegionOptions& options) {
+int NearestPart(const Vec3& p, const std::map<std::string, Vec3>& points) {
+  const auto nearest = std::ranges::min_element(
+      points, {}, [&](const auto& site) { return (site.second - p).squaredNorm(); });
+  return FacePartOfSite(nearest->first);
+}
+
+std::vector<Sphere> ExcludedSpheres(const std::map<std::string, Vec3>& points,
+                                    const std::vector<ExcludedZone>& zones) {
+  std::vector<Sphere> spheres;
+  for (const ExcludedZone& zone : zones) {
+    const auto point = points.find(zone.site);
+    if (point == points.end()) {
+      throw InputError(
+          fmt::format("face region: excluded zone: {}", ComplaintAboutSite(zone.site)));
+    }
+    spheres.push_back({point->second, zone.radius_mm});
+  }
+  return spheres;
+}
+
+FaceRegion InFrontOfNetwork(const TriMesh& mesh, std::span<const Dowel> dowels,
+                            const DowelNetwork& network, const std::map<std::string, Vec3>& points,
+                            const FaceRegionOptions& options) {
   if (network.areas.empty()) {
     throw InputError(
         "face region: the dowel network has no area; at least three dowels that share an area are "
@@ -113,11 +118,12 @@ FaceRegion FindFaceRegion(const TriMesh& skin, std::span<const Dowel> dowels,
   const TriMesh network_mesh = NetworkMesh(dowels, network);
   const MeshQuery query(network_mesh);
   const BorderRule border(network_mesh);
-  const std::vector<Sphere> excluded = ExcludedSpheres(dowels, options.exclude);
-  FaceRegion region{std::vector<bool>(skin.points.size(), false),
-                    std::vector<int>(skin.points.size(), -1)};
-  for (std::size_t v = 0; v < skin.points.size(); ++v) {
-    const Vec3& p = skin.points[v];
+  const std::vector<Sphere> excluded = ExcludedSpheres(WithDowels(points, dowels), options.exclude);
+  const std::map<std::string, Vec3> bases = WithDowels({}, dowels);
+  FaceRegion region{std::vector<bool>(mesh.points.size(), false),
+                    std::vector<int>(mesh.points.size(), -1)};
+  for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+    const Vec3& p = mesh.points[v];
     const MeshPoint nearest = query.Closest(p);
     const bool inside = nearest.distance_mm <= options.reach_mm &&
                         border.Overhang(p, nearest) <= options.margin_mm + 1e-9;
@@ -125,7 +131,7 @@ FaceRegion FindFaceRegion(const TriMesh& skin, std::span<const Dowel> dowels,
                                     [&](const Sphere& s) { return s.Contains(p); });
     if (inside && !barred) {
       region.scored[v] = true;
-      region.part[v] = NearestPart(p, dowels);
+      region.part[v] = NearestPart(p, bases);
     }
   }
   return region;

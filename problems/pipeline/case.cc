@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_file.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -15,12 +16,16 @@ void Append(std::vector<std::string>& notes, const std::vector<std::string>& mor
   notes.insert(notes.end(), more.begin(), more.end());
 }
 
-TriMesh ReadHeadMesh(const std::filesystem::path& path, const char* option, SubjectData& subject) {
+TriMesh ReadHeadMesh(const FileSubject& options, const std::filesystem::path& path,
+                     const char* option, SubjectData& subject) {
   if (path.empty()) {
     throw InputError(fmt::format(
         "subject.{}: no file is named; give the path of a mesh (PLY, OBJ, STL or OFF)", option));
   }
   TriMesh mesh = ReadMesh(path);
+  for (Vec3& p : mesh.points) {
+    p = ToLpsMm(p, options.axes, options.units);
+  }
   Append(subject.notes, CheckHeadMesh(mesh, path.filename().string()));
   subject.inputs.push_back(path);
   return mesh;
@@ -58,9 +63,9 @@ LandmarkFile Load(const PhantomOptions& options, SubjectData& subject, const Run
 
 LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunContext&) {
   LandmarkFile landmarks = LandmarksOf(options.landmarks, subject);
-  subject.skull = ReadHeadMesh(options.skull, "skull", subject);
+  subject.skull = ReadHeadMesh(options, options.skull, "skull", subject);
   if (!options.skin.empty()) {
-    subject.skin = ReadHeadMesh(options.skin, "skin", subject);
+    subject.skin = ReadHeadMesh(options, options.skin, "skin", subject);
   }
   return landmarks;
 }
@@ -88,6 +93,25 @@ void NoteDroppedAreas(Case& subject) {
   }
 }
 
+// The landmarks where they were given, before they are laid onto bone: a skin is scored alike with
+// and without its skull at hand.
+std::vector<Dowel> AsGiven(const LandmarkFile& file, std::vector<Dowel> dowels_on_bone) {
+  for (std::size_t k = 0; k < dowels_on_bone.size(); ++k) {
+    const std::array<double, 3>& point = file.landmarks[k].point;
+    dowels_on_bone[k].base = {point[0], point[1], point[2]};
+  }
+  return dowels_on_bone;
+}
+
+std::vector<std::string> CheckLandmarks(const SubjectData& data, const MeshQuery& skull,
+                                        const PlaceOptions& options) {
+  const LandmarkMistakes found = FindLandmarkMistakes(data.landmarks, data.skull, skull, options);
+  if (!found.errors.empty()) {
+    throw InputError(fmt::format("{}", fmt::join(found.errors, "\n")));
+  }
+  return found.notes;
+}
+
 void CheckFilesNamed(const Experiment& experiment) {
   if (experiment.network.empty()) {
     throw InputError(
@@ -105,15 +129,26 @@ SubjectData LoadSubject(const Subject& subject, const RunContext& context) {
   return data;
 }
 
+std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOptions& options) {
+  return CheckLandmarks(subject, MeshQuery(subject.skull), options);
+}
+
 Case MakeCase(const SubjectData& data, const Experiment& experiment) {
   CheckFilesNamed(experiment);
-  Case subject{.name = data.landmarks.subject,
-               .skull = data.skull,
-               .skin = data.skin,
-               .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, experiment.landmarks),
-               .network = {},
-               .notes = data.notes,
-               .inputs = data.inputs};
+  const MeshQuery query(data.skull);
+  const bool measured = !std::holds_alternative<PhantomOptions>(experiment.subject);
+  const std::vector<std::string> remarks =
+      measured ? CheckLandmarks(data, query, experiment.landmarks) : std::vector<std::string>();
+  Case subject{
+      .name = data.landmarks.subject,
+      .skull = data.skull,
+      .skin = data.skin,
+      .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks),
+      .network = {},
+      .basis = {},
+      .notes = data.notes,
+      .inputs = data.inputs};
+  Append(subject.notes, remarks);
   Append(subject.notes, FillDepths(experiment.tissue, data.landmarks, subject.dowels_on_bone));
   subject.network = BuildNetwork(ReadNetworkPlan(experiment.network), subject.dowels_on_bone);
   if (subject.network.areas.empty()) {
@@ -122,6 +157,7 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
         subject.name));
   }
   NoteDroppedAreas(subject);
+  subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
   subject.inputs.push_back(experiment.network);
   for (const std::filesystem::path& table : TablesOf(experiment.tissue)) {
     subject.inputs.push_back(table);
@@ -132,6 +168,11 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
     std::erase(subject.inputs, std::filesystem::path());
   }
   return subject;
+}
+
+ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options) {
+  return FindScoredSkin(*subject.skin, *subject.basis.sites, subject.dowels_on_bone,
+                        subject.network, options);
 }
 
 }  // namespace semblance

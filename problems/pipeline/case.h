@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "interp/dowels/dowel_network.h"
+#include "problems/metrics/face_details.h"
 #include "problems/pipeline/experiment.h"
 
 namespace semblance {
@@ -27,6 +28,7 @@ struct Case {
   std::optional<TriMesh> skin;
   std::vector<Dowel> dowels_on_bone;  // with depths
   DowelNetwork network;               // of those dowels
+  ScoreBasis basis;                   // the landmarks as given, for what is scored
   std::vector<std::string> notes;     // what a reader of the result should know, a line each
   std::vector<std::filesystem::path> inputs;  // for the manifest
 };
@@ -35,7 +37,15 @@ struct Case {
 // one clear line for what cannot be used.
 SubjectData LoadSubject(const Subject& subject, const RunContext& context);
 
-// Places the dowels on the bone and gives them their depths and network. Throws as LoadSubject.
+// Whether skull and landmarks belong together and are a head's (landmark_mistakes.h). Returns what
+// may be meant so, a line each; throws InputError, a line for each mistake.
+std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOptions& options);
+
+// Places the dowels on the bone and gives them their depths and network. Throws as LoadSubject and
+// CheckSubject.
 Case MakeCase(const SubjectData& subject, const Experiment& experiment);
+
+// Of the subject's skin, which must be there.
+ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options);
 
 }  // namespace semblance

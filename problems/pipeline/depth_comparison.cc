@@ -48,8 +48,8 @@ std::vector<double> TipErrors(const DepthStage& stage, const DepthComparison& co
 DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
                               const RunContext& context) {
   DepthComparison comparison;
-  comparison.region =
-      FindFaceRegion(stage.shell, stage.dowels_on_shell, stage.subject.network, experiment.region);
+  comparison.region = InFrontOfNetwork(stage.shell, stage.dowels_on_shell, stage.subject.network,
+                                       stage.subject.basis.sites->points, experiment.region);
   comparison.directions = DepthDirections(experiment.direction, stage.Input(), context);
   comparison.truth = MeasureDepthTruth(stage.shell, comparison.directions, *stage.subject.skin,
                                        experiment.depth_truth, context);

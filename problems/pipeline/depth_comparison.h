@@ -31,7 +31,7 @@ struct DepthComparison {
 };
 
 // Over the vertices of the region where the depth is finite, also where the outside rule gave it,
-// and the truth is valid. The subject must have a skin. Throws InputError as FindFaceRegion and
+// and the truth is valid. The subject must have a skin. Throws InputError as InFrontOfNetwork and
 // DepthDirections; Cancelled if stopped.
 DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
                               const RunContext& context);

@@ -23,6 +23,7 @@
 #include "problems/prior/face_source.h"
 #include "problems/subject/dowel_depths.h"
 #include "problems/subject/landmarks.h"
+#include "problems/subject/length_unit.h"
 #include "problems/subject/phantom.h"
 #include "surfaces/implicit_face.h"
 #include "surfaces/mesh/skull_fill.h"
@@ -35,16 +36,26 @@ struct FileSubject {
   std::filesystem::path skull;
   std::filesystem::path skin;
   std::filesystem::path landmarks;
+  Axes axes = Axes::kLps;                      // of skull and skin
+  LengthUnit units = LengthUnit::kMillimetre;  // of skull and skin
 };
 template <class Visitor>
 void Fields(Visitor& visit, FileSubject& o) {
-  visit(FieldInfo{.name = "skull", .doc = "mesh of the skull: PLY, OBJ, STL or OFF; mm, LPS"},
-        o.skull);
+  visit(FieldInfo{.name = "skull", .doc = "mesh of the skull: PLY, OBJ, STL or OFF"}, o.skull);
   visit(FieldInfo{.name = "skin",
                   .doc = "mesh of the true skin in the skull's frame; empty where it is not known"},
         o.skin);
   visit(FieldInfo{.name = "landmarks", .doc = "landmarks on the skull: .yaml, or a file of Slicer, MeshLab or CloudCompare, or .csv"},
         o.landmarks);
+  visit(
+      FieldInfo{.name = "axes",
+                .doc = "of skull and skin (the landmarks' file has its own); LPS: +x subject left, "
+                       "+y posterior, +z up; RAS: x and y the other way. All results are LPS"},
+      o.axes);
+  visit(FieldInfo{.name = "units",
+                  .doc =
+                      "of skull and skin (the landmarks' file has its own). All results are in mm"},
+        o.units);
 }
 
 // A subject in a CT volume: skull and true skin are taken from it.

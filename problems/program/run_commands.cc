@@ -7,16 +7,21 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "problems/metrics/face_metrics_json.h"
+#include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/pipeline/stage_cache.h"
+#include "problems/pipeline/stage_key.h"
 #include "problems/points/point_fit.h"
+#include "problems/program/evaluate.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/progress.h"
 #include "problems/report/run_folder.h"
@@ -39,6 +44,8 @@ struct Arguments {
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   bool force = false, quiet = false, schema = false;
   std::string options_of = "experiment";
+  std::string config, landmarks;
+  std::vector<std::string> exclude;
   CtImportOptions ct;
   std::string ct_edges = "threshold";
   std::stop_token stop;
@@ -78,9 +85,7 @@ int RunCommand(const Arguments& arguments) {
     fmt::print("note: {}\n", note);
   }
   if (result.truth) {
-    fmt::print(
-        "scored: the skin in front of the dowel network, without excluded zones; closest-point "
-        "distances\n");
+    fmt::print("{}; closest-point distances\n", InWords(result.truth->skin));
     PrintFaceError("implicit face", result.truth->implicit);
     PrintFaceError("H-spline face", result.truth->face);
   }
@@ -117,33 +122,74 @@ int FitCommand(const Arguments& arguments) {
   return result.fit.usable ? kDone : kNotUsable;
 }
 
-void CheckStudy(const std::string& file, std::span<const std::string> overrides) {
+// Looks at the subjects of experiments, each once, so that a run of hours does not begin with sides
+// exchanged.
+class SubjectCheck {
+ public:
+  explicit SubjectCheck(const RunContext& context) : context_(context) {}
+
+  void Look(const std::string& file, const Experiment& experiment) {
+    if (std::holds_alternative<PhantomOptions>(experiment.subject)) {
+      return;  // made, not measured
+    }
+    const std::string key = StageKey("subject", experiment.subject, experiment.landmarks);
+    if (sound_.contains(key)) {
+      return;
+    }
+    const auto subject = subjects_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
+      return LoadSubject(experiment.subject, context_);
+    });
+    for (const std::string& note : CheckSubject(*subject, experiment.landmarks)) {
+      fmt::print("{}: warning: {}\n", file, note);
+    }
+    sound_.insert(key);
+  }
+
+ private:
+  RunContext context_;
+  StageCache subjects_{4};
+  std::set<std::string> sound_;
+};
+
+void CheckStudy(const std::string& file, std::span<const std::string> overrides,
+                SubjectCheck& subjects) {
   if (!overrides.empty()) {
     throw InputError(fmt::format(
         "{}: --set is for experiments and fits; write it into the study, under set:", file));
   }
-  ReadStudy(file);
+  for (const StudyTrial& trial : ReadStudy(file).trials) {
+    subjects.Look(file, trial.experiment);
+  }
+}
+
+void CheckExperiment(const std::string& file, const Experiment& experiment,
+                     SubjectCheck& subjects) {
+  for (const std::string& warning : DepthWarnings(experiment.tissue)) {
+    fmt::print("{}: warning: {}\n", file, warning);
+  }
+  subjects.Look(file, experiment);
 }
 
 // The keys at the top tell what a file is for: an experiment, where no other fits better.
-void CheckConfig(const std::string& file, std::span<const std::string> overrides) {
+void CheckConfig(const std::string& file, std::span<const std::string> overrides,
+                 SubjectCheck& subjects) {
   if (OwnKeys<StudyFile>(file) > OwnKeys<Experiment>(file)) {
-    CheckStudy(file, overrides);
+    CheckStudy(file, overrides, subjects);
   } else if (KnownKeys<PointFitOptions>(file) > KnownKeys<Experiment>(file)) {
     ReadConfig<PointFitOptions>(file, overrides);
   } else {
-    for (const std::string& warning :
-         DepthWarnings(ReadConfig<Experiment>(file, overrides).tissue)) {
-      fmt::print("{}: warning: {}\n", file, warning);
-    }
+    CheckExperiment(file, ReadConfig<Experiment>(file, overrides), subjects);
   }
 }
 
 int CheckCommand(const Arguments& arguments) {
+  RunContext context;
+  context.threads = arguments.threads;
+  SubjectCheck subjects(context);
   bool sound = true;
   for (const std::string& file : arguments.files) {
     try {
-      CheckConfig(file, arguments.overrides);
+      CheckConfig(file, arguments.overrides, subjects);
       fmt::print("{}: no fault found\n", file);
     } catch (const Error& e) {
       fmt::print(stderr, "{}\n", e.what());
@@ -186,12 +232,14 @@ int ImportCtCommand(const Arguments& arguments) {
 }
 
 int EvaluateCommand(const Arguments& arguments) {
-  const TriMesh face = ReadMesh(arguments.files.at(0)), truth = ReadMesh(arguments.files.at(1));
-  CheckHeadMesh(face, arguments.files.at(0));
-  CheckHeadMesh(truth, arguments.files.at(1));
-  fmt::print("{}\n",
-             MetricsToJson(CompareFaces(truth, WholeSurface(truth), face, MakeContext(arguments)))
-                 .dump(2));
+  EvaluateOptions options{.face = arguments.files.at(0),
+                          .truth = arguments.files.size() > 1 ? arguments.files[1] : "",
+                          .config = arguments.config,
+                          .overrides = arguments.overrides,
+                          .landmarks = arguments.landmarks,
+                          .exclude = {}};
+  std::ranges::transform(arguments.exclude, std::back_inserter(options.exclude), ParseZone);
+  fmt::print("{}\n", Evaluate(options, MakeContext(arguments)).dump(2));
   return kDone;
 }
 
@@ -293,9 +341,24 @@ void DeclareOptions(CLI::App& command, CommandLine& line) {
 
 void DeclareEvaluate(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &EvaluateCommand);
-  command.add_option("FACE TRUTH", a.files, "the reconstructed mesh and the true one")
+  command
+      .add_option("FACE TRUTH", a.files,
+                  "the reconstructed face (a mesh, or a run's face.hspline.json) and the mesh of "
+                  "the true skin")
       ->required()
-      ->expected(2);
+      ->expected(1, 2);
+  command.add_option("--config", a.config,
+                     "experiment whose true skin, landmarks and region are taken; without TRUTH, "
+                     "its figures are the run's to the bit");
+  AddSet(command, a);
+  command.add_option(
+      "--landmarks", a.landmarks,
+      "YAML file of the landmarks on the true skull: only the outer skin of the face "
+      "is scored; without it all of TRUTH");
+  command
+      .add_option("--exclude", a.exclude,
+                  "site=radius_mm, e.g. zy_r=15: a zone that is not scored; may be repeated")
+      ->allow_extra_args(false);
   AddWork(command, line, a);
 }
 
@@ -312,7 +375,9 @@ constexpr std::array kCommands = {
     ProgramCommand{"fit", "fit an H-spline surface to any scattered points", &DeclareFit},
     ProgramCommand{"import-ct", "make meshes of skull and skin from a CT volume, in mm",
                    &DeclareImportCt},
-    ProgramCommand{"check", "check configurations of experiments, studies and fits; run nothing",
+    ProgramCommand{"check",
+                   "check configurations of experiments, studies and fits, and the experiments' "
+                   "skulls and landmarks; run nothing",
                    &DeclareCheck},
     ProgramCommand{"options", "list every option: default, unit, range, meaning", &DeclareOptions},
     ProgramCommand{"evaluate", "measure how far a face is from the true one, as JSON",

@@ -251,7 +251,9 @@ std::string ManifestJson(Json provenance, const OutputFolder& folder) {
 std::string ResultJson(const Experiment& experiment, const RunResult& result) {
   Json json = {
       {"title", experiment.title}, {"subject", result.subject.name}, {"usable", result.usable()}};
-  json["face"] = result.truth ? MetricsToJson(result.truth->face) : Json(nullptr);
+  json["face"] = result.truth
+                     ? ScoreToJson(result.truth->face, result.truth->details, result.truth->skin)
+                     : Json(nullptr);
   json["implicit_face"] = result.truth ? MetricsToJson(result.truth->implicit) : Json(nullptr);
   json["depth"] = DepthToJson(result.depth, result.subject);
   json["depth_truth"] = result.truth ? ComparisonToJson(result.truth->depth) : Json(nullptr);

@@ -58,10 +58,38 @@ void WriteOverview(const RunResult& result, OutputFolder& folder, int threads) {
   folder.Write("pictures/overview.png", EncodePng(ContactSheet(pictures, sheet)));
 }
 
+Colour PlaceColour(SkinPlace place) {
+  switch (place) {
+    case SkinPlace::kScored:
+      return HexColour(0x4f9d69);
+    case SkinPlace::kMasked:
+      return HexColour(0xe0a030);
+    case SkinPlace::kInner:
+      return HexColour(0xb03060);
+    case SkinPlace::kEnd:
+      return HexColour(0x6070c0);
+    case SkinPlace::kBeyond:
+      break;
+  }
+  return HexColour(0xc8c0b8);
+}
+
+// Green is scored, yellow masked, red inner, blue a lid; the rest is grey.
+void WriteScoredSkin(const RunResult& result, OutputFolder& folder, int threads) {
+  const std::vector<SkinPlace>& places = result.truth->skin.place;
+  SceneObject object = SkinObject(*result.subject.skin);
+  for (const SkinPlace place : places) {
+    object.vertex_colours.push_back(PlaceColour(place));
+  }
+  WriteViews({{object}}, result, {InWords(result.truth->skin), {}, std::nullopt}, Lighting::kStudio,
+             folder, "pictures/scored.png", threads);
+}
+
 void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
   const TriMesh& skin = *result.subject.skin;
   WriteViews({{SkinObject(skin)}}, result, {"True skin", {}, std::nullopt}, Lighting::kStudio,
              folder, "pictures/truth.png", threads);
+  WriteScoredSkin(result, folder, threads);
   const Legend legend{ErrorColours(), "H-spline face outside (+) or inside (-) the true skin"};
   WriteViews({{MappedObject(skin, result.truth->face.signed_mm, legend.map)}}, result,
              {"Signed error on the true skin", {}, legend}, Lighting::kEven, folder,
@@ -81,8 +109,9 @@ ColourMap SigmaColours() { return SequentialMap(0, 6); }
 
 std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
                                   const RunContext& context) {
-  const TriMesh& skin = *result.subject.skin;
-  const std::vector<bool> comparable = ComparableTriangles(skin, result.truth->region);
+  const FaceRegion& region = result.truth->skin.region;
+  const TriMesh skin = OuterSurface(*result.subject.skin, region);
+  const std::vector<bool> comparable = ComparableTriangles(skin, region);
   const MeshQuery query(skin);
   const std::vector<Vec3> normals = VertexNormals(skin);
   std::vector<double> error(mesh.points.size(), kNaN);

@@ -192,12 +192,37 @@ ReportTable CountsTable(const std::string& caption, const Json& values) {
   return table;
 }
 
+// Folders of older versions have none.
+void AddScored(const Json& face, const OutputFolder& folder, ReportSection& section) {
+  if (face.contains("scored_skin")) {
+    section.images.push_back(ReportImageFromFile(
+        folder.Root() / "pictures/scored.png",
+        "Green: scored. Yellow: masked by the configuration. Red: inner walls and folds. Blue: "
+        "where the scan ended.",
+        "the scored part of the true skin from three sides"));
+  }
+}
+
+void AddProtocols(const Json& face, ReportSection& section) {
+  if (!face.contains("protocols")) {
+    return;
+  }
+  ReportTable table = MetricsTable("H-spline face, as other papers score theirs", face);
+  table.rows = {
+      MetricsRow("in the scan's frame", face.at("protocols").at("ct_frame")),
+      MetricsRow("after the best rigid fit (Lee 2012, Miranda 2018)",
+                 face.at("protocols").at("best_fit")),
+      MetricsRow("along the view from the front (Hu 2021)", face.at("protocols").at("view_ray"))};
+  section.tables.push_back(std::move(table));
+}
+
 ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
   ReportSection section{.heading = "Against the true skin"};
   section.paragraphs = {
-      "Scored is the skin in front of the dowel network, without the zones that the configuration "
-      "excludes; see resolved.yaml, region. Distances are to the "
-      "closest point, weighted by area; nothing was aligned to the true skin."};
+      "Scored is the outer skin of the face, without the zones that the configuration excludes "
+      "(see "
+      "resolved.yaml, region, and the picture of the scored skin). Distances are to the closest "
+      "point, weighted by area; nothing was aligned to the true skin but where a table says so."};
   section.images = {
       ReportImageFromFile(folder.Root() / "pictures/error.png", "",
                           "signed error of the H-spline face on the true skin from three sides"),
@@ -205,6 +230,7 @@ ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
                           "signed error of the implicit face on the true skin"),
       ReportImageFromFile(folder.Root() / "pictures/truth.png", "",
                           "the true skin from three sides")};
+  AddScored(result.at("face"), folder, section);
   section.images.push_back(
       {QuantilePlotSvg({{"H-spline face", Numbers(result.at("face").at("quantiles_mm"))},
                         {"implicit face", Numbers(result.at("implicit_face").at("quantiles_mm"))}},
@@ -213,6 +239,7 @@ ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
        "cumulative distribution of the errors of both faces"});
   section.tables = {MetricsTable("H-spline face", result.at("face")),
                     MetricsTable("Implicit face", result.at("implicit_face"))};
+  AddProtocols(result.at("face"), section);
   return section;
 }
 

@@ -284,6 +284,7 @@ TEST(Run, TheFolderHoldsWhatItsManifestLists) {
                                                 "pictures/face_over_skull.png",
                                                 "pictures/implicit.png",
                                                 "pictures/overview.png",
+                                                "pictures/scored.png",
                                                 "pictures/sigma.png",
                                                 "pictures/skull_dowels.png",
                                                 "pictures/truth.png",

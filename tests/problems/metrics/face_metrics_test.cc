@@ -82,7 +82,7 @@ TEST(FaceMetrics, ThreadsChangeNoBit) {
 TEST(FaceRegion, IsTheSkinOverTheNetwork) {
   const TriMesh skin = Plate(40, 80);
   const std::vector<Dowel> dowels = ThreeDowels();
-  const FaceRegion region = FindFaceRegion(skin, dowels, kOneArea, {});
+  const FaceRegion region = InFrontOfNetwork(skin, dowels, kOneArea, {}, {});
   for (std::size_t v = 0; v < skin.points.size(); ++v) {
     const double x = skin.points[v].x(), y = skin.points[v].y();
     const double inside = std::min({x - 10, y - 10, (40 - x - y) / std::sqrt(2)});
@@ -96,7 +96,7 @@ TEST(FaceRegion, MarginReachesAcrossTheBorderAndZonesAreLeftOut) {
   const TriMesh skin = Plate(40, 80);
   const std::vector<Dowel> dowels = ThreeDowels();
   const FaceRegion region =
-      FindFaceRegion(skin, dowels, kOneArea, {.margin_mm = 4, .exclude = {{"g", 8}}});
+      InFrontOfNetwork(skin, dowels, kOneArea, {}, {.margin_mm = 4, .exclude = {{"g", 8}}});
   for (std::size_t v = 0; v < skin.points.size(); ++v) {
     const Vec3& p = skin.points[v];
     if ((p - dowels[0].base).norm() < 7.9) {
@@ -120,8 +120,9 @@ TEST(FaceRegion, PartsFollowTheNearestSite) {
 TEST(FaceRegion, RefusesAnEmptyNetworkAndAnUnknownZone) {
   const TriMesh skin = Plate(40, 4);
   const std::vector<Dowel> dowels = ThreeDowels();
-  EXPECT_THROW(FindFaceRegion(skin, dowels, DowelNetwork{}, {}), InputError);
-  EXPECT_THROW(FindFaceRegion(skin, dowels, kOneArea, {.exclude = {{"zy_r", 8}}}), InputError);
+  EXPECT_THROW(InFrontOfNetwork(skin, dowels, DowelNetwork{}, {}, {}), InputError);
+  EXPECT_THROW(InFrontOfNetwork(skin, dowels, kOneArea, {}, {.exclude = {{"zy_r", 8}}}),
+               InputError);
 }
 
 TEST(FaceMetrics, NothingScoredIsAnError) {

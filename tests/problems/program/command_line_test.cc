@@ -17,6 +17,7 @@
 #include <thread>
 #include <vector>
 
+#include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/program_call.h"
@@ -161,7 +162,28 @@ TEST_F(CommandLine, ASkullWithTooFewLandmarksIsRefused) {
                 "no area of the dowel network has all its three dowels");
 }
 
+TEST_F(CommandLine, CheckFindsSidesThatAreSwapped) {
+  const Phantom phantom = MakePhantom({.rings = 30});
+  Write("skull.ply", EncodeMesh(phantom.skull, ".ply"));
+  Write("e.yaml", "subject: {type: files, skull: skull.ply, landmarks: marks.yaml}\n");
+  for (const bool swapped : {false, true}) {
+    std::string marks = "subject: P\nlandmarks:\n";
+    for (const PhantomSite& s : phantom.sites) {
+      const double side = swapped ? -1 : 1;
+      marks += fmt::format("  - {{site: {}, point: [{}, {}, {}]}}\n", s.site, side * s.base.x(),
+                           s.base.y(), s.base.z());
+    }
+    Write("marks.yaml", marks);
+    const Outcome outcome = Call("check e.yaml --set landmarks.max_distance_mm=10");
+    EXPECT_EQ(outcome.code, swapped ? 2 : 0) << outcome.err;
+    EXPECT_EQ(outcome.err.find("left and right are swapped") != std::string::npos, swapped);
+  }
+}
+
 TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
+  if (!fs::exists("/usr/share/doc/invesalius-examples/examples/Cranium.inv3")) {
+    GTEST_SKIP() << "Debian's invesalius-examples is not here, and check looks at the subjects";
+  }
   std::string files;
   for (const std::string& folder : {kConfigs, kConfigs + "/fit", kConfigs + "/studies"}) {
     for (const auto& entry : fs::directory_iterator(folder)) {
