@@ -35,7 +35,7 @@ struct FeatureError {
 };
 // nose_tip (pronasale): the most anterior vertex within 20 mm of the midline and 5 to 60 mm below
 // nasion, in the frame and millimetres of an average skull. Not there where a mesh has no triangle
-// in that box, or is foremost at its upper or lower end: then it has no nose (a phantom).
+// in that box, or is foremost at its upper or lower end: then it has no nose.
 std::vector<FeatureError> MeasureFeaturePoints(const TriMesh& outer_skin, const TriMesh& face,
                                                const SkullSites& sites);
 
