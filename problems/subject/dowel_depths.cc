@@ -196,8 +196,9 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
   std::erase_if(dowels, [](const Dowel& dowel) { return std::isnan(dowel.depth_mm); });
   if (dowels.empty()) {
     throw InputError(
-        "no dowel has a tissue depth; measure at least one in the landmark file, or set `depths: "
-        "table`");
+        fmt::format("no dowel has a tissue depth ({}); measure at least one in the landmark file, "
+                    "or name a table that has one of these sites",
+                    fmt::join(notes, "; ")));
   }
   return notes;
 }

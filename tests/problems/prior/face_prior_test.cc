@@ -191,7 +191,9 @@ TEST(HSplinePrior, WhatCannotBeUsedIsNamed) {
   EXPECT_THAT(fault(head + R"("features": [], "modes": []})"), HasSubstr("no mode"));
   EXPECT_THAT(fault(head + R"("features": [{"uv": [2, 0], "clearance_mm": 1}], "modes": []})"),
               HasSubstr("outside [0,1]"));
-  HSplineModes modes{.shape = {.patches_u = 4, .patches_v = 4, .max_level = 0}, .level = 0};
+  HSplineModes modes;
+  modes.shape = {.patches_u = 4, .patches_v = 4, .max_level = 0};
+  modes.level = 0;
   EXPECT_THROW(PriorOf(modes, Face(), 1), InputError);
   EXPECT_THROW(LoadPrior(NoPrior{}, Face()), InputError);
 }

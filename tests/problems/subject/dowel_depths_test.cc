@@ -192,7 +192,7 @@ TEST(FillDepths, NoDepthAtAllIsAnError) {
   Subject s({"me"});
   s.file.landmarks[0].depth_along_normal_mm.reset();
   EXPECT_THAT(WordsOf<InputError>([&] { FillDepths(Measured(), s.file, s.dowels); }),
-              HasSubstr("no dowel has a tissue depth; measure at least one"));
+              HasSubstr("measure at least one in the landmark file"));
 }
 
 }  // namespace

@@ -31,8 +31,9 @@ Subject PhantomSubject() {
   Subject subject{.file = {}, .skull = phantom.skull};
   subject.file.subject = "P";
   for (const PhantomSite& s : phantom.sites) {
-    subject.file.landmarks.push_back(
-        {.site = s.site, .point = {s.base.x(), s.base.y(), s.base.z()}});
+    Landmark& landmark = subject.file.landmarks.emplace_back();
+    landmark.site = s.site;
+    landmark.point = {s.base.x(), s.base.y(), s.base.z()};
   }
   return subject;
 }

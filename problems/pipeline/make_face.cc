@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/pipeline/make_face.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/metrics/quantile.h"
+#include "problems/pipeline/stage_key.h"
+#include "problems/prior/hspline_prior.h"
+#include "problems/prior/prior_target.h"
+#include "surfaces/base/thin_plate.h"
+#include "surfaces/hspline_query/hspline_project.h"
+#include "surfaces/mesh/cut_planes.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+// The dowel tips for which the generic face has a (u,v).
+FitTarget DowelTarget(const std::vector<Dowel>& dowels, const TemplateFace& face) {
+  FitTarget target;
+  for (const Dowel& dowel : dowels) {
+    const auto uv = face.site_uv.find(dowel.site);
+    if (uv != face.site_uv.end()) {
+      target.points.push_back(
+          {.label = dowel.site, .position = dowel.Tip(), .uv = uv->second, .role = dowel.role});
+      target.anchors.push_back({dowel.base, dowel.direction});
+    }
+  }
+  return target;
+}
+
+Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& dowels,
+                         const PlacementOptions& options) {
+  std::vector<Vec3> on_template, on_subject;
+  for (const FitPoint& point : dowels.points) {
+    on_template.push_back(generic.surface.Point(point.uv));
+    on_subject.push_back(point.position);
+  }
+  return PlaceTemplate(on_template, on_subject, {}, options);
+}
+
+TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_from_template) {
+  TemplateFace placed = generic;
+  placed.surface = Transformed(generic.surface, face_from_template);
+  for (TemplateFeature& feature : placed.features) {
+    if (feature.region) {
+      feature.region = Transformed(*feature.region, face_from_template);
+    }
+  }
+  return placed;
+}
+
+PlacedTemplate Place(const TemplateFace& generic, const std::vector<Dowel>& dowels_on_bone,
+                     const PlacementOptions& options) {
+  FitTarget dowels = DowelTarget(dowels_on_bone, generic);
+  const Similarity face_from_template = PlaceOnDowels(generic, dowels, options);
+  return {std::move(dowels), face_from_template, InSubjectFrame(generic, face_from_template)};
+}
+
+bool LooksAtBone(const std::vector<Term>& terms) {
+  return std::any_of(terms.begin(), terms.end(), [](const Term& term) {
+    return std::holds_alternative<NonPenetrationTerm>(term) ||
+           std::holds_alternative<SpringTerm>(term);
+  });
+}
+
+// Where seeds stand on the shell of the skull: nearest, and seen from there.
+std::vector<BoneAnchor> AnchorsOf(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
+  const MeshQuery query(shell);
+  std::vector<BoneAnchor> anchors;
+  for (const FitPoint& seed : seeds) {
+    const MeshPoint nearest = query.Closest(seed.position);
+    const Vec3 out = nearest.distance_mm > 1e-6
+                         ? Vec3(seed.position - nearest.position)
+                         : TriangleAreaVector(shell, shell.triangles[nearest.triangle]);
+    anchors.push_back({nearest.position, out.normalized()});
+  }
+  return anchors;
+}
+
+// The template, bent to the dowels alone: what the first seeds are taken on.
+HSplineSurface FirstFit(const Experiment& experiment, const TemplateFace& placed,
+                        const FitTarget& dowels, const RunContext& context) {
+  if (experiment.first_fit.empty()) {
+    return placed.surface;
+  }
+  FitOptions first = experiment.fit;
+  first.plan = ListedPlan{.schedule = experiment.first_fit, .aim = AimOf(experiment.fit.plan)};
+  first.relaxation = NoRelaxation{};
+  return Fit(placed.surface, placed.surface, dowels, FeatureVertices(placed), first, context)
+      .surface;
+}
+
+FitTarget WithSeeds(FitTarget target, const std::vector<FitPoint>& seeds,
+                    const std::vector<Term>& terms, const TriMesh& shell) {
+  target.points.insert(target.points.end(), seeds.begin(), seeds.end());
+  target.anchors.resize(target.points.size());
+  if (LooksAtBone(terms)) {
+    const std::vector<BoneAnchor> anchors = AnchorsOf(seeds, shell);
+    std::copy(anchors.begin(), anchors.end(), target.anchors.end() - std::ssize(anchors));
+  }
+  return target;
+}
+
+// Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
+// both (see seeding.h for why).
+FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, const TriMesh& implicit,
+                const TriMesh& shell, const RunContext& context) {
+  const HSplineSurface& rest = placed.face.surface;
+  const std::vector<VertexId> features = FeatureVertices(placed.face);
+  const std::vector<Sphere> masks = TemplateMasks(placed.face);
+  FitTarget dowels = placed.dowels;
+  const MeshQuery query(implicit);
+  HSplineSurface surface = FirstFit(experiment, placed.face, dowels, context);
+  std::optional<FaceFit> result;
+  for (int round = 0; round < experiment.rounds; ++round) {
+    context.Report("fit", fmt::format("round {} of {}", round + 1, experiment.rounds));
+    SeedResult seeding = SeedDowels(surface, query, implicit, masks, experiment.seeds);
+    FitTarget target = WithSeeds(dowels, seeding.points, experiment.fit.terms, shell);
+    FitResult fit = Fit(surface, rest, target, features, experiment.fit, context);
+    surface = fit.surface;
+    for (std::size_t k = 0; k < dowels.points.size(); ++k) {
+      dowels.points[k].uv = fit.uv[k];  // where relaxation has left them
+    }
+    result.emplace(std::move(seeding), std::move(target), std::move(fit));
+  }
+  return std::move(*result);
+}
+
+// A face that no fit has touched, in the form of a fit's result.
+FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {
+  FitResult fit{.surface = std::move(surface)};
+  double sum = 0;
+  for (const FitPoint& point : dowels.points) {
+    fit.uv.push_back(point.uv);
+    fit.residual_mm.push_back((fit.surface.Point(point.uv) - point.position).norm());
+    sum += fit.residual_mm.back() * fit.residual_mm.back();
+  }
+  fit.dowel_rms_mm = fit.point_rms_mm = std::sqrt(sum / static_cast<double>(fit.uv.size()));
+  fit.restored_features = 0;
+  fit.usable = true;
+  return {{.points = {}, .masked = 0, .missed = 0, .folded = 0}, dowels, std::move(fit)};
+}
+
+HSplineSurface UnderThinPlate(const HSplineSurface& surface, const FitTarget& dowels,
+                              double stiffness_mm) {
+  std::vector<Vec3> from, to, samples;
+  for (const FitPoint& point : dowels.points) {
+    from.push_back(surface.Point(point.uv));
+    to.push_back(point.position);
+  }
+  const ThinPlate plate = FitThinPlate(from, to, {}, {.stiffness_mm = stiffness_mm});
+  const DomainGrid grid = GridOf(surface.shape());
+  for (std::size_t k = 0; k < grid.size(); ++k) {
+    samples.push_back(plate(surface.Point(grid.UvAt(k))));
+  }
+  return SurfaceThrough(surface.shape(), grid, samples);
+}
+
+// The prior's most likely face as a placed template.
+MadeFace MostLikelyFace(const ShapeFitOptions& estimate, const TableDepthOptions& table_depths,
+                        PlacedTemplate placed, const FaceInput& in, const RunContext& context) {
+  const bool from_table = in.experiment.tissue.depths == DepthSource::kTable;
+  const LoadedPrior& prior = *in.prior;
+  ShapeEstimate shape =
+      EstimateShape(prior.face.model,
+                    PriorTarget(prior.face, in.subject.dowels_on_bone,
+                                from_table ? &table_depths : nullptr, &in.implicit),
+                    estimate, context);
+  placed.face_from_template =
+      Composed(shape.subject_from_model, prior.on_template.mean_from_template);
+  placed.face = InSubjectFrame(in.generic, placed.face_from_template);
+  placed.face.surface = SurfaceOf(shape, prior.face, prior.on_template, in.generic.surface.shape());
+  FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
+  unfitted.fit.usable = shape.usable;
+  return {std::move(placed), std::move(unfitted), std::move(shape)};
+}
+
+MadeFace MakeFace(const PlacedFace&, PlacedTemplate placed, const FaceInput&, const RunContext&) {
+  FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
+  return {std::move(placed), std::move(unfitted), {}};
+}
+
+MadeFace MakeFace(const ThinPlateFace& o, PlacedTemplate placed, const FaceInput&,
+                  const RunContext&) {
+  FaceFit unfitted =
+      Unfitted(UnderThinPlate(placed.face.surface, placed.dowels, o.stiffness_mm), placed.dowels);
+  return {std::move(placed), std::move(unfitted), {}};
+}
+
+MadeFace MakeFace(const FittedTemplate&, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  FaceFit fitted = FitFace(in.experiment, placed, in.implicit, in.shell, context);
+  return {std::move(placed), std::move(fitted), {}};
+}
+
+MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  return MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
+}
+
+MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  MadeFace made = MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
+  for (FitPoint& point : made.placed.dowels.points) {
+    point.uv = ProjectFrom(made.placed.face.surface, point.position, point.uv).uv;
+  }
+  Experiment softer = in.experiment;
+  softer.seeds.weight = o.seed_weight;
+  made.fitted = FitFace(softer, made.placed, in.implicit, in.shell, context);
+  return made;
+}
+
+}  // namespace
+
+std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
+                                              const TemplateFace& generic, StageCache& cache,
+                                              const RunContext& context) {
+  if (!AsksPrior(experiment.face)) {
+    return nullptr;
+  }
+  return cache.Get<LoadedPrior>(StageKey("prior", experiment.prior, experiment.face_template), [&] {
+    LoadedPrior prior{.face = LoadPrior(experiment.prior, generic), .on_template = {}};
+    prior.on_template = LayOnTemplate(prior.face, generic, context);
+    return prior;
+  });
+}
+
+TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh& implicit) {
+  const std::vector<CutPlane> planes = FindCutPlanes(subject.skull);
+  for (const CutPlane& plane : planes) {
+    subject.notes.push_back(
+        fmt::format("the skull is cut off at {}: no seeds within {:.0f} mm of there, and the face "
+                    "beyond it is the template's",
+                    InWords(plane), experiment.cut_margin_mm));
+  }
+  return WithinScan(implicit, planes, experiment.cut_margin_mm);
+}
+
+MadeFace MakeFace(const FaceInput& in, const RunContext& context) {
+  PlacedTemplate placed = Place(in.generic, in.subject.dowels_on_bone, in.experiment.placement);
+  return std::visit([&](const auto& way) { return MakeFace(way, std::move(placed), in, context); },
+                    in.experiment.face);
+}
+
+FaceUncertainty PriorUncertainty(const LoadedPrior& prior, const ShapeEstimate& estimate,
+                                 const Tessellation& face) {
+  FaceUncertainty result;
+  result.sigma_mm = SigmaAt(face.uv, estimate, prior.face, prior.on_template);
+  const std::vector<WeightedValue> by_area = SortedValues(result.sigma_mm, VertexAreas(face.mesh));
+  result.median_mm = Quantile(by_area, 0.5);
+  result.p95_mm = Quantile(by_area, 0.95);
+  return result;
+}
+
+}  // namespace semblance
