@@ -53,12 +53,13 @@ TEST(Experiment, AllOptionsThatNameALevelAreLookedAt) {
 TEST(Experiment, WhatAPlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(Faults("fit: {plan: adaptive}\n"),
               HasSubstr("1:13: fit.plan.finest: level 4 is finer than the surface"));
-  EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, terms: [points, symmetry]}\n"),
-              HasSubstr("1:58: fit.terms[1]: the term 'symmetry'"));
-  EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, features: frozen}\n"),
-              HasSubstr("fit.features: features that are weighted or frozen"));
-  EXPECT_NO_THROW(
-      ReadConfigText<Experiment>("fit: {plan: {type: adaptive, finest: 3}}\n", "a.yaml"));
+  EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, terms: [symmetry]}\n"),
+              HasSubstr("1:49: fit.terms: the adaptive plan has no term 'points'"));
+  EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 3}, relaxation: tangent_distance}\n"),
+              HasSubstr("1:54: fit.relaxation: the relaxation tangent_distance goes level by"));
+  EXPECT_NO_THROW(ReadConfigText<Experiment>(
+      "fit: {plan: {type: adaptive, finest: 3}, terms: [points, symmetry], features: frozen}\n",
+      "a.yaml"));
 }
 
 // What a plan does not use is no key of it.

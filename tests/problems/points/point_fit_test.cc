@@ -150,8 +150,8 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   const auto read = [](const std::string& text) {
     return testing::WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
   };
-  EXPECT_THAT(read("fit: {terms: [points, symmetry]}\n"),
-              HasSubstr("x.yaml:1:23: fit.terms[1]: the term 'symmetry'"));
+  EXPECT_THAT(read("fit: {terms: [symmetry]}\n"),
+              HasSubstr("x.yaml:1:14: fit.terms: the adaptive plan has no term 'points'"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
 }
 
