@@ -88,7 +88,9 @@ FitDriver::FitDriver(const HSplineSurface& rest, const FitTarget& target, const 
       terms_(std::move(terms)),
       context_(context),
       result_(result),
-      rms_mm_(PointRms(result.surface, target, context.threads)),
+      rms_mm_(std::holds_alternative<AdaptivePlan>(options.plan)  // which measures by itself
+                  ? kNaN
+                  : PointRms(result.surface, target, context.threads)),
       moves_(MovesOf(options.relaxation)) {
   if (moves_) {
     moved_ = target;
