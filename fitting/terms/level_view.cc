@@ -150,13 +150,24 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
   return view;
 }
 
+// In place, cycle by cycle: a second copy of a million observations would be most of a fit's
+// memory.
 void SortObservations(const PointCloud& cloud, std::vector<Observation>& observations) {
-  std::vector<Observation> sorted;
-  sorted.reserve(observations.size());
-  for (std::size_t k = 0; k < observations.size(); ++k) {
-    sorted.push_back(observations[cloud.Given(k)]);
+  std::vector<bool> is_placed(observations.size(), false);
+  for (std::size_t begin = 0; begin < observations.size(); ++begin) {
+    if (is_placed[begin]) {
+      continue;
+    }
+    const Observation first = observations[begin];
+    std::size_t k = begin;
+    for (std::size_t from = cloud.Given(k); from != begin; from = cloud.Given(k)) {
+      observations[k] = observations[from];
+      is_placed[k] = true;
+      k = from;
+    }
+    observations[k] = first;
+    is_placed[k] = true;
   }
-  observations = std::move(sorted);
 }
 
 LevelView ViewOfSpace(const HierarchicalSplineSpace& space, const PointCloud& cloud,
