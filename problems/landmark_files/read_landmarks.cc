@@ -120,9 +120,7 @@ void FindRepeats(const LandmarkFile& file, std::vector<std::string>& faults) {
   std::ranges::for_each(file.absent, see, &AbsentLandmark::site);
 }
 
-std::string_view WordOf(Axes axes) {
-  return EnumNames(axes)[static_cast<std::size_t>(axes)];
-}
+std::string_view WordOf(Axes axes) { return EnumNames(axes)[static_cast<std::size_t>(axes)]; }
 
 void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, LandmarkFile& file,
                 Notes& notes) {

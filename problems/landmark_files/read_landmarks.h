@@ -12,8 +12,8 @@
 namespace semblance {
 
 struct ReadLandmarksOptions {
-  std::optional<Axes> axes;  // of a file that does not say; none: LPS, and a note
-  bool leave_out_unknown = false;   // points whose name is no site, with a note each
+  std::optional<Axes> axes;        // of a file that does not say; none: LPS, and a note
+  bool leave_out_unknown = false;  // points whose name is no site, with a note each
 };
 
 // Landmarks in LPS and mm, and what people should know of how they were read.

@@ -45,7 +45,9 @@ void Fields(Visitor& visit, FileSubject& o) {
   visit(FieldInfo{.name = "skin",
                   .doc = "mesh of the true skin in the skull's frame; empty where it is not known"},
         o.skin);
-  visit(FieldInfo{.name = "landmarks", .doc = "landmarks on the skull: .yaml, or a file of Slicer, MeshLab or CloudCompare, or .csv"},
+  visit(FieldInfo{.name = "landmarks",
+                  .doc = "landmarks on the skull: .yaml, or a file of Slicer, MeshLab or "
+                         "CloudCompare, or .csv"},
         o.landmarks);
   visit(
       FieldInfo{.name = "axes",
@@ -68,7 +70,9 @@ struct CtSubject {
 template <class Visitor>
 void Fields(Visitor& visit, CtSubject& o) {
   visit(FieldInfo{.name = "volume", .doc = "InVesalius project (.inv3) of a head CT"}, o.volume);
-  visit(FieldInfo{.name = "landmarks", .doc = "landmarks on the skull: .yaml, or a file of Slicer, MeshLab or CloudCompare, or .csv"},
+  visit(FieldInfo{.name = "landmarks",
+                  .doc = "landmarks on the skull: .yaml, or a file of Slicer, MeshLab or "
+                         "CloudCompare, or .csv"},
         o.landmarks);
   visit(FieldInfo{.name = "import", .doc = "how skull and skin are taken from the volume"},
         o.import);

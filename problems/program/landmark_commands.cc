@@ -50,8 +50,7 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
   LandmarkArguments& a = *Bind(convert, line, &Convert);
   convert.add_option("IN", a.in, ".yaml, .mrk.json, .fcsv, .pp, .csv, .txt or .asc")->required();
   convert.add_option("OUT", a.out, "file of one of these kinds")->required();
-  const std::map<std::string, Axes> words = {{"LPS", Axes::kLps},
-                                                    {"RAS", Axes::kRas}};
+  const std::map<std::string, Axes> words = {{"LPS", Axes::kLps}, {"RAS", Axes::kRas}};
   convert
       .add_option("--axes", a.reading.axes,
                   "LPS or RAS: of a file that does not say (.pp, .csv, .txt, .asc) [LPS]")
