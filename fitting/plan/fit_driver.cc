@@ -28,15 +28,19 @@ double WeightedRms(std::vector<WeightAndDistance> points) {
 }
 
 std::vector<double> Distances(const HSplineSurface& surface, const FitTarget& target, int threads) {
-  std::vector<Vec2> uv;
-  uv.reserve(target.points.size());
-  for (const FitPoint& p : target.points) {
-    uv.push_back(p.uv);
-  }
-  const std::vector<Vec3> on_surface = HSplineBatch(surface).Points(uv, threads);
-  std::vector<double> distances(uv.size());
-  for (std::size_t k = 0; k < uv.size(); ++k) {
-    distances[k] = (on_surface[k] - target.points[k].position).norm();
+  constexpr std::size_t kAtOnce = 1 << 16;  // bounds the memory beside the points
+  const HSplineBatch batch(surface);
+  const std::vector<FitPoint>& points = target.points;
+  std::vector<double> distances;
+  distances.reserve(points.size());
+  for (std::size_t begin = 0; begin < points.size(); begin += kAtOnce) {
+    std::vector<Vec2> uv;
+    for (std::size_t k = begin; k < std::min(begin + kAtOnce, points.size()); ++k) {
+      uv.push_back(points[k].uv);
+    }
+    for (const Vec3& on_surface : batch.Points(uv, threads)) {
+      distances.push_back((on_surface - points[distances.size()].position).norm());
+    }
   }
   return distances;
 }

@@ -85,6 +85,22 @@ LevelView Checked(LevelView view) {
   return view;
 }
 
+bool NeedsRows(std::span<const Term> terms, Solver solver) {
+  return solver != Solver::kFastest || !SeparableButForLoss(terms);
+}
+
+// A view that no term takes rows of gives its observations away: the cloud says it all, and they
+// would be a third of the memory.
+PointCloud CloudOf(std::span<const Term> terms, Solver solver, LevelView& view) {
+  PointCloud cloud(view.grid.Shape(), view.observations);
+  if (NeedsRows(terms, solver) || Has<LandmarkTerm>(terms)) {
+    SortObservations(cloud, view.observations);
+  } else {
+    view.observations = std::vector<Observation>();
+  }
+  return cloud;
+}
+
 void SortBone(std::vector<BoneObservation>& bone) {
   const auto key = [](const BoneObservation& o) {
     const Vec3 &p = o.point.position, &f = o.foot;
@@ -143,14 +159,13 @@ SpaceSolve::SpaceSolve(const SpaceProblem& problem)
 SpaceSolve::SpaceSolve(LevelView level, std::span<const Term> terms, Solver solver)
     : view_(Checked(std::move(level))),
       rest_(view_->grid.Shape(), view_->rest),
-      cloud_(view_->grid.Shape(), view_->observations),
+      cloud_(CloudOf(terms, solver, *view_)),
       space_(HSplineSurface(view_->grid.Shape(), view_->start), rest_, cloud_),
       terms_(terms.begin(), terms.end()),
       auto_term_(AutoTerm(terms_)),
       solver_(solver),
       lengths_mm_(view_->lengths_mm),
       settled_(true) {
-  SortObservations(cloud_, view_->observations);
   SortBone(view_->bone);
   landmark_weight_ = view_->LandmarkWeightSum();
   CheckTerms(
@@ -291,9 +306,7 @@ double SpaceSolve::ChooseSmoothness() {
   return chosen_;
 }
 
-bool SpaceSolve::GoesDirectly() const {
-  return solver_ == Solver::kFastest && SeparableButForLoss(terms_);
-}
+bool SpaceSolve::GoesDirectly() const { return !NeedsRows(terms_, solver_); }
 
 NormalSystem SpaceSolve::System(std::span<const Term> terms, SystemPart part) {
   std::vector<LevelStiffness> forms;

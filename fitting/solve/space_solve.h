@@ -104,7 +104,7 @@ class SpaceSolve {
   void NoteCoverage(LevelSummary& summary);
 
   const FitTarget* target_ = nullptr;  // of all levels; null: `view_` is a level's, as given
-  std::optional<LevelView> view_;
+  std::optional<LevelView> view_;      // without observations where no term takes rows of them
   HSplineSurface rest_;
   PointCloud cloud_;
   HierarchicalSplineSpace space_;  // measured, its points weighted by what the terms make of them

@@ -60,6 +60,7 @@ HierarchicalSplineSpace::HierarchicalSplineSpace(const HSplineSurface& start,
       AddDof({0, i, j}, net.At(i, j));
     }
   }
+  nodes_.reserve(static_cast<std::size_t>(shape_.patches_u) * shape_.patches_v);
   for (int j = 0; j < shape_.patches_v; ++j) {
     for (int i = 0; i < shape_.patches_u; ++i) {
       AddNode({0, i, j}, -1, cloud.PatchOfLevel0(i, j));
