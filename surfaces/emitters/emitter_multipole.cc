@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "surfaces/emitters/simd.h"
+#include "surfaces/base/simd.h"
 
 namespace semblance {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/simd.h"
 #include "surfaces/emitters/emitter.h"
-#include "surfaces/emitters/simd.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {

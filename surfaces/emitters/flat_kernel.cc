@@ -8,8 +8,8 @@
 #include <numbers>
 #include <span>
 
-#include "surfaces/emitters/polygon_integral.h"
-#include "surfaces/emitters/simd.h"
+#include "surfaces/base/polygon_integral.h"
+#include "surfaces/base/simd.h"
 
 namespace semblance {
 namespace {

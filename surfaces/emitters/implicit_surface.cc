@@ -14,7 +14,6 @@
 #include "surfaces/emitters/emitter_search.h"
 #include "surfaces/emitters/emitter_triangle.h"
 #include "surfaces/emitters/flat_kernel.h"
-#include "surfaces/emitters/neighbour_list_cache.h"
 
 namespace semblance {
 namespace {
