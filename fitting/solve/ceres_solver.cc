@@ -2,12 +2,14 @@
 #include "fitting/solve/ceres_solver.h"
 
 #include <ceres/cost_function.h>
+#include <ceres/iteration_callback.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <utility>
@@ -61,7 +63,22 @@ ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t ver
   return options;
 }
 
+// A step is rejected although it changes the cost by no more than rounding does: there is nothing
+// left to gain, and shorter steps would be rejected likewise, each with a factor of its own.
+class StopAtRounding final : public ceres::IterationCallback {
+ public:
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
+    constexpr double kRounding = 1e-13;
+    const bool rounding = step.iteration > 0 && step.step_is_valid && !step.step_is_successful &&
+                          std::abs(step.cost_change) <= kRounding * step.cost;
+    return rounding ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  }
+};
+
 std::string TerminationName(ceres::TerminationType type) {
+  if (type == ceres::USER_SUCCESS) {
+    return "convergence";  // by StopAtRounding
+  }
   std::string text = ceres::TerminationTypeToString(type);
   std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -231,8 +248,11 @@ SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, C
     return outcome;
   }
   const ControlNet before = net;
+  StopAtRounding stop;
+  ceres::Solver::Options options = CeresOptions(terms, net.vertices.size());
+  options.callbacks.push_back(&stop);
   ceres::Solver::Summary summary;
-  ceres::Solve(CeresOptions(terms, net.vertices.size()), &problem, &summary);
+  ceres::Solve(options, &problem, &summary);
   outcome.iterations = static_cast<int>(summary.iterations.size()) - 1;
   outcome.termination = TerminationName(summary.termination_type);
   outcome.usable = summary.IsSolutionUsable();
