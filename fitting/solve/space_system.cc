@@ -55,9 +55,12 @@ class Assembler {
     PatchPart part;
     if (point_scale_ > 0 && node.range.size() > 0) {
       if (both_) {
-        part.matrix = point_scale_ * space_.GramOf(node);
+        const PatchSystem points = space_.SystemOf(node);
+        part.matrix = point_scale_ * points.gram;
+        part.right = point_scale_ * points.residual;
+      } else {
+        part.right = point_scale_ * space_.ResidualOf(node);
       }
-      part.right = point_scale_ * space_.ResidualOf(node);
     }
     if (!forms_.empty()) {
       const LevelStiffness& forms = forms_[node.patch.level];

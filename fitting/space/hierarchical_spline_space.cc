@@ -242,7 +242,7 @@ void HierarchicalSplineSpace::Measure(std::vector<double> factors, int threads,
       std::copy(&node.sums.moments[0][0], &node.sums.moments[0][0] + 56, &sums.moments[0][0]);
     }
     AddMoments(cloud_.Of(node.range), node.patch, node.vertices, moments,
-               {.factors = factors_.empty() ? nullptr : factors_.data() + node.range.begin,
+               {.factors = FactorsOf(node),
                 .squares = squares == nullptr ? nullptr : squares->data() + node.range.begin},
                sums);
     node.sums = sums;
@@ -251,17 +251,20 @@ void HierarchicalSplineSpace::Measure(std::vector<double> factors, int threads,
   });
 }
 
-PatchSystem HierarchicalSplineSpace::SystemOf(const QuadtreeNode& leaf) const {
-  return SystemOfPoints(cloud_.Of(leaf.range), leaf.patch, leaf.vertices,
-                        factors_.empty() ? nullptr : factors_.data() + leaf.range.begin);
+const double* HierarchicalSplineSpace::FactorsOf(const QuadtreeNode& leaf) const {
+  return factors_.empty() ? nullptr : factors_.data() + leaf.range.begin;
 }
 
-Matrix16 HierarchicalSplineSpace::GramOf(const QuadtreeNode& leaf) const {
-  return leaf.range.size() < kFew ? SystemOf(leaf).gram : GramOfMoments(leaf.sums);
+PatchSystem HierarchicalSplineSpace::SystemOf(const QuadtreeNode& leaf) const {
+  return leaf.range.size() < kFew
+             ? SystemOfPoints(cloud_.Of(leaf.range), leaf.patch, leaf.vertices, FactorsOf(leaf))
+             : PatchSystem{GramOfMoments(leaf.sums), ResidualOfMoments(leaf.sums)};
 }
 
 PatchMatrix HierarchicalSplineSpace::ResidualOf(const QuadtreeNode& leaf) const {
-  return leaf.range.size() < kFew ? SystemOf(leaf).residual : ResidualOfMoments(leaf.sums);
+  return leaf.range.size() < kFew
+             ? ResidualOfPoints(cloud_.Of(leaf.range), leaf.patch, leaf.vertices, FactorsOf(leaf))
+             : ResidualOfMoments(leaf.sums);
 }
 
 int HierarchicalSplineSpace::LeafAt(const Vec2& uv) const {

@@ -133,6 +133,29 @@ Matrix16 MakeRefinement(int right, int upper) {
   return refinement;
 }
 
+// A point's weights of the sixteen vertices, and its misfit.
+struct PointRow {
+  Eigen::Matrix<double, 16, 1> weights;
+  Eigen::RowVector3d misfit;
+};
+
+PointRow RowOf(const CloudPoint& p, const PatchId& patch, const PatchMatrix& vertices) {
+  const double scale = 1 << patch.level;
+  const auto along_u = CubicWeights(p.x * scale - patch.i, 0),
+             along_v = CubicWeights(p.y * scale - patch.j, 0);
+  PointRow row;
+  for (int v = 0; v < 16; ++v) {
+    row.weights[v] = along_u[v % 4] * along_v[v / 4];
+  }
+  const Eigen::RowVector3d position(p.position[0], p.position[1], p.position[2]);
+  row.misfit = position - row.weights.transpose() * vertices;
+  return row;
+}
+
+double WeightOf(const CloudPoint& p, const double* factors, std::size_t k) {
+  return factors == nullptr ? p.weight : p.weight * factors[k];
+}
+
 }  // namespace
 
 void AddMoments(std::span<const CloudPoint> points, const PatchId& patch,
@@ -163,23 +186,24 @@ PatchMatrix ResidualOfMoments(const PatchMoments& sums) {
 PatchSystem SystemOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
                            const PatchMatrix& vertices, const double* factors) {
   PatchSystem system;
-  const double scale = 1 << patch.level;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const CloudPoint& p = points[k];
-    const auto along_u = CubicWeights(p.x * scale - patch.i, 0),
-               along_v = CubicWeights(p.y * scale - patch.j, 0);
-    Eigen::Matrix<double, 16, 1> weights;
-    for (int v = 0; v < 16; ++v) {
-      weights[v] = along_u[v % 4] * along_v[v / 4];
-    }
-    const Eigen::RowVector3d position(p.position[0], p.position[1], p.position[2]);
-    const Eigen::RowVector3d e = position - weights.transpose() * vertices;
-    const Eigen::Matrix<double, 16, 1> weighted =
-        (factors == nullptr ? p.weight : p.weight * factors[k]) * weights;
-    system.gram += weighted * weights.transpose();
-    system.residual += weighted * e;
+    const PointRow row = RowOf(points[k], patch, vertices);
+    const Eigen::Matrix<double, 16, 1> weighted = WeightOf(points[k], factors, k) * row.weights;
+    system.gram += weighted * row.weights.transpose();
+    system.residual += weighted * row.misfit;
   }
   return system;
+}
+
+PatchMatrix ResidualOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
+                             const PatchMatrix& vertices, const double* factors) {
+  PatchMatrix residual = PatchMatrix::Zero();
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const PointRow row = RowOf(points[k], patch, vertices);
+    const Eigen::Matrix<double, 16, 1> weighted = WeightOf(points[k], factors, k) * row.weights;
+    residual += weighted * row.misfit;
+  }
+  return residual;
 }
 
 const Matrix16& RefinementMatrix(int right, int upper) {

@@ -45,6 +45,8 @@ struct PatchSystem {
 // nothing the sums are so too. factors: of the points' weights, or null.
 PatchSystem SystemOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
                            const PatchMatrix& vertices, const double* factors);
+PatchMatrix ResidualOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
+                             const PatchMatrix& vertices, const double* factors);
 
 // The vertices of the child (right, upper: 0 or 1) of a patch: RefinePatch as a matrix.
 const Matrix16& RefinementMatrix(int right, int upper);
