@@ -14,6 +14,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {
@@ -210,7 +211,8 @@ TemplateFace ReadTemplate(const FileTemplate& files) {
   For(files.sites, [&] { CheckSites(face); });
   if (!files.features.empty()) {
     For(files.features, [&] {
-      face.features = FeaturesFrom(Json::parse(ReadFileBytes(files.features)));
+      face.features =
+          FeaturesFrom(ParseJson(ReadFileBytes(files.features), files.features.string()));
       CheckFeatures(face);
     });
   }

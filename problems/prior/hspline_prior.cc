@@ -9,6 +9,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -195,7 +196,7 @@ std::string HSplineModesToJson(const HSplineModes& modes) {
 
 HSplineModes HSplineModesFromJson(std::string_view text, std::string_view name) {
   try {
-    return ModesFrom(Json::parse(text));
+    return ModesFrom(ParseJson(text, name));
   } catch (const nlohmann::json::exception& error) {
     throw InputError(fmt::format("{}: not a file of modes: {}", name, error.what()));
   } catch (const InputError& error) {

@@ -13,6 +13,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 
 namespace semblance {
 namespace {
@@ -352,7 +353,8 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
 void WriteReport(OutputFolder& folder) {
   const std::filesystem::path file = folder.Root() / "result.json";
   try {
-    folder.Write("report.html", ReportHtml(BuildReport(Json::parse(ReadFileBytes(file)), folder)));
+    folder.Write("report.html",
+                 ReportHtml(BuildReport(ParseJson(ReadFileBytes(file), file.string()), folder)));
   } catch (const nlohmann::json::exception& e) {
     throw IoError(fmt::format("{}: not the result of a run: {}", file.string(), e.what()));
   }

@@ -12,6 +12,7 @@
 
 #include "problems/report/run_pictures.h"
 #include "problems/report/scene_blobs.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/decimate/decimate.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -256,6 +257,7 @@ SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t 
   Json all = {{"scenes", Json::array()}, {"blobs", Json::object()}};
   std::size_t size = 0;
   for (const SceneText& text : scenes) {
+    CheckJsonDepth(text.json);
     Json scene = Json::parse(text.json, nullptr, false);
     if (!scene.is_object() || !scene.contains("blobs") || !scene.contains("layers")) {
       throw IoError(fmt::format("scene '{}': no scene of a run; run it again", text.label));

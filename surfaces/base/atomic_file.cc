@@ -3,17 +3,21 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <fstream>
-#include <iterator>
+#include <new>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {
@@ -22,20 +26,23 @@ namespace fs = std::filesystem;
 
 std::string Reason(int error_number) { return std::generic_category().message(error_number); }
 
-// A file descriptor that is closed, and a temporary file that is removed, whatever happens.
+// A file descriptor that is closed, and a temporary file that is removed, whatever happens. It is
+// locked as long as it is written, which tells a sweep that somebody does.
 class TemporaryFile {
  public:
   TemporaryFile(const fs::path& target, fs::path temporary)
       : target_(target), temporary_(std::move(temporary)) {
-    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (descriptor_ < 0) {
-      Fail();
-    }
+    do {
+      Close();
+      descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+      if (descriptor_ < 0) {
+        Fail();
+      }
+      ::flock(descriptor_, LOCK_EX);  // where there are no locks, no sweep gets one either
+    } while (WasSwept());
   }
   ~TemporaryFile() {
-    if (descriptor_ >= 0) {
-      ::close(descriptor_);
-    }
+    Close();
     if (!renamed_) {
       ::unlink(temporary_.c_str());
     }
@@ -64,6 +71,18 @@ class TemporaryFile {
   }
 
  private:
+  // Between its creation and its lock a sweep may have taken the file for a leftover.
+  bool WasSwept() const {
+    struct stat file {};
+    return ::fstat(descriptor_, &file) == 0 && file.st_nlink == 0;
+  }
+
+  void Close() {
+    if (descriptor_ >= 0) {
+      ::close(std::exchange(descriptor_, -1));
+    }
+  }
+
   [[noreturn]] void Fail() const {
     const int error_number = errno;
     throw IoError(fmt::format(
@@ -78,20 +97,44 @@ class TemporaryFile {
   bool renamed_ = false;
 };
 
-fs::path TemporaryBeside(const fs::path& path) {
-  static std::atomic<int> count{0};
-  return path.parent_path() /
-         fmt::format(".{}.{}-{}.tmp", path.filename().string(), ::getpid(), count++);
+// What comes after the size that the system states: all of a pipe, the rest of a file that grew.
+void AppendRest(std::ifstream& file, const fs::path& path, std::string& bytes) {
+  constexpr std::size_t kBlock = 1 << 20, kMost = std::size_t{256} << 20;
+  const std::size_t before = bytes.size();
+  while (file && bytes.size() - before <= kMost) {
+    const std::size_t at = bytes.size();
+    bytes.resize(at + kBlock);
+    file.read(bytes.data() + at, kBlock);
+    bytes.resize(at + static_cast<std::size_t>(file.gcount()));
+  }
+  if (bytes.size() - before > kMost) {
+    throw IoError(fmt::format(
+        "{}: more than 256 MB come out of what is no regular file; save them in one and name that",
+        path.string()));
+  }
 }
 
-// Makes the rename itself last over a power failure, where the file system can.
-void SyncFolder(const fs::path& folder) {
-  const int descriptor =
-      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor >= 0) {
-    ::fsync(descriptor);
-    ::close(descriptor);
+std::string ReadBytes(const fs::path& path) {
+  std::error_code error;
+  errno = 0;
+  std::ifstream file(path, std::ios::binary);
+  const std::uintmax_t size = fs::is_regular_file(path, error) ? fs::file_size(path, error) : 0;
+  std::string bytes(error ? 0 : size, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  if (file) {
+    AppendRest(file, path, bytes);
   }
+  if (!file.is_open() || file.bad()) {
+    throw IoError(fmt::format("{}: cannot be read: {}", path.string(), Reason(errno)));
+  }
+  return bytes;
+}
+
+[[noreturn]] void FailTooLarge(const fs::path& path) {
+  std::error_code ignored;
+  throw IoError(fmt::format("{}: not enough memory for its {} MB", path.string(),
+                            fs::file_size(path, ignored) >> 20));
 }
 
 }  // namespace
@@ -113,19 +156,13 @@ std::string ReadFileBytes(const fs::path& path) {
   if (fs::is_directory(path, error)) {
     throw IoError(fmt::format("{}: is a folder, not a file", path.string()));
   }
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  const std::uintmax_t size = fs::is_regular_file(path, error) ? fs::file_size(path, error) : 0;
-  std::string bytes(error ? 0 : size, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  if (file) {  // whatever has no size: a pipe, a file that grew meanwhile
-    bytes.append(std::istreambuf_iterator<char>(file), {});
+  try {
+    return ReadBytes(path);
+  } catch (const std::bad_alloc&) {
+    FailTooLarge(path);
+  } catch (const std::length_error&) {
+    FailTooLarge(path);
   }
-  if (!file.is_open() || file.bad()) {
-    throw IoError(fmt::format("{}: cannot be read: {}", path.string(), Reason(errno)));
-  }
-  return bytes;
 }
 
 }  // namespace semblance

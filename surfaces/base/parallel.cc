@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -37,8 +38,12 @@ void ParallelFor(std::size_t count, int threads, std::size_t block,
   {
     std::vector<std::jthread> helpers;
     const std::size_t wanted = std::min<std::size_t>(threads > 1 ? threads - 1 : 0, blocks);
-    for (std::size_t t = 0; t < wanted; ++t) {
-      helpers.emplace_back(work);
+    try {
+      for (std::size_t t = 0; t < wanted; ++t) {
+        helpers.emplace_back(work);
+      }
+    } catch (const std::system_error&) {
+      // The system gives no more of them: those that are there do the work.
     }
     work();
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 
 namespace semblance::json_parts {
 namespace {
@@ -32,6 +33,7 @@ double DoubleFromJson(const Json& number) {
 // The JSON library keeps one of several entries of the same name, silently.
 Json ParseWithoutRepeats(std::string_view text) {
   std::set<std::string> seen;
+  CheckJsonDepth(text);
   return Json::parse(text, [&seen](int depth, Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::key && depth == 1 &&
         !seen.insert(parsed.get<std::string>()).second) {

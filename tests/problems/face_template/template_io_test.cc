@@ -144,7 +144,7 @@ TEST_F(TemplateIo, NamesWhatIsMissingOrOfTheWrongKind) {
               HasSubstr("semblance template features"));
   const FileTemplate files = Written();
   WriteFileAtomically(files.features, "{\"format\": ");
-  EXPECT_THAT(MessageOfReading(files, files.features), HasSubstr("not a file of features"));
+  EXPECT_THAT(MessageOfReading(files, files.features), HasSubstr("this is not JSON"));
 }
 
 TEST_F(TemplateIo, AFileThatIsNotNamedOrNotThereIsAClearError) {

@@ -185,7 +185,7 @@ TEST(HSplinePrior, WhatCannotBeUsedIsNamed) {
   };
   const std::string head =
       R"({"format": "semblance face prior", "version": 1, "patches_u": 4, "patches_v": 4, "level": 0,)";
-  EXPECT_THAT(fault("{"), HasSubstr("modes.json: not a file of modes"));
+  EXPECT_THAT(fault("{"), HasSubstr("modes.json: this is not JSON"));
   EXPECT_THAT(fault(R"({"format": "x", "version": 1})"), HasSubstr("format and version"));
   EXPECT_THAT(fault(head + R"("features": [], "modes": [[1, 2]]})"), HasSubstr("has 2 numbers"));
   EXPECT_THAT(fault(head + R"("features": [], "modes": []})"), HasSubstr("no mode"));

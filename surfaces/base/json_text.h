@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Text to JSON, within the depth that a recursion over the tree can stand.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+
+namespace semblance {
+
+inline constexpr int kDeepestJson = 64;  // levels of lists and objects within each other
+
+// Throws IoError for deeper nesting, whether the text is JSON or not.
+void CheckJsonDepth(std::string_view text);
+
+// Throws IoError, which begins with `name`, for deeper nesting and for what is no JSON.
+nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name);
+
+}  // namespace semblance

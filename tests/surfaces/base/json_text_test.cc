@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/base/json_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::WordsOf;
+
+std::string Nested(int levels, char open, char close) {
+  return std::string(static_cast<std::size_t>(levels), open) +
+         std::string(static_cast<std::size_t>(levels), close);
+}
+
+TEST(JsonText, IsReadToSixtyFourLevelsAndNoFurther) {
+  EXPECT_NO_THROW(ParseJson(Nested(kDeepestJson, '[', ']'), "a"));
+  for (const int levels : {kDeepestJson + 1, 1000, 1'000'000}) {
+    EXPECT_THAT(WordsOf<IoError>([&] { ParseJson(Nested(levels, '[', ']'), "a.json"); }),
+                HasSubstr("a.json: more than 64 levels"));
+  }
+  std::string objects = "0";
+  for (int k = 0; k < kDeepestJson + 1; ++k) {
+    objects = "{\"a\":" + objects + "}";
+  }
+  EXPECT_THROW(ParseJson(objects, "a"), IoError);
+}
+
+TEST(JsonText, BracketsInTextsAreNoLevels) {
+  const std::string brackets(200, '[');
+  EXPECT_EQ(ParseJson("\"" + brackets + "\"", "a"), brackets);
+  EXPECT_EQ(ParseJson("[\"\\\"" + brackets + "\"]", "a")[0], "\"" + brackets);
+  EXPECT_EQ(ParseJson("[\"\\\\\", []]", "a").size(), 2u);
+  std::string wide = "[0";
+  for (int k = 0; k < 1000; ++k) {
+    wide += ",[]";
+  }
+  EXPECT_EQ(ParseJson(wide + "]", "a").size(), 1001u);
+}
+
+TEST(JsonText, WhatIsNoJsonIsNamed) {
+  for (const char* const text : {"", "{", "[1,]", "nan", "\"\xff\""}) {
+    EXPECT_THAT(WordsOf<IoError>([&] { ParseJson(text, "a.json"); }),
+                HasSubstr("a.json: this is not JSON"));
+  }
+}
+
+}  // namespace
+}  // namespace semblance
