@@ -10,8 +10,11 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
+#include <span>
 #include <sstream>
+#include <vector>
 
+#include "problems/config/config_limits.h"
 #include "problems/config/utf8_check.h"
 #include "surfaces/base/atomic_file.h"
 
@@ -31,11 +34,48 @@ ConfigPlace EndOf(std::string_view text, const SourcePtr& source) {
   return {source, static_cast<int>(lines) + 1, static_cast<int>(text.size() - line_begin) + 1};
 }
 
+// The lines of a text as the parser counts them: from 0, and without a mark of byte order.
+std::vector<std::string_view> LinesOf(std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) {
+    text.remove_prefix(kByteOrderMark.size());
+  }
+  std::vector<std::string_view> lines;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    lines.push_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return lines;
+}
+
+// What follows a place in its line.
+std::string_view LineFrom(std::span<const std::string_view> lines, const YAML::Mark& mark) {
+  const auto line = static_cast<std::size_t>(std::max(mark.line, 0));
+  const std::string_view text = line < lines.size() ? lines[line] : std::string_view();
+  return text.substr(std::min<std::size_t>(std::max(mark.column, 0), text.size()));
+}
+
+// Of a line that begins with a quote: whether the quote ends in it.
+bool ClosesQuote(std::string_view line) {
+  const char quote = line.front();
+  for (std::size_t k = 1; k < line.size(); ++k) {
+    if (quote == '"' && line[k] == '\\') {
+      ++k;  // what is escaped closes nothing
+    } else if (line[k] == quote && quote == '\'' && line.substr(k + 1).starts_with(quote)) {
+      ++k;  // '' stands for one
+    } else if (line[k] == quote) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // Builds the tree of the first document, and complains about all that the tree cannot hold.
 class TreeBuilder : public YAML::EventHandler {
  public:
-  TreeBuilder(SourcePtr source, ConfigErrors& errors)
-      : source_(std::move(source)), errors_(errors) {
+  TreeBuilder(std::string_view text, SourcePtr source, ConfigErrors& errors)
+      : lines_(LinesOf(text)), source_(std::move(source)), errors_(errors) {
     root_.place = {source_, 1, 1};
   }
 
@@ -61,6 +101,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
                 const std::string& value) override {
+    RefuseSeveralLines(mark, value);
     ConfigNode node = At(mark);
     node.kind = ConfigNode::Kind::kScalar;
     node.text = value;
@@ -71,13 +112,13 @@ class TreeBuilder : public YAML::EventHandler {
     Add(std::move(node));
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {
-    Open(mark, tag, ConfigNode::Kind::kList);
+                       YAML::EmitterStyle::value style) override {
+    Open(mark, tag, ConfigNode::Kind::kList, style);
   }
   void OnSequenceEnd() override { Close(); }
   void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
-                  YAML::EmitterStyle::value) override {
-    Open(mark, tag, ConfigNode::Kind::kMap);
+                  YAML::EmitterStyle::value style) override {
+    Open(mark, tag, ConfigNode::Kind::kMap, style);
   }
   void OnMapEnd() override { Close(); }
 
@@ -85,6 +126,7 @@ class TreeBuilder : public YAML::EventHandler {
   // A map or list that is not closed yet; for a map also the key that waits for its value.
   struct Level {
     ConfigNode node;
+    bool is_flow = false;
     bool has_key = false;
     bool is_key_good = false;
     std::string key = {};
@@ -121,9 +163,32 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
 
-  void Open(const YAML::Mark& mark, const std::string& tag, ConfigNode::Kind kind) {
+  // A text that goes on over the end of its line: mostly a quote or a bracket that somebody forgot
+  // to close, and which then swallows the options that follow.
+  void RefuseSeveralLines(const YAML::Mark& mark, const std::string& value) {
+    const std::string_view line = LineFrom(lines_, mark);
+    const bool is_quoted = line.starts_with('"') || line.starts_with('\'');
+    const bool is_flow = !levels_.empty() && levels_.back().is_flow;
+    if (is_quoted && !ClosesQuote(line)) {
+      AddError(mark,
+               "the quote that begins here is not closed in its line; close it (a text of "
+               "several lines is written as a block, after |)");
+    } else if (!is_quoted && is_flow && !line.starts_with(value)) {
+      AddError(mark,
+               "a text within brackets goes on in the next line; is a comma or a bracket "
+               "missing?");
+    }
+  }
+
+  void Open(const YAML::Mark& mark, const std::string& tag, ConfigNode::Kind kind,
+            YAML::EmitterStyle::value style) {
+    if (levels_.size() >= kDeepestConfig) {
+      throw YAML::Exception(mark, fmt::format("more than {} levels of maps and lists within each "
+                                              "other",
+                                              kDeepestConfig));
+    }
     RefuseTag(mark, tag);
-    levels_.push_back({.node = At(mark)});
+    levels_.push_back({.node = At(mark), .is_flow = style == YAML::EmitterStyle::Flow});
     levels_.back().node.kind = kind;
   }
 
@@ -201,6 +266,7 @@ class TreeBuilder : public YAML::EventHandler {
     level.node.entries.push_back({level.key, level.key_place, std::move(value)});
   }
 
+  std::vector<std::string_view> lines_;
   SourcePtr source_;
   ConfigErrors& errors_;
   ConfigNode root_;
@@ -229,6 +295,9 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
   const auto canonical = std::filesystem::weakly_canonical(base_file);
   if (std::find(loading.chain.begin(), loading.chain.end(), canonical) != loading.chain.end()) {
     return fail(fmt::format("'{}' would be its own base", base.text));
+  }
+  if (loading.chain.size() > kDeepestConfig) {
+    return fail(fmt::format("more than {} bases of bases", kDeepestConfig));
   }
   std::string text;
   try {
@@ -294,11 +363,16 @@ void ApplyOverride(std::string_view override_text, int order, const ConfigNode& 
 ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
                            ConfigErrors& errors) {
   const auto shared_source = std::make_shared<const ConfigSource>(source);
+  if (text.size() > kLargestConfig_bytes) {
+    errors.Add({shared_source, 1, 1}, "",
+               fmt::format("{} MB of YAML; at most 16 MB are read", text.size() / 1'000'000));
+    return ConfigNode::Map();
+  }
   if (!RequireReadableBytes(text, shared_source, errors)) {
     return ConfigNode::Map();
   }
   std::istringstream stream{std::string(text)};
-  TreeBuilder builder(shared_source, errors);
+  TreeBuilder builder(text, shared_source, errors);
   try {
     YAML::Parser parser(stream);
     // The second round is for the complaint about a second document.

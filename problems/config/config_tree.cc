@@ -7,6 +7,7 @@
 #include <charconv>
 #include <optional>
 
+#include "problems/config/config_limits.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -60,6 +61,10 @@ std::vector<Step> ParsePath(std::string_view path) {
       FailMalformed(path);
     }
     steps.push_back(TakeStep(path, at));
+    if (steps.size() > kDeepestConfig) {
+      throw ConfigError(fmt::format("{}...: a path of more than {} steps leads nowhere",
+                                    path.substr(0, 40), kDeepestConfig));
+    }
   } while (at < path.size());
   return steps;
 }

@@ -10,6 +10,23 @@ unsigned char ByteAt(std::string_view text, std::size_t i) {
   return static_cast<unsigned char>(text[i]);
 }
 
+// Of the first two bytes of a longer sequence: not more bytes than needed, no half of a pair of
+// UTF-16 (U+D800 to U+DFFF), nothing above U+10FFFF.
+bool IsShortestCharacter(unsigned char first, unsigned char second) {
+  switch (first) {
+    case 0xE0:
+      return second >= 0xA0;
+    case 0xED:
+      return second < 0xA0;
+    case 0xF0:
+      return second >= 0x90;
+    case 0xF4:
+      return second < 0x90;
+    default:
+      return true;
+  }
+}
+
 // The length of the UTF-8 sequence at `i`; 0 if there is none.
 std::size_t SequenceLength(std::string_view text, std::size_t i) {
   const unsigned char first = ByteAt(text, i);
@@ -26,7 +43,7 @@ std::size_t SequenceLength(std::string_view text, std::size_t i) {
       return 0;
     }
   }
-  return length;
+  return length == 1 || IsShortestCharacter(first, ByteAt(text, i + 1)) ? length : 0;
 }
 
 bool IsControl(char c) {

@@ -2,6 +2,7 @@
 // Reading strictly: what is accepted, and the exact words for all that is not.
 #include "problems/config/config.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +13,9 @@
 
 namespace semblance {
 namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 using testing::Flat;
 using testing::Mixed;
@@ -98,6 +102,16 @@ TEST(Config, SaysExactlyWhatIsWrong) {
        "18446744073709551615"},
       {"random_seed: -1",
        "x.yaml:1:14: random_seed: -1 does not fit; allowed is 0 to 18446744073709551615"},
+      // Texts that swallow what follows.
+      {"label: \"a\ncount: 3\"",
+       "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (a text "
+       "of several lines is written as a block, after |)"},
+      {"label: 'it''s\ncount: 3'",
+       "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (a text "
+       "of several lines is written as a block, after |)"},
+      {"{label: a\n  b}",
+       "x.yaml:1:9: label: a text within brackets goes on in the next line; is a comma or a "
+       "bracket missing?"},
       // Kinds.
       {"radius_mm: {a: 1}", "x.yaml:1:12: radius_mm: expected a number, found a map"},
       {"radius_mm: [1]", "x.yaml:1:12: radius_mm: expected a number, found a list"},
@@ -144,12 +158,48 @@ TEST(Config, SaysExactlyWhatIsWrong) {
       {"last:\n\tlevel: 1", "x.yaml:2:1: a tab; use spaces (in a text, write \"\\t\")"},
       {"label: a\x01", "x.yaml:1:9: a control character; remove it"},
       {"label: \xff", "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
+      {"label: \xed\xa0\x80",  // half of a pair of UTF-16
+       "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
+      {"label: \xe0\x80\x80",  // longer than it need be
+       "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
+      {"label: \xf0\x80\x80\x80", "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
+      {"label: \xf4\x90\x80\x80",  // above U+10FFFF
+       "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
       {"last: {level: 1", "x.yaml:1:16: this is not YAML: end of map flow not found"},
       {"count: 1: 2", "x.yaml:1:9: this is not YAML: illegal map value"},
   };
   for (const Wrong& wrong : cases) {
     EXPECT_EQ(ErrorsOf(wrong.text), wrong.error) << wrong.text;
   }
+}
+
+TEST(Config, AllOfUnicodeIsReadAndTextsOfSeveralLinesAreBlocks) {
+  for (const char* const text : {"\xed\x9f\xbf", "\xee\x80\x80", "\xe0\xa0\x80", "\xf0\x90\x80\x80",
+                                 "\xf4\x8f\xbf\xbf", "it's \"so\"", "a # b"}) {
+    EXPECT_EQ(Read(fmt::format("label: |-\n  {}\n", text)).label, text);
+  }
+  EXPECT_EQ(Read("label: |\n  \"a\n  'b\n").label, "\"a\n'b\n");
+  EXPECT_EQ(Read("\xEF\xBB\xBFlabel: \"a \\\" b\"\n").label, "a \" b");
+  EXPECT_EQ(Read("label: 'it''s'\n").label, "it's");
+  EXPECT_EQ(Read("label: one\n  and two\n").label, "one and two");
+}
+
+TEST(Config, WhatIsTooDeepOrTooLargeIsRefusedBeforeItIsFollowed) {
+  const auto nested = [](std::size_t levels) {
+    return "label: " + std::string(levels, '[') + std::string(levels, ']');
+  };
+  EXPECT_THAT(ErrorsOf(nested(63)), Not(HasSubstr("levels")));
+  for (const std::size_t levels : {64, 400, 100000}) {
+    EXPECT_THAT(ErrorsOf(nested(levels)),
+                HasSubstr("more than 64 levels of maps and lists within each other"));
+  }
+  EXPECT_THAT(ErrorsOf("# " + std::string(16'000'000, 'x')), HasSubstr("at most 16 MB are read"));
+  std::string path = "a";
+  for (int k = 0; k < 100000; ++k) {
+    path += ".a";
+  }
+  ConfigNode tree = ConfigNode::Map();
+  EXPECT_THROW(SetPath(tree, path, ConfigNode::Scalar("1")), ConfigError);
 }
 
 TEST(Config, ReportsAllErrorsInTheOrderOfLines) {

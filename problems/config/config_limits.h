@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How large a configuration can be. What is followed by recursion must not be deeper than a stack.
+#pragma once
+
+#include <cstddef>
+
+namespace semblance {
+
+// Maps and lists within each other, steps of a path, bases of bases.
+inline constexpr std::size_t kDeepestConfig = 64;
+inline constexpr std::size_t kLargestConfig_bytes = 16'000'000;
+
+}  // namespace semblance
