@@ -8,9 +8,11 @@
 #include <iterator>
 #include <memory>
 
+#include "fitting/plan/fit_faults.h"
 #include "problems/pipeline/make_face.h"
 #include "problems/pipeline/stage_key.h"
 #include "problems/prior/hspline_prior.h"
+#include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {
 namespace {
@@ -91,6 +93,24 @@ std::optional<FaceUncertainty> UncertaintyOf(const Experiment& experiment, const
 
 }  // namespace
 
+std::vector<std::string> RunResult::Faults() const {
+  std::vector<std::string> faults = FaultsIn(fit);
+  if (face.mesh.points.empty()) {
+    faults.emplace_back("the face has no vertex");
+  }
+  const auto require = [&](const FaceMetrics& metrics, const char* what) {
+    const DistanceSummary& s = metrics.truth_to_face;
+    if (!std::isfinite(s.mean_abs_mm) || !std::isfinite(s.rms_mm)) {
+      faults.push_back(fmt::format("the distance of the {} from the true skin is no number", what));
+    }
+  };
+  if (truth) {
+    require(truth->face, "H-spline face");
+    require(truth->implicit, "implicit face");
+  }
+  return faults;
+}
+
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache) {
   StepClock step(context);
   StageCache own_cache(4);
@@ -107,6 +127,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const TriMesh seedable = SeedableFace(experiment, subject, skull->implicit.dense);
   const FaceInput input{experiment, *generic, prior.get(), subject, seedable, bone.shell};
   MadeFace made = step("fit", [&] { return MakeFace(input, context); });
+  CheckFinite(made.fitted.fit.surface);
   Tessellation face =
       step("tessellate", [&] { return Tessellate(made.fitted.fit.surface, kFaceQuadsPerPatch); });
   std::optional<FaceUncertainty> uncertainty = step("uncertainty", [&] {

@@ -48,13 +48,16 @@ struct RunResult {
   std::vector<FeatureDistortion> features;
   std::vector<StepTime> times;  // not part of the result proper
 
-  bool usable() const { return fit.usable && face.mesh.points.size() > 0; }
+  // Why the face cannot be used; empty if it can.
+  std::vector<std::string> Faults() const;
+  bool usable() const { return Faults().empty(); }
 };
 
 // Loads the case, fills the skull, interpolates depth, lays the implicit face, places the generic
 // face, makes the subject's face of it as experiment.face says, measures. Throws as LoadSubject
-// does, and Cancelled. What experiments have in common (the subject, its shell, the implicit face,
-// the generic face) is taken from `cache`, where one is given; the result does not depend on it.
+// does, OutOfMemory, Cancelled, and InputError if the face is not finite. What experiments have in
+// common (the subject, its shell, the implicit face, the generic face) is taken from `cache`, where
+// one is given; the result does not depend on it.
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache = nullptr);
 
 }  // namespace semblance

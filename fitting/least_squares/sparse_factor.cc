@@ -17,6 +17,7 @@ struct SparseFactor::Cholmod : Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::
 SparseFactor::SparseFactor(const SparseMatrix& lower, double shift)
     : cholmod_(std::make_unique<Cholmod>()) {
   UseOneBlasThread();
+  cholmod_->cholmod().print = 0;  // what it would say is in usable()
   cholmod_->setShift(shift);
   cholmod_->compute(lower);
 }

@@ -205,7 +205,8 @@ void FitDriver::Finish(std::span<const VertexId> features) {
   }
   MeasurePoints(/*known=*/!restore);
   result_.usable = std::all_of(result_.levels.begin(), result_.levels.end(),
-                               [](const LevelSummary& s) { return s.usable; });
+                               [](const LevelSummary& s) { return s.usable; }) &&
+                   std::isfinite(result_.point_rms_mm);
 }
 
 // known: whether the surface is as the last step left it.

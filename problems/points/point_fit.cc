@@ -69,7 +69,8 @@ Json ResultJsonOf(const PointFitOptions& options, const std::filesystem::path& p
                {"p95_mm", Quantile(residual, 0.95)},
                {"max_mm", Quantile(residual, 1)},
                {"control_vertices", VerticesJson(result.fit.surface)},
-               {"usable", result.fit.usable}};
+               {"usable", result.Faults().empty()},
+               {"faults", result.Faults()}};
   json.update(StepsToJson(result.fit));
   return json;
 }
@@ -119,13 +120,18 @@ PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
 
 void WritePointFit(const PointFitOptions& options, const std::filesystem::path& points,
                    const PointFit& result, OutputFolder& folder, const RunContext& context) {
-  context.Report("write", folder.Root().string());
+  context.Report("write");
+  // First what can still be refused.
+  const std::string mesh = SurfacePly(result.fit.surface, options.chord_mm, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
-  folder.Write("surface.ply", SurfacePly(result.fit.surface, options.chord_mm, context.threads));
+  folder.Write("surface.ply", mesh);
   folder.Write("residuals.csv", ResidualsCsv(result.fit));
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("result.json", ResultJsonOf(options, points, result).dump(2) + "\n");
+  folder.Write(
+      "result.json",
+      ResultJsonOf(options, points, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+          "\n");
 }
 
 }  // namespace semblance

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "fitting/plan/fit_faults.h"
 #include "fitting/problem/parametrise.h"
 #include "problems/config/config_errors.h"
 #include "problems/output/files.h"
@@ -56,6 +57,9 @@ struct PointFit {
   std::string parameters;  // given, plane or cylinder
   FitResult fit;
   std::vector<StepTime> times;
+
+  // Why the result cannot be used; empty if it can.
+  std::vector<std::string> Faults() const { return FaultsIn(fit); }
 };
 
 // Throws InputError as Parametrise, StartSurface and Fit do, and for a closure that does not suit

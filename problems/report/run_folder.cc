@@ -249,8 +249,10 @@ std::string ManifestJson(Json provenance, const OutputFolder& folder) {
 }  // namespace
 
 std::string ResultJson(const Experiment& experiment, const RunResult& result) {
-  Json json = {
-      {"title", experiment.title}, {"subject", result.subject.name}, {"usable", result.usable()}};
+  Json json = {{"title", experiment.title},
+               {"subject", result.subject.name},
+               {"usable", result.usable()},
+               {"faults", result.Faults()}};
   json["face"] = result.truth
                      ? ScoreToJson(result.truth->face, result.truth->details, result.truth->skin)
                      : Json(nullptr);
@@ -272,7 +274,7 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
 
 void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,
               const RunContext& context) {
-  context.Report("write", folder.Root().string());
+  context.Report("write");
   std::filesystem::remove(folder.Root() / "manifest.json");  // of a run that is written over
   folder.Write("resolved.yaml", WriteConfig(experiment));
   folder.Write("result.json", ResultJson(experiment, result));

@@ -102,8 +102,15 @@ std::string TipsPly(const DepthResult& result) {
 
 }  // namespace
 
-bool DepthResult::usable() const {
-  return std::ranges::any_of(stage->depth.depth_mm, [](double d) { return std::isfinite(d); });
+std::vector<std::string> DepthResult::Faults() const {
+  std::vector<std::string> faults;
+  if (std::ranges::none_of(stage->depth.depth_mm, [](double d) { return std::isfinite(d); })) {
+    faults.emplace_back("no vertex of the skull has a depth");
+  }
+  if (truth && !std::isfinite(truth->tips.rms_mm)) {
+    faults.emplace_back("the distance of the depth's end from the true skin is no number");
+  }
+  return faults;
 }
 
 DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context,
@@ -131,6 +138,7 @@ std::string DepthResultJson(const Experiment& experiment, const DepthResult& res
   Json json = {{"title", experiment.title},
                {"subject", result.stage->subject.name},
                {"usable", result.usable()},
+               {"faults", result.Faults()},
                {"depth", DepthToJson(result.stage->depth, result.stage->subject)},
                {"depth_truth", nullptr},
                {"cross_validation", Json::object()}};

@@ -25,7 +25,9 @@ struct DepthResult {
   std::vector<std::pair<std::string, CrossValidation>> left_out;
   std::vector<StepTime> times;  // not part of the result proper
 
-  bool usable() const;  // a vertex has a depth
+  // Why it cannot be used; empty if it can.
+  std::vector<std::string> Faults() const;
+  bool usable() const { return Faults().empty(); }
 };
 
 // Loads the case, fills the skull, interpolates, compares, leaves dowels out. Throws as

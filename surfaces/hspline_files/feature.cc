@@ -153,6 +153,14 @@ FeatureBlend BlendFeatures(std::string name, std::span<const Feature> features,
       }
     }
   }
+  for (const auto& [vertex, offset] : blend.feature.offsets) {
+    if (!offset.allFinite()) {
+      throw InputError(fmt::format(
+          "feature {}: with these weights the offset of vertex ({}, {}) of level {} is no finite "
+          "number; use weights about 0..1",
+          blend.feature.name, vertex.i, vertex.j, vertex.level));
+    }
+  }
   return blend;
 }
 

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/json_parts.h"
@@ -36,7 +38,21 @@ HSplineSurface SurfaceFromJson(const Json& json) {
 
 }  // namespace
 
+void CheckFinite(const HSplineSurface& surface) {
+  const ControlNet level0 = surface.Net(0);
+  bool finite = std::ranges::all_of(level0.vertices, [](const Vec3& p) { return p.allFinite(); });
+  for (const auto& [vertex, offset] : surface.Offsets()) {
+    finite = finite && offset.allFinite();
+  }
+  if (!finite) {
+    throw InputError(
+        "H-spline: a vertex is at no finite place, so it cannot be written; look for huge numbers "
+        "in what it was made from");
+  }
+}
+
 std::string HSplineToJson(const HSplineSurface& surface) {
+  CheckFinite(surface);
   const HSplineShape& shape = surface.shape();
   Json json;
   json["format"] = kHSplineFormat;

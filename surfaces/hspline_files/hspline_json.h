@@ -10,9 +10,13 @@
 
 namespace semblance {
 
+// Throws InputError if a vertex is at no finite place: JSON has no word for that.
+void CheckFinite(const HSplineSurface& surface);
+
 // {"format": "semblance-hspline", "version": 1, "patches": [u, v], "max_level": L, "closure": ...,
 // "offset_reference": ..., "units": "mm",
 //  "level0": [[x, y, z], ...] row by row, "offsets": [[level, i, j, x, y, z], ...] in order}.
+// Throws as CheckFinite.
 std::string HSplineToJson(const HSplineSurface& surface);
 
 // `name`: what errors call the text, e.g. its file. Throws IoError for anything but what

@@ -37,6 +37,30 @@ void CheckUnit(double size, const std::string& name) {
                   size, kSmallest_mm, kLargest_mm, guess));
 }
 
+// Beyond this, numbers of a file's single precision lie more than 0.01 mm apart.
+constexpr double kFarthest_mm = 1e5;
+
+void CheckPlace(const TriMesh& mesh, const std::string& name) {
+  const double off = Bounds(mesh).center().norm();
+  if (!(off <= kFarthest_mm)) {
+    throw InputError(
+        fmt::format("{}: it lies {:.3g} mm from the origin, where its numbers are no longer exact; "
+                    "move it to within {} m",
+                    name, off, kFarthest_mm / 1000));
+  }
+}
+
+void CheckArea(const TriMesh& mesh, const std::string& name) {
+  constexpr double kLeast_mm2 = 1;
+  const double area_mm2 = Area(mesh);
+  if (!(area_mm2 >= kLeast_mm2)) {
+    throw InputError(
+        fmt::format("{}: its {} triangles have an area of {:.3g} mm² in all; give a "
+                    "surface",
+                    name, mesh.triangles.size(), area_mm2));
+  }
+}
+
 // The share of rays from all sides towards the mesh that hit the outside of a triangle first.
 double OutwardShare(const TriMesh& mesh) {
   const MeshQuery query(mesh);
@@ -63,6 +87,8 @@ std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& n
     throw InputError(fmt::format("{}: the mesh has no triangles", name));
   }
   CheckUnit(Bounds(mesh).sizes().maxCoeff(), name);
+  CheckPlace(mesh, name);
+  CheckArea(mesh, name);
   const double outward = OutwardShare(mesh);
   if (outward < 0.5) {
     throw InputError(

@@ -10,7 +10,8 @@
 namespace semblance {
 
 // Throws InputError, naming the mesh, if it is empty or not finite, if its bounding box is not
-// that of a head in mm (saying which unit it looks like), or if it is inside out: of rays sent from
+// that of a head in mm (saying which unit it looks like), if it lies more than 100 m from the
+// origin, if it has no area, or if it is inside out: of rays sent from
 // far outside, most hit a triangle's back first. The mesh is never turned silently. Returns a line
 // for each lesser defect that real scans have: non-manifold, inconsistent or open edges, triangles
 // without area.

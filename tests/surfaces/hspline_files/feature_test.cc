@@ -31,6 +31,19 @@ HSplineSurface MirroredLevelZero(const HSplineSurface& surface) {
   return HSplineSurface(shape, net);
 }
 
+TEST(Feature, ABlendThatIsNoFiniteNumberIsRefused) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
+  const Feature feature = ExtractFeature(RandomSurface(shape, 1), "a");
+  const std::vector<Feature> features = {feature, feature};
+  EXPECT_NO_THROW(BlendFeatures("b", features, std::vector{0.5, 0.5}));
+  for (const std::vector<double>& weights :
+       {std::vector{1e308, 1e308}, std::vector{1e308, 0.0}, std::vector{kNaN, 1.0}}) {
+    Feature large = feature;
+    large.offsets.begin()->second *= 1e3;
+    EXPECT_THROW(BlendFeatures("b", std::vector{large, large}, weights), InputError);
+  }
+}
+
 class FeatureLaws : public ::testing::TestWithParam<HSplineShape> {
  protected:
   HSplineSurface Face(std::uint64_t random_seed) const {

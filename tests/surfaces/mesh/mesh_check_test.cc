@@ -37,6 +37,17 @@ TEST(MeshCheck, AnotherUnitIsNamed) {
               HasSubstr("it looks like inches; multiply by 25.4,"));
 }
 
+TEST(MeshCheck, WhatIsTooFarAwayOrHasNoAreaIsRefused) {
+  EXPECT_EQ(ErrorOf(SphereMesh({9e4, 0, 0}, 100, 20)), "accepted");
+  EXPECT_THAT(ErrorOf(SphereMesh({1.1e5, 0, 0}, 100, 20)), HasSubstr("move it to within 100 m"));
+  EXPECT_THAT(ErrorOf(SphereMesh({0, 1e15, 0}, 100, 20)), HasSubstr("skull.ply: "));
+  TriMesh line = SphereMesh({0, 0, 0}, 100, 20);
+  for (Vec3& p : line.points) {
+    p.x() = p.y() = 0;
+  }
+  EXPECT_THAT(ErrorOf(line), HasSubstr("have an area of 0 mm² in all"));
+}
+
 TEST(MeshCheck, AMeshInsideOutIsRefusedNotTurned) {
   TriMesh sphere = SphereMesh({0, 0, 0}, 100, 20);
   for (Triangle& t : sphere.triangles) {
