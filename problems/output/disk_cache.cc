@@ -2,23 +2,44 @@
 #include "problems/output/disk_cache.h"
 
 #include <algorithm>
+#include <fstream>
 #include <tuple>
 #include <vector>
 
 #include "problems/output/manifest.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {
 
 namespace fs = std::filesystem;
 
+// A file of the cache is KEY.bin and begins with this line; others in its folder are not touched.
+constexpr std::string_view kCacheMark = "semblance cache 1\n";
 constexpr std::size_t kHashDigits = 64;
+constexpr std::string_view kEnding = ".bin";
+
+// By its name alone.
+bool MayBeOurs(const fs::path& path) {
+  const std::string stem = path.stem().string();
+  return path.extension() == kEnding && stem.size() == kHashDigits &&
+         stem.find_first_not_of("0123456789abcdef") == stem.npos;
+}
+
+bool BeginsWithMark(const fs::path& path) {
+  std::string begin(kCacheMark.size(), '\0');
+  std::ifstream(path, std::ios::binary)
+      .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  return begin == kCacheMark;
+}
 
 }  // namespace
 
-fs::path DiskCache::FileOf(const std::string& key) const { return folder_ / (key + ".bin"); }
+fs::path DiskCache::FileOf(const std::string& key) const {
+  return folder_ / (key + std::string(kEnding));
+}
 
 std::optional<std::string> DiskCache::Get(const std::string& key) const {
   std::string file;
@@ -27,8 +48,9 @@ std::optional<std::string> DiskCache::Get(const std::string& key) const {
   } catch (const IoError&) {
     return std::nullopt;
   }
-  std::string bytes = file.substr(std::min(file.size(), kHashDigits));
-  if (file.compare(0, kHashDigits, Sha256OfText(bytes)) != 0) {
+  constexpr std::size_t kHead = kCacheMark.size() + kHashDigits;
+  std::string bytes = file.substr(std::min(file.size(), kHead));
+  if (file.substr(0, kHead) != std::string(kCacheMark) + Sha256OfText(bytes)) {
     return std::nullopt;
   }
   std::error_code ignored;
@@ -40,7 +62,9 @@ void DiskCache::Put(const std::string& key, std::string_view bytes) const {
   std::error_code ignored;
   fs::create_directories(folder_, ignored);
   try {
-    WriteFileAtomically(FileOf(key), Sha256OfText(bytes).append(bytes));
+    SweepTemporaryFiles(folder_);
+    WriteFileAtomically(FileOf(key),
+                        std::string(kCacheMark).append(Sha256OfText(bytes)).append(bytes));
   } catch (const IoError&) {
     return;  // a full disk costs time, not the result
   }
@@ -56,11 +80,12 @@ void DiskCache::Trim() const {
   std::vector<Kept> files;
   std::uintmax_t total = 0;
   std::error_code error;  // another process may be trimming too: files may vanish at any time
-  for (const auto& entry : fs::directory_iterator(folder_, error)) {
-    const std::uintmax_t size = entry.file_size(error);
-    const fs::file_time_type used = error ? fs::file_time_type() : entry.last_write_time(error);
-    if (!error && entry.path().extension() == ".bin") {
-      files.push_back({used, entry.path(), size});
+  for (fs::directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
+    std::error_code gone;
+    const std::uintmax_t size = at->file_size(gone);
+    const fs::file_time_type used = gone ? fs::file_time_type() : at->last_write_time(gone);
+    if (!gone && MayBeOurs(at->path()) && BeginsWithMark(at->path())) {
+      files.push_back({used, at->path(), size});
       total += size;
     }
   }

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {
@@ -44,7 +45,7 @@ void RefuseIfNotEmpty(const fs::path& folder) {
 }
 
 void TryToWrite(const fs::path& folder) {
-  const fs::path probe = folder / fmt::format(".semblance-probe-{}.tmp", ::getpid());
+  const fs::path probe = folder / fmt::format(".semblance-probe.{}-0.tmp", ::getpid());
   const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor < 0) {
     throw IoError(fmt::format(
@@ -70,6 +71,7 @@ OutputFolder::OutputFolder(fs::path root, WhenNotEmpty when_not_empty) : root_(s
     RefuseIfNotEmpty(root_);
   }
   TryToWrite(root_);
+  SweepTemporaryFiles(root_);
 }
 
 fs::path OutputFolder::PathOf(std::string_view name) const {
@@ -84,7 +86,11 @@ fs::path OutputFolder::PathOf(std::string_view name) const {
 }
 
 void OutputFolder::Write(std::string_view name, std::string_view bytes, Durability durability) {
-  WriteFileAtomically(PathOf(name), bytes, durability);
+  const fs::path path = PathOf(name);
+  if (path.parent_path() != root_) {
+    SweepTemporaryFiles(path.parent_path());
+  }
+  WriteFileAtomically(path, bytes, durability);
   written_.emplace_back(name);
 }
 

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <chrono>
+#include <new>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,17 +19,20 @@ struct StepTime {
   double wall_s = kNaN;
 };
 
+[[noreturn]] void ThrowOutOfMemory(const char* step);
+
 class StepClock {
  public:
   explicit StepClock(const RunContext& context) : context_(context) {}
 
-  // What step() returns. Reports the name first; throws Cancelled if a stop was requested.
+  // What step() returns. Reports the name first; throws Cancelled if a stop was requested, and
+  // OutOfMemory, with what to ask for instead, where step() needs more than there is.
   template <class Step>
   auto operator()(const char* name, Step&& step) {
     context_.ThrowIfStopped();
     context_.Report(name);
     const auto start = std::chrono::steady_clock::now();
-    auto value = step();
+    auto value = Guarded(name, std::forward<Step>(step));
     times_.push_back(
         {name, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()});
     return value;
@@ -35,6 +40,17 @@ class StepClock {
   std::vector<StepTime> Take() { return std::move(times_); }
 
  private:
+  template <class Step>
+  static auto Guarded(const char* name, Step&& step) {
+    try {
+      return step();
+    } catch (const std::bad_alloc&) {
+      ThrowOutOfMemory(name);
+    } catch (const std::length_error&) {  // more than any memory
+      ThrowOutOfMemory(name);
+    }
+  }
+
   const RunContext& context_;
   std::vector<StepTime> times_;
 };

@@ -17,6 +17,9 @@ std::string Duration(double seconds) {
                         : fmt::format("{:.1f} h", seconds / 3600);
 }
 
+// A stream that takes nothing is no reason for a study to stop.
+void Put(std::FILE* stream, const std::string& text) { std::fputs(text.c_str(), stream); }
+
 }  // namespace
 
 std::string EtaText(const StudyEta& eta) {
@@ -53,14 +56,14 @@ void StudyProgress::operator()(const StudyEta& eta, const std::string& trial) {
   is_over_ = is_last;
   if (eta.failed > failed_) {
     failed_ = eta.failed;
-    fmt::print(stream_, "{}{}\n", is_terminal_ ? kClearLine : "", trial);
+    Put(stream_, fmt::format("{}{}\n", is_terminal_ ? kClearLine : "", trial));
   }
   if (is_terminal_) {
-    fmt::print(stream_, "{}{} {}{}", kClearLine, BarText(eta, 30), EtaText(eta),
-               is_last ? "\n" : "");
+    Put(stream_,
+        fmt::format("{}{} {}{}", kClearLine, BarText(eta, 30), EtaText(eta), is_last ? "\n" : ""));
   } else if (is_last || Clock::now() - last_ >= interval_) {
     last_ = Clock::now();
-    fmt::print(stream_, "{}\n", EtaText(eta));
+    Put(stream_, EtaText(eta) + "\n");
   }
   std::fflush(stream_);
 }

@@ -9,8 +9,10 @@
 #include <condition_variable>
 #include <ctime>
 #include <mutex>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <system_error>
 #include <thread>
 
 #include "problems/output/manifest.h"
@@ -20,6 +22,7 @@
 #include "problems/report/timing_json.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/study_tables.h"
+#include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
 
 namespace semblance {
@@ -28,19 +31,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-fs::path TrialFolder(const fs::path& folder, const std::string& id) {
-  return folder / "trials" / id;
-}
-
 // The status of a finished trial; nothing if it is not there or not whole.
 std::optional<std::string> StatusOf(const fs::path& folder, const std::string& id) {
-  const fs::path file = TrialFolder(folder, id) / "trial.json";
-  if (!fs::exists(file)) {
-    return std::nullopt;
-  }
-  const Json json = Json::parse(ReadFileBytes(file), nullptr, false);
-  const bool whole = json.is_object() && json.value("id", "") == id;
-  return whole ? std::optional(json.value("status", "failed")) : std::nullopt;
+  const auto json = ReadTrialFile(folder, id);
+  return json ? std::optional(json->value("status", "failed")) : std::nullopt;
 }
 
 Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
@@ -100,13 +94,20 @@ class StudyRunner {
       }
     }
     std::vector<std::jthread> threads;
-    for (int job = 0; job < std::min<int>(options_.jobs, static_cast<int>(queue_.size())); ++job) {
-      threads.emplace_back([this] {
-        Work();
-        const std::lock_guard lock(mutex_);
-        ++ended_;
-        thread_ended_.notify_one();
-      });
+    try {
+      for (int job = 0; job < std::min<int>(options_.jobs, static_cast<int>(queue_.size()));
+           ++job) {
+        threads.emplace_back([this] {
+          Work();
+          const std::lock_guard lock(mutex_);
+          ++ended_;
+          thread_ended_.notify_one();
+        });
+      }
+    } catch (const std::system_error&) {
+      if (threads.empty()) {
+        throw;
+      }  // else the system gives no more of them: those that are there do the work
     }
     WatchUntilEnded(threads.size());
     threads.clear();  // joins
@@ -165,18 +166,40 @@ class StudyRunner {
     try {
       write = plan_.job == StudyJob::kFace ? Face(trial, cpu_before_s, json)
                                            : Depth(trial, cpu_before_s, json);
-    } catch (const Error& error) {
-      json["status"] = "failed";
-      json["reason"] = error.what();
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const std::bad_alloc&) {
+      Fail("not enough memory for this trial; run fewer at a time (--jobs), or ask it for less",
+           json);
+    } catch (const std::exception& error) {
+      Fail(error.what(), json);
     }
     AppendProvenance(trial, json);
     OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
     write(output);
+    std::vector<std::string> names = output.Written();
+    std::erase(names, "timing.json");  // differs from run to run
+    if (!names.empty()) {
+      json["files"] = HashesOf(output.Root(), names);
+    }
     // Last: it says that the trial is whole. A broken one counts as none; with other files beside
     // it, it must not outlast them.
     output.Write("trial.json", json.dump(1) + "\n",
                  plan_.keep == TrialFiles::kSummary ? Durability::kUnsynced : Durability::kSynced);
     Tell(trial, json);
+  }
+
+  static void SetStatus(const std::vector<std::string>& faults, Json& json) {
+    json["status"] = faults.empty() ? "done" : "unusable";
+    if (!faults.empty()) {
+      json["reason"] = fmt::format("{}", fmt::join(faults, "; "));
+    }
+  }
+
+  static void Fail(const std::string& reason, Json& json) {
+    json["status"] = "failed";
+    json["reason"] = reason;
+    json.erase("result");
   }
 
   RunContext Quiet() const {
@@ -188,7 +211,7 @@ class StudyRunner {
   Files Face(const StudyTrial& trial, double cpu_before_s, Json& json) {
     auto result =
         std::make_shared<const RunResult>(semblance::Run(trial.experiment, Quiet(), &cache_));
-    json["status"] = result->usable() ? "done" : "unusable";
+    SetStatus(result->Faults(), json);
     json["result"] = Json::parse(ResultJson(trial.experiment, *result));
     const double cpu_s = ThreadCpu_s() - cpu_before_s;
     return [this, &trial, result, cpu_s](OutputFolder& output) {
@@ -206,7 +229,7 @@ class StudyRunner {
   Files Depth(const StudyTrial& trial, double cpu_before_s, Json& json) {
     auto result =
         std::make_shared<const DepthResult>(MeasureDepth(trial.experiment, Quiet(), &cache_));
-    json["status"] = result->usable() ? "done" : "unusable";
+    SetStatus(result->Faults(), json);
     json["result"] = Json::parse(DepthResultJson(trial.experiment, *result));
     const double cpu_s = ThreadCpu_s() - cpu_before_s;
     return [this, &trial, result, cpu_s](OutputFolder& output) {
@@ -261,15 +284,6 @@ class StudyRunner {
   StudySummary summary_;
 };
 
-// The hash in a folder's plan.json; empty where there is none.
-std::string PlanHashOf(const fs::path& folder) {
-  const fs::path file = folder / "plan.json";
-  if (!fs::exists(file)) {
-    return "";
-  }
-  return Json::parse(ReadFileBytes(file), nullptr, false).value("hash", "");
-}
-
 // plan.json as text.
 std::string PlanJson(const StudyPlan& plan) {
   Json json = {{"title", plan.title}, {"hash", plan.hash},       {"metric", plan.metric},
@@ -296,7 +310,8 @@ StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const Study
   return StudyRunner(plan, folder, options, context).Run();
 }
 
-void GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
+std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
+  std::vector<std::string> not_taken;
   for (const fs::path& other : others) {
     const std::string hash = PlanHashOf(other);
     if (hash.empty() || (!PlanHashOf(folder).empty() && PlanHashOf(folder) != hash)) {
@@ -311,12 +326,13 @@ void GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
     for (const auto& entry : fs::directory_iterator(other / "trials")) {
       const std::string id = entry.path().filename().string();
       if (StatusOf(other, id) && !StatusOf(folder, id)) {
-        fs::create_directories(folder / "trials");
-        fs::copy(entry.path(), TrialFolder(folder, id),
-                 fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+        if (const std::string fault = CopyTrial(other, folder, id); !fault.empty()) {
+          not_taken.push_back(fmt::format("{}: not taken: {}", entry.path().string(), fault));
+        }
       }
     }
   }
+  return not_taken;
 }
 
 }  // namespace semblance

@@ -43,9 +43,10 @@ struct StudySummary {
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);
 
-// Copies finished trials from other folders of the same plan; those that are there already stay.
-// Throws IoError if a folder is of another plan.
-void GatherTrials(const std::filesystem::path& folder,
-                  const std::vector<std::filesystem::path>& others);
+// Copies finished trials from other folders of the same plan, each whole or not at all; those that
+// are there already stay. Returns a line for each that is not taken, as CopyTrial says. Throws
+// IoError if a folder is of another plan.
+std::vector<std::string> GatherTrials(const std::filesystem::path& folder,
+                                      const std::vector<std::filesystem::path>& others);
 
 }  // namespace semblance

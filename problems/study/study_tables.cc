@@ -6,11 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
+#include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 
 namespace semblance {
 namespace {
@@ -47,7 +50,9 @@ void ReadCurves(const Json& result, TrialRow& row) {
   const Json levels = result.value(Json::json_pointer("/fit/levels"), Json());
   for (const Json& level : levels.is_array() ? levels : Json::array()) {
     const auto number = [&](const char* name) {
-      return level.contains(name) && level[name].is_number() ? level[name].get<double>() : kNaN;
+      return level.is_object() && level.contains(name) && level[name].is_number()
+                 ? level[name].get<double>()
+                 : kNaN;
     };
     if (row.step_rms_mm.empty()) {
       row.step_rms_mm.push_back(number("rms_before_mm"));
@@ -57,20 +62,16 @@ void ReadCurves(const Json& result, TrialRow& row) {
 }
 
 void ReadTrial(const fs::path& folder, TrialRow& row) {
-  const fs::path file = folder / "trials" / row.id / "trial.json";
   row.status = "missing";
-  if (!fs::exists(file)) {
+  const std::optional<Json> json = ReadTrialFile(folder, row.id);
+  if (!json) {
     return;
   }
-  const Json json = Json::parse(ReadFileBytes(file), nullptr, false);
-  if (!json.is_object() || json.value("id", "") != row.id) {
-    return;
-  }
-  row.status = json.value("status", "failed");
-  row.reason = json.value("reason", "");
-  if (json.contains("result")) {
-    Flatten(json["result"], "", row.metrics);
-    ReadCurves(json["result"], row);
+  row.status = json->value("status", "failed");
+  row.reason = json->value("reason", "");
+  if (json->contains("result") && (*json)["result"].is_object()) {
+    Flatten((*json)["result"], "", row.metrics);
+    ReadCurves((*json)["result"], row);
   }
 }
 
@@ -108,7 +109,7 @@ StudyResults ReadStudyResults(const fs::path& folder) {
   const fs::path file = folder / "plan.json";
   StudyResults results;
   try {
-    const Json plan = Json::parse(ReadFileBytes(file));
+    const Json plan = ParseJson(ReadFileBytes(file), file.string());
     results.title = plan.at("title");
     results.hash = plan.at("hash");
     results.metric = plan.at("metric");

@@ -19,6 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ScratchFolder;
 
+constexpr std::uintmax_t kHead = 82;  // of each file: the mark and the hash
+
 std::string Key(int n) { return Sha256OfText(std::to_string(n)); }
 
 void Age(const fs::path& folder, int n, int hours) {
@@ -52,7 +54,7 @@ TEST(DiskCache, WhatIsDamagedIsMissing) {
 
 TEST(DiskCache, AboveItsLimitWhatWasUsedLongestAgoGoes) {
   const ScratchFolder folder;
-  const DiskCache cache(folder.Path(), 3 * 164 + 10);
+  const DiskCache cache(folder.Path(), 3 * (kHead + 100) + 10);
   for (int n = 1; n <= 3; ++n) {
     cache.Put(Key(n), std::string(100, 'x'));
     Age(folder.Path(), n, 10 - n);
@@ -63,6 +65,24 @@ TEST(DiskCache, AboveItsLimitWhatWasUsedLongestAgoGoes) {
   EXPECT_FALSE(cache.Get(Key(2)));
   EXPECT_TRUE(cache.Get(Key(3)));
   EXPECT_TRUE(cache.Get(Key(4)));
+}
+
+TEST(DiskCache, FilesOfOthersAreNeitherCountedNorDeleted) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder.Path(), 200);
+  const std::vector<fs::path> others = {folder / "my_scan.bin", folder / (Key(9) + ".bin"),
+                                        folder / (Key(8) + ".txt")};
+  for (const fs::path& other : others) {
+    WriteFileAtomically(other, std::string(5000, 'x'));
+    fs::last_write_time(other, fs::file_time_type::clock::now() - std::chrono::hours(24));
+  }
+  cache.Put(Key(1), "a");
+  cache.Put(Key(2), std::string(100, 'b'));
+  EXPECT_FALSE(cache.Get(Key(1)));
+  EXPECT_TRUE(cache.Get(Key(2)));
+  for (const fs::path& other : others) {
+    EXPECT_EQ(ReadFileBytes(other), std::string(5000, 'x')) << other;
+  }
 }
 
 TEST(DiskCache, ManyAtOnceReadWholeValuesOrNone) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/output/files.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -13,6 +15,7 @@
 #include <thread>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {
@@ -104,6 +107,49 @@ TEST_F(FilesTest, APipeHasNoSizeAndIsReadToItsEnd) {
   std::thread writer([&] { std::ofstream(folder_ / "pipe") << bytes; });
   EXPECT_EQ(ReadFileBytes(folder_ / "pipe"), bytes);
   writer.join();
+}
+
+TEST_F(FilesTest, WhatAKilledProcessHasLeftIsSweptAndNothingElse) {
+  for (const char* name : {".face.ply.123-4.tmp", ".a.1-0.tmp"}) {
+    std::ofstream(folder_ / name) << "half";
+  }
+  const std::vector<std::string> others = {"face.ply",  ".face.ply.tmp",  ".1-2.tmp",
+                                           "x.1-2.tmp", ".x.1-2.tmp.bak", ".x.-2.tmp",
+                                           ".x.1-.tmp"};
+  for (const std::string& name : others) {
+    std::ofstream(folder_ / name) << "mine";
+  }
+  fs::create_symlink("face.ply", folder_ / ".link.1-2.tmp");
+  OutputFolder out(folder_, WhenNotEmpty::kReplaceFiles);
+  out.Write("face.ply", "new");
+  EXPECT_EQ(Count(folder_), static_cast<int>(others.size()) + 1);
+  EXPECT_EQ(ReadFileBytes(folder_ / "face.ply"), "new");
+}
+
+TEST_F(FilesTest, ATemporaryFileThatIsBeingWrittenIsNotSwept) {
+  const int descriptor = ::open((folder_ / ".x.1-2.tmp").c_str(), O_WRONLY | O_CREAT, 0600);
+  ASSERT_EQ(::flock(descriptor, LOCK_EX), 0);
+  SweepTemporaryFiles(folder_);
+  EXPECT_EQ(Count(folder_), 1);
+  ::close(descriptor);
+  SweepTemporaryFiles(folder_);
+  EXPECT_EQ(Count(folder_), 0);
+}
+
+TEST_F(FilesTest, WhatHasNoEndIsRefused) {
+  EXPECT_THAT(MessageOf<IoError>([] { ReadFileBytes("/dev/zero"); }),
+              HasSubstr("/dev/zero: more than 256 MB"));
+}
+
+TEST_F(FilesTest, AFileLargerThanMemoryIsSaid) {
+  std::ofstream(folder_ / "huge").close();
+  std::error_code error;
+  fs::resize_file(folder_ / "huge", std::uintmax_t{1} << 43, error);
+  if (error) {
+    GTEST_SKIP() << "no sparse files of this size here";
+  }
+  EXPECT_THAT(MessageOf<IoError>([&] { ReadFileBytes(folder_ / "huge"); }),
+              HasSubstr("huge: not enough memory for its 8388608 MB"));
 }
 
 TEST_F(FilesTest, OutputFolderIsCreatedEmptyAndTakesFilesInSubfolders) {

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files of one job, which appear together: they are written into a folder of the program's own,
+// and moved to where they belong once all are there.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/output/files.h"
+#include "problems/output/folder_claim.h"
+
+namespace semblance {
+
+// Where `root` is missing or empty, the folder of the program's own is ".NAME.semblance-part"
+// beside it and takes its name in one step. Where `root` holds something, or where nothing can be
+// put beside it, it is ".semblance-part" in `root`, and its files are moved one by one, the one
+// that was written last at the end; files of other names stay.
+//
+// While it lives nobody else writes `root` in this way. What a killed process has left there is
+// cleared by the next one.
+class StagedFolder {
+ public:
+  // Throws IoError as OutputFolder does, and if another process is writing `root`.
+  StagedFolder(const std::filesystem::path& root, WhenNotEmpty when_not_empty);
+  // Whatever was not published is gone, and so are folders that were made for it.
+  ~StagedFolder();
+  StagedFolder(const StagedFolder&) = delete;
+  StagedFolder& operator=(const StagedFolder&) = delete;
+
+  const std::filesystem::path& Root() const { return root_; }
+
+  // To write into, until Publish().
+  OutputFolder& Files() { return *files_; }
+
+  // Moves all to Root(). Throws IoError if something has come up there meanwhile, or cannot be
+  // moved; the files then stay in a folder that the message names.
+  void Publish(Durability durability = Durability::kSynced);
+
+ private:
+  bool TakesName() const;
+  void Undo();
+  void MoveFiles();
+  [[noreturn]] void KeepAndFail(const std::string& why);
+
+  std::filesystem::path root_;
+  WhenNotEmpty when_not_empty_;
+  bool beside_ = false;
+  std::vector<std::filesystem::path> made_;  // folders above, outermost first
+  FolderClaim claim_;
+  std::optional<OutputFolder> files_;
+  bool published_ = false;
+};
+
+}  // namespace semblance
