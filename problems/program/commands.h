@@ -4,10 +4,12 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <span>
 #include <stop_token>
+#include <string>
 #include <utility>
 
 namespace semblance {
@@ -24,6 +26,17 @@ struct ProgramCommand {
   // Adds the options, and sees to it that `line.chosen` is set.
   void (*declare)(CLI::App& command, CommandLine& line);
 };
+
+// For options that take a number: not nan, not inf, which ranges let pass.
+inline CLI::Validator Finite() {
+  return {[](std::string& text) -> std::string {
+            double number = 0;
+            return CLI::detail::lexical_cast(text, number) && !std::isfinite(number)
+                       ? "'" + text + "' is not a finite number"
+                       : "";
+          },
+          ""};
+}
 
 // What the user types goes into the Arguments returned; `run` gets them once all are parsed.
 template <class Arguments>

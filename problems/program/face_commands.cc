@@ -47,8 +47,19 @@ void RefuseToReplace(const fs::path& path, const FaceArguments& a) {
   }
 }
 
+// Two outputs of one name: one would be lost.
+void RefuseOneName(const std::string& out, const std::string& other) {
+  const auto resolved = [](const std::string& name) {
+    return fs::weakly_canonical(fs::absolute(name));
+  };
+  if (!other.empty() && resolved(out) == resolved(other)) {
+    throw InputError(fmt::format("{}: --out and --inverse name the same file; name two", out));
+  }
+}
+
 int Edit(const FaceArguments& a) {
   RefuseToReplace(a.out, a);
+  RefuseOneName(a.out, a.inverse);
   HSplineSurface face = ReadHSpline(a.face);
   const EditScript inverse = ApplyEdits(ReadEditScript(a.script), face);
   if (!a.inverse.empty()) {
@@ -184,7 +195,8 @@ void DeclareExport(CLI::App& to, CommandLine& line) {
   AddFace(to, a);
   to.add_option("--to", a.out, "file; exact: .vtu .step .iges, triangles: .glb .ply .obj .off .stl")
       ->required();
-  to.add_option("--chord_mm", a.chord_mm, "how far a triangle may be from the surface [0.1]");
+  to.add_option("--chord_mm", a.chord_mm, "how far a triangle may be from the surface [0.1]")
+      ->check(Finite());
   to.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
       ->check(CLI::Range(1, 1024));
   AddForce(to, a);
@@ -194,8 +206,11 @@ void DeclareExtract(CLI::App& extract, CommandLine& line) {
   FaceArguments& a = *Bind(extract, line, &ExtractCommand);
   AddFace(extract, a);
   extract.add_option("--u", a.u, "lowest and highest u; lowest > highest runs across the seam")
+      ->check(Finite())
       ->check(CLI::Range(0.0, 1.0));
-  extract.add_option("--v", a.v, "lowest and highest v")->check(CLI::Range(0.0, 1.0));
+  extract.add_option("--v", a.v, "lowest and highest v")
+      ->check(Finite())
+      ->check(CLI::Range(0.0, 1.0));
   extract.add_option("--levels", a.levels, "first and last level")->check(CLI::Range(1, 8));
   AddStore(extract, a);
 }
@@ -212,7 +227,8 @@ void DeclareBlend(CLI::App& blend, CommandLine& line) {
   FaceArguments& a = *Bind(blend, line, &BlendCommand);
   blend.add_option("FEATURE", a.features, "files of a library")->required();
   blend.add_option("--weights", a.weights, "one per feature; outside 0..1 it extrapolates")
-      ->required();
+      ->required()
+      ->check(Finite());
   AddStore(blend, a);
 }
 
@@ -240,7 +256,7 @@ void DeclarePrior(CLI::App& prior, CommandLine& line) {
   prior.add_option("--template", a.template_folder, "what `semblance template MEAN` has written")
       ->required();
   prior.add_option("--out", a.out, "file for the modes (.json)")->required();
-  prior.add_option("--scale", a.prior.scale, "mm per unit of the modes [1]");
+  prior.add_option("--scale", a.prior.scale, "mm per unit of the modes [1]")->check(Finite());
   prior.add_option("--modes", a.prior.count, "how many, at most [60]")->check(CLI::Range(1, 10000));
   prior.add_option("--level", a.level, "of the B-splines that hold them [2]")
       ->check(CLI::Range(0, 8));

@@ -3,64 +3,70 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstdio>
-#include <stop_token>
+#include <exception>
+#include <iostream>
+#include <string>
 
 #include "problems/program/exit_code.h"
 #include "problems/program/face_commands.h"
+#include "problems/program/failure.h"
 #include "problems/program/landmark_commands.h"
 #include "problems/program/run_commands.h"
+#include "problems/program/stop_signals.h"
 #include "problems/program/study_commands.h"
 #include "problems/program/template_commands.h"
-#include "surfaces/base/error.h"
-#include "surfaces/base/run_context.h"
 
 namespace semblance {
 namespace {
 
-std::stop_source& StopSource() {
-  static std::stop_source source;  // a signal handler has no other way in
-  return source;
+int Complain(const std::string& words, int exit_code) {
+  std::fputs(("semblance: " + words + "\n").c_str(), stderr);
+  return exit_code;
 }
 
-int Execute(const CommandLine& line) {
-  try {
-    return line.chosen();
-  } catch (const Error& e) {
-    fmt::print(stderr, "semblance: {}\n", e.what());
-    return kBadInput;
-  } catch (const Cancelled&) {
-    fmt::print(
-        stderr,
-        "semblance: stopped; no run was written, and the finished trials of a study are kept\n");
-    return kNotUsable;
-  }
+// What does not reach its reader was not done.
+int Flushed(int exit_code) {
+  std::cout.flush();
+  const bool all_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
+  return all_written ? exit_code
+                     : Complain("the standard output cannot be written; is the disk full?",
+                                exit_code == kDone ? kNotUsable : exit_code);
 }
 
-int Main(int argc, char** argv) {
+int ParseAndRun(int argc, char** argv) {
   CLI::App app("Recovers a face from a skull, and compares the ways of doing so.", "semblance");
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   app.require_subcommand(1);
-  CommandLine line{.stop = StopSource().get_token(), .chosen = {}};
+  CommandLine line{.stop = StopOnSignals(), .chosen = {}};
   for (const auto& commands :
        {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(), TemplateCommands()}) {
     Declare(commands, app, line);
   }
   try {
     app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
+  } catch (const CLI::Success& e) {
     return app.exit(e) == 0 ? kDone : kBadInput;
+  } catch (const CLI::ParseError& e) {
+    return Complain(Shortened(fmt::format("{}; --help tells more", e.what())), kBadInput);
   }
-  return Execute(line);
+  return line.chosen();
+}
+
+int Main(int argc, char** argv) {
+  try {
+    return Flushed(ParseAndRun(argc, argv));
+  } catch (...) {
+    if (std::ferror(stdout) != 0) {
+      return Flushed(kNotUsable);
+    }
+    const Failure failure = FailureOf(std::current_exception());
+    std::fflush(stdout);
+    return Complain(failure.words, failure.exit_code);
+  }
 }
 
 }  // namespace
 }  // namespace semblance
 
-int main(int argc, char** argv) {
-  const auto stop = [](int) { semblance::StopSource().request_stop(); };
-  std::signal(SIGINT, stop);
-  std::signal(SIGTERM, stop);
-  return semblance::Main(argc, argv);
-}
+int main(int argc, char** argv) { return semblance::Main(argc, argv); }

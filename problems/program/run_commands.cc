@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -16,6 +18,7 @@
 #include <thread>
 #include <vector>
 
+#include "problems/output/staged_folder.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/stage_cache.h"
@@ -23,6 +26,7 @@
 #include "problems/points/point_fit.h"
 #include "problems/program/evaluate.h"
 #include "problems/program/exit_code.h"
+#include "problems/program/failure.h"
 #include "problems/program/progress.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
@@ -61,9 +65,17 @@ RunContext MakeContext(const Arguments& arguments) {
   return context;
 }
 
-OutputFolder MakeFolder(const Arguments& arguments, const std::string& default_out) {
+StagedFolder MakeFolder(const Arguments& arguments, const std::string& default_out) {
   return {arguments.out.empty() ? default_out : arguments.out,
           arguments.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
+}
+
+// The exit code of a result with these faults.
+int TellFaults(const std::vector<std::string>& faults) {
+  for (const std::string& fault : faults) {
+    fmt::print(stderr, "semblance: the result is not usable: {}\n", fault);
+  }
+  return faults.empty() ? kDone : kNotUsable;
 }
 
 void PrintFaceError(const char* what, const FaceMetrics& m) {
@@ -77,10 +89,11 @@ void PrintFaceError(const char* what, const FaceMetrics& m) {
 int RunCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
-  OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
+  StagedFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
   const RunContext context = MakeContext(arguments);
   const RunResult result = Run(experiment, context);
-  WriteRun(experiment, result, folder, context);
+  WriteRun(experiment, result, folder.Files(), context);
+  folder.Publish();
   for (const std::string& note : result.subject.notes) {
     fmt::print("note: {}\n", note);
   }
@@ -89,37 +102,38 @@ int RunCommand(const Arguments& arguments) {
     PrintFaceError("implicit face", result.truth->implicit);
     PrintFaceError("H-spline face", result.truth->face);
   }
-  fmt::print("report: {}\n",
-             std::filesystem::absolute(folder.Root() / "report.html").lexically_normal().string());
-  return result.usable() ? kDone : kNotUsable;
+  fmt::print("report: {}\n", (folder.Root() / "report.html").string());
+  return TellFaults(result.Faults());
 }
 
 int DepthCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
-  OutputFolder folder = MakeFolder(arguments, "out/" + config.stem().string() + "_depth");
+  StagedFolder folder = MakeFolder(arguments, "out/" + config.stem().string() + "_depth");
   const RunContext context = MakeContext(arguments);
   const DepthResult result = MeasureDepth(experiment, context);
-  WriteDepth(experiment, result, folder, context);
+  WriteDepth(experiment, result, folder.Files(), context);
+  folder.Publish();
   fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
-  return result.usable() ? kDone : kNotUsable;
+  return TellFaults(result.Faults());
 }
 
 int FitCommand(const Arguments& arguments) {
   const std::filesystem::path points = arguments.files.at(0), config = arguments.files.at(1);
   const auto options = ReadConfig<PointFitOptions>(config, arguments.overrides);
   const PointTable table = ReadPointTable(points);
-  OutputFolder folder = MakeFolder(arguments, fmt::format("out/{}", points.stem().string()));
+  StagedFolder folder = MakeFolder(arguments, fmt::format("out/{}", points.stem().string()));
   const RunContext context = MakeContext(arguments);
   const PointFit result = FitPoints(table, options, context);
-  WritePointFit(options, points, result, folder, context);
+  WritePointFit(options, points, result, folder.Files(), context);
+  folder.Publish();
   fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
              table.positions.size(), result.parameters,
              result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
              result.fit.point_rms_mm,
              *std::max_element(result.fit.residual_mm.begin(), result.fit.residual_mm.end()));
-  fmt::print("folder: {}\n", std::filesystem::absolute(folder.Root()).lexically_normal().string());
-  return result.fit.usable ? kDone : kNotUsable;
+  fmt::print("folder: {}\n", folder.Root().string());
+  return TellFaults(result.Faults());
 }
 
 // Looks at the subjects of experiments, each once, so that a run of hours does not begin with sides
@@ -191,8 +205,8 @@ int CheckCommand(const Arguments& arguments) {
     try {
       CheckConfig(file, arguments.overrides, subjects);
       fmt::print("{}: no fault found\n", file);
-    } catch (const Error& e) {
-      fmt::print(stderr, "{}\n", e.what());
+    } catch (...) {
+      fmt::print(stderr, "{}\n", FailureOf(std::current_exception()).words);
       sound = false;
     }
   }
@@ -216,10 +230,13 @@ int ImportCtCommand(const Arguments& arguments) {
   const std::filesystem::path volume = arguments.files.at(0);
   CtImportOptions options = arguments.ct;
   options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
-  OutputFolder folder = MakeFolder(arguments, "out/" + volume.stem().string());
+  StagedFolder folder = MakeFolder(arguments, "out/" + volume.stem().string());
   const CtImport import = ImportCt(ReadInvesalius(volume), options, MakeContext(arguments));
-  folder.Write("skull.ply", EncodeMesh(import.skull, ".ply"));
-  folder.Write("skin.ply", EncodeMesh(import.skin, ".ply"));
+  CheckHeadMesh(import.skull, "the imported skull");  // as whoever reads it will
+  CheckHeadMesh(import.skin, "the imported skin");
+  folder.Files().Write("skull.ply", EncodeMesh(import.skull, ".ply"));
+  folder.Files().Write("skin.ply", EncodeMesh(import.skin, ".ply"));
+  folder.Publish();
   fmt::print("skull.ply: {} triangles; {} pieces below {} cm^2 dropped\n",
              import.skull.triangles.size(), import.dropped_bone, options.smallest_bone_cm2);
   fmt::print("skin.ply: {} triangles; {} pieces apart from the largest dropped\n",
@@ -227,7 +244,7 @@ int ImportCtCommand(const Arguments& arguments) {
   for (const std::string& note : import.notes) {
     fmt::print("note: {}\n", note);
   }
-  fmt::print("folder: {}\n", std::filesystem::absolute(folder.Root()).lexically_normal().string());
+  fmt::print("folder: {}\n", folder.Root().string());
   return kDone;
 }
 
@@ -239,13 +256,17 @@ int EvaluateCommand(const Arguments& arguments) {
                           .landmarks = arguments.landmarks,
                           .exclude = {}};
   std::ranges::transform(arguments.exclude, std::back_inserter(options.exclude), ParseZone);
-  fmt::print("{}\n", Evaluate(options, MakeContext(arguments)).dump(2));
-  return kDone;
+  const nlohmann::ordered_json score = Evaluate(options, MakeContext(arguments));
+  fmt::print("{}\n", score.dump(2));
+  return TellFaults(std::isfinite(score.at("rms_mm").get<double>())
+                        ? std::vector<std::string>()
+                        : std::vector<std::string>{"the distance of the faces is no number"});
 }
 
 int ReportCommand(const Arguments& arguments) {
   const std::filesystem::path root = arguments.files.at(0);
-  if (!std::filesystem::is_directory(root)) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(root, ignored)) {
     throw IoError(
         fmt::format("{}: no such folder; name the folder of a run or a study", root.string()));
   }
@@ -313,9 +334,11 @@ void DeclareImportCt(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &ImportCtCommand);
   command.add_option("VOLUME", a.files, "InVesalius project (.inv3)")->required()->expected(1);
   command.add_option("--bone-hu", a.ct.bone_hu, "Hounsfield value of the skull's surface")
+      ->check(Finite())
       ->check(CLI::Range(50.0, 3000.0))
       ->capture_default_str();
   command.add_option("--skin-hu", a.ct.skin_hu, "Hounsfield value of the skin's surface")
+      ->check(Finite())
       ->check(CLI::Range(-900.0, 0.0))
       ->capture_default_str();
   command.add_option("--edges", a.ct_edges, "threshold, or half_maximum, which thins tissue less")

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <charconv>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -30,16 +31,25 @@ struct StudyArguments {
   std::stop_token stop;
 };
 
+// Whether all of `text` is "I/N".
+bool ReadShard(const std::string& text, StudyRunOptions& options) {
+  const char* const end = text.data() + text.size();
+  const auto [slash, fault] = std::from_chars(text.data(), end, options.shard);
+  if (fault != std::errc() || slash == end || *slash != '/') {
+    return false;
+  }
+  const auto [rest, other_fault] = std::from_chars(slash + 1, end, options.shards);
+  return other_fault == std::errc() && rest == end;
+}
+
 // "I/N", or what Slurm says of an array of jobs.
 void SetShard(const std::string& text, StudyRunOptions& options) {
   const char *index = std::getenv("SLURM_ARRAY_TASK_ID"),
              *count = std::getenv("SLURM_ARRAY_TASK_COUNT");
   const std::string given =
       text.empty() && index && count ? fmt::format("{}/{}", index, count) : text;
-  char rest = 0;
-  const bool read = given.empty() || std::sscanf(given.c_str(), "%d/%d%c", &options.shard,
-                                                 &options.shards, &rest) == 2;
-  if (!read || options.shards < 1 || options.shard < 0 || options.shard >= options.shards) {
+  if (!(given.empty() || ReadShard(given, options)) || options.shards < 1 || options.shard < 0 ||
+      options.shard >= options.shards) {
     throw InputError(fmt::format("--shard {}: write I/N with 0 <= I < N, e.g. 0/4", given));
   }
 }
@@ -111,7 +121,9 @@ int StudyCommand(const StudyArguments& a) {
 
 int MergeCommand(const StudyArguments& a) {
   const fs::path root = a.files.at(0);
-  GatherTrials(root, {a.files.begin() + 1, a.files.end()});
+  for (const std::string& line : GatherTrials(root, {a.files.begin() + 1, a.files.end()})) {
+    fmt::print(stderr, "semblance: {}\n", line);
+  }
   if (!fs::exists(root / "plan.json")) {
     throw IoError(fmt::format("{}: no folder of a study; it has no plan.json", root.string()));
   }

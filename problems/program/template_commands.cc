@@ -13,7 +13,7 @@
 
 #include "problems/face_template/template_io.h"
 #include "problems/face_template/template_summary.h"
-#include "problems/output/files.h"
+#include "problems/output/staged_folder.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/progress.h"
@@ -37,21 +37,26 @@ struct TemplateArguments {
   std::stop_token stop;
 };
 
-OutputFolder MakeFolder(const TemplateArguments& a) {
+StagedFolder MakeFolder(const TemplateArguments& a) {
   return {a.out.empty() ? fmt::format("out/{}_template", a.input.stem().string()) : a.out,
           a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
 }
 
-void Write(const TemplateFace& face, const OutputFolder& folder) {
-  const FileTemplate files = WriteTemplate(folder.Root(), face);
+void Write(const TemplateFace& face, StagedFolder& folder) {
+  const FileTemplate files = WriteTemplate(folder.Files().Root(), face);
+  folder.Publish();
+  const auto name = [&](const fs::path& file) {
+    return (folder.Root() / file.filename()).string();
+  };
   fmt::print("template: {{type: file, surface: {}, sites: {}, features: {}}}\n",
-             files.surface.string(), files.sites.string(), files.features.string());
+             name(files.surface), name(files.sites), name(files.features));
 }
 
 // The generic face that a configuration asks for.
 int FromConfig(const TemplateArguments& a) {
   const auto experiment = ReadConfig<Experiment>(a.input, a.overrides);
-  Write(LoadTemplate(experiment.face_template), MakeFolder(a));
+  StagedFolder folder = MakeFolder(a);
+  Write(LoadTemplate(experiment.face_template), folder);
   return kDone;
 }
 
@@ -66,10 +71,10 @@ int FromHead(const TemplateArguments& a) {
   }
   const OuterHead head =
       PrepareHead(ReadMesh(a.input), ReadSkinLandmarks(a.landmarks), a.input.string(), context);
-  OutputFolder folder = MakeFolder(a);
+  StagedFolder folder = MakeFolder(a);
   const TemplateFit fit = FitTemplate(head, a.fit, context);
-  folder.Write("template.json", TemplateJson(fit, head, a.fit));
-  folder.Write("template.png", EncodePng(TemplatePicture(fit, head, a.threads)));
+  folder.Files().Write("template.json", TemplateJson(fit, head, a.fit));
+  folder.Files().Write("template.png", EncodePng(TemplatePicture(fit, head, a.threads)));
   for (const std::string& note : head.notes) {
     fmt::print("note: {}\n", note);
   }
@@ -96,6 +101,7 @@ void DeclareTemplate(CLI::App& command, CommandLine& line) {
   command
       .add_option("--tolerance_mm", a.fit.tolerance_mm,
                   "root mean square distance from the skin, over the face, that ends the fit")
+      ->check(Finite())
       ->check(CLI::Range(1e-3, 10.0))
       ->capture_default_str();
   command.add_option("--finest", a.fit.finest, "finest level of the H-spline")

@@ -18,9 +18,12 @@ struct Outcome {
   std::string out, err;
 };
 
-inline Outcome CallProgram(const ScratchFolder& folder, const std::string& arguments) {
-  const std::string command = fmt::format("cd '{}' && '{}' {} > stdout.txt 2> stderr.txt",
-                                          folder.Path().string(), SEMBLANCE_PROGRAM, arguments);
+// before: what the shell does first, e.g. "ulimit -v 500000;".
+inline Outcome CallProgram(const ScratchFolder& folder, const std::string& arguments,
+                           const std::string& before = "") {
+  const std::string command =
+      fmt::format("cd '{}' && {} '{}' {} > stdout.txt 2> stderr.txt", folder.Path().string(),
+                  before, SEMBLANCE_PROGRAM, arguments);
   const int status = std::system(command.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadFileBytes(folder / "stdout.txt"),
           ReadFileBytes(folder / "stderr.txt")};

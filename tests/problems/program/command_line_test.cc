@@ -313,22 +313,28 @@ TEST_F(CommandLine, ReportOfAFolderThatIsNoRunIsRefused) {
   EXPECT_THAT(Call("report empty").err, HasSubstr("result.json"));
 }
 
-// A killed run leaves whole files or none, and no manifest that would call it finished.
-TEST_F(CommandLine, AKilledRunLeavesNoBrokenFile) {
+// A killed run leaves nothing under the name of its folder, and what it leaves beside is taken over
+// by the next one.
+TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneClearsUp) {
   const std::string config = kConfigs + "/phantom.yaml", out = (folder_ / "out").string();
+  const fs::path part = folder_ / ".out.semblance-part";
   const pid_t child = ::fork();
   if (child == 0) {
     ::execl(kProgram.c_str(), "semblance", "run", config.c_str(), "--out", out.c_str(), "--quiet",
             "--set", "subject.rings=30", "--set", "implicit.resolution=40", nullptr);
     ::_exit(127);
   }
-  while (!fs::exists(fs::path(out) / "face.ply") && ::waitpid(child, nullptr, WNOHANG) == 0) {
+  while (!fs::exists(part / "face.ply") && ::waitpid(child, nullptr, WNOHANG) == 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
-  EXPECT_NO_THROW(ReadMesh(fs::path(out) / "face.ply"));
-  EXPECT_FALSE(fs::exists(fs::path(out) / "manifest.json"));
+  EXPECT_NO_THROW(ReadMesh(part / "face.ply"));
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_EQ(Call("depth " + config + " --out out --quiet --set subject.rings=30").code, 0);
+  EXPECT_TRUE(fs::exists(fs::path(out) / "result.json"));
+  EXPECT_FALSE(fs::exists(fs::path(out) / "face.ply"));
+  EXPECT_FALSE(fs::exists(part));
 }
 
 }  // namespace

@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the program does where something goes wrong around it: kills, signals, a second process, no
+// memory, no room, names and files that no program expects. None ends in a crash or loses a file.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "tests/testing/ct_phantom.h"
+#include "tests/testing/program_call.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing::Outcome;
+using testing::ScratchFolder;
+using Clock = std::chrono::steady_clock;
+
+const std::string kPhantom = SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml";
+// A second or less of work.
+const std::string kDepth = "depth " + kPhantom + " --set subject.rings=20 --quiet";
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+class Trust : public ::testing::Test {
+ protected:
+  Outcome Call(const std::string& arguments, const std::string& before = "") {
+    return testing::CallProgram(folder_, arguments, before);
+  }
+
+  // One line of error and this exit code; nothing at `out`.
+  void ExpectRefused(const std::string& arguments, const std::string& words, int code = 2,
+                     const std::string& before = "") {
+    const Outcome outcome = Call(arguments, before);
+    EXPECT_EQ(outcome.code, code) << arguments << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_LT(outcome.err.size(), 3000u);
+    EXPECT_FALSE(fs::exists(folder_ / "out")) << arguments;
+  }
+
+  void Write(const std::string& name, const std::string& text) {
+    fs::create_directories((folder_ / name).parent_path());
+    WriteFileAtomically(folder_ / name, text);
+  }
+
+  // Starts the program in the folder, words apart, and lets it run.
+  pid_t Start(const std::vector<std::string>& words) {
+    const std::string folder = folder_.Path().string();
+    std::vector<char*> argv = {const_cast<char*>("semblance")};
+    for (const std::string& word : words) {
+      argv.push_back(const_cast<char*>(word.c_str()));
+    }
+    argv.push_back(nullptr);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const bool ready = ::chdir(folder.c_str()) == 0 && std::freopen("/dev/null", "w", stderr);
+      ::execv(SEMBLANCE_PROGRAM, argv.data());
+      ::_exit(ready ? 127 : 126);
+    }
+    return child;
+  }
+
+  void WaitFor(const fs::path& path) {
+    const Clock::time_point start = Clock::now();
+    while (!fs::exists(path) && SecondsSince(start) < 60) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    ASSERT_TRUE(fs::exists(path)) << path;
+  }
+
+  static int CodeOf(pid_t child) {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+  ScratchFolder folder_;
+};
+
+// ------------------------------------------------------------------ nothing is lost
+
+TEST_F(Trust, OfTwoProcessesOnOneFolderTheSecondIsRefused) {
+  const pid_t first = Start({"run", kPhantom, "--out", "out", "--quiet"});
+  WaitFor(folder_ / ".out.semblance-part");
+  for (const std::string force : {"", " --force"}) {
+    const Outcome second = Call(kDepth + " --out out" + force);
+    EXPECT_EQ(second.code, 2);
+    EXPECT_THAT(second.err, HasSubstr("out: another process is writing it"));
+  }
+  ::kill(first, SIGKILL);
+  CodeOf(first);
+  EXPECT_EQ(Call(kDepth + " --out out").code, 0) << "a dead process holds nothing";
+}
+
+TEST_F(Trust, ARefusalLeavesNoFolder) {
+  ExpectRefused(kDepth + " --out out/a/b --set landmarks.max_distance_mm=0", "max_distance_mm");
+  std::string csv = "x,y,z\n";
+  for (int k = 0; k < 144; ++k) {
+    csv += fmt::format("{},{},{}\n", k % 12, k / 12, (k % 12) * (k / 12) % 7 * 10000);
+  }
+  Write("points.csv", csv);
+  Write("fit.yaml", "parameters: plane\npatches_u: 4\npatches_v: 4\n");
+  ExpectRefused("fit points.csv fit.yaml --out out --quiet --set chord_mm=1e-9",
+                "needs too many triangles");
+}
+
+TEST_F(Trust, AFullDiskLeavesNoFolderAndTheOldFiles) {
+  const std::string no_room = "ulimit -f 20; trap '' XFSZ;";  // in blocks of 512 or 1024 bytes
+  ExpectRefused(kDepth + " --out out", "cannot be written: File too large", 2, no_room);
+  ASSERT_EQ(Call(kDepth + " --out old").code, 0);
+  const std::string before = ReadFileBytes(folder_ / "old/result.json");
+  EXPECT_EQ(Call(kDepth + " --set interp=nearest --out old --force", no_room).code, 2);
+  EXPECT_EQ(ReadFileBytes(folder_ / "old/result.json"), before);
+  EXPECT_FALSE(fs::exists(folder_ / "old/.semblance-part"));
+}
+
+TEST_F(Trust, OneNameForTwoOutputsIsRefused) {
+  Write("face.json", "{}");
+  Write("script.yaml", "edits: []\n");
+  ExpectRefused("edit face.json script.yaml --out out --inverse ./out", "name the same file");
+}
+
+// ------------------------------------------------------------------ no exception escapes
+
+TEST_F(Trust, NamesThatNoSystemTakesAreErrorsInOneLine) {
+  const std::string name(300, 'a');
+  fs::create_symlink("loop", folder_ / "loop");
+  for (const std::string& bad : {name, std::string("loop"), std::string("''")}) {
+    for (const std::string command :
+         {"run {} --out out", "study {}", "check {}", "status {}", "merge {}", "merge new {}",
+          "report {}", "evaluate {} {}", "edit {} {} --out out", "export {} --to out.ply",
+          "feature list {}", "template {}", "import-ct {} --out out", "fit {} {} --out out",
+          "landmarks convert {} out.yaml"}) {
+      ExpectRefused(fmt::format(fmt::runtime(command), bad, bad), "");
+    }
+  }
+}
+
+TEST_F(Trust, AStudysFilesMayHoldAnything) {
+  const std::vector<std::string> contents = {
+      "",
+      "{",
+      "[]",
+      "3",
+      "\"x\"",
+      std::string(100000, '['),
+      R"({"hash": 7})",
+      R"({"title": 1, "hash": 2, "metric": [], "axes": {}, "notes": 3, "trials": 7})"};
+  Write("study.yaml", fmt::format("base: {}\ngrid: {{rounds: [1, 2]}}\n", kPhantom));
+  for (const std::string& content : contents) {
+    Write("s/plan.json", content);
+    for (const std::string command :
+         {"status s", "merge s", "report s", "merge new s", "study study.yaml --out s"}) {
+      ExpectRefused(command, "s", 2);
+    }
+  }
+  Write("s/plan.json", R"({"title": "t", "hash": "h", "metric": "m", "axes": [], "notes": [],
+      "trials": [{"id": "a", "subject": "p", "values": []}]})");
+  for (const std::string& content :
+       {std::string(R"({"id": 1})"), std::string(R"({"id": "a", "status": [], "reason": {}})"),
+        std::string(R"({"id": "a", "status": "done", "result": {"fit": {"levels": [3]}}})"),
+        std::string(R"({"id": "a", "status": "done", "result": [1]})"), contents[5]}) {
+    Write("s/trials/a/trial.json", content);
+    for (const std::string command : {"status s", "merge s", "report s", "merge new s"}) {
+      EXPECT_THAT(Call(command).code, AnyOf(0, 1)) << command << content.substr(0, 80);
+    }
+    fs::remove_all(folder_ / "new");
+  }
+}
+
+TEST_F(Trust, TooLittleMemoryIsSaidWithWhatToAskFor) {
+  ExpectRefused("run " + kPhantom + " --out out --quiet --threads 1 --set subject.rings=1000",
+                "not enough memory for the step 'load subject'; give meshes", 1,
+                "ulimit -v 300000;");
+}
+
+TEST_F(Trust, AStudyGoesOnWhenATrialRunsOutOfMemory) {
+  Write("study.yaml", fmt::format("base: {}\nset: {{implicit.resolution: 16, seeds.level: 0, "
+                                  "template.max_level: 1, first_fit: []}}\n"
+                                  "grid: {{fit.plan.schedule: [[{{level: 0, fraction: 1}}]], "
+                                  "subject.rings: [1000, 24]}}\n",
+                                  kPhantom));
+  const Outcome outcome = Call("study study.yaml --out s --quiet", "ulimit -v 300000;");
+  EXPECT_EQ(outcome.code, 1) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("1 of 2 trials done, 0 unusable, 1 failed"));
+  EXPECT_THAT(outcome.out, HasSubstr("not enough memory for the step 'load subject'"));
+}
+
+TEST_F(Trust, AFullStandardOutputIsAnError) {
+  Write("stdout.txt", "");
+  for (const std::string& command : {std::string("options"), std::string("--help"),
+                                     std::string("--version"), kDepth + " --out full"}) {
+    const Outcome outcome = Call("2> stderr.txt " + command + " > /dev/full #");
+    EXPECT_EQ(outcome.code, 1) << command;
+    EXPECT_THAT(outcome.err, HasSubstr("standard output")) << command;
+  }
+}
+
+// ------------------------------------------------------------------ signals
+
+TEST_F(Trust, ASignalEndsALongRunWithinASecondAndLeavesNothing) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const pid_t child = Start({"run", kPhantom, "--out", "out", "--quiet", "--threads", "1",
+                               "--set", "implicit.resolution=300"});
+    WaitFor(folder_ / ".out.semblance-part");
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    const Clock::time_point start = Clock::now();
+    ::kill(child, signal);
+    EXPECT_EQ(CodeOf(child), 1);
+    EXPECT_LT(SecondsSince(start), 1.5);
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
+  }
+}
+
+// A pipe into which nobody writes: the reader does not come back.
+TEST_F(Trust, AReaderThatHangsIsEndedAfterASecondAndByASecondSignalAtOnce) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.yaml").c_str(), 0600), 0);
+  const auto start_reader = [&] {
+    const pid_t child = Start({"check", "pipe.yaml"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    return child;
+  };
+  pid_t child = start_reader();
+  Clock::time_point start = Clock::now();
+  ::kill(child, SIGTERM);
+  EXPECT_EQ(CodeOf(child), 1);
+  EXPECT_LT(SecondsSince(start), 1.5);
+
+  child = start_reader();
+  start = Clock::now();
+  ::kill(child, SIGINT);
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  ::kill(child, SIGTERM);
+  EXPECT_EQ(CodeOf(child), 1);
+  EXPECT_LT(SecondsSince(start), 0.6);
+}
+
+// ------------------------------------------------------------------ what is wrong is said
+
+TEST_F(Trust, NumbersOfTheCommandLineAreFinite) {
+  for (const std::string number : {"nan", "inf", "-inf", "NAN"}) {
+    for (const std::string option :
+         {"import-ct x.inv3 --bone-hu={}", "import-ct x.inv3 --skin-hu={}",
+          "export f.json --to out.ply --chord_mm={}", "template a.ply b.csv --tolerance_mm={}",
+          "feature extract f.json --name a --library l --u 0 {}",
+          "feature blend a.json --name a --library l --weights {}"}) {
+      ExpectRefused(fmt::format(fmt::runtime(option), number), "is not a finite number");
+    }
+  }
+}
+
+TEST_F(Trust, AShardIsTwoNumbersThatFit) {
+  Write("study.yaml", fmt::format("base: {}\ngrid: {{rounds: [1, 2]}}\n", kPhantom));
+  for (const std::string shard :
+       {"0/99999999999", "4294967296/4294967297", "0/", "/2", "1", "0/2/3", "-1/2", "2/2", "a/b"}) {
+    ExpectRefused("study study.yaml --out out --shard=" + shard, "write I/N with 0 <= I < N");
+  }
+}
+
+TEST_F(Trust, ALongMessageIsCut) {
+  ExpectRefused("check " + kPhantom + " --set " + std::string(90'000, 'a') + "=1",
+                "bytes left out");
+  std::string deep = "a";
+  for (int k = 0; k < 30'000; ++k) {
+    deep += ".a";
+  }
+  ExpectRefused("check " + kPhantom + " --set " + deep + "=1", "more than 64 steps");
+}
+
+TEST_F(Trust, AResultThatIsNoNumberIsNotUsableAndSaysWhy) {
+  std::string csv = "x,y,z,weight\n";
+  for (int k = 0; k < 100; ++k) {
+    csv += fmt::format("{},{},{},1e308\n", k % 10, k / 10, (k * k) % 7);
+  }
+  Write("points.csv", csv);
+  Write("fit.yaml", "parameters: plane\npatches_u: 4\npatches_v: 4\n");
+  const Outcome outcome = Call("fit points.csv fit.yaml --out out --quiet");
+  EXPECT_EQ(outcome.code, 1) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("the result is not usable: the points' distances"));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("CHOLMOD")));
+  EXPECT_THAT(ReadFileBytes(folder_ / "out/result.json"), HasSubstr("\"usable\": false"));
+}
+
+TEST_F(Trust, MeshesThatCannotBeMeasuredAreRefused) {
+  TriMesh ball = testing::SphereMesh({0, 0, 0}, 80, 20), far = ball, flat = ball;
+  for (Vec3& p : far.points) {
+    p.x() += 1e9;
+  }
+  for (Vec3& p : flat.points) {
+    p.x() = p.y() = 0;
+  }
+  Write("ball.ply", EncodeMesh(ball, ".ply"));
+  Write("far.ply", EncodeMesh(far, ".ply"));
+  Write("flat.ply", EncodeMesh(flat, ".ply"));
+  ExpectRefused("evaluate far.ply ball.ply --quiet", "from the origin");
+  ExpectRefused("evaluate flat.ply ball.ply --quiet", "have an area of 0 mm²");
+}
+
+// A volume whose voxels are ten times too large.
+TEST_F(Trust, ImportedMeshesAreThoseThatARunTakes) {
+  const CtVolume volume = testing::CtPhantom{}.Make();
+  Write("matrix.dat", {reinterpret_cast<const char*>(volume.values.data()),
+                       volume.values.size() * sizeof(volume.values[0])});
+  Write("main.plist",
+        "<?xml version=\"1.0\"?><plist version=\"1.0\"><dict><key>matrix</key><dict>"
+        "<key>dtype</key><string>int16</string><key>filename</key><string>matrix.dat</string>"
+        "<key>shape</key><array><integer>54</integer><integer>81</integer><integer>81</integer>"
+        "</array></dict><key>orientation</key><integer>1</integer><key>spacing</key><array>"
+        "<real>15</real><real>15</real><real>15</real></array></dict></plist>");
+  ASSERT_EQ(std::system(fmt::format("cd '{}' && tar cf large.inv3 main.plist matrix.dat",
+                                    folder_.Path().string())
+                            .c_str()),
+            0);
+  ExpectRefused("import-ct large.inv3 --out out --quiet", "which is no head's");
+}
+
+TEST_F(Trust, NothingIsOpenedToTheNet) {
+  if (std::system("command -v strace > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "strace is not here";
+  }
+  for (const std::string& command : {kDepth + " --out quiet", std::string("options")}) {
+    const Outcome outcome = Call(command, "strace -f -qq -e trace=network -o calls.txt");
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const std::string calls = ReadFileBytes(folder_ / "calls.txt");
+    // The C library asks the machine's own name service for the user's name.
+    EXPECT_THAT(calls, Not(AnyOf(HasSubstr("AF_INET"), HasSubstr("AF_NETLINK"), HasSubstr("bind("),
+                                 HasSubstr("listen("))))
+        << command;
+  }
+}
+
+}  // namespace
+}  // namespace semblance
