@@ -8,7 +8,7 @@ BUILD        := $(if $(filter sanitize debug quick,$(PRESET)),build-$(PRESET),bu
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build demo test bench sanitize format check headers tidy configs clean
+.PHONY: all setup configure build demo test bench faults sanitize format check headers tidy configs clean
 
 all: build
 
@@ -42,6 +42,11 @@ bench: build
 	@{ echo '{"machine": "'"$$(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | sed 's/^ //'), $$(nproc) cores"'",'; \
 	  echo '"entries": ['; grep '^{' build/bench.lines | sed '$$!s/$$/,/'; echo ']}'; } > build/bench.json; rm build/bench.lines
 	@echo build/bench.json
+
+# Kills, full disks, little memory, damaged files: a table of how many fell short (docs/reliability.md).
+COUNT        ?= 100
+faults: build
+	@tests/faults/faults.sh $(BUILD)/problems/semblance configs $(COUNT)
 
 # The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:
