@@ -343,12 +343,19 @@ std::vector<Vec2> JointRound::Solved() {
         term);
   }
   Bound(places, problem);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    if (relaxer_.IsKept(relaxer_.order()[k])) {
+      problem.SetParameterBlockConstant(places[k].data());
+    }
+  }
   ceres::Solver::Summary summary;
   ceres::Solve(SchurOptions(places, net, problem), &problem, &summary);
   std::vector<Vec2> way(start_.size(), Vec2::Zero());
   for (std::size_t k = 0; summary.IsSolutionUsable() && k < places.size(); ++k) {
     const int corner = relaxer_.order()[k];
-    way[corner] = places[k].cwiseQuotient(level_.view.lengths_mm) - start_[corner];
+    if (!relaxer_.IsKept(corner)) {
+      way[corner] = places[k].cwiseQuotient(level_.view.lengths_mm) - start_[corner];
+    }
   }
   return way;
 }

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "fitting/problem/fit_target.h"
 #include "fitting/relaxation/dowel_mesh.h"
@@ -20,6 +22,9 @@ struct PointMoves {
   double max_move_mm = 5;
   double standard = 0;
   bool barrier = true;
+  // Labels of points that stay at their (u,v), with all points at the same place. Not among the
+  // options: a caller knows of its points which were placed by hand.
+  std::vector<std::string> kept = {};
 };
 template <class Visitor>
 void Fields(Visitor& visit, PointMoves& o) {

@@ -37,9 +37,13 @@ Relaxer::Relaxer(const HSplineSurface& surface, const HSplineSurface& rest, cons
 
 void Relaxer::LinkMembers() {
   members_.resize(uv_.size());
+  kept_.resize(uv_.size());
   std::vector<double> weights;
   for (std::size_t k = 0; k < uv_.size(); ++k) {
     members_[mesh_.corner()[k]].push_back(static_cast<int>(k));
+    if (std::ranges::find(moves_.kept, target_.points[k].label) != moves_.kept.end()) {
+      kept_[mesh_.corner()[k]] = true;
+    }
     weights.push_back(target_.points[k].weight);
   }
   std::sort(weights.begin(), weights.end());
@@ -194,7 +198,9 @@ void Relaxer::MoveCorner(int corner, RelaxationSummary& summary) {
 
 void Relaxer::Round(RelaxationSummary& summary) {
   for (const int corner : order_) {
-    MoveCorner(corner, summary);
+    if (!kept_[corner]) {
+      MoveCorner(corner, summary);
+    }
   }
   for (std::size_t k = 0; k < uv_.size(); ++k) {
     uv_[k] = uv_[mesh_.corner()[k]];

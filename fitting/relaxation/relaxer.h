@@ -43,6 +43,7 @@ class Relaxer {
   // For fits that move vertices too. The corners in the network's own order, and their points.
   const std::vector<int>& order() const { return order_; }
   const std::vector<int>& members(int corner) const { return members_[corner]; }
+  bool IsKept(int corner) const { return kept_[corner]; }  // PointMoves::kept
   double mean_weight() const { return mean_weight_; }
   // Of a corner where it is, its neighbours held: all penalties but the distance.
   LocalPenalty Held(int corner) const;
@@ -78,6 +79,7 @@ class Relaxer {
   std::vector<SurfaceSample> spots_;
   std::vector<int> order_;                    // of the corners, by the template's (u,v)
   std::vector<std::vector<int>> members_;     // of a corner
+  std::vector<bool> kept_;                    // corners that do not move
   std::vector<std::vector<int>> neighbours_;  // of a corner
   std::vector<std::vector<int>> around_;      // triangles of a corner
 };

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -255,6 +256,26 @@ TEST(Relaxation, EveryKindBringsThePointsNearer) {
       EXPECT_LT(rms, before);
       before = rms;
     }
+  }
+}
+
+// A (u,v) that was placed by hand, whatever the others do.
+TEST(Relaxation, AKeptPointStaysAndTheOthersMove) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  FitTarget target = Dowels(subject, 0.05);
+  target.points[27].label = "n";
+  for (Relaxation relaxation : EveryRelaxation(2)) {
+    SCOPED_TRACE(NameOf(relaxation));
+    std::visit(
+        []<class R>(R& chosen) {
+          if constexpr (std::is_base_of_v<PointMoves, R>) {
+            chosen.kept = {"n"};
+          }
+        },
+        relaxation);
+    const FitResult fit = Fit(rest, target, {}, ShortOptions(relaxation), {});
+    EXPECT_EQ(fit.uv[27], target.points[27].uv);
+    EXPECT_NE(fit.uv[28], target.points[28].uv);
   }
 }
 
