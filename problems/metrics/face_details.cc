@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/metrics/face_metrics_json.h"
+#include "problems/subject/sites.h"
 
 namespace semblance {
 namespace {
@@ -84,11 +85,13 @@ Json SkinJson(const ScoredSkin& skin) {
 ScoreBasis BasisOf(std::vector<Dowel> landmarks) {
   constexpr std::size_t kFewest = 3;
   ScoreBasis basis{std::nullopt, std::move(landmarks)};
-  if (basis.landmarks.size() >= kFewest) {
-    std::vector<SitePoint> points;
-    for (const Dowel& landmark : basis.landmarks) {
+  std::vector<SitePoint> points;
+  for (const Dowel& landmark : basis.landmarks) {
+    if (IsStandardSite(landmark.site)) {
       points.push_back({landmark.site, landmark.base});
     }
+  }
+  if (points.size() >= kFewest) {
     basis.sites = CompleteSites(points);
   }
   return basis;

@@ -20,7 +20,7 @@ struct ScoreBasis {
   std::optional<SkullSites> sites;  // none: nothing is known of where the face is
   std::vector<Dowel> landmarks;     // as they were given: site, base, direction where it is known
 };
-// Without sites if there are fewer than three landmarks.
+// Without sites if there are fewer than three landmarks at standard ones (sites.h).
 ScoreBasis BasisOf(std::vector<Dowel> landmarks);
 
 // Beyond the distances of face_metrics.h.

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_file.h"
@@ -96,9 +98,9 @@ void NoteDroppedAreas(Case& subject) {
 // The landmarks where they were given, before they are laid onto bone: a skin is scored alike with
 // and without its skull at hand.
 std::vector<Dowel> AsGiven(const LandmarkFile& file, std::vector<Dowel> dowels_on_bone) {
-  for (std::size_t k = 0; k < dowels_on_bone.size(); ++k) {
-    const std::array<double, 3>& point = file.landmarks[k].point;
-    dowels_on_bone[k].base = {point[0], point[1], point[2]};
+  for (Dowel& dowel : dowels_on_bone) {
+    const auto landmark = std::ranges::find(file.landmarks, dowel.site, &Landmark::site);
+    dowel.base = {landmark->point[0], landmark->point[1], landmark->point[2]};
   }
   return dowels_on_bone;
 }

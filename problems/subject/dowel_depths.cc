@@ -16,10 +16,13 @@ namespace {
 using Notes = std::vector<std::string>;
 
 void CheckSetSites(const std::map<std::string, double>& set_mm) {
-  std::vector<std::string> known = StandardSiteCodes();
-  for (const Site& site : StandardSites()) {
-    if (site.side == Side::kLeft) {
-      known.push_back(site.landmark);
+  std::vector<std::string> known;
+  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
+    for (const Site& site : *list) {
+      known.push_back(site.code);
+      if (site.side == Side::kLeft) {
+        known.push_back(site.landmark);
+      }
     }
   }
   for (const auto& [site, depth_mm] : set_mm) {

@@ -10,6 +10,7 @@
 #include <functional>
 #include <numbers>
 #include <optional>
+#include <span>
 
 #include "problems/subject/average_skull.h"
 #include "problems/subject/sites.h"
@@ -20,11 +21,13 @@ namespace {
 constexpr double kWorstFit_mm = 12;  // median residual of sites that are a skull's
 constexpr double kLeastScale = 0.7, kMostScale = 1.4;  // of a skull over the average one
 
+// Those that the average skull has come first.
 std::vector<SitePoint> PointsOf(const LandmarkFile& file) {
   std::vector<SitePoint> sites;
   for (const Landmark& l : file.landmarks) {
     sites.push_back({l.site, {l.point[0], l.point[1], l.point[2]}});
   }
+  std::ranges::stable_partition(sites, IsStandardSite, &SitePoint::site);
   return sites;
 }
 
@@ -87,6 +90,8 @@ class Search {
         query_(query),
         options_(options),
         sites_(PointsOf(file)),
+        standard_(std::span(sites_).first(static_cast<std::size_t>(
+            std::ranges::count_if(sites_, IsStandardSite, &SitePoint::site)))),
         who_(file.subject.empty() ? "landmarks" : fmt::format("landmarks of {}", file.subject)) {
     for (const SitePoint& s : sites_) {
       air_mm_.push_back(query.Closest(s.point).distance_mm);
@@ -97,8 +102,8 @@ class Search {
     if (SamePoints()) {
       return std::move(found_);
     }
-    if (sites_.size() >= 6) {
-      fit_ = FitAverageSkull(sites_);
+    if (standard_.size() >= 6) {
+      fit_ = FitAverageSkull(standard_);
     }
     if (!(fit_ && (AnotherFrame() || NoSkull()))) {
       if (fit_) {
@@ -192,7 +197,7 @@ class Search {
 
   // Whether the sites, taken together, are not those of a skull as it should stand.
   bool NoSkull() {
-    const SkullFit mirrored = FitAverageSkull(sites_, Handedness::kMirrored);
+    const SkullFit mirrored = FitAverageSkull(standard_, Handedness::kMirrored);
     if (mirrored.median_mm <= kWorstFit_mm && mirrored.median_mm <= 0.6 * fit_->median_mm) {
       return Error(
           "left and right are swapped: mirrored, the sites fit an average skull within {:.1f} mm "
@@ -251,7 +256,7 @@ class Search {
   }
 
   void FarOff() {
-    for (std::size_t k = 0; k < sites_.size(); ++k) {
+    for (std::size_t k = 0; k < standard_.size(); ++k) {
       const double off_mm = fit_->residual_mm[k];
       if (off_mm > options_.max_misfit_mm) {
         Error(
@@ -314,6 +319,7 @@ class Search {
   const MeshQuery& query_;
   const PlaceOptions& options_;
   std::vector<SitePoint> sites_;
+  std::span<const SitePoint> standard_;  // of those; the average skull knows no others
   std::string who_;
   std::vector<double> air_mm_;  // of each site from the bone
   std::optional<SkullFit> fit_;

@@ -63,7 +63,7 @@ Vec3 DirectionAt(const LandmarkFile& file, const Landmark& landmark, const TriMe
 
 template <class Report>
 void CheckValue(Report& report, const Landmark& landmark) {
-  if (const std::string complaint = ComplaintAboutSite(landmark.site); !complaint.empty()) {
+  if (const std::string complaint = ComplaintAboutLandmark(landmark.site); !complaint.empty()) {
     report("site", complaint);
   }
   if (!ToVec3(landmark.point).allFinite()) {
@@ -80,7 +80,7 @@ void CheckValue(Report& report, const Landmark& landmark) {
 
 template <class Report>
 void CheckValue(Report& report, const AbsentLandmark& absent) {
-  if (const std::string complaint = ComplaintAboutSite(absent.site); !complaint.empty()) {
+  if (const std::string complaint = ComplaintAboutLandmark(absent.site); !complaint.empty()) {
     report("site", complaint);
   }
 }

@@ -126,8 +126,8 @@ void Fields(Visitor& visit, PlaceOptions& o) {
 // The one way to read such a file, as the checks are made here; points and normals come in mm and
 // LPS whatever the file is in. Throws IoError if the file cannot
 // be read; ConfigError, with a line for each fault, if it has no
-// landmark, a site is not one of StandardSiteCodes() or stands twice (also once as absent), a point
-// lacks, or a normal is not of length 1 within 1 %.
+// landmark, a site is neither standard nor further (sites.h) or stands twice (also once as absent),
+// a point lacks, or a normal is not of length 1 within 1 %.
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
 
 // One dowel per landmark, in the file's order, its depth still NaN. The base is the skull's point

@@ -90,7 +90,7 @@ std::string Joined(const std::vector<std::string>& words) {
 
 bool IsNamed(const Site& site, const std::string& name) {
   if (name == Joined(WordsOf(site.landmark)) || name == Joined(WordsOf(site.name)) ||
-      name == std::to_string(site.number)) {
+      (site.number > 0 && name == std::to_string(site.number))) {
     return true;
   }
   return std::any_of(std::begin(kOtherNames), std::end(kOtherNames), [&](const OtherName& other) {
@@ -98,10 +98,18 @@ bool IsNamed(const Site& site, const std::string& name) {
   });
 }
 
+std::vector<Site> AllSites() {
+  std::vector<Site> sites = StandardSites();
+  sites.insert(sites.end(), FurtherSites().begin(), FurtherSites().end());
+  return sites;
+}
+
 NamedSite Unknown(std::string_view name) {
-  std::vector<std::string> known = StandardSiteCodes();
-  std::transform(StandardSites().begin(), StandardSites().end(), std::back_inserter(known),
-                 [](const Site& site) { return std::string(site.name); });
+  std::vector<std::string> known;
+  for (const Site& site : AllSites()) {
+    known.push_back(site.code);
+    known.emplace_back(site.name);
+  }
   const std::string near = NearestWord(name, known);
   return {
       .code = "",
@@ -119,16 +127,16 @@ NamedSite SiteCalled(std::string_view name) {
   }
   const Side side = TakeSide(words);
   const std::string landmark = Joined(words);
-  const Site* named = nullptr;
-  for (const Site& site : StandardSites()) {
+  std::optional<Site> named;
+  for (const Site& site : AllSites()) {
     if (IsNamed(site, landmark)) {
-      named = &site;
+      named = site;
       if (site.side == side) {
         return {.code = site.code, .fault = ""};
       }
     }
   }
-  if (named == nullptr) {
+  if (!named) {
     return Unknown(name);
   }
   return {.code = "",

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
+#include <span>
 
 #include "problems/config/spelling_suggestion.h"
 
@@ -41,9 +43,22 @@ constexpr StandardLandmark kLandmarks[] = {
     {21, "iM2", "Sub M2", true},
 };
 
-std::vector<Site> MakeSites() {
+// Names of the points on bone; definitions: Caple & Stephan 2016.
+constexpr StandardLandmark kFurther[] = {
+    {0, "op", "Opisthocranion", false},
+    {0, "v", "Vertex", false},
+    {0, "mn", "Mid-nasal", false},
+    {0, "ss", "Subspinale", false},
+    {0, "gn", "Gnathion", false},
+    {0, "ac", "Alare curvature point", true},
+    {0, "sC", "Supra canine", true},
+    {0, "iC", "Infra canine", true},
+    {0, "mmb", "Mid-mandibular border", true},
+};
+
+std::vector<Site> MakeSites(std::span<const StandardLandmark> landmarks) {
   std::vector<Site> sites;
-  for (const auto& [number, code, name, paired] : kLandmarks) {
+  for (const auto& [number, code, name, paired] : landmarks) {
     if (!paired) {
       sites.push_back({code, code, number, name, Side::kMidline, code});
       continue;
@@ -56,16 +71,39 @@ std::vector<Site> MakeSites() {
 }
 
 const Site* FindLandmark(std::string_view landmark) {
-  const auto it = std::ranges::find(StandardSites(), landmark, &Site::landmark);
-  return it == StandardSites().end() ? nullptr : &*it;
+  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
+    if (const auto it = std::ranges::find(*list, landmark, &Site::landmark); it != list->end()) {
+      return &*it;
+    }
+  }
+  return nullptr;
+}
+
+bool Stands(const std::vector<Site>& list, std::string_view site) {
+  return std::ranges::find(list, site, &Site::code) != list.end();
+}
+
+std::string UnknownSite(std::string_view site, const std::vector<std::string>& codes) {
+  const Site* const pair = FindLandmark(site);
+  return pair != nullptr && std::ranges::find(codes, pair->code) != codes.end()
+             ? fmt::format("site '{0}' stands on both sides; write '{0}_l' or '{0}_r'", site)
+             : fmt::format("unknown site '{}'{}", site, Suggestion(site, codes));
 }
 
 }  // namespace
 
 const std::vector<Site>& StandardSites() {
-  static const std::vector<Site> sites = MakeSites();
+  static const std::vector<Site> sites = MakeSites(kLandmarks);
   return sites;
 }
+
+const std::vector<Site>& FurtherSites() {
+  static const std::vector<Site> sites = MakeSites(kFurther);
+  return sites;
+}
+
+bool IsStandardSite(std::string_view site) { return Stands(StandardSites(), site); }
+bool IsFurtherSite(std::string_view site) { return Stands(FurtherSites(), site); }
 
 std::vector<std::string> StandardSiteCodes() {
   std::vector<std::string> codes;
@@ -79,14 +117,16 @@ std::string SiteInWords(std::string_view site) {
 }
 
 std::string ComplaintAboutSite(std::string_view site) {
-  const std::vector<std::string> codes = StandardSiteCodes();
-  if (std::ranges::find(codes, site) != codes.end()) {
+  return IsStandardSite(site) ? "" : UnknownSite(site, StandardSiteCodes());
+}
+
+std::string ComplaintAboutLandmark(std::string_view site) {
+  if (IsStandardSite(site) || IsFurtherSite(site)) {
     return "";
   }
-  if (FindLandmark(site) != nullptr) {
-    return fmt::format("site '{0}' stands on both sides; write '{0}_l' or '{0}_r'", site);
-  }
-  return fmt::format("unknown site '{}'{}", site, Suggestion(site, codes));
+  std::vector<std::string> codes = StandardSiteCodes();
+  std::ranges::transform(FurtherSites(), std::back_inserter(codes), &Site::code);
+  return UnknownSite(site, codes);
 }
 
 }  // namespace semblance

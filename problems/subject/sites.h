@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The standard sites of the skull (thesis app. A): who they are. What a phantom or a generic face
-// has there stands with these, keyed by the codes.
+// The sites of the skull: the standard ones (thesis app. A), and those that other tables have
+// beside them. What a phantom or a generic face has there stands with these, keyed by the codes.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ namespace semblance {
 struct Site {
   std::string code;       // with side, e.g. "g", "go_l"
   std::string landmark;   // the code without side, "go": what tables of depth name
-  int number;             // of the landmark in the thesis's tables, 1 ... 21
+  int number;             // of the landmark in the thesis's tables, 1 ... 21; 0: not there
   std::string_view name;  // of the landmark as printed there, e.g. "Gonion"
   Side side;
   std::string mirror;  // the code of the site on the other side; its own in the midline
@@ -26,10 +26,21 @@ const std::vector<Site>& StandardSites();
 // Their codes in that order.
 std::vector<std::string> StandardSiteCodes();
 
-// "go_l (Gonion)", also of "go"; the code alone where the site is not a standard one.
+// The 13 of published tables that the network lacks, e.g. "mmb_l" (Caple & Stephan 2016): 5 in the
+// midline, then 4 pairs. A landmark may stand at one, and its table gives the depth; the generic
+// face and the average skull have none.
+const std::vector<Site>& FurtherSites();
+
+bool IsStandardSite(std::string_view site);
+bool IsFurtherSite(std::string_view site);
+
+// "go_l (Gonion)", also of "go"; the code alone where the site is in neither list.
 std::string SiteInWords(std::string_view site);
 
 // "" if `site` is one of StandardSiteCodes(), else what is wrong with it and what to do.
 std::string ComplaintAboutSite(std::string_view site);
+
+// The same where a further site may stand too: in landmarks' files and depths by site.
+std::string ComplaintAboutLandmark(std::string_view site);
 
 }  // namespace semblance

@@ -21,6 +21,15 @@ TEST(SiteCalled, EveryCodeNumberAndPrintedNameIsItsSite) {
   }
 }
 
+TEST(SiteCalled, AlsoTheTablesOwnSites) {
+  for (const Site& site : FurtherSites()) {
+    const std::string side = site.side == Side::kLeft ? "l" : site.side == Side::kRight ? "r" : "";
+    EXPECT_EQ(SiteCalled(site.code).code, site.code);
+    EXPECT_EQ(SiteCalled(fmt::format("{} {}", site.name, side)).code, site.code) << site.name;
+  }
+  EXPECT_EQ(SiteCalled("SC left").code, "sC_l");
+}
+
 TEST(SiteCalled, SideBeforeOrBehindInAnyLetters) {
   for (const char* name : {"left gonion", "Gonion (L)", "GONION LEFT", "go_L", "L go", "18l",
                            "18_l", "left-gonion", "  go.l "}) {

@@ -45,7 +45,18 @@ TEST(Sites, TheMirrorOfAMirrorIsTheSite) {
 TEST(Sites, AreNamedInWords) {
   EXPECT_EQ(SiteInWords("zy_r"), "zy_r (Zygomatic Arch, midway)");
   EXPECT_EQ(SiteInWords("go"), "go (Gonion)");
-  EXPECT_EQ(SiteInWords("mmb"), "mmb");
+  EXPECT_EQ(SiteInWords("mmb_l"), "mmb_l (Mid-mandibular border)");
+  EXPECT_EQ(SiteInWords("mine"), "mine");
+}
+
+TEST(Sites, TheFurtherOnesAreTheTablesOwn) {
+  EXPECT_EQ(FurtherSites().size(), 13u);
+  for (const Site& site : FurtherSites()) {
+    EXPECT_TRUE(IsFurtherSite(site.code) && !IsStandardSite(site.code)) << site.code;
+    EXPECT_EQ(ComplaintAboutLandmark(site.code), "");
+    EXPECT_THAT(ComplaintAboutSite(site.code), HasSubstr("unknown site"));
+  }
+  EXPECT_THAT(ComplaintAboutLandmark("mmb"), HasSubstr("write 'mmb_l' or 'mmb_r'"));
 }
 
 TEST(Sites, AComplaintSaysWhatToWrite) {
