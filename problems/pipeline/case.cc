@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/pipeline/extra_dowels.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_file.h"
 #include "surfaces/mesh/mesh_check.h"
@@ -146,20 +147,25 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
       .skull = data.skull,
       .skin = data.skin,
       .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks),
+      .open_dowels = {},
       .network = {},
       .basis = {},
       .notes = data.notes,
       .inputs = data.inputs};
   Append(subject.notes, remarks);
-  Append(subject.notes, FillDepths(experiment.tissue, data.landmarks, subject.dowels_on_bone));
-  subject.network = BuildNetwork(ReadNetworkPlan(experiment.network), subject.dowels_on_bone);
+  Append(subject.notes, FillDepths(WithSiteDepths(experiment, data.landmarks), data.landmarks,
+                                   subject.dowels_on_bone));
+  subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
+  InsertDowels(experiment, data, query, subject);
+  const NetworkPlan plan = ReadNetworkPlan(experiment.network);
+  subject.network = BuildNetwork(plan, subject.dowels_on_bone);
   if (subject.network.areas.empty()) {
     throw InputError(fmt::format(
         "{}: no area of the dowel network has all its three dowels; more landmarks are needed",
         subject.name));
   }
   NoteDroppedAreas(subject);
-  subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
+  Append(subject.notes, JoinNetwork(plan, subject.dowels_on_bone, subject.network));
   subject.inputs.push_back(experiment.network);
   for (const std::filesystem::path& table : TablesOf(experiment.tissue)) {
     subject.inputs.push_back(table);

@@ -27,6 +27,7 @@ struct Case {
   TriMesh skull;
   std::optional<TriMesh> skin;
   std::vector<Dowel> dowels_on_bone;  // with depths
+  std::vector<Dowel> open_dowels;     // `depth: auto`: NaN until depth is interpolated
   DowelNetwork network;               // of those dowels
   ScoreBasis basis;                   // the landmarks as given, for what is scored
   std::vector<std::string> notes;     // what a reader of the result should know, a line each

@@ -62,6 +62,9 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back(
         {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
+  for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
+    faults.push_back({"sites." + fault.path, fault.what});
+  }
   if (AsksPrior(experiment.face) && std::holds_alternative<NoPrior>(experiment.prior)) {
     faults.push_back({"face",
                       "it asks a prior, and there is none; name one under `prior`, or take "

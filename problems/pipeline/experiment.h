@@ -22,6 +22,7 @@
 #include "problems/pipeline/uncertainty_options.h"
 #include "problems/prior/face_source.h"
 #include "problems/subject/dowel_depths.h"
+#include "problems/subject/extra_sites.h"
 #include "problems/subject/landmarks.h"
 #include "problems/subject/length_unit.h"
 #include "problems/subject/phantom.h"
@@ -103,6 +104,7 @@ struct Experiment {
   Subject subject;                // whose skull
   PlaceOptions landmarks;         // how they are laid onto bone
   TissueOptions tissue;           // where the dowels' depths come from
+  ExtraSites sites;               // dowels beside the landmarks', (u,v) set by hand
   std::filesystem::path network;  // which dowels share an area
   DepthScheme interp;             // depth between the dowels
   OutsideRule outside;            // depth outside the network
@@ -130,6 +132,11 @@ void Fields(Visitor& visit, Experiment& o) {
         o.subject);
   visit(FieldInfo{.name = "landmarks", .doc = "how landmarks are laid onto bone"}, o.landmarks);
   visit(FieldInfo{.name = "tissue", .doc = "where the dowels' depths come from"}, o.tissue);
+  visit(FieldInfo{.name = "sites",
+                  .doc = "by name: dowels beside the landmarks', and where a site lies on the "
+                         "generic face, e.g. {my_site: {near: [n, rhi], depth: 4.5}, n: {uv: [0.5, "
+                         "0.6], hold: true}}"},
+        o.sites);
   visit(FieldInfo{.name = "network", .doc = "YAML file of the dowel network"}, o.network);
   visit(FieldInfo{.name = "interp", .doc = "how depth is interpolated between the dowels"},
         o.interp);

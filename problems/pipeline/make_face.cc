@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "problems/metrics/quantile.h"
+#include "problems/pipeline/dowel_target.h"
 #include "problems/pipeline/stage_key.h"
 #include "problems/prior/hspline_prior.h"
 #include "problems/prior/prior_target.h"
@@ -17,30 +19,6 @@
 
 namespace semblance {
 namespace {
-
-// The dowel tips for which the generic face has a (u,v).
-FitTarget DowelTarget(const std::vector<Dowel>& dowels, const TemplateFace& face) {
-  FitTarget target;
-  for (const Dowel& dowel : dowels) {
-    const auto uv = face.site_uv.find(dowel.site);
-    if (uv != face.site_uv.end()) {
-      target.points.push_back(
-          {.label = dowel.site, .position = dowel.Tip(), .uv = uv->second, .role = dowel.role});
-      target.anchors.push_back({dowel.base, dowel.direction});
-    }
-  }
-  return target;
-}
-
-Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& dowels,
-                         const PlacementOptions& options) {
-  std::vector<Vec3> on_template, on_subject;
-  for (const FitPoint& point : dowels.points) {
-    on_template.push_back(generic.surface.Point(point.uv));
-    on_subject.push_back(point.position);
-  }
-  return PlaceTemplate(on_template, on_subject, {}, options);
-}
 
 TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_from_template) {
   TemplateFace placed = generic;
@@ -54,10 +32,28 @@ TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_
 }
 
 PlacedTemplate Place(const TemplateFace& generic, const std::vector<Dowel>& dowels_on_bone,
-                     const PlacementOptions& options) {
-  FitTarget dowels = DowelTarget(dowels_on_bone, generic);
-  const Similarity face_from_template = PlaceOnDowels(generic, dowels, options);
-  return {std::move(dowels), face_from_template, InSubjectFrame(generic, face_from_template)};
+                     const Experiment& experiment) {
+  const Similarity face_from_template = PlaceOnDowels(
+      generic, KnownDowels(dowels_on_bone, generic, experiment.sites), experiment.placement);
+  TemplateFace placed = InSubjectFrame(generic, face_from_template);
+  FitTarget dowels = AllDowels(dowels_on_bone, placed, experiment.sites);
+  return {std::move(dowels), face_from_template, std::move(placed)};
+}
+
+// The fit's options, and that relaxation leaves alone what is held by hand.
+FitOptions FitKeeping(const ExtraSites& sites, FitOptions options) {
+  std::visit(
+      [&sites]<class R>(R& relaxation) {
+        if constexpr (std::is_base_of_v<PointMoves, R>) {
+          for (const auto& [name, site] : sites) {
+            if (site.hold) {
+              relaxation.kept.push_back(name);
+            }
+          }
+        }
+      },
+      options.relaxation);
+  return options;
 }
 
 bool LooksAtBone(const std::vector<Term>& terms) {
@@ -112,6 +108,7 @@ FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, cons
   const HSplineSurface& rest = placed.face.surface;
   const std::vector<VertexId> features = FeatureVertices(placed.face);
   const std::vector<Sphere> masks = TemplateMasks(placed.face);
+  const FitOptions options = FitKeeping(experiment.sites, experiment.fit);
   FitTarget dowels = placed.dowels;
   const MeshQuery query(implicit);
   HSplineSurface surface = FirstFit(experiment, placed.face, dowels, context);
@@ -120,7 +117,7 @@ FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, cons
     context.Report("fit", fmt::format("round {} of {}", round + 1, experiment.rounds));
     SeedResult seeding = SeedDowels(surface, query, implicit, masks, experiment.seeds);
     FitTarget target = WithSeeds(dowels, seeding.points, experiment.fit.terms, shell);
-    FitResult fit = Fit(surface, rest, target, features, experiment.fit, context);
+    FitResult fit = Fit(surface, rest, target, features, options, context);
     surface = fit.surface;
     for (std::size_t k = 0; k < dowels.points.size(); ++k) {
       dowels.points[k].uv = fit.uv[k];  // where relaxation has left them
@@ -206,7 +203,9 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
                   const RunContext& context) {
   MadeFace made = MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
   for (FitPoint& point : made.placed.dowels.points) {
-    point.uv = ProjectFrom(made.placed.face.surface, point.position, point.uv).uv;
+    if (!IsHeld(in.experiment.sites, point.label)) {
+      point.uv = ProjectFrom(made.placed.face.surface, point.position, point.uv).uv;
+    }
   }
   Experiment softer = in.experiment;
   softer.seeds.weight = o.seed_weight;
@@ -241,7 +240,7 @@ TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh&
 }
 
 MadeFace MakeFace(const FaceInput& in, const RunContext& context) {
-  PlacedTemplate placed = Place(in.generic, in.subject.dowels_on_bone, in.experiment.placement);
+  PlacedTemplate placed = Place(in.generic, in.subject.dowels_on_bone, in.experiment);
   return std::visit([&](const auto& way) { return MakeFace(way, std::move(placed), in, context); },
                     in.experiment.face);
 }

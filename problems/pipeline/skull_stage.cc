@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/pipeline/skull_stage.h"
 
+#include <algorithm>
+#include <string>
+
 #include "problems/pipeline/dowel_projection.h"
+#include "problems/pipeline/extra_dowels.h"
 #include "problems/pipeline/implicit_cache.h"
 #include "problems/pipeline/stage_key.h"
 #include "surfaces/mesh/cut_planes.h"
@@ -36,15 +40,24 @@ DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
     return ApplyOutsideRule(e.outside, stage.Input(),
                             InterpolateDepth(e.interp, stage.Input(), context), context);
   });
+  FillOpenDowels(stage.shell, stage.depth, stage.subject);
   return stage;
+}
+
+// All that the depth comes from. The generic face is among it where a dowel is placed by its (u,v).
+std::string KeyOfDepth(const Experiment& e) {
+  std::string key = StageKey("depth", e.subject, e.landmarks, e.tissue, e.sites, e.network,
+                             e.interp, e.outside, e.fill);
+  return std::ranges::any_of(e.sites, [](const auto& entry) { return entry.second.uv.has_value(); })
+             ? key + StageKey("placed on", e.face_template, e.placement)
+             : key;
 }
 
 }  // namespace
 
 std::shared_ptr<const DepthStage> MakeDepthStage(const Experiment& e, StageCache& cache,
                                                  StepClock& step, const RunContext& context) {
-  return cache.Get<DepthStage>(StageKey("depth stage", e.subject, e.landmarks, e.tissue, e.network,
-                                        e.interp, e.outside, e.fill),
+  return cache.Get<DepthStage>("stage " + KeyOfDepth(e),
                                [&] { return Make(e, cache, step, context); });
 }
 
@@ -67,19 +80,16 @@ std::vector<double> DepthsToTheEnds(const DepthStage& stage) {
 
 std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache& cache,
                                                  StepClock& step, const RunContext& context) {
-  return cache.Get<SkullStage>(StageKey("skull stage", e.subject, e.landmarks, e.tissue, e.network,
-                                        e.interp, e.outside, e.fill, e.implicit),
-                               [&] {
-                                 auto depth = MakeDepthStage(e, cache, step, context);
-                                 ImplicitFace implicit = step("implicit face", [&] {
-                                   return CachedImplicitFace(depth->shell,
-                                                             e.implicit.ends == FaceEnds::kOpen
-                                                                 ? DepthsToTheEnds(*depth)
-                                                                 : depth->depth.depth_mm,
-                                                             e.implicit, cache.disk(), context);
-                                 });
-                                 return SkullStage{std::move(depth), std::move(implicit)};
-                               });
+  return cache.Get<SkullStage>(StageKey("skull stage", e.implicit) + KeyOfDepth(e), [&] {
+    auto depth = MakeDepthStage(e, cache, step, context);
+    ImplicitFace implicit = step("implicit face", [&] {
+      return CachedImplicitFace(
+          depth->shell,
+          e.implicit.ends == FaceEnds::kOpen ? DepthsToTheEnds(*depth) : depth->depth.depth_mm,
+          e.implicit, cache.disk(), context);
+    });
+    return SkullStage{std::move(depth), std::move(implicit)};
+  });
 }
 
 }  // namespace semblance

@@ -143,18 +143,24 @@ class SubjectCheck {
   explicit SubjectCheck(const RunContext& context) : context_(context) {}
 
   void Look(const std::string& file, const Experiment& experiment) {
-    if (std::holds_alternative<PhantomOptions>(experiment.subject)) {
-      return;  // made, not measured
+    const bool made = std::holds_alternative<PhantomOptions>(experiment.subject);  // not measured
+    if (made && experiment.sites.empty()) {
+      return;
     }
-    const std::string key = StageKey("subject", experiment.subject, experiment.landmarks);
+    const std::string key =
+        StageKey("subject", experiment.subject, experiment.landmarks, experiment.sites);
     if (sound_.contains(key)) {
       return;
     }
     const auto subject = subjects_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
       return LoadSubject(experiment.subject, context_);
     });
-    for (const std::string& note : CheckSubject(*subject, experiment.landmarks)) {
+    for (const std::string& note :
+         made ? std::vector<std::string>() : CheckSubject(*subject, experiment.landmarks)) {
       fmt::print("{}: warning: {}\n", file, note);
+    }
+    if (!experiment.sites.empty()) {
+      MakeCase(*subject, experiment);  // whether each can be placed
     }
     sound_.insert(key);
   }

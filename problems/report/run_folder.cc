@@ -126,17 +126,21 @@ int TargetIndex(const FitTarget& target, const std::string& site) {
   return found == target.points.end() ? -1 : static_cast<int>(found - target.points.begin());
 }
 
+std::string RoleOf(const Dowel& dowel) {
+  return dowel.role == PointRole::kInserted ? "inserted" : "landmark";
+}
+
 std::string DowelsCsv(const RunResult& result) {
   CsvWriter csv({"site", "base_x_mm", "base_y_mm", "base_z_mm", "direction_x", "direction_y",
                  "direction_z", "depth_mm", "sd_mm", "tip_x_mm", "tip_y_mm", "tip_z_mm", "u", "v",
-                 "fit_residual_mm"});
+                 "fit_residual_mm", "role"});
   for (const Dowel& d : result.subject.dowels_on_bone) {
     const int index = TargetIndex(result.target, d.site);
     const Vec2 uv = index < 0 ? Vec2(kNaN, kNaN) : result.fit.uv[index];
     const Vec3 tip = d.Tip();
     csv.Row(d.site, d.base.x(), d.base.y(), d.base.z(), d.direction.x(), d.direction.y(),
             d.direction.z(), d.depth_mm, d.sd_mm, tip.x(), tip.y(), tip.z(), uv.x(), uv.y(),
-            index < 0 ? kNaN : result.fit.residual_mm[index]);
+            index < 0 ? kNaN : result.fit.residual_mm[index], RoleOf(d));
   }
   return csv.Text();
 }

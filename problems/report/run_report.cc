@@ -168,7 +168,8 @@ ReportTable LevelsTable(const Json& fit) {
 
 // Some columns of dowels.csv, rounded for reading.
 ReportTable DowelsTable(const std::filesystem::path& file) {
-  ReportTable table{"Dowels", {"site", "depth (mm)", "SD (mm)", "u", "v", "fit residual (mm)"}, {}};
+  ReportTable table{
+      "Dowels", {"site", "depth (mm)", "SD (mm)", "u", "v", "fit residual (mm)", "role"}, {}};
   const std::string text = ReadFileBytes(file);
   CsvReader csv(text, file.string());
   const std::size_t site = csv.ColumnOf("site");
@@ -178,6 +179,8 @@ ReportTable DowelsTable(const std::filesystem::path& file) {
       const double value = csv.NumberOrNan(csv.ColumnOf(column));
       row.push_back(std::isnan(value) ? "" : fmt::format("{:.2f}", value));
     }
+    const auto role = csv.Find("role");  // folders of older versions have none
+    row.emplace_back(role ? csv.Cell(*role) : "landmark");
     table.rows.push_back(std::move(row));
   }
   return table;
