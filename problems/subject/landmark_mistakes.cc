@@ -13,6 +13,7 @@
 #include <span>
 
 #include "problems/subject/average_skull.h"
+#include "problems/subject/jaw_pose.h"
 #include "problems/subject/sites.h"
 
 namespace semblance {
@@ -35,11 +36,6 @@ double Median(std::vector<double> values) {
   const auto middle = values.begin() + std::ssize(values) / 2;
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-bool OfMandible(std::string_view site) {
-  constexpr std::array<std::string_view, 7> kMandible = {"id", "sm", "pg", "me", "go", "mr", "iM2"};
-  return std::ranges::find(kMandible, WithoutSide(site)) != kMandible.end();
 }
 
 // A change that people forget, and what to say of it.
@@ -105,7 +101,7 @@ class Search {
     if (standard_.size() >= 6) {
       fit_ = FitAverageSkull(standard_);
     }
-    if (!(fit_ && (AnotherFrame() || NoSkull()))) {
+    if (!(fit_ && (AnotherFrame() || NoSkull() || OpenMandible()))) {
       if (fit_) {
         FarOff();
       }
@@ -240,6 +236,17 @@ class Search {
         front.x(), front.y(), front.z(), up.x(), up.y(), up.z());
   }
 
+  bool OpenMandible() {
+    const std::optional<JawPose> jaw = FindJawPose(standard_);
+    return jaw && jaw->opening_deg > options_.max_opening_deg &&
+           Error(
+               "the mandible is open by {0:.0f} degrees, and at most {1} are taken "
+               "(max_opening_deg): its sites are {2:.0f} mm (median) from where the upper jaw "
+               "foresees them; give the mandible as a mesh of its own and close it (`subject: "
+               "{{mandible: {{mesh: ..., opening_deg: -{0:.0f}}}}}`)",
+               jaw->opening_deg, options_.max_opening_deg, jaw->off_mm);
+  }
+
   // The site that is foreseen where this one lies, if its own landmark is not there.
   std::string TakenFor(const SitePoint& off) const {
     constexpr double kNear_mm = 12;
@@ -272,7 +279,7 @@ class Search {
   bool MandibleInTheAir() {
     int of_mandible = 0, in_air = 0, others_in_air = 0;
     for (std::size_t k = 0; k < sites_.size(); ++k) {
-      const bool mandible = OfMandible(sites_[k].site);
+      const bool mandible = IsOfMandible(sites_[k].site);
       of_mandible += mandible;
       in_air += mandible && InAir(k);
       others_in_air += !mandible && InAir(k);
@@ -297,7 +304,7 @@ class Search {
 
   void NoteMissingMandible() {
     constexpr double kNoBone_mm = 20;
-    const auto of_mandible = [](const auto& entry) { return OfMandible(entry.site); };
+    const auto of_mandible = [](const auto& entry) { return IsOfMandible(entry.site); };
     if (!fit_ || std::ranges::any_of(sites_, of_mandible) ||
         std::ranges::any_of(file_.absent, of_mandible)) {
       return;

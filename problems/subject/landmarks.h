@@ -52,6 +52,7 @@ struct PlaceOptions {
   double max_distance_mm = 3;   // of a landmark from the skull; more is an error
   double normal_radius_mm = 3;  // of the mean normal where a landmark has none
   double max_misfit_mm = 25;    // of a landmark from where the others foresee it; more is an error
+  double max_opening_deg = 15;  // of the mandible; more is an error
 };
 
 template <class Visitor>
@@ -121,6 +122,13 @@ void Fields(Visitor& visit, PlaceOptions& o) {
                   .doc = "a landmark further than this from where the others and an average skull "
                          "foresee it is an error; in mm of the average skull"},
         o.max_misfit_mm);
+  visit(FieldInfo{.name = "max_opening_deg",
+                  .unit = "deg",
+                  .min = 0,
+                  .max = 90,
+                  .doc = "a mandible that is open further than this is an error; from the sites of "
+                         "both jaws and an average skull, to some degrees"},
+        o.max_opening_deg);
 }
 
 // The one way to read such a file, as the checks are made here; points and normals come in mm and

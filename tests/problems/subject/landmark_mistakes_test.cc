@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <functional>
+#include <numbers>
 
+#include "problems/subject/average_skull.h"
+#include "problems/subject/jaw_pose.h"
 #include "problems/subject/phantom.h"
 
 namespace semblance {
@@ -194,6 +197,40 @@ TEST(LandmarkMistakes, EachGetsItsWords) {
         EXPECT_THAT(found.errors.front(), HasSubstr(words)) << subject.file.subject;
       }
     }
+  }
+}
+
+// The mandible's sites, and the specks of bone at them, turned about the condyles.
+void OpenMouth(Subject& s, double opening_deg) {
+  std::vector<SitePoint> sites;
+  for (const Landmark& l : s.file.landmarks) {
+    sites.push_back({l.site, Vec3(l.point.data())});
+  }
+  const Similarity pose = FitAverageSkull(sites).skull_from_average;
+  const Vec3 hinge = pose * Vec3((AverageCondyles()[0] + AverageCondyles()[1]) / 2);
+  const Mat3 turn = Eigen::AngleAxisd(opening_deg * std::numbers::pi / 180, pose.rotation.col(0))
+                        .toRotationMatrix();
+  for (std::size_t k = 0; k < s.file.landmarks.size(); ++k) {
+    Landmark& l = s.file.landmarks[k];
+    if (IsOfMandible(l.site)) {
+      const Vec3 p = hinge + turn * (Vec3(l.point.data()) - hinge);
+      const Vec3 way = p - Vec3(l.point.data());
+      l.point = {p.x(), p.y(), p.z()};
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        s.skull.points[3 * k + corner] += way;
+      }
+    }
+  }
+}
+
+TEST(LandmarkMistakes, AnOpenMandibleIsToldOnceWithItsAngle) {
+  for (Subject subject : {RealSubject("cthead"), RealSubject("vhm")}) {
+    OpenMouth(subject, 30);
+    EXPECT_THAT(Find(subject).errors,
+                ElementsAre(AllOf(HasSubstr("the mandible is open by "),
+                                  HasSubstr("at most 15 are taken (max_opening_deg)"),
+                                  HasSubstr("close it (`subject: {mandible: {mesh: ..., "))))
+        << subject.file.subject;
   }
 }
 
