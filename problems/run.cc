@@ -118,6 +118,9 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const auto skull = MakeSkullStage(experiment, shared, step, context);
   const DepthStage& bone = *skull->depth_stage;
   Case subject = bone.subject;
+  std::vector<BoneOrigin> origin = step("observed bone", [&] {
+    return OriginOfShell(bone.shell, subject.skull, subject.origin, context.threads);
+  });
   const auto generic =
       step("make template", [&] { return GenericFace(experiment.face_template, shared); });
   std::ranges::copy(TemplateFiles(experiment.face_template), std::back_inserter(subject.inputs));
@@ -141,6 +144,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
       MeasureFeatures(made.placed.face, made.fitted.fit.surface);
   return {.subject = std::move(subject),
           .shell = bone.shell,
+          .origin = std::move(origin),
           .depth = bone.depth,
           .implicit = skull->implicit,
           .face_from_template = made.placed.face_from_template,

@@ -32,8 +32,9 @@ struct TruthComparison {
 
 struct RunResult {
   Case subject;
-  TriMesh shell;     // the outer shell of the skull, temples and gaps bridged: what emits
-  DepthField depth;  // of the shell's vertices
+  TriMesh shell;  // the outer shell of the skull, temples and gaps bridged: what emits
+  std::vector<BoneOrigin> origin;  // of the shell's triangles
+  DepthField depth;                // of the shell's vertices
   ImplicitFace implicit;
   Similarity face_from_template;
   TemplateFace placed;  // the generic face brought to the dowels; the prior's most likely face

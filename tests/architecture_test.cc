@@ -56,7 +56,7 @@ const std::map<std::string, Layers> kRooms = {
     {"problems",
      {{"config", "ct", "output"},
       {"pictures", "subject"},
-      {"landmark_files"},
+      {"landmark_files", "preparation"},
       {"face_template"},
       {"metrics", "prior"},
       {"pipeline"},

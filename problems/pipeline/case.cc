@@ -64,12 +64,24 @@ LandmarkFile Load(const PhantomOptions& options, SubjectData& subject, const Run
   return file;
 }
 
-LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunContext&) {
+void Mirror(const MirrorOptions& options, LandmarkFile& landmarks, SubjectData& subject,
+            const RunContext& context) {
+  Append(subject.notes,
+         PrepareMirrored(options, subject.skull, subject.origin, landmarks, context.threads));
+}
+
+LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunContext& context) {
   LandmarkFile landmarks = LandmarksOf(options.landmarks, subject);
   subject.skull = ReadHeadMesh(options, options.skull, "skull", subject);
   if (!options.skin.empty()) {
     subject.skin = ReadHeadMesh(options, options.skin, "skin", subject);
   }
+  if (!options.mandible.mesh.empty()) {
+    TriMesh mandible = ReadHeadMesh(options, options.mandible.mesh, "mandible.mesh", subject);
+    Append(subject.notes,
+           AddMandible(options.mandible, std::move(mandible), subject.skull, landmarks));
+  }
+  Mirror(options.mirror, landmarks, subject, context);
   return landmarks;
 }
 
@@ -83,6 +95,7 @@ LandmarkFile Load(const CtSubject& options, SubjectData& subject, const RunConte
   subject.skull = std::move(import.skull);
   subject.skin = std::move(import.skin);
   Append(subject.notes, import.notes);
+  Mirror(options.mirror, landmarks, subject, context);
   return landmarks;
 }
 
@@ -145,6 +158,7 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
   Case subject{
       .name = data.landmarks.subject,
       .skull = data.skull,
+      .origin = data.origin,
       .skin = data.skin,
       .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks),
       .open_dowels = {},

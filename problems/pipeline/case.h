@@ -10,13 +10,15 @@
 #include "interp/dowels/dowel_network.h"
 #include "problems/metrics/face_details.h"
 #include "problems/pipeline/experiment.h"
+#include "problems/preparation/bone_origin.h"
 
 namespace semblance {
 
 // What was read or made of a subject, before any choice of depth or network.
 struct SubjectData {
-  TriMesh skull;                // mm, outward
-  std::optional<TriMesh> skin;  // the true skin, in the skull's frame, where it is known
+  TriMesh skull;                   // mm, outward
+  std::vector<BoneOrigin> origin;  // one per triangle of the skull; none: all observed
+  std::optional<TriMesh> skin;     // the true skin, in the skull's frame, where it is known
   LandmarkFile landmarks;
   std::vector<std::string> notes;
   std::vector<std::filesystem::path> inputs;  // files that were read
@@ -25,6 +27,7 @@ struct SubjectData {
 struct Case {
   std::string name;
   TriMesh skull;
+  std::vector<BoneOrigin> origin;  // one per triangle of the skull; none: all observed
   std::optional<TriMesh> skin;
   std::vector<Dowel> dowels_on_bone;  // with depths
   std::vector<Dowel> open_dowels;     // `depth: auto`: NaN until depth is interpolated

@@ -20,6 +20,8 @@
 #include "problems/face_template/template_source.h"
 #include "problems/metrics/face_region.h"
 #include "problems/pipeline/uncertainty_options.h"
+#include "problems/preparation/hinge.h"
+#include "problems/preparation/mirror.h"
 #include "problems/prior/face_source.h"
 #include "problems/subject/dowel_depths.h"
 #include "problems/subject/extra_sites.h"
@@ -39,6 +41,8 @@ struct FileSubject {
   std::filesystem::path landmarks;
   Axes axes = Axes::kLps;                      // of skull and skin
   LengthUnit units = LengthUnit::kMillimetre;  // of skull and skin
+  MandibleOptions mandible;                    // where it is a mesh of its own
+  MirrorOptions mirror;                        // what one side lacks
 };
 template <class Visitor>
 void Fields(Visitor& visit, FileSubject& o) {
@@ -59,6 +63,10 @@ void Fields(Visitor& visit, FileSubject& o) {
                   .doc =
                       "of skull and skin (the landmarks' file has its own). All results are in mm"},
         o.units);
+  visit(FieldInfo{.name = "mandible",
+                  .doc = "where the mandible is a mesh of its own: it turns about the condyles"},
+        o.mandible);
+  visit(FieldInfo{.name = "mirror", .doc = "bone that one side lacks, from the other"}, o.mirror);
 }
 
 // A subject in a CT volume: skull and true skin are taken from it.
@@ -67,6 +75,7 @@ struct CtSubject {
   std::filesystem::path volume;
   std::filesystem::path landmarks;
   CtImportOptions import;
+  MirrorOptions mirror;  // what one side lacks
 };
 template <class Visitor>
 void Fields(Visitor& visit, CtSubject& o) {
@@ -77,6 +86,7 @@ void Fields(Visitor& visit, CtSubject& o) {
         o.landmarks);
   visit(FieldInfo{.name = "import", .doc = "how skull and skin are taken from the volume"},
         o.import);
+  visit(FieldInfo{.name = "mirror", .doc = "bone that one side lacks, from the other"}, o.mirror);
 }
 
 // How dowels are left out to see how well the others predict them (`semblance depth`, and studies

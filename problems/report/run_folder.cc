@@ -204,19 +204,40 @@ void WriteSamples(const FaceUncertainty& uncertainty, OutputFolder& folder) {
   }
 }
 
+// 0 observed, 1 mirrored, 2 inferred: of the bone under each vertex.
+VertexScalar OriginScalar(const TriMesh& mesh, const RunResult& result, const RunContext& context) {
+  VertexScalar scalar{"scalar_origin", {}};
+  for (const BoneOrigin origin : OriginUnder(mesh, result.shell, result.origin, context.threads)) {
+    scalar.values.push_back(static_cast<double>(origin));
+  }
+  return scalar;
+}
+
+Json BoneJson(const RunResult& result) {
+  const auto area_cm2 = AreaByOrigin_cm2(result.shell, result.origin);
+  Json json;
+  for (std::size_t k = 0; k < area_cm2.size(); ++k) {
+    json[fmt::format("{}_cm2", EnumNames(BoneOrigin{})[k])] = area_cm2[k];
+  }
+  return json;
+}
+
 void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext& context) {
   folder.Write("face.hspline.json", HSplineToJson(result.fit.surface));
-  std::vector<VertexScalar> sigma;
+  std::vector<VertexScalar> more = {OriginScalar(result.face.mesh, result, context)};
   if (result.uncertainty && !result.uncertainty->sigma_mm.empty()) {
-    sigma.push_back({"scalar_sigma_mm", result.uncertainty->sigma_mm});
+    more.push_back({"scalar_sigma_mm", result.uncertainty->sigma_mm});
   }
-  folder.Write("face.ply", ReconstructionPly(result.face.mesh, result, sigma, context));
-  folder.Write("implicit.ply", ReconstructionPly(result.implicit.mesh, result, {}, context));
+  folder.Write("face.ply", ReconstructionPly(result.face.mesh, result, more, context));
+  folder.Write("implicit.ply",
+               ReconstructionPly(result.implicit.mesh, result,
+                                 {OriginScalar(result.implicit.mesh, result, context)}, context));
   if (result.uncertainty) {
     WriteSamples(*result.uncertainty, folder);
   }
   folder.Write("depth.ply",
-               MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthColours()));
+               MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthColours(),
+                         {OriginScalar(result.shell, result, context)}));
 }
 
 // What went in, and what it was made with.
@@ -261,6 +282,7 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
                      ? ScoreToJson(result.truth->face, result.truth->details, result.truth->skin)
                      : Json(nullptr);
   json["implicit_face"] = result.truth ? MetricsToJson(result.truth->implicit) : Json(nullptr);
+  json["bone"] = BoneJson(result);
   json["depth"] = DepthToJson(result.depth, result.subject);
   json["depth_truth"] = result.truth ? ComparisonToJson(result.truth->depth) : Json(nullptr);
   json["implicit"] = ImplicitJson(result.implicit);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/report/run_pictures.h"
 
+#include <fmt/format.h>
+
 #include "problems/pictures/pictures.h"
 #include "problems/pictures/render.h"
 #include "surfaces/base/parallel.h"
@@ -101,6 +103,41 @@ void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
              "pictures/error_implicit.png", threads);
 }
 
+Colour OriginColour(BoneOrigin origin) {
+  switch (origin) {
+    case BoneOrigin::kObserved:
+      return HexColour(0xe3dac9);
+    case BoneOrigin::kMirrored:
+      return HexColour(0x2f7fc1);
+    case BoneOrigin::kInferred:
+      break;
+  }
+  return HexColour(0xe0a030);
+}
+
+SceneObject ByOrigin(SceneObject object, const RunResult& result, int threads) {
+  for (const BoneOrigin origin : OriginUnder(object.mesh, result.shell, result.origin, threads)) {
+    object.vertex_colours.push_back(OriginColour(origin));
+  }
+  return object;
+}
+
+// Where any of it is invented: the shell, and the face over it.
+void WriteOrigin(const RunResult& result, OutputFolder& folder, int threads) {
+  const auto [observed, mirrored, inferred] = AreaByOrigin_cm2(result.shell, result.origin);
+  if (mirrored + inferred == 0) {
+    return;
+  }
+  const std::string title = fmt::format(
+      "Bone: {:.0f} cm² observed, {:.0f} cm² mirrored (blue), {:.0f} cm² inferred (yellow)",
+      observed, mirrored, inferred);
+  WriteViews({{ByOrigin(SkullObject(result.shell), result, threads)}}, result,
+             {title, {}, std::nullopt}, Lighting::kStudio, folder, "pictures/origin.png", threads);
+  WriteViews({{ByOrigin(SkinObject(result.face.mesh), result, threads)}}, result,
+             {"The face, by the bone under it", {}, std::nullopt}, Lighting::kStudio, folder,
+             "pictures/origin_face.png", threads);
+}
+
 }  // namespace
 
 ColourMap DepthColours() { return SequentialMap(0, 25); }
@@ -141,6 +178,7 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
              Lighting::kStudio, folder, "pictures/implicit.png", threads);
   WriteViews({{SkinObject(result.face.mesh)}}, result, {"H-spline face", {}, std::nullopt},
              Lighting::kStudio, folder, "pictures/face.png", threads);
+  WriteOrigin(result, folder, threads);
   Scene over = SkullScene(result);
   over.objects.push_back(SkinObject(result.face.mesh, 0.55));
   WriteViews(over, result, {"H-spline face over skull and dowels", {}, std::nullopt},

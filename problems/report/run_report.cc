@@ -261,6 +261,28 @@ ReportSection PictureSection(const OutputFolder& folder) {
   return section;
 }
 
+// Folders of older versions do not say.
+bool IsPartlyInvented(const Json& result) {
+  return result.contains("bone") && result.at("bone").at("mirrored_cm2").get<double>() +
+                                            result.at("bone").at("inferred_cm2").get<double>() >
+                                        0;
+}
+
+ReportSection BoneSection(const Json& bone, const OutputFolder& folder) {
+  return {
+      .heading = "What of the bone was seen",
+      .paragraphs = {fmt::format(
+          "Of the shell that carries the tissue {} cm² lie on bone of the scan. Invented are {} "
+          "cm² mirrored from the other side (blue) and {} cm² inferred, where temples, orbits "
+          "and gaps are bridged (yellow). What of the face stands on them is no evidence.",
+          Number(bone.at("observed_cm2"), 0), Number(bone.at("mirrored_cm2"), 0),
+          Number(bone.at("inferred_cm2"), 0))},
+      .images = {ReportImageFromFile(folder.Root() / "pictures/origin.png", "",
+                                     "observed, mirrored and inferred bone from three sides"),
+                 ReportImageFromFile(folder.Root() / "pictures/origin_face.png", "",
+                                     "the face by the bone under it, from three sides")}};
+}
+
 ReportSection UncertaintySection(const Json& result, const OutputFolder& folder) {
   const Json& uncertainty = result.at("uncertainty");
   ReportSection section{.heading = "How far the face may be off"};
@@ -315,6 +337,9 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
     sections.push_back(ErrorSection(result, folder));
   }
   sections.push_back(PictureSection(folder));
+  if (IsPartlyInvented(result)) {
+    sections.push_back(BoneSection(result.at("bone"), folder));
+  }
   sections.push_back(FitSection(result.at("fit"), folder));
   if (HasSigma(result)) {
     sections.push_back(UncertaintySection(result, folder));

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/preparation/hinge.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "problems/config/config.h"
+#include "problems/subject/jaw_pose.h"
+#include "problems/subject/sites.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::WordsOf;
+
+const Hinge kHinge{{50, 76, -38}, {-48, 75, -40}};
+
+LandmarkFile AverageLandmarks() {
+  LandmarkFile file;
+  for (const std::string& code : StandardSiteCodes()) {
+    Landmark& landmark = file.landmarks.emplace_back();
+    const Vec3 p = AverageSite(code);
+    landmark.site = code;
+    landmark.point = {p.x(), p.y(), p.z()};
+    landmark.normal = {0, -1, 0};
+  }
+  return file;
+}
+
+Landmark& At(LandmarkFile& file, const std::string& site) {
+  return *std::ranges::find(file.landmarks, site, &Landmark::site);
+}
+
+Vec3 PointAt(LandmarkFile& file, const std::string& site) {
+  return Vec3(At(file, site).point.data());
+}
+
+TEST(Hinge, NothingIsTheIdentityToTheBit) {
+  const Vec3 p(1.1, -2.3, -99.7);
+  EXPECT_EQ(kHinge.Opened(p, 0), p);
+}
+
+TEST(Hinge, ThereAndBackIsTheIdentityAndTheAxisStays) {
+  for (const double opening_deg : {-20.0, 3.0, 45.0}) {
+    for (const Vec3& p : {Vec3(0, 10, -112), Vec3(48, 71, -89), Vec3(-30, 38, -89)}) {
+      EXPECT_LT((kHinge.Opened(kHinge.Opened(p, opening_deg), -opening_deg) - p).norm(), 1e-12);
+      EXPECT_NEAR((kHinge.Opened(p, opening_deg) - kHinge.left).norm(), (p - kHinge.left).norm(),
+                  1e-12);
+    }
+    EXPECT_LT((kHinge.Opened(kHinge.right, opening_deg) - kHinge.right).norm(), 1e-12);
+  }
+}
+
+TEST(Hinge, OpeningLowersTheChin) {
+  const Vec3 chin(0, 10, -112);
+  const Vec3 open = kHinge.Opened(chin, 20);
+  EXPECT_LT(open.z(), chin.z() - 10);
+  EXPECT_GT(open.y(), chin.y());
+}
+
+TEST(Hinge, ABiteIsTheDistanceThatItSays) {
+  const Vec3 pr(0.5, -1, -67), id(-0.5, 4, -91);
+  for (const double bite_mm : {15.0, 24.5, 40.0, 60.0}) {
+    const double opening_deg = OpeningForBite_deg(kHinge, pr, id, bite_mm);
+    EXPECT_NEAR((kHinge.Opened(id, opening_deg) - pr).norm(), bite_mm, 1e-9);
+    EXPECT_EQ(opening_deg > 0, bite_mm > (pr - id).norm());
+    EXPECT_LT(std::abs(opening_deg), 60);
+  }
+  EXPECT_THAT(WordsOf<InputError>([&] { OpeningForBite_deg(kHinge, pr, id, 900); }),
+              HasSubstr("cannot be 900 mm apart"));
+}
+
+TEST(AddMandible, TurnsTheMandibleAndItsLandmarksAndNothingElse) {
+  LandmarkFile file = AverageLandmarks(), before = file;
+  const TriMesh cranium = testing::SphereMesh({0, 60, 30}, 80, 6);
+  const TriMesh jaw = testing::SphereMesh({0, 20, -100}, 30, 6);
+  TriMesh skull = cranium;
+  MandibleOptions options;
+  options.opening_deg = 12;
+  const auto notes = AddMandible(options, jaw, skull, file);
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("opened by 12.0 degrees about the condyles")));
+  ASSERT_EQ(skull.points.size(), cranium.points.size() + jaw.points.size());
+  EXPECT_TRUE(std::equal(cranium.points.begin(), cranium.points.end(), skull.points.begin()));
+  EXPECT_NE(skull.points.back(), jaw.points.back());
+  std::vector<SitePoint> sites;
+  for (const Landmark& l : file.landmarks) {
+    EXPECT_EQ(l.point == At(before, l.site).point, !IsOfMandible(l.site)) << l.site;
+    EXPECT_NEAR(Vec3(l.normal->data()).norm(), 1, 1e-12);
+    sites.push_back({l.site, Vec3(l.point.data())});
+  }
+  EXPECT_NEAR(FindJawPose(sites)->opening_deg, 12, 1e-6);
+  options.opening_deg = -12;
+  TriMesh again;
+  AddMandible(options, {}, again, file);
+  for (const Landmark& l : file.landmarks) {
+    EXPECT_LT((Vec3(l.point.data()) - PointAt(before, l.site)).norm(), 1e-6) << l.site;
+  }
+}
+
+TEST(AddMandible, WithoutAnAngleItOnlyAdds) {
+  LandmarkFile file = AverageLandmarks(), before = file;
+  const TriMesh jaw = testing::SphereMesh({0, 20, -100}, 30, 6);
+  TriMesh skull;
+  MandibleOptions options;
+  options.opening_deg = 0;
+  EXPECT_THAT(AddMandible(options, jaw, skull, file), IsEmpty());
+  EXPECT_EQ(skull.points, jaw.points);
+  EXPECT_EQ(PointAt(file, "me"), PointAt(before, "me"));
+}
+
+TEST(MandibleOptions, WhatDoesNotGoTogetherIsToldAtItsLine) {
+  const auto words = [](const std::string& text) {
+    return WordsOf<ConfigError>([&] { ReadConfigText<MandibleOptions>(text, "a.yaml"); });
+  };
+  EXPECT_THAT(words("{mesh: a.ply, opening_deg: 3, bite_mm: 30}"), HasSubstr("opened twice"));
+  EXPECT_THAT(words("{mesh: a.ply, condyle_left: [1, 2, 3]}"), HasSubstr("needs both condyles"));
+  EXPECT_THAT(words("{opening_deg: 3}"), HasSubstr("there is no mesh to turn"));
+  EXPECT_THAT(words("{mesh: a.ply, opening_deg: 90}"), HasSubstr("opening_deg"));
+}
+
+}  // namespace
+}  // namespace semblance
