@@ -78,7 +78,7 @@ std::vector<OptionFault> FaultsOfSites(const ExtraSites& sites) {
     if (LacksSide(name)) {
       faults.push_back({name, complaint});
     } else if (!complaint.empty() && !placed) {
-      faults.push_back({name, complaint + "; a site of your own needs `near` or `uv`"});
+      faults.push_back({name, complaint + " (a site of your own needs `near` or `uv`)"});
     } else if (!placed && !site.depth && !site.hold) {
       faults.push_back({name, "nothing is said of the site; give `uv`, `near`, `depth` or `hold`"});
     }
