@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/landmark_files/site_page.h"
 #include "problems/program/exit_code.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -22,6 +23,7 @@ namespace fs = std::filesystem;
 // What the user typed.
 struct LandmarkArguments {
   std::string in, out;
+  std::vector<std::string> tables;
   ReadLandmarksOptions reading;
   bool force = false;
 };
@@ -46,6 +48,30 @@ int Convert(const LandmarkArguments& a) {
   return kDone;
 }
 
+int Page(const LandmarkArguments& a) {
+  std::vector<TissueTable> tables;
+  for (const std::string& table : a.tables) {
+    tables.push_back(ReadTissueTable(table));
+  }
+  const fs::path page = fs::path(a.out) / "sites.md", picture = fs::path(a.out) / "sites.png";
+  if (!a.force && (fs::exists(page) || fs::exists(picture))) {
+    throw IoError(
+        fmt::format("{}: sites.md or sites.png exists; add --force to replace it", a.out));
+  }
+  fs::create_directories(a.out);
+  WriteFileAtomically(page, SitePage(tables, picture.filename().string()));
+  WriteFileAtomically(picture, EncodePng(SitePicture(/*threads=*/1)));
+  fmt::print("{}\n", page.string());
+  return kDone;
+}
+
+void DeclarePage(CLI::App& page, CommandLine& line) {
+  LandmarkArguments& a = *Bind(page, line, &Page);
+  page.add_option("TABLES", a.tables, "tissue tables to say which sites they have")->required();
+  page.add_option("--out", a.out, "folder for sites.md and sites.png")->required();
+  page.add_flag("--force", a.force, "replace them where they are");
+}
+
 void DeclareConvert(CLI::App& convert, CommandLine& line) {
   LandmarkArguments& a = *Bind(convert, line, &Convert);
   convert.add_option("IN", a.in, ".yaml, .mrk.json, .fcsv, .pp, .csv, .txt or .asc")->required();
@@ -63,6 +89,8 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
 constexpr std::array kLandmarkCommands = {
     ProgramCommand{"convert", "read landmarks of one program, write them for another",
                    &DeclareConvert},
+    ProgramCommand{"page", "a page with each of the sites: names, place, tables, picture",
+                   &DeclarePage},
 };
 
 void DeclareLandmarks(CLI::App& landmarks, CommandLine& line) {

@@ -147,4 +147,14 @@ NamedSite SiteCalled(std::string_view name) {
                                      name, SiteInWords(named->code), named->code)};
 }
 
+std::vector<std::string> OtherNamesOf(std::string_view landmark) {
+  std::vector<std::string> names;
+  for (const OtherName& other : kOtherNames) {
+    if (other.landmark == landmark) {
+      names.emplace_back(other.name);
+    }
+  }
+  return names;
+}
+
 }  // namespace semblance

@@ -5,6 +5,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace semblance {
 
@@ -20,5 +21,8 @@ struct NamedSite {
 // the side is l, r, left or right, before or behind ("left gonion", "Gonion (L)", "go_L", "18r"). A
 // landmark in the midline takes no side; one of a pair needs it.
 NamedSite SiteCalled(std::string_view name);
+
+// What a landmark ("go", sites.h) is called beside its code, number and printed name.
+std::vector<std::string> OtherNamesOf(std::string_view landmark);
 
 }  // namespace semblance

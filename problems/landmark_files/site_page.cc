@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/landmark_files/site_page.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <vector>
+
+#include "problems/pictures/pictures.h"
+#include "problems/pictures/stroke_font.h"
+#include "problems/subject/phantom.h"
+#include "problems/subject/site_names.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+struct Definition {
+  std::string_view landmark;
+  std::string_view words;  // where it is on the bone
+};
+
+constexpr Definition kDefinitions[] = {
+    {"sg", "midline of the forehead, in the shallow hollow just above glabella"},
+    {"g", "midline, the most forward point between the brow ridges, above the root of the nose"},
+    {"n", "midline, where the suture between nasal bones and frontal bone crosses it"},
+    {"rhi", "midline, the lower free end of the nasal bones, where cartilage begins"},
+    {"mp", "midline of the upper jaw, as high as the bone is still flat below the nasal spine"},
+    {"pr", "midline, the front edge of the upper jaw's bone between the two middle incisors"},
+    {"id", "midline, the upper tip of the lower jaw's bone between the two middle incisors"},
+    {"sm", "midline, the deepest point of the hollow between lower incisors and chin"},
+    {"pg", "midline, the most forward point of the chin's bone"},
+    {"me", "midline, the lowest point of the chin's bone; the dowel points down"},
+    {"fe", "the bulge of the forehead above the middle of the eyebrow"},
+    {"mso",
+     "the upper rim of the orbit at its highest point; the dowel points forward, not into "
+     "the orbit"},
+    {"mio", "the lower rim of the orbit at its lowest point; not the foramen below it"},
+    {"im", "the lower part of the cheek bone's front, below the middle of the orbit"},
+    {"lo",
+     "the cheek bone about 10 mm below the orbit, under its outer rim; not the corner of the "
+     "eye"},
+    {"zy",
+     "the arch of the cheek bone halfway along, as a rule its outermost point seen from above"},
+    {"sgl", "the root of the arch, above and a little before the opening of the ear"},
+    {"go",
+     "the outer side of the angle of the lower jaw, where the lines of its lower and its rear "
+     "border meet"},
+    {"sM2",
+     "the outer edge of the upper jaw's bone above the second molar; the dowel points to the "
+     "side"},
+    {"mr",
+     "the ramus of the lower jaw halfway from front to rear, at the height of the biting "
+     "surfaces"},
+    {"iM2",
+     "the outer edge of the lower jaw's bone below the second molar; the dowel points to the "
+     "side"},
+    {"op",
+     "midline of the back of the head, the point farthest from glabella, above the external "
+     "protuberance"},
+    {"v", "midline, the highest point of the skull as the head is held"},
+    {"mn", "midline, halfway between nasion and the end of the nasals"},
+    {"ss", "midline, the deepest point of the profile below the nasal spine"},
+    {"gn", "midline, halfway between mental eminence and the point beneath the chin"},
+    {"ac", "beside the nasal opening, about 5 mm out from its widest point"},
+    {"sC", "the outer edge of the upper jaw's bone above the crown of the canine"},
+    {"iC", "the outer edge of the lower jaw's bone below the crown of the canine"},
+    {"mmb", "the lower border of the lower jaw, halfway between chin and angle"},
+};
+
+std::string_view DefinitionOf(const Site& site) {
+  const auto* const found = std::ranges::find(kDefinitions, site.landmark, &Definition::landmark);
+  if (found == std::end(kDefinitions)) {
+    throw InputError(fmt::format("sites: {} has no definition; write one", site.code));
+  }
+  return found->words;
+}
+
+// "a" where the table has the row; "a (part)" where cells of it are missing.
+std::vector<std::string> TablesWith(const Site& site, std::span<const TissueTable> tables) {
+  std::vector<std::string> names;
+  for (const TissueTable& table : tables) {
+    const auto row = std::ranges::find(table.rows, site.landmark, &TissueRow::site);
+    if (row == table.rows.end()) {
+      continue;
+    }
+    const auto missing = std::ranges::count_if(
+        row->values, [](const auto& cell) { return cell.second.flag == CellFlag::kMissing; });
+    names.push_back(missing == 0 ? table.id : fmt::format("{} (part)", table.id));
+  }
+  return names;
+}
+
+std::string Row(const Site& site, std::span<const TissueTable> tables) {
+  return fmt::format("| {} | {} | {} | {} | {} | {} |\n",
+                     site.side == Side::kMidline ? fmt::format("`{}`", site.code)
+                                                 : fmt::format("`{0}_l` `{0}_r`", site.landmark),
+                     site.number == 0 ? "" : std::to_string(site.number), site.name,
+                     fmt::join(OtherNamesOf(site.landmark), ", "), DefinitionOf(site),
+                     fmt::join(TablesWith(site, tables), ", "));
+}
+
+std::string Rows(const std::vector<Site>& sites, std::span<const TissueTable> tables) {
+  std::string text =
+      "| code | no. | name | also | on the bone | tables |\n|---|--:|---|---|---|---|\n";
+  for (const Site& site : sites) {
+    if (site.side != Side::kRight) {  // a pair once
+      text += Row(site, tables);
+    }
+  }
+  return text;
+}
+
+constexpr int kWidth = 460, kHeight = 540;
+
+void Disc(Image& image, double x, double y, double radius, const Colour& colour) {
+  for (int row = static_cast<int>(y - radius) - 1; row <= static_cast<int>(y + radius) + 1; ++row) {
+    for (int column = static_cast<int>(x - radius) - 1; column <= static_cast<int>(x + radius) + 1;
+         ++column) {
+      const double inside = radius + 0.5 - std::hypot(column + 0.5 - x, row + 0.5 - y);
+      BlendPixel(image, column, row, colour, std::clamp(inside, 0.0, 1.0));
+    }
+  }
+}
+
+// A disc, and its number on the left or the right of it.
+void Mark(Image& image, const Camera& camera, const Site& site, const Vec3& point, bool left) {
+  const Vec3 seen = camera.view_from_world * (point - camera.centre);
+  const double pixels = kHeight / camera.height_mm;
+  const double x = kWidth / 2.0 + pixels * seen.x(), y = kHeight / 2.0 - pixels * seen.y();
+  Disc(image, x, y, 5, HexColour(0xffffff));
+  Disc(image, x, y, 4, HexColour(0xb3261e));
+  DrawText(image, x + (left ? -9 : 9), y + 5, std::to_string(site.number),
+           {.cap_height_px = 11,
+            .stroke = 0.15,
+            .colour = HexColour(0x16304f),
+            .anchor = left ? Anchor::kRight : Anchor::kLeft});
+}
+
+Image SeenFrom(View view, const Phantom& phantom, const Box3& region, int threads) {
+  const Camera camera = CameraFor(view, region, static_cast<double>(kWidth) / kHeight);
+  Image image =
+      Render({{SkullObject(phantom.skull)}}, camera, {.width = kWidth, .height = kHeight}, threads);
+  for (std::size_t k = 0; k < phantom.sites.size(); ++k) {
+    const Site& site = StandardSites()[k];
+    if (view == View::kFront || site.side != Side::kRight) {
+      const bool left =
+          view == View::kFront ? site.side != Side::kLeft : site.side == Side::kMidline;
+      Mark(image, camera, site, phantom.sites[k].base, left);
+    }
+  }
+  return image;
+}
+
+}  // namespace
+
+std::string SitePage(std::span<const TissueTable> tables, const std::string& picture) {
+  std::string page =
+      "# The sites\n\n"
+      "A site is a point of the skull by which tissue depth is known: there a dowel stands. Left "
+      "and "
+      "right are the subject's. A landmarks' file names a site\nby its code, its number with the "
+      "side (`18l`), or a name (`left gonion`); upper and lower case make no difference.\n\n"
+      "This page is made by `semblance landmarks page configs/tables/*.yaml --out docs --force`; a "
+      "test holds it and the program against each other.\n\n";
+  page += fmt::format("![the sites on a phantom's skull, by number]({})\n\n", picture);
+  page +=
+      "The skull is a phantom's, drawn by formula: it shows where the sites lie to each other, not "
+      "what the bone looks like there.\n\n"
+      "## The 32 of the network\n\nNumbers and names are those of the thesis's tables (Rhine).\n\n";
+  page += Rows(StandardSites(), tables);
+  page +=
+      "\n## Further sites of tables\n\n"
+      "The standard network and the generic face lack them. A landmark may stand at one: its table "
+      "gives the depth, the dowel joins the network, and the ray\nof the dowel tells where it "
+      "meets "
+      "the generic face. An experiment can also place one, or a site of its own:\n\n"
+      "```yaml\nsites:\n"
+      "  mn: {near: [n, rhi]}                    # the bone nearest to the middle of two "
+      "landmarks; "
+      "the table's depth\n"
+      "  scar: {near: [31.5, -80, 12], depth: 7.5}  # nearest to a point, in mm (LPS)\n"
+      "  cheek: {uv: [0.7, 0.45], depth: auto}   # under a point of the generic face, as deep as "
+      "interpolated: for the fit alone\n"
+      "  n: {uv: [0.5, 0.62], hold: true}        # where nasion lies on the generic face, set by "
+      "hand; relaxation leaves it there\n```\n\n";
+  page += Rows(FurtherSites(), tables);
+  page += "\n## The tables\n\n";
+  for (const TissueTable& table : tables) {
+    page += fmt::format("- `{}`: {}; {}. {}\n", table.id, table.title, table.population_label,
+                        table.citation);
+  }
+  page +=
+      "\n\"(part)\": some builds or one sex have no depth there. `tissue: {fill_from: ...}` takes "
+      "them from another table.\n\n"
+      "## Where the definitions come from\n\n"
+      "In our own words, after Caple and Stephan (2016), A standardized nomenclature for "
+      "craniofacial and facial anthropometry, Int J Legal Med 130:863-879,\nfor the points that "
+      "they name. `sg`, `fe`, `im`, `lo` and `sgl` are not among those: for them, and for the "
+      "directions of dowels, after the usual\ninstructions for Rhine's set of points.\n";
+  return page;
+}
+
+Image SitePicture(int threads) {
+  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 120});
+  Box3 region = Bounds(phantom.skull);
+  region.extend(Vec3(region.min() - Vec3(0, 15, 0)));  // room for the numbers before the face
+  const std::array views = {SeenFrom(View::kFront, phantom, region, threads),
+                            SeenFrom(View::kSide, phantom, region, threads)};
+  return ContactSheet(views,
+                      {.title = "", .captions = {"front", "left side"}, .legend = std::nullopt});
+}
+
+}  // namespace semblance

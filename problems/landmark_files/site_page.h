@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// docs/sites.md: each site's names, its place on the bone, the tables that have it, and a picture.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "problems/pictures/image.h"
+#include "problems/subject/tissue_table.h"
+
+namespace semblance {
+
+// The page, for the sites of sites.h in their order; picture: the file's name beside it. tables: in
+// whose order they are named; all of them are explained below. The same input, the same text.
+std::string SitePage(std::span<const TissueTable> tables, const std::string& picture);
+
+// A phantom's skull from the front and from its left, with the standard sites by their numbers.
+Image SitePicture(int threads);
+
+}  // namespace semblance
