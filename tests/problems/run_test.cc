@@ -16,11 +16,14 @@
 
 #include "fitting/terms/metric_distortion.h"
 #include "problems/face_template/template_io.h"
+#include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
+#include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
@@ -260,6 +263,48 @@ TEST(Run, ATemplateThatIsNotThereIsOneClearError) {
   Experiment experiment = SmallPhantom({});
   experiment.face_template = FileTemplate{"/no/head.hspline.json", "/no/sites.csv", {}};
   EXPECT_THROW(semblance::Run(experiment, {}), IoError);
+}
+
+// A phantom in files whose left cheek is gone, and nothing else of it.
+Experiment WithoutCheek(const fs::path& folder) {
+  const Phantom phantom = MakePhantom({.random_seed = 2, .rings = 40});
+  const Vec3 cheek =
+      std::ranges::find(phantom.sites, std::string("im_l"), &PhantomSite::site)->base;
+  std::vector<bool> keep;
+  for (const Triangle& t : phantom.skull.triangles) {
+    keep.push_back((TriangleCentroid(phantom.skull, t) - cheek).norm() > 35);
+  }
+  LandmarkFile landmarks;
+  landmarks.subject = "P";
+  for (const PhantomSite& s : phantom.sites) {
+    if ((s.base - cheek).norm() > 36) {
+      Landmark& landmark = landmarks.landmarks.emplace_back();
+      landmark.site = s.site;
+      landmark.point = {s.base.x(), s.base.y(), s.base.z()};
+    }
+  }
+  WriteFileAtomically(folder / "skull.ply", EncodeMesh(Submesh(phantom.skull, keep), ".ply"));
+  WriteFileAtomically(folder / "landmarks.yaml", EncodeLandmarks(landmarks, "landmarks.yaml"));
+  return SmallPhantom({fmt::format("subject={{type: files, skull: {0}/skull.ply, landmarks: "
+                                   "{0}/landmarks.yaml, mirror: {{missing: true}}}}",
+                                   folder.string()),
+                       "tissue={depths: table, table: " +
+                           (kConfigs / "tables/rhine_caucasoid.yaml").string() + "}"});
+}
+
+TEST(Run, MirroredBoneIsToldDrawnAndKeptToTheFace) {
+  const ScratchFolder folder;
+  const auto files = FilesOfRun(WithoutCheek(folder.Path()), folder / "run", 2);
+  const auto result = nlohmann::json::parse(files.at("result.json"));
+  EXPECT_GT(result.at("bone").at("mirrored_cm2"), 15);
+  EXPECT_GT(result.at("bone").at("observed_cm2"), 800);
+  EXPECT_THAT(result.at("notes").dump(), HasSubstr("the left side lacks"));
+  EXPECT_THAT(result.at("notes").dump(), HasSubstr("im_l"));
+  EXPECT_TRUE(files.contains("pictures/origin.png") && files.contains("pictures/origin_face.png"));
+  EXPECT_THAT(files.at("report.html"), HasSubstr("What of the bone was seen"));
+  for (const char* mesh : {"face.ply", "implicit.ply", "depth.ply"}) {
+    EXPECT_THAT(files.at(mesh).substr(0, 1000), HasSubstr("scalar_origin")) << mesh;
+  }
 }
 
 TEST(Run, TheFolderHoldsWhatItsManifestLists) {
