@@ -52,6 +52,7 @@ std::optional<JawPose> FindJawPose(std::span<const SitePoint> sites) {
     return std::nullopt;
   }
   std::vector<double> off_mm;
+  off_mm.reserve(lower.size());
   for (const SitePoint& s : lower) {
     off_mm.push_back((s.point - cranium->Foreseen(s.site)).norm());
   }
