@@ -73,8 +73,8 @@ TEST(ExtraDowels, TheInterpolatedDepthChangesNoOtherDowel) {
   EXPECT_EQ(was.subject.network.areas.size() + 2, is.subject.network.areas.size());
 }
 
-// 4 mm more than is interpolated in the middle of the cheek: the implicit face comes out to the tip,
-// but for what the emitters round off a cone of depths no broader than they reach (2.0 mm).
+// 4 mm more than is interpolated in the middle of the cheek: the implicit face comes out to the
+// tip, but for what the emitters round off a cone of depths no broader than they reach (2.0 mm).
 TEST(ExtraDowels, PullTheImplicitFaceToTheirTips) {
   constexpr char kMiddle[] = "near: [zy_l, mr_l, sM2_l]";
   const std::vector<std::string> fine = {"subject.rings=80", "implicit.resolution=70"};
