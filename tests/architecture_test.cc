@@ -59,7 +59,7 @@ const std::map<std::string, Layers> kRooms = {
       {"landmark_files", "preparation"},
       {"face_template"},
       {"metrics", "prior"},
-      {"pipeline"},
+      {"pipeline", "propose"},
       {kHall},
       {"report"},
       {"points", "study"},

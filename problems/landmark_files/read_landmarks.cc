@@ -183,6 +183,12 @@ LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& 
   }
   LandmarkReading reading{.file = ReadLandmarkFile(path), .notes = {}};
   ChooseAxes(path, options, reading.file, reading.notes);
+  if (reading.file.proposed) {
+    reading.notes.push_back(fmt::format(
+        "{}: these landmarks are a proposal that no person has confirmed; look at each on the "
+        "skull, correct it, then set `proposed: false`",
+        path.filename().string()));
+  }
   return reading;
 }
 
@@ -208,6 +214,9 @@ std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) 
   lose(format.holds_notes, noted, "notes");
   if (format.parse != nullptr && !file.absent.empty()) {
     lost.push_back(fmt::format("{} sites that are said to be absent", file.absent.size()));
+  }
+  if (format.parse != nullptr && file.proposed) {
+    lost.emplace_back("that they are a proposal");
   }
   return lost;
 }

@@ -3,17 +3,25 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/landmark_files/site_page.h"
 #include "problems/program/exit_code.h"
+#include "problems/program/progress.h"
+#include "problems/propose/proposal_table.h"
+#include "problems/propose/propose_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {
@@ -34,11 +42,15 @@ void Tell(const std::vector<std::string>& lines, const char* what) {
   }
 }
 
-int Convert(const LandmarkArguments& a) {
-  if (!a.force && fs::exists(a.out)) {
+void CheckFree(const std::string& out, bool force) {
+  if (!force && fs::exists(out)) {
     throw IoError(
-        fmt::format("{}: it exists; name another file, or add --force to replace it", a.out));
+        fmt::format("{}: it exists; name another file, or add --force to replace it", out));
   }
+}
+
+int Convert(const LandmarkArguments& a) {
+  CheckFree(a.out, a.force);
   const LandmarkReading reading = ReadLandmarks(a.in, a.reading);
   const std::string bytes = EncodeLandmarks(reading.file, a.out);
   Tell(reading.notes, "note");
@@ -86,11 +98,102 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
   convert.add_flag("--force", a.force, "replace a file of the same name");
 }
 
+// What the user typed.
+struct ProposeArguments {
+  std::string skull, out, compare;
+  std::vector<std::pair<std::string, std::string>> references;  // skull, landmarks
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  bool force = false, quiet = false;
+  std::stop_token stop;
+};
+
+// Without a reference two made-up heads stand in.
+std::vector<ReferenceHead> ReferencesOf(const ProposeArguments& a) {
+  std::vector<ReferenceHead> heads;
+  for (const auto& [skull, landmarks] : a.references) {
+    heads.push_back(ReadReference(skull, landmarks, a.threads));
+  }
+  if (heads.empty()) {
+    heads.push_back(PhantomReference(1));
+    heads.push_back(PhantomReference(2));
+    fmt::print(stderr,
+               "note: without --reference made-up heads stand in, which have no orbits, arches or "
+               "teeth; a marked skull as --reference is much better\n");
+  }
+  return heads;
+}
+
+void TellDifferences(const ProposeArguments& a, LandmarkFile file) {
+  if (file.axes == "RAS") {
+    for (Landmark& l : file.landmarks) {
+      l.point = {-l.point[0], -l.point[1], l.point[2]};
+    }
+  }
+  fmt::print("{}", TextOf(CompareProposal(file, ReadLandmarks(a.compare).file)));
+}
+
+void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
+  const std::string bytes = EncodeLandmarks(file, out);
+  Tell(LostIn(file, out), "not kept in this kind of file");
+  if (const fs::path folder = fs::path(out).parent_path(); !folder.empty()) {
+    fs::create_directories(folder);
+  }
+  CheckFree(out, a.force);
+  WriteFileAtomically(out, bytes);
+  fmt::print(
+      "{}: {} sites proposed, {} absent. Look at each on the skull and correct it; then set "
+      "`proposed: false`\n",
+      out, file.landmarks.size(), file.absent.size());
+}
+
+int Propose(const ProposeArguments& a) {
+  const std::string out =
+      a.out.empty() ? fmt::format("out/{}_proposed.yaml", fs::path(a.skull).stem().string())
+                    : a.out;
+  const bool writes = a.compare.empty() || !a.out.empty();
+  if (writes) {
+    CheckFree(out, a.force);
+  }
+  RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
+  if (!a.quiet) {
+    context.on_event = ProgressPrinter(stderr);
+  }
+  const Proposal proposal = ProposeLandmarks(ReadMesh(a.skull), a.skull, ReferencesOf(a), context);
+  Tell(proposal.notes, "note");
+  const LandmarkFile file = ProposalFile(proposal, fs::path(a.skull).stem().string());
+  if (!a.compare.empty()) {
+    TellDifferences(a, file);
+  }
+  if (writes) {
+    WriteProposal(a, out, file);
+  }
+  return kDone;
+}
+
+void DeclarePropose(CLI::App& propose, CommandLine& line) {
+  ProposeArguments& a = *Bind(propose, line, &Propose);
+  a.stop = line.stop;
+  propose.add_option("SKULL", a.skull, "skull (.ply .obj .stl .off), mm, in any pose")->required();
+  propose.add_option("--reference", a.references,
+                     "SKULL LANDMARKS: a skull whose landmarks are known, mm; may be repeated: the "
+                     "median counts [two made-up heads]");
+  propose.add_option("--out", a.out, "file for the proposal [out/SKULL_proposed.yaml]");
+  propose.add_option("--compare", a.compare,
+                     "landmarks placed by hand: tells how far each site is off; without --out no "
+                     "file is written then");
+  propose.add_flag("--force", a.force, "replace a file of the same name");
+  propose.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  propose.add_flag("--quiet", a.quiet, "no progress");
+}
+
 constexpr std::array kLandmarkCommands = {
     ProgramCommand{"convert", "read landmarks of one program, write them for another",
                    &DeclareConvert},
     ProgramCommand{"page", "a page with each of the sites: names, place, tables, picture",
                    &DeclarePage},
+    ProgramCommand{"propose", "propose the landmarks of a skull, as a file to correct",
+                   &DeclarePropose},
 };
 
 void DeclareLandmarks(CLI::App& landmarks, CommandLine& line) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands that work on landmarks alone: landmarks convert.
+// The commands that work on landmarks alone: landmarks convert, landmarks propose.
 #pragma once
 
 #include <span>

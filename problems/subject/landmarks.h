@@ -46,6 +46,7 @@ struct LandmarkFile {
   std::string axes = "LPS";  // of points and normals, as EnumNames(Axes); "": the file does not say
   std::vector<Landmark> landmarks;
   std::vector<AbsentLandmark> absent;
+  bool proposed = false;  // by the program, and no person has confirmed it
 };
 
 struct PlaceOptions {
@@ -97,6 +98,10 @@ void Fields(Visitor& visit, LandmarkFile& o) {
   visit(FieldInfo{.name = "landmarks", .doc = "those that were placed"}, o.landmarks);
   visit(FieldInfo{.name = "absent", .doc = "those that cannot be placed, with the reason"},
         o.absent);
+  visit(FieldInfo{.name = "proposed",
+                  .doc = "the program proposed the points and no person has confirmed them; set it "
+                         "to false once each was looked at"},
+        o.proposed);
 }
 
 template <class Visitor>

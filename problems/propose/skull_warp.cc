@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/propose/skull_warp.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "problems/propose/skull_pose.h"
+#include "surfaces/mesh/vertex_clusters.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kAlike = 0.5;  // cosine of 60 degrees between normals
+
+// Points of the reference and where they belong on the skull.
+struct Pairs {
+  std::vector<Vec3> from, to;
+  std::vector<double> weights;
+
+  void Add(const Vec3& source, const Vec3& target, double distance_mm, double reach_mm) {
+    const double share = distance_mm / reach_mm;
+    if (share < 1) {
+      from.push_back(source);
+      to.push_back(target);
+      weights.push_back(std::max(1e-3, (1 - share * share) * (1 - share * share)));  // Tukey
+    }
+  }
+};
+
+template <class IsNear>
+std::vector<ShellPoint> DenseWhere(const SkullShell& shell, IsNear&& is_near) {
+  constexpr double kNearCell_mm = 15, kFarCell_mm = 40;
+  std::vector<ShellPoint> points;
+  for (const ShellPoint& p : SpreadPoints(shell, kNearCell_mm)) {
+    if (is_near(p.position)) {
+      points.push_back(p);
+    }
+  }
+  for (const ShellPoint& p : SpreadPoints(shell, kFarCell_mm)) {
+    if (!is_near(p.position)) {
+      points.push_back(p);
+    }
+  }
+  return points;
+}
+
+bool NearASite(const ReferenceHead& reference, const Vec3& p) {
+  constexpr double kNear_mm = 30;
+  return std::ranges::any_of(reference.sites,
+                             [&](const SitePoint& s) { return (s.point - p).norm() <= kNear_mm; });
+}
+
+TriMesh Carried(const TriMesh& mesh, const ThinPlate& plate) {
+  TriMesh carried = mesh;
+  std::ranges::transform(mesh.points, carried.points.begin(), plate);
+  return carried;
+}
+
+struct Round {
+  double stiffness_mm, reach_mm;
+};
+
+class Warper {
+ public:
+  Warper(const ReferenceHead& reference, const SkullShell& skull, const Similarity& pose)
+      : reference_(reference), skull_(skull), pose_(pose) {
+    of_reference_ =
+        DenseWhere(reference.shell, [&](const Vec3& p) { return NearASite(reference, p); });
+    const Similarity back = Inverse(pose);
+    of_skull_ = DenseWhere(skull, [&](const Vec3& q) { return NearASite(reference, back * q); });
+    coarse_ = ClusterVertices(reference.shell.mesh, 4);
+    plate_.affine << pose.scale * pose.rotation, pose.translation;
+  }
+
+  ThinPlate Run() {
+    constexpr std::array kRounds = {Round{20000, 25}, Round{5000, 20}, Round{1000, 16},
+                                    Round{200, 12},   Round{60, 9},    Round{20, 7}};
+    for (const Round& round : kRounds) {
+      const Pairs pairs = Match(round.reach_mm);
+      if (pairs.from.size() < 30) {
+        break;  // nothing to go by: the pose stays
+      }
+      plate_ =
+          FitThinPlate(pairs.from, pairs.to, pairs.weights, {.stiffness_mm = round.stiffness_mm});
+    }
+    return std::move(plate_);
+  }
+
+ private:
+  Pairs Match(double reach_mm) const {
+    Pairs pairs;
+    for (const ShellPoint& p : of_reference_) {
+      const Vec3 moved = plate_(p.position);
+      const ShellPoint q = skull_.Closest(moved);
+      if ((pose_.rotation * p.normal).dot(q.normal) > kAlike) {
+        pairs.Add(p.position, q.position, (q.position - moved).norm(), reach_mm);
+      }
+    }
+    const SkullShell carried = AsShell(Carried(coarse_, plate_));
+    for (const ShellPoint& q : of_skull_) {
+      const MeshPoint p = carried.query.Closest(q.position);
+      if (carried.At(p).normal.dot(q.normal) > kAlike) {
+        pairs.Add(Before(p), q.position, p.distance_mm, reach_mm);
+      }
+    }
+    return pairs;
+  }
+
+  // Where a point of the carried shell came from.
+  Vec3 Before(const MeshPoint& p) const {
+    const Triangle& t = coarse_.triangles[p.triangle];
+    return p.weights[0] * coarse_.points[t[0]] + p.weights[1] * coarse_.points[t[1]] +
+           p.weights[2] * coarse_.points[t[2]];
+  }
+
+  const ReferenceHead& reference_;
+  const SkullShell& skull_;
+  const Similarity& pose_;
+  std::vector<ShellPoint> of_reference_, of_skull_;
+  TriMesh coarse_;  // of the reference, for matches from the skull
+  ThinPlate plate_;
+};
+
+std::vector<ShellMatch> MatchPatch(const std::vector<ShellPoint>& patch, const SkullShell& skull,
+                                   const Similarity& motion) {
+  constexpr double kReach_mm = 6;
+  std::vector<ShellMatch> matches;
+  for (const ShellPoint& p : patch) {
+    const Vec3 from = motion * p.position;
+    const ShellPoint q = skull.Closest(from);
+    const double distance_mm = (q.position - from).norm();
+    if (distance_mm <= kReach_mm) {
+      matches.push_back({.from = from,
+                         .to = q.position,
+                         .normal = q.normal,
+                         .distance_mm = distance_mm,
+                         .faces_alike = (motion.rotation * p.normal).dot(q.normal) > kAlike});
+    }
+  }
+  return matches;
+}
+
+struct PatchFit {
+  Similarity motion;
+  double misfit_mm = kNaN;
+};
+
+PatchFit LayPatch(const std::vector<ShellPoint>& patch, const SkullShell& skull) {
+  constexpr int kRounds = 12;
+  constexpr double kKept = 0.8;
+  const std::size_t fewest = std::max<std::size_t>(12, patch.size() / 3);
+  PatchFit fit;
+  for (int round = 0; round <= kRounds; ++round) {
+    const std::vector<ShellMatch> kept = KeepClosest(MatchPatch(patch, skull, fit.motion), kKept);
+    if (kept.size() < fewest) {
+      return {};
+    }
+    fit.misfit_mm = 0;
+    for (const ShellMatch& m : kept) {
+      fit.misfit_mm += m.distance_mm / static_cast<double>(kept.size());
+    }
+    if (round < kRounds) {
+      fit.motion = StepTowards(kept, /*scale_too=*/false) * fit.motion;
+    }
+  }
+  return fit;
+}
+
+std::vector<ShellPoint> PatchAround(const Vec3& site, const std::vector<ShellPoint>& points,
+                                    const ThinPlate& plate, const Mat3& rotation) {
+  constexpr double kRadius_mm = 18;
+  std::vector<ShellPoint> patch;
+  for (const ShellPoint& p : points) {
+    if ((p.position - site).norm() <= kRadius_mm) {
+      patch.push_back({plate(p.position), rotation * p.normal});
+    }
+  }
+  return patch;
+}
+
+}  // namespace
+
+Similarity FacePose(const ReferenceHead& reference, const SkullShell& skull,
+                    const Similarity& skull_from_reference) {
+  return RefinePose(reference.shell, skull, skull_from_reference,
+                    [&](const Vec3& p) { return NearASite(reference, p); });
+}
+
+ThinPlate WarpOnto(const ReferenceHead& reference, const SkullShell& skull,
+                   const Similarity& skull_from_reference) {
+  return Warper(reference, skull, skull_from_reference).Run();
+}
+
+std::vector<WarpedSite> CarrySites(const ReferenceHead& reference, const SkullShell& skull,
+                                   const Similarity& skull_from_reference, const ThinPlate& plate) {
+  constexpr double kCell_mm = 3, kFarthest_mm = 8;
+  const std::vector<ShellPoint> points = SpreadPoints(reference.shell, kCell_mm);
+  std::vector<WarpedSite> sites;
+  for (const SitePoint& s : reference.sites) {
+    const Vec3 carried = plate(s.point);
+    const PatchFit fit =
+        LayPatch(PatchAround(s.point, points, plate, skull_from_reference.rotation), skull);
+    const Vec3 laid = fit.motion * carried;
+    const bool near = (laid - carried).norm() <= kFarthest_mm;
+    sites.push_back({s.site, near ? laid : carried, fit.misfit_mm});
+  }
+  return sites;
+}
+
+}  // namespace semblance
