@@ -14,6 +14,7 @@
 //     metric: face.rms_mm              # that the report ranks by; lower is better
 //     keep: summary
 //     job: face
+//     identify: {others: [{name: c, set: {subject.random_seed: 3}}]}   # for job: identify
 //
 // Each of grid, zip, list and sample gives rows; a trial is a subject with one row of each. A value
 // is any part of an experiment, be it a number or a whole strategy.
@@ -42,8 +43,10 @@ constexpr auto EnumNames(TrialFiles) {
   return std::to_array<std::string_view>({"summary", "view", "run"});
 }
 
-enum class StudyJob { kFace, kDepth };
-constexpr auto EnumNames(StudyJob) { return std::to_array<std::string_view>({"face", "depth"}); }
+enum class StudyJob { kFace, kDepth, kIdentify };
+constexpr auto EnumNames(StudyJob) {
+  return std::to_array<std::string_view>({"face", "depth", "identify"});
+}
 
 // lhs: one point in each of n equal slices of each axis (McKay et al. 1979); sobol: the first n
 // points of the sequence after its origin.
@@ -66,6 +69,35 @@ void Fields(Visitor& visit, StudySubject& o) {
                   .doc = "skip the subject where its files are missing, and say so, rather than "
                          "refuse the study"},
         o.optional);
+}
+
+// The gallery is the study's subjects and these others; everyone in it has a true skin.
+struct IdentifyOptions {
+  std::vector<StudySubject> others;  // whom no trial asks for
+  double ceiling_cell_mm = 3;        // the ceiling is the true face in vertices so far apart,
+  double ceiling_noise_mm = 0.5;     // each off by so much (rms): what another scan would show
+  std::uint64_t random_seed = 1;     // of the noise
+};
+template <class Visitor>
+void Fields(Visitor& visit, IdentifyOptions& o) {
+  visit(FieldInfo{.name = "others",
+                  .doc = "people of the gallery beside the study's subjects, whom no trial asks "
+                         "for: name, base and set as those have"},
+        o.others);
+  visit(
+      FieldInfo{.name = "ceiling_cell_mm",
+                .unit = "mm",
+                .min = 0.1,
+                .max = 20,
+                .doc = "of the ceiling, the true face seen again: how far its vertices are apart"},
+      o.ceiling_cell_mm);
+  visit(FieldInfo{.name = "ceiling_noise_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 20,
+                  .doc = "of the ceiling: rms by which each vertex is off along its normal"},
+        o.ceiling_noise_mm);
+  visit(FieldInfo{.name = "random_seed", .doc = "of the ceiling's noise"}, o.random_seed);
 }
 
 struct StudySamples {
@@ -110,6 +142,7 @@ struct StudyFile {
   std::string metric = "face.rms_mm";
   TrialFiles keep = TrialFiles::kSummary;  // the files of a run are some 30 MB, of a summary 10 kB
   StudyJob job = StudyJob::kFace;
+  std::optional<IdentifyOptions> identify;  // of that job only; left out, its defaults
 };
 template <class Visitor>
 void Fields(Visitor& visit, StudyFile& o) {
@@ -139,8 +172,17 @@ void Fields(Visitor& visit, StudyFile& o) {
                          "view needs (job: depth: pictures of the first subject's depth maps); "
                          "run, all files of a run"},
         o.keep);
-  visit(FieldInfo{.name = "job", .doc = "face, or depth: the interpolated depth without a fit"},
+  visit(FieldInfo{.name = "job",
+                  .doc = "face; depth: the interpolated depth without a fit; identify: the face, "
+                         "and its rank among the subjects' true faces"},
         o.job);
+  visit(FieldInfo{.name = "identify", .doc = "for job: identify"}, o.identify);
+}
+template <class Report>
+void CheckValue(Report& report, const StudyFile& o) {
+  if (o.identify && o.job != StudyJob::kIdentify) {
+    report("identify", "is for a study of that job only; set job: identify, or take it out");
+  }
 }
 
 // Throws IoError if the file cannot be read. What is wrong with it goes to `errors`; `tree` gets

@@ -33,29 +33,53 @@ class SubjectReader {
                 ConfigErrors& errors)
       : study_(study), tree_(tree), defaults_(defaults), errors_(errors) {}
 
-  std::vector<SubjectTree> Read() const {
+  struct All {
+    std::vector<SubjectTree> subjects, others;
+  };
+
+  All Read() const {
     const ConfigNode base = ReadBase();
-    std::vector<SubjectTree> subjects;
-    for (std::size_t n = 0; n < study_.subjects.size(); ++n) {
-      const StudySubject& subject = study_.subjects[n];
-      const std::string path = JoinPath("subjects", n);
-      RequireOwnName(n, path);
-      ConfigNode tree = base;
-      if (!subject.base.empty()) {
-        tree = MergeTrees(std::move(tree), Load(subject.base, JoinPath(path, "base")));
-      }
-      Apply(study_.set, tree);
-      Apply(subject.set, tree);
-      subjects.push_back({subject.name, std::move(tree), subject.optional});
-    }
+    All all{.subjects = ReadList(study_.subjects, "subjects", base), .others = {}};
     if (study_.subjects.empty()) {
-      subjects.push_back({"base", base});
-      Apply(study_.set, subjects.back().tree);
+      all.subjects.push_back({"base", base});
+      Apply(study_.set, all.subjects.back().tree);
     }
-    return subjects;
+    if (study_.identify) {
+      all.others = ReadList(study_.identify->others, "identify.others", base);
+      RequireOtherNames(all);
+    }
+    return all;
   }
 
  private:
+  std::vector<SubjectTree> ReadList(const std::vector<StudySubject>& list,
+                                    const std::string& list_path, const ConfigNode& base) const {
+    std::vector<SubjectTree> trees;
+    for (std::size_t n = 0; n < list.size(); ++n) {
+      const std::string path = JoinPath(list_path, n);
+      RequireOwnName(list, n, path);
+      ConfigNode tree = base;
+      if (!list[n].base.empty()) {
+        tree = MergeTrees(std::move(tree), Load(list[n].base, JoinPath(path, "base")));
+      }
+      Apply(study_.set, tree);
+      Apply(list[n].set, tree);
+      trees.push_back({list[n].name, std::move(tree), list[n].optional});
+    }
+    return trees;
+  }
+
+  void RequireOtherNames(const All& all) const {
+    for (std::size_t n = 0; n < all.others.size(); ++n) {
+      if (std::ranges::find(all.subjects, all.others[n].name, &SubjectTree::name) !=
+          all.subjects.end()) {
+        Fail(JoinPath("identify.others", n),
+             fmt::format("'{}' is a subject too, and so in the gallery already; take one out",
+                         all.others[n].name));
+      }
+    }
+  }
+
   void Fail(std::string_view path, std::string_view what) const {
     errors_.Add(PlaceOf(tree_, path), path, what);
   }
@@ -68,9 +92,10 @@ class SubjectReader {
     return Load(study_.base, "base");
   }
 
-  void RequireOwnName(std::size_t n, const std::string& path) const {
-    const std::string& name = study_.subjects[n].name;
-    const auto begin = study_.subjects.begin();
+  void RequireOwnName(const std::vector<StudySubject>& list, std::size_t n,
+                      const std::string& path) const {
+    const std::string& name = list[n].name;
+    const auto begin = list.begin();
     if (name.empty()) {
       Fail(path, "the subject has no name; give it one");
     } else if (std::any_of(begin, begin + static_cast<std::ptrdiff_t>(n),
@@ -208,14 +233,31 @@ class ExperimentHash {
   std::map<std::string, std::string> file_hashes_;
 };
 
+// What the trials of a study have in common beside their experiments; empty for job: face.
+std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
+  std::string common = plan.job == StudyJob::kDepth ? "depth" : "";
+  if (plan.job == StudyJob::kIdentify) {
+    common = fmt::format("identify {} {} {}", plan.identify.ceiling_cell_mm,
+                         plan.identify.ceiling_noise_mm, plan.identify.random_seed);
+    for (const GalleryEntry& person : plan.gallery) {
+      common += person.name + hash(person.experiment);
+    }
+  }
+  return common;
+}
+
 // Gives each trial its id; two of one id are a fault.
 void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
   ExperimentHash hash;
+  const std::string common = CommonPart(plan, hash);
   std::map<std::string, std::size_t> first;
   std::string ids;
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     StudyTrial& trial = plan.trials[n];
     trial.id = hash(trial.experiment);
+    if (plan.job == StudyJob::kIdentify) {  // its result is not the experiment's alone
+      trial.id = Sha256OfText(trial.id + common).substr(0, ExperimentHash::kIdDigits);
+    }
     ids += trial.id;
     const auto [it, is_new] = first.emplace(trial.id, n);
     if (!is_new) {
@@ -224,7 +266,7 @@ void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
           file.string(), it->second + 1, n + 1, trial.subject, fmt::join(trial.values, ", ")));
     }
   }
-  ids += plan.job == StudyJob::kDepth ? "depth" : "";
+  ids += common;
   plan.hash = Sha256OfText(ids).substr(0, ExperimentHash::kIdDigits);
 }
 
@@ -246,6 +288,24 @@ void AddTrials(const fs::path& file, const SubjectTree& subject, const std::vect
   }
 }
 
+// The person of a subject's tree, where its files are there.
+void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& plan,
+                  TrialFaults& faults) {
+  ConfigErrors errors;
+  StudyTrial as_trial{"", person.name, {}, ReadConfigTree<Experiment>(person.tree, errors)};
+  faults.Add(errors);
+  const std::set<std::string> missing = MissingFiles({as_trial});
+  if (missing.empty()) {
+    plan.gallery.push_back({person.name, std::move(as_trial.experiment)});
+  } else if (!person.optional) {
+    faults.Add(fmt::format("{}: gallery: {}: no such file: {}", file.string(), person.name,
+                           fmt::join(missing, ", ")));
+  } else {
+    plan.notes.push_back(
+        fmt::format("gallery: {}: left out, as there is no {}", person.name, *missing.begin()));
+  }
+}
+
 std::vector<fs::path> FilesOf(const PhantomOptions&) { return {}; }
 std::vector<fs::path> FilesOf(const FileSubject& o) { return {o.skull, o.skin, o.landmarks}; }
 std::vector<fs::path> FilesOf(const CtSubject& o) { return {o.volume, o.landmarks}; }
@@ -257,7 +317,7 @@ StudyPlan ReadStudy(const fs::path& file) {
   ConfigNode tree;
   const StudyFile study = ReadStudyFile(file, tree, errors);
   const ConfigNode defaults = ConfigTreeOf(Experiment{});
-  const auto subjects = SubjectReader(study, tree, defaults, errors).Read();
+  const auto [subjects, others] = SubjectReader(study, tree, defaults, errors).Read();
   const std::vector<StudyRow> rows = StudyRows(study, errors);
   errors.ThrowIfAny();
 
@@ -267,6 +327,14 @@ StudyPlan ReadStudy(const fs::path& file) {
   TrialFaults faults;
   for (const SubjectTree& subject : subjects) {
     AddTrials(file, subject, rows, defaults, plan, faults);
+  }
+  if (study.job == StudyJob::kIdentify) {
+    plan.identify = study.identify.value_or(IdentifyOptions{});
+    for (const auto* people : {&subjects, &others}) {
+      for (const SubjectTree& person : *people) {
+        AddToGallery(file, person, plan, faults);
+      }
+    }
   }
   faults.ThrowIfAny();
   if (plan.trials.empty()) {

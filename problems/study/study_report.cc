@@ -11,6 +11,7 @@
 #include "problems/report/report.h"
 #include "problems/report/scene_json.h"
 #include "problems/report/svg_plot.h"
+#include "problems/study/identify_report.h"
 #include "problems/study/results_sqlite.h"
 #include "problems/study/study_subtables.h"
 
@@ -332,6 +333,7 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
   if (ranked.size() > 1) {
     sections.push_back(RankSection(ranked));
   }
+  std::ranges::move(IdentifySections(results, ranked), std::back_inserter(sections));
   sections.push_back({.heading = "Behind the metric", .tables = Subtables(results, ranked)});
   sections.push_back(CurvesSection(results, ranked));
   sections.push_back({.heading = "Depth maps", .images = maps});

@@ -21,6 +21,7 @@
 #include "problems/report/scene_json.h"
 #include "problems/report/timing_json.h"
 #include "problems/study/depth_study.h"
+#include "problems/study/identify_study.h"
 #include "problems/study/study_tables.h"
 #include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
@@ -164,8 +165,9 @@ class StudyRunner {
     Files write = [](OutputFolder&) {};
     const double cpu_before_s = ThreadCpu_s();
     try {
-      write = plan_.job == StudyJob::kFace ? Face(trial, cpu_before_s, json)
-                                           : Depth(trial, cpu_before_s, json);
+      write = plan_.job == StudyJob::kFace    ? Face(trial, cpu_before_s, json)
+              : plan_.job == StudyJob::kDepth ? Depth(trial, cpu_before_s, json)
+                                              : Identity(trial, cpu_before_s, json);
     } catch (const Cancelled&) {
       throw;
     } catch (const std::bad_alloc&) {
@@ -213,7 +215,25 @@ class StudyRunner {
         std::make_shared<const RunResult>(semblance::Run(trial.experiment, Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = Json::parse(ResultJson(trial.experiment, *result));
-    const double cpu_s = ThreadCpu_s() - cpu_before_s;
+    return FilesOfRun(trial, result, ThreadCpu_s() - cpu_before_s);
+  }
+
+  Files Identity(const StudyTrial& trial, double cpu_before_s, Json& json) {
+    const auto own = std::ranges::find(plan_.gallery, trial.subject, &GalleryEntry::name);
+    if (own == plan_.gallery.end()) {
+      throw InputError(fmt::format(
+          "{} is not in the gallery, as files of the study's base are missing", trial.subject));
+    }
+    auto result = std::make_shared<const IdentifyResult>(Identify(
+        trial.experiment, plan_.gallery, static_cast<std::size_t>(own - plan_.gallery.begin()),
+        plan_.identify, Quiet(), cache_));
+    SetStatus(result->run.Faults(), json);
+    json["result"] = Json::parse(IdentifyResultJson(trial.experiment, *result));
+    return FilesOfRun(trial, {result, &result->run}, ThreadCpu_s() - cpu_before_s);
+  }
+
+  Files FilesOfRun(const StudyTrial& trial, const std::shared_ptr<const RunResult>& result,
+                   double cpu_s) const {
     return [this, &trial, result, cpu_s](OutputFolder& output) {
       const RunContext quiet;
       if (plan_.keep == TrialFiles::kRun) {
