@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/subject/phantom.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/program_call.h"
 
 namespace semblance {
@@ -45,6 +47,18 @@ TEST_F(LandmarkCommands, WritesNothingWhereANameIsNoSite) {
       testing::CallProgram(folder_, "landmarks convert odd.csv out.yaml --leave-out-unknown");
   EXPECT_EQ(kept.code, 0);
   EXPECT_THAT(kept.err, HasSubstr("left out: 'F-1'"));
+}
+
+TEST_F(LandmarkCommands, AProposalSaysThatItIsOneAndReplacesNothingUnasked) {
+  const TriMesh skull = MakePhantom({.random_seed = 4, .rings = 40}).skull;
+  WriteFileAtomically(folder_ / "skull.ply", EncodeMesh(skull, ".ply"));
+  ASSERT_EQ(testing::CallProgram(folder_, "landmarks propose skull.ply --quiet").code, 0);
+  const LandmarkReading reading = ReadLandmarks(folder_ / "out/skull_proposed.yaml");
+  EXPECT_TRUE(reading.file.proposed);
+  EXPECT_THAT(reading.notes, ::testing::Contains(HasSubstr("no person has confirmed")));
+  const testing::Outcome again = testing::CallProgram(folder_, "landmarks propose skull.ply");
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("it exists"));
 }
 
 }  // namespace
