@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-using Cell = std::array<std::int64_t, 4>;  // of the grid, and the side that is faced
+using FacedCell = std::array<std::int64_t, 4>;  // of the grid, and the side that is faced
 
 std::int64_t FacedSide(const Vec3& normal) {
   Eigen::Index axis = 0;
@@ -20,7 +20,7 @@ std::int64_t FacedSide(const Vec3& normal) {
   return 2 * axis + (normal[axis] < 0 ? 1 : 0);
 }
 
-Cell CellOf(const Vec3& p, const Vec3& normal, double cell_mm) {
+FacedCell FacedCellOf(const Vec3& p, const Vec3& normal, double cell_mm) {
   if (!p.allFinite()) {
     throw InputError("cluster vertices: a point is not finite; repair the mesh first");
   }
@@ -35,12 +35,12 @@ TriMesh ClusterVertices(const TriMesh& mesh, double cell_mm) {
     throw InputError(fmt::format("cluster vertices: cell_mm is {}; it must be positive", cell_mm));
   }
   const std::vector<Vec3> normals = VertexNormals(mesh);
-  std::map<Cell, std::int32_t> clusters;  // numbered in the order of their first vertices
+  std::map<FacedCell, std::int32_t> clusters;  // numbered in the order of their first vertices
   std::vector<std::int32_t> cluster_of(mesh.points.size());
   TriMesh coarse;
   std::vector<double> members;
   for (std::size_t v = 0; v < mesh.points.size(); ++v) {
-    const auto [it, is_new] = clusters.try_emplace(CellOf(mesh.points[v], normals[v], cell_mm),
+    const auto [it, is_new] = clusters.try_emplace(FacedCellOf(mesh.points[v], normals[v], cell_mm),
                                                    static_cast<std::int32_t>(clusters.size()));
     if (is_new) {
       coarse.points.emplace_back(Vec3::Zero());
