@@ -12,6 +12,22 @@ namespace {
 
 bool InDomain(const Vec2& uv) { return (uv.array() >= 0).all() && (uv.array() <= 1).all(); }
 
+bool IsPositive(double value) { return std::isfinite(value) && value > 0; }
+
+void CheckShapePoints(std::span<const ShapePoint> shape) {
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    const ShapePoint& p = shape[i];
+    if (!p.position.allFinite() || !InDomain(p.uv) || !IsPositive(p.sd_mm) ||
+        !IsPositive(p.share)) {
+      throw InputError(
+          fmt::format("fit target: point {} of the prior's shape: (u,v) = ({}, {}), sd_mm {}, "
+                      "share {}; give a finite position, (u,v) in [0,1] x [0,1], and sd_mm and "
+                      "share above 0",
+                      i, p.uv.x(), p.uv.y(), p.sd_mm, p.share));
+    }
+  }
+}
+
 }  // namespace
 
 FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
@@ -49,7 +65,7 @@ void CheckTarget(const FitTarget& target) {
     if (!InDomain(p.uv)) {
       fail(fmt::format("(u,v) = ({}, {}) is outside [0,1] x [0,1]", p.uv.x(), p.uv.y()));
     }
-    if (!(std::isfinite(p.weight) && p.weight > 0)) {
+    if (!IsPositive(p.weight)) {
       fail(fmt::format("weight {} is not a positive number", p.weight));
     }
     if (!target.anchors.empty() && target.anchors[i].foot.allFinite() &&
@@ -58,6 +74,7 @@ void CheckTarget(const FitTarget& target) {
                        target.anchors[i].direction.norm()));
     }
   }
+  CheckShapePoints(target.shape);
 }
 
 }  // namespace semblance

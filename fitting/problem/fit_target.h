@@ -25,9 +25,19 @@ struct BoneAnchor {
   Vec3 direction = Vec3::Constant(kNaN);  // unit, out of the bone
 };
 
+// What a prior holds for likely, for PriorShapeTerm: at uv the surface lies at `position`, give or
+// take sd_mm in each direction.
+struct ShapePoint {
+  Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
+  Vec3 position = Vec3::Constant(kNaN);  // mm
+  double sd_mm = kNaN;                   // > 0
+  double share = 1;                      // > 0: of the surface that it stands for, relative
+};
+
 struct FitTarget {
   std::vector<FitPoint> points;
   std::vector<BoneAnchor> anchors = {};  // one per point, or none
+  std::vector<ShapePoint> shape = {};    // where there is a prior
 };
 
 // Scattered points, without labels. weights: one per point, or none for equal ones. Throws
@@ -36,8 +46,9 @@ FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
                    std::span<const double> weights = {});
 
 // Throws InputError, naming the point, if one has a position that is not finite, a (u,v) outside
-// the domain, a weight that is not positive and finite, or a foot without a unit direction; or if
-// there are anchors, but not one per point.
+// the domain, a weight that is not positive and finite, or a foot without a unit direction; if
+// there are anchors, but not one per point; or for a point of the shape that is not finite, outside
+// the domain, or without a positive sd_mm and share.
 void CheckTarget(const FitTarget& target);
 
 }  // namespace semblance

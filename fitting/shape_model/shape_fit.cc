@@ -12,6 +12,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "fitting/shape_model/farthest_points.h"
 #include "fitting/shape_model/shape_cost.h"
@@ -67,29 +68,50 @@ std::vector<Vec3> FeaturePositions(const ShapeTarget& target) {
   return positions;
 }
 
-// Points of the mean that may be drawn to the surface: near a tip, and clear of the features.
-std::vector<int> SurfaceCandidates(const ShapeModel& model, const ShapeTarget& target,
-                                   const ShapeFitOptions& options) {
-  const auto near = [](const Vec3& p, const Vec3& q, double mm) {
-    return (p - q).squaredNorm() <= mm * mm;
-  };
-  std::vector<Vec3> tips;
+// What the tips know of a point of the mean.
+struct NearestTip {
+  double squared_mm = 0;    // to the nearest; 0 without tips
+  double shared_sd_mm = 0;  // of that
+};
+
+NearestTip NearestTipTo(const Vec3& p, const ShapeModel& model, const ShapeTarget& target) {
+  NearestTip nearest;
+  bool first = true;
   for (const ShapeTip& tip : target.tips) {
-    tips.push_back(PositionOf(tip.at, model.mean, model.mean.points));
+    const Vec3 at = PositionOf(tip.at, model.mean, model.mean.points);
+    const double squared_mm = (at - p).squaredNorm();
+    if (std::exchange(first, false) || squared_mm < nearest.squared_mm) {
+      nearest = {squared_mm, tip.shared_sd_mm};
+    }
   }
+  return nearest;
+}
+
+// A point of the model that is drawn to the surface.
+struct DrawnPoint {
+  int vertex = -1;
+  double shared_sd_mm = 0;  // ShapeTip::shared_sd_mm of the nearest tip
+};
+
+// Spread evenly over what is near a tip and clear of the features.
+std::vector<DrawnPoint> DrawnPoints(const ShapeModel& model, const ShapeTarget& target,
+                                    const ShapeFitOptions& options) {
+  const double farthest = options.surface_range_mm * options.surface_range_mm;
   std::vector<int> candidates;
   for (const int v : AllPoints(model.mean)) {
     const Vec3& p = model.mean.points[v];
-    const bool in_range = tips.empty() || std::ranges::any_of(tips, [&](const Vec3& tip) {
-                            return near(p, tip, options.surface_range_mm);
-                          });
-    if (in_range && std::ranges::none_of(target.features, [&](const ShapeFeature& f) {
-          return near(p, f.position, f.clearance_mm);
-        })) {
+    const bool clear = std::ranges::none_of(target.features, [&](const ShapeFeature& f) {
+      return (p - f.position).squaredNorm() <= f.clearance_mm * f.clearance_mm;
+    });
+    if (clear && NearestTipTo(p, model, target).squared_mm <= farthest) {
       candidates.push_back(v);
     }
   }
-  return candidates;
+  std::vector<DrawnPoint> drawn;
+  for (const int v : FarthestPoints(model.mean.points, candidates, options.surface_points)) {
+    drawn.push_back({v, NearestTipTo(model.mean.points[v], model, target).shared_sd_mm});
+  }
+  return drawn;
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -145,7 +167,7 @@ class ShapeEstimator {
       : model_(model),
         target_(target),
         options_(options),
-        prior_{.scale_sd = options.scale_sd},
+        prior_{.scale_sd = options.scale_sd, .mode_sd = options.mode_sd},
         frame_(StartFrame(model, target.start)) {
     const std::vector<int> centres =
         FarthestPoints(model.mean.points, AllPoints(model.mean), options.field.centres);
@@ -154,8 +176,7 @@ class ShapeEstimator {
     start_pose_ = parameters_.pose;
     if (target.surface != nullptr && options.surface_points > 0 && options.surface_worth > 0) {
       surface_.emplace(*target.surface, options);
-      drawn_ = FarthestPoints(model.mean.points, SurfaceCandidates(model, target, options),
-                              options.surface_points);
+      drawn_ = DrawnPoints(model, target, options);
     }
   }
 
@@ -177,7 +198,7 @@ class ShapeEstimator {
   ShapeFrame frame_;
   Eigen::MatrixXd field_;
   std::optional<DrawingSurface> surface_;
-  std::vector<int> drawn_;  // points of the model
+  std::vector<DrawnPoint> drawn_;
 
   ShapeParameters parameters_;
   std::array<double, 7> start_pose_;
@@ -205,8 +226,11 @@ void ShapeEstimator::SeeTips() {
                              .tangent_sd_mm = options_.tip_tangent_sd_mm,
                              .direction = tip.direction,
                              .along_sd_mm = tip.along_sd_mm};
-    seen_.push_back({RowAt(model_, field_, tip.at), tip.position, WhiteningOf(spread),
-                     options_.tip_loss_width});
+    seen_.push_back({.row = RowAt(model_, field_, tip.at),
+                     .position = tip.position,
+                     .whitening = WhiteningOf(spread),
+                     .loss_width = options_.tip_loss_width,
+                     .shared_mm = tip.shared_sd_mm * tip.direction});
   }
 }
 
@@ -214,10 +238,14 @@ void ShapeEstimator::SeeSurface() {
   surface_points_ = 0;
   const double weight = options_.surface_worth /
                         (options_.surface_points * options_.surface_sd_mm * options_.surface_sd_mm);
-  for (const int v : drawn_) {
+  for (const auto& [v, shared_sd_mm] : drawn_) {
     if (const auto foot = surface_->FootOf(placed_.points[v], normals_[v])) {
-      seen_.push_back({RowOfVertex(model_, field_, v), foot->position, foot->normal.transpose(),
-                       options_.surface_loss_width_mm, weight});
+      seen_.push_back({.row = RowOfVertex(model_, field_, v),
+                       .position = foot->position,
+                       .whitening = foot->normal.transpose(),
+                       .loss_width = options_.surface_loss_width_mm,
+                       .weight = weight,
+                       .shared_mm = shared_sd_mm * foot->normal});
       ++surface_points_;
     }
   }
@@ -230,7 +258,7 @@ void ShapeEstimator::AddPriors(ceres::Problem& problem) {
   };
   Eigen::VectorXd pose = Eigen::Map<const Eigen::VectorXd>(start_pose_.data(), 7);
   pose[0] = 0;  // the model's own size
-  const Eigen::VectorXd sd = prior_.Deviations(parameters_.size());
+  const Eigen::VectorXd sd = prior_.Deviations(parameters_);
   add(parameters_.pose.data(), pose, sd.head(7));
   const Eigen::Index k = parameters_.coefficients.size(), m = parameters_.field.size();
   add(parameters_.coefficients.data(), Eigen::VectorXd::Zero(k), sd.segment(7, k));
@@ -301,9 +329,10 @@ ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   result.subject_from_model = SimilarityOf(frame_, parameters_);
   result.coefficients = parameters_.coefficients;
   result.points = placed_.points;
-  const Eigen::MatrixXd information = InformationOf(frame_, parameters_, seen_, prior_);
+  const ShapePosterior posterior = PosteriorOf(frame_, parameters_, seen_, prior_);
   result.sigma_mm =
-      DeviationsAlong(frame_, parameters_, information, rows, normals_, context.threads);
+      DeviationsAlong(frame_, parameters_, posterior, {options_.mode_sd, options_.population_sd},
+                      rows, normals_, context.threads);
   for (double& sigma : result.sigma_mm) {
     sigma = std::hypot(sigma, options_.discrepancy_mm);
   }

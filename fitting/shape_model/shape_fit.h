@@ -19,6 +19,7 @@ struct ShapeFitOptions {
   double tip_tangent_sd_mm = 4;
   double tip_loss_width = 3;
   double scale_sd = 0.03;
+  double mode_sd = 1;
   SmoothFieldOptions field;
   int surface_points = 300;
   double surface_worth = 80;
@@ -28,6 +29,7 @@ struct ShapeFitOptions {
   double surface_max_angle_deg = 60;
   double surface_range_mm = 60;
   int rounds = 12;
+  double population_sd = 2;
   double discrepancy_mm = 1.25;
 };
 template <class Visitor>
@@ -57,6 +59,12 @@ void Fields(Visitor& visit, ShapeFitOptions& o) {
                   .doc = "standard deviation of the logarithm of the model's scale; the modes hold "
                          "most of what differs in size"},
         o.scale_sd);
+  visit(FieldInfo{.name = "mode_sd",
+                  .min = 0.01,
+                  .max = 100,
+                  .doc = "standard deviation of the modes' coefficients; more lets a face be less "
+                         "average"},
+        o.mode_sd);
   visit(FieldInfo{.name = "field", .doc = "the smooth rest that the modes cannot express"},
         o.field);
   visit(FieldInfo{.name = "surface_points",
@@ -100,7 +108,8 @@ void Fields(Visitor& visit, ShapeFitOptions& o) {
                   .min = 0,
                   .max = 1e6,
                   .doc = "nor one farther than this from every dowel's point of the model, where "
-                         "the implicit face rests on no depth"},
+                         "the implicit face rests on no depth; weights that fall with that "
+                         "distance do worse"},
         o.surface_range_mm);
   visit(FieldInfo{.name = "rounds",
                   .min = 3,
@@ -109,6 +118,12 @@ void Fields(Visitor& visit, ShapeFitOptions& o) {
                          "taken anew; two rounds move the pose alone, and the implicit face comes "
                          "in with the fourth"},
         o.rounds);
+  visit(FieldInfo{.name = "population_sd",
+                  .min = 0.01,
+                  .max = 100,
+                  .doc = "standard deviation of the people's coefficients, where the estimate "
+                         "takes mode_sd: people differ more than the model's, and sigma knows"},
+        o.population_sd);
   visit(FieldInfo{.name = "discrepancy_mm",
                   .unit = "mm",
                   .min = 0,
@@ -125,6 +140,7 @@ struct ShapeTip {
   Vec3 position = Vec3::Constant(kNaN);  // mm
   Vec3 direction = Vec3::Zero();         // unit, along which it may be off besides
   double along_sd_mm = 0;                // by this
+  double shared_sd_mm = 0;               // and by this, in which all tips of a person err together
 };
 
 // Points of the model nearer to it than this are not drawn to the surface.
@@ -157,11 +173,12 @@ struct ShapeEstimate {
 // Minimises, in Ceres, over s, R, t, w and a of shape_parameters.h
 //   sum_tips Huber_width(r' C^-1 r) + worth / (points * sd^2) sum_surface Huber_width((n . (c -
 //   x))^2)
-//     + |w|^2 + |a|^2 + (ln s / scale_sd)^2,
+//     + |w / mode_sd|^2 + |a|^2 + (ln s / scale_sd)^2,
 // C of shape_observation.h with the shape's own normal, c the surface's closest point to x and n
 // its normal; and a prior of 1 rad and 100 mm on the pose, so weak that it matters only where
 // nothing else speaks. Points and normals are taken anew in each round. The posterior is the normal
-// distribution of the last linearisation. One thread apart from sigma; same bytes whatever their
+// distribution of the last linearisation, widened as DeviationsAlong says; the surface shares the
+// error of the nearest tip. One thread apart from sigma; same bytes whatever their
 // number. Throws InputError as CheckShapeModel (name: "shape model"), for a tip that is not on the
 // model or not finite, and for a start without a positive scale; Cancelled.
 ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,

@@ -16,6 +16,8 @@ struct ShapeObservation {
   Eigen::Matrix<double, Eigen::Dynamic, 3> whitening;
   double loss_width = kNaN;
   double weight = 1;
+  Vec3 shared_mm = Vec3::Zero();  // how far one standard deviation of an error that all
+                                  // observations share moves the position
 };
 
 // How sure a point is in its directions.

@@ -9,41 +9,48 @@
 
 namespace semblance {
 
-Eigen::VectorXd ShapePrior::Deviations(Eigen::Index parameters) const {
-  Eigen::VectorXd deviations = Eigen::VectorXd::Ones(parameters);
+Eigen::VectorXd ShapePrior::Deviations(const ShapeParameters& parameters) const {
+  Eigen::VectorXd deviations = Eigen::VectorXd::Ones(parameters.size());
   deviations[0] = scale_sd;
   deviations.segment<3>(1).setConstant(rotation_sd);
   deviations.segment<3>(4).setConstant(translation_sd);
+  deviations.segment(7, parameters.coefficients.size()).setConstant(mode_sd);
   return deviations;
 }
 
-Eigen::MatrixXd InformationOf(const ShapeFrame& frame, const ShapeParameters& parameters,
-                              std::span<const ShapeObservation> seen, const ShapePrior& prior) {
+ShapePosterior PosteriorOf(const ShapeFrame& frame, const ShapeParameters& parameters,
+                           std::span<const ShapeObservation> seen, const ShapePrior& prior) {
   Eigen::Index count = 0, row = 0;
   for (const ShapeObservation& one : seen) {
     count += one.whitening.rows();
   }
   Eigen::MatrixXd jacobian(count, parameters.size());
+  Eigen::VectorXd shared(count);
   for (const ShapeObservation& one : seen) {
     ShapeDerivatives derivatives;
     const Vec3 placed = PlacedPoint(frame, one.row, parameters, &derivatives);
     const double root = std::sqrt(one.weight * LossWeight(one, placed));
     for (Eigen::Index r = 0; r < one.whitening.rows(); ++r) {
-      jacobian.row(row++) =
-          root * DerivativeAlong(one.whitening.row(r).transpose(), one.row, derivatives);
+      const Vec3 direction = root * one.whitening.row(r).transpose();
+      jacobian.row(row) = DerivativeAlong(direction, one.row, derivatives);
+      shared[row++] = direction.dot(one.shared_mm);
     }
   }
-  Eigen::MatrixXd information = jacobian.transpose() * jacobian;
-  information.diagonal() += prior.Deviations(parameters.size()).array().inverse().square().matrix();
-  return information;
+  ShapePosterior posterior{jacobian.transpose() * jacobian, jacobian.transpose() * shared};
+  posterior.information.diagonal() +=
+      prior.Deviations(parameters).array().inverse().square().matrix();
+  return posterior;
 }
 
 std::vector<double> DeviationsAlong(const ShapeFrame& frame, const ShapeParameters& parameters,
-                                    const Eigen::MatrixXd& information,
+                                    const ShapePosterior& posterior, const Population& population,
                                     std::span<const ShapeRow> rows,
                                     std::span<const Vec3> directions, int threads) {
   constexpr std::size_t kBlock = 128;  // columns that are solved for at once
-  const Eigen::LLT<Eigen::MatrixXd> factor(information);
+  const Eigen::LLT<Eigen::MatrixXd> factor(posterior.information);
+  const double taken = 1 / (population.mode_sd * population.mode_sd),
+               wider = std::pow(population.population_sd * taken, 2) - taken;
+  const Eigen::Index modes = parameters.coefficients.size();
   std::vector<double> deviations(rows.size(), kNaN);
   ParallelFor((rows.size() + kBlock - 1) / kBlock, threads, 1, [&](std::size_t block) {
     const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, rows.size());
@@ -53,9 +60,13 @@ std::vector<double> DeviationsAlong(const ShapeFrame& frame, const ShapeParamete
       PlacedPoint(frame, rows[k], parameters, &derivatives);
       along.col(k - begin) = DerivativeAlong(directions[k], rows[k], derivatives).transpose();
     }
-    factor.matrixL().solveInPlace(along);
+    const Eigen::MatrixXd answer = factor.solve(along);
     for (std::size_t k = begin; k < end; ++k) {
-      deviations[k] = along.col(k - begin).norm();
+      const auto a = along.col(k - begin);
+      const auto x = answer.col(k - begin);
+      const double moved = posterior.shared.dot(x);
+      const double variance = a.dot(x) + wider * x.segment(7, modes).squaredNorm() + moved * moved;
+      deviations[k] = std::sqrt(std::max(variance, 0.0));
     }
   });
   return deviations;

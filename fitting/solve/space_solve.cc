@@ -45,7 +45,7 @@ bool Has(std::span<const Term> terms) {
 // What a space or a level has for its terms to look at.
 struct InSight {
   Vec2 lengths_mm;
-  bool feet = false, landmarks = false;
+  bool feet = false, landmarks = false, shape = false;
 };
 
 void CheckTerms(std::span<const Term> terms, const InSight& sight) {
@@ -70,6 +70,11 @@ void CheckTerms(std::span<const Term> terms, const InSight& sight) {
     throw InputError(
         "fit: the term 'landmarks' looks at standard landmarks, and no point is one; leave "
         "it out, or fit a face to dowels at sites");
+  }
+  if (Has<PriorShapeTerm>(terms) && !sight.shape) {
+    throw InputError(
+        "fit: the term 'prior_shape' looks at a prior's face, and there is none; leave it out, or "
+        "write face: prior_then_fit");
   }
 }
 
@@ -150,7 +155,8 @@ SpaceSolve::SpaceSolve(const SpaceProblem& problem)
   CheckTerms(terms_, {.lengths_mm = lengths_mm_,
                       .feet = std::any_of(anchors.begin(), anchors.end(),
                                           [](const BoneAnchor& a) { return a.foot.allFinite(); }),
-                      .landmarks = landmark_weight_ > 0});
+                      .landmarks = landmark_weight_ > 0,
+                      .shape = !problem.target.shape.empty()});
   EditMirrors();
   Begin();
   Measure();
@@ -168,9 +174,10 @@ SpaceSolve::SpaceSolve(LevelView level, std::span<const Term> terms, Solver solv
       settled_(true) {
   SortBone(view_->bone);
   landmark_weight_ = view_->LandmarkWeightSum();
-  CheckTerms(
-      terms_,
-      {.lengths_mm = lengths_mm_, .feet = !view_->bone.empty(), .landmarks = landmark_weight_ > 0});
+  CheckTerms(terms_, {.lengths_mm = lengths_mm_,
+                      .feet = !view_->bone.empty(),
+                      .landmarks = landmark_weight_ > 0,
+                      .shape = !view_->likely.empty()});
   Begin();
   Measure();
 }

@@ -21,12 +21,28 @@ Observation Observe(const FitPoint& point) {
 }
 
 // The detail that finer levels add at uv is taken off the point that the level aims at.
-Observation Observe(const FitPoint& point, const HSplineSurface& surface, int level, FitAim aim) {
-  Observation o = Observe(point);
+Observation WithoutFiner(Observation o, const HSplineSurface& surface, int level, FitAim aim) {
   if (aim == FitAim::kSurface && level < surface.shape().max_level) {
-    o.position -= surface.Point(point.uv) - surface.LevelDerivative(level, point.uv);
+    o.position -= surface.Point(o.uv) - surface.LevelDerivative(level, o.uv);
   }
   return o;
+}
+
+// LevelView::likely of the points as they stand, those of a patch together.
+std::vector<Observation> LikelyShape(const HSplineShape& shape,
+                                     const std::vector<ShapePoint>& points) {
+  double all = 0;
+  for (const ShapePoint& point : points) {
+    all += point.share;
+  }
+  std::vector<Observation> likely;
+  for (const ShapePoint& point : points) {
+    likely.push_back({.uv = point.uv,
+                      .position = point.position,
+                      .weight = point.share / (all * point.sd_mm * point.sd_mm)});
+  }
+  SortObservations(PointCloud(shape, likely), likely);
+  return likely;
 }
 
 // If the point has a foot; what has been taken off the point is taken off the foot too.
@@ -137,7 +153,7 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
                  .observations = {}};
   view.observations.reserve(target.points.size());
   for (const FitPoint& point : target.points) {
-    view.observations.push_back(Observe(point, surface, level, options.aim));
+    view.observations.push_back(WithoutFiner(Observe(point), surface, level, options.aim));
   }
   for (std::size_t k = 0; k < target.anchors.size(); ++k) {
     AddBone(target.anchors[k], target.points[k].position, view.observations[k], view);
@@ -146,6 +162,10 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
     if (vertex.level == level) {
       view.held.push_back(view.start.Index(vertex.i, vertex.j));
     }
+  }
+  view.likely = LikelyShape(shape, target.shape);
+  for (Observation& o : view.likely) {
+    o = WithoutFiner(o, surface, level, options.aim);
   }
   return view;
 }
@@ -187,6 +207,7 @@ LevelView ViewOfSpace(const HierarchicalSplineSpace& space, const PointCloud& cl
       AddBone(target.anchors[cloud.Given(k)], point.position, o, view);
     }
   }
+  view.likely = LikelyShape(space.shape(), target.shape);
   return view;
 }
 

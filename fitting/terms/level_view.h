@@ -61,6 +61,8 @@ struct LevelView {
   std::vector<Observation> observations;
   std::vector<BoneObservation> bone = {};
   std::vector<int> held = {};  // vertices that a PriorTerm with held_only looks at, each once
+  std::vector<Observation> likely = {};  // of a prior's shape, less what finer levels add; their
+                                         // weights times |d|^2 add up to the mean of |d / sd|^2
 
   std::shared_ptr<const SplineElements> space = nullptr;  // of all levels at once; null: `grid`
 

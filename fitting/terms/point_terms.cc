@@ -71,9 +71,10 @@ class ElementBuffer {
 
 // The rows of those observations that are taken.
 template <class Taken>
-void AddWeighted(const LevelView& view, double scale, const Taken& taken, RowSink& sink) {
+void AddWeighted(const LevelView& view, const std::vector<Observation>& observations, double scale,
+                 const Taken& taken, RowSink& sink) {
   ElementBuffer buffer(view, sink);
-  for (const Observation& o : view.observations) {
+  for (const Observation& o : observations) {
     if (taken(o)) {
       buffer.Add(view.LocalAt(o.uv), o.position, std::sqrt(scale * o.weight));
     }
@@ -97,13 +98,19 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scal
 
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink) {
   AddWeighted(
-      view, term.weight / view.WeightSum(), [](const Observation&) { return true; }, sink);
+      view, view.observations, term.weight / view.WeightSum(),
+      [](const Observation&) { return true; }, sink);
+}
+
+void AddRows(const PriorShapeTerm& term, const LevelView& view, RowSink& sink) {
+  AddWeighted(
+      view, view.likely, term.weight, [](const Observation&) { return true; }, sink);
 }
 
 void AddRows(const LandmarkTerm& term, const LevelView& view, RowSink& sink) {
   AddWeighted(
-      view, term.weight / view.LandmarkWeightSum(), [](const Observation& o) { return o.landmark; },
-      sink);
+      view, view.observations, term.weight / view.LandmarkWeightSum(),
+      [](const Observation& o) { return o.landmark; }, sink);
 }
 
 void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
@@ -130,6 +137,14 @@ double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNe
     sum += o.landmark ? o.weight * (view.PointAt(o.uv, net) - o.position).squaredNorm() : 0;
   }
   return sum > 0 ? term.weight * sum / view.LandmarkWeightSum() : 0;
+}
+
+double TermCost(const PriorShapeTerm& term, const LevelView& view, const ControlNet& net) {
+  double sum = 0;
+  for (const Observation& o : view.likely) {
+    sum += o.weight * (view.PointAt(o.uv, net) - o.position).squaredNorm();
+  }
+  return term.weight * sum;
 }
 
 namespace {

@@ -50,6 +50,18 @@ void Fields(Visitor& visit, LandmarkTerm& o) {
   WeightField(visit, o.weight);
 }
 
+// The surface stays where a prior holds it for likely: weight * mean over the prior's shape of
+// |S(u,v) - x|^2 / sd^2, x and sd those that the prior states there. weight, mm^2, is the cost of
+// one standard deviation everywhere: more than the points' mean square is worth following.
+struct PriorShapeTerm {
+  static constexpr std::string_view kName = "prior_shape";
+  double weight = 1;
+};
+template <class Visitor>
+void Fields(Visitor& visit, PriorShapeTerm& o) {
+  WeightField(visit, o.weight);
+}
+
 // The surface may slide along itself (tangent-distance minimisation): weight * the mean over the
 // points, by their weights, of (n . d)^2 + tangential |d - n (n . d)|^2, mm^2; d = S(u,v) - p and n
 // the unit normal at (u,v) of the level's surface before the solve. For points whose (u,v) are only

@@ -16,7 +16,7 @@ namespace semblance {
 
 using Term =
     std::variant<PointTerm, PriorTerm, SmoothnessTerm, MembraneTerm, TangentPointTerm, SymmetryTerm,
-                 NonPenetrationTerm, SpringTerm, DistortionTerm, LandmarkTerm>;
+                 NonPenetrationTerm, SpringTerm, DistortionTerm, LandmarkTerm, PriorShapeTerm>;
 
 inline std::string_view TermName(const Term& term) {
   return std::visit([](const auto& t) { return t.kName; }, term);

@@ -21,6 +21,7 @@ namespace semblance {
 // squares equals TermCost.
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const LandmarkTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const PriorShapeTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
@@ -98,6 +99,7 @@ std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scal
 // The cost of a term as term.h states it, mm^2.
 double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const PriorShapeTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const PriorTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net);

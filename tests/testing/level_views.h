@@ -80,6 +80,14 @@ inline void StandOnBone(LevelView& view) {
   }
 }
 
+// A prior's shape 2 mm above the template, surer at one end than at the other.
+inline void LayShape(LevelView& view) {
+  for (const Observation& o : Observe(view.rest, 50, 7)) {
+    view.likely.push_back(
+        {.uv = o.uv, .position = o.position + Vec3(0, 0, 2), .weight = (0.2 + o.uv.x()) / 50});
+  }
+}
+
 // 320 points on 12 patches, enough in each to be reduced; every twentieth is a landmark.
 inline LevelView NoisyView() {
   LevelView view = View(Sheet(4, 3, 2, 1), Observe(Sheet(4, 3, 3, 2), 320, 3, 1));
@@ -87,6 +95,7 @@ inline LevelView NoisyView() {
     view.observations[k].landmark = true;
   }
   StandOnBone(view);
+  LayShape(view);
   return view;
 }
 

@@ -19,7 +19,8 @@ using testing::SmoothSurface;
 
 constexpr HSplineShape kShape{.patches_u = 4, .patches_v = 3, .max_level = 2};
 
-// Points around a surface, standing on bone 4 mm below them; every tenth is a landmark.
+// Points around a surface, standing on bone 4 mm below them; every tenth is a landmark. A prior
+// holds the surface 1 mm higher for likely, surer at one end than at the other.
 FitTarget Target() {
   const HSplineSurface truth = RandomSurface(kShape, 1);
   Random random(5);
@@ -32,6 +33,10 @@ FitTarget Target() {
                              .weight = random.Uniform(0.5, 2),
                              .role = k % 10 == 0 ? PointRole::kLandmark : PointRole::kScattered});
     target.anchors.push_back({target.points.back().position - Vec3(0, 0, 4), Vec3(0, 0, 1)});
+    target.shape.push_back({.uv = uv,
+                            .position = truth.Point(uv) + Vec3(0, 0, 1),
+                            .sd_mm = 1 + uv.x(),
+                            .share = random.Uniform(0.5, 2)});
   }
   return target;
 }

@@ -283,19 +283,22 @@ struct SeenDome {
   ShapeFrame frame = StartFrame(model, {});
   ShapeParameters parameters = StartParameters(frame, {}, model.Modes(), 5);
 
-  std::vector<double> Sigma(const std::vector<int>& seen_vertices) const {
+  std::vector<double> Sigma(const std::vector<int>& seen_vertices, double population_sd = 1) const {
     std::vector<ShapeObservation> seen;
     for (const int v : seen_vertices) {
       const PointSpread spread{.normal = Vec3::UnitZ(), .normal_sd_mm = 0.5, .tangent_sd_mm = 4};
-      seen.push_back({RowOfVertex(model, field, v), model.mean.points[v], WhiteningOf(spread), 3});
+      seen.push_back({.row = RowOfVertex(model, field, v),
+                      .position = model.mean.points[v],
+                      .whitening = WhiteningOf(spread),
+                      .loss_width = 3});
     }
     std::vector<ShapeRow> rows;
     for (int v = 0; v < kSide * kSide; ++v) {
       rows.push_back(RowOfVertex(model, field, v));
     }
     const std::vector<Vec3> up(rows.size(), Vec3::UnitZ());
-    return DeviationsAlong(frame, parameters, InformationOf(frame, parameters, seen, {}), rows, up,
-                           1);
+    return DeviationsAlong(frame, parameters, PosteriorOf(frame, parameters, seen, {}),
+                           {.population_sd = population_sd}, rows, up, 1);
   }
 };
 
@@ -322,7 +325,48 @@ TEST(ShapePosterior, WithoutObservationsItIsThePrior) {
   const Vec3 arm = dome.model.mean.points[v] - dome.frame.centre;
   const double modes = dome.model.modes.row(3 * v + 2).squaredNorm();
   const double pose = std::pow(0.03 * arm.z(), 2) + std::pow(100, 2) + arm.head<2>().squaredNorm();
-  EXPECT_NEAR(sigma[v], std::sqrt(modes + pose + dome.field.row(v).squaredNorm()), 1e-6);
+  const double rest = pose + dome.field.row(v).squaredNorm();
+  EXPECT_NEAR(sigma[v], std::sqrt(modes + rest), 1e-6);
+  EXPECT_NEAR(dome.Sigma({}, 3)[v], std::sqrt(9 * modes + rest), 1e-6);
+}
+
+// A wider population matters where nothing is seen, and not where all is.
+TEST(ShapePosterior, AWiderPopulationIsUnsureOfWhatIsNotSeen) {
+  const SeenDome dome;
+  const std::vector<int> seen = {0, 1, 2, 9, 10, 11, 18, 19, 20};  // a corner
+  const std::vector<double> one = dome.Sigma(seen, 1), two = dome.Sigma(seen, 2);
+  EXPECT_LT(two[10], 1.1 * one[10]);
+  EXPECT_GT(two[80], 1.5 * one[80]);
+}
+
+// What an error that all tips share adds to the variance is what the estimate moves by, squared.
+TEST(ShapePosterior, ASharedErrorCountsAsTheEstimateFollowsIt) {
+  const ShapeModel model = Dome();
+  ShapeTarget target;
+  for (int t = 0; t < std::ssize(model.mean.triangles); t += 5) {
+    target.tips.push_back(TipAt(model, t, model.mean.points));
+    target.tips.back().direction = Vec3::UnitZ();
+    target.tips.back().along_sd_mm = 2;
+  }
+  ShapeFitOptions options;
+  options.tip_loss_width = 1e6;
+  options.rounds = 40;
+  const ShapeEstimate before = EstimateShape(model, target, options, {});
+  ShapeTarget shared = target, moved = target;
+  for (std::size_t k = 0; k < target.tips.size(); ++k) {
+    const double mm = 0.5 + 0.1 * static_cast<double>(k % 3);
+    shared.tips[k].shared_sd_mm = mm;
+    moved.tips[k].position.z() += mm;
+  }
+  const ShapeEstimate wide = EstimateShape(model, shared, options, {});
+  const ShapeEstimate after = EstimateShape(model, moved, options, {});
+  EXPECT_EQ(wide.points, before.points);
+  const std::vector<Vec3> normals = VertexNormals(TriMesh{before.points, model.mean.triangles});
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    const double added = std::pow(wide.sigma_mm[v], 2) - std::pow(before.sigma_mm[v], 2);
+    const double way = (after.points[v] - before.points[v]).dot(normals[v]);
+    EXPECT_NEAR(std::sqrt(std::max(added, 0.0)), std::abs(way), 0.04) << v;
+  }
 }
 
 }  // namespace

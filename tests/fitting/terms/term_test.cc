@@ -207,6 +207,46 @@ TEST(Terms, APriorOfTheHeldLooksAtThemAlone) {
   EXPECT_EQ(TermCost(term, view, view.start), 0);
 }
 
+// Shares and standard deviations as they come; the surface everywhere k of these above the shape.
+TEST(Terms, StandardDeviationsFromThePriorsShapeCostTheWeight) {
+  const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 0};
+  const HSplineSurface surface(shape, Sheet(4, 3, 2, 1));
+  FitTarget target;
+  Random random(3);
+  for (int k = 0; k < 40; ++k) {
+    const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
+    const double sd_mm = random.Uniform(0.5, 3);
+    target.shape.push_back({.uv = uv,
+                            .position = surface.Point(uv) - 2 * sd_mm * Vec3(0.6, 0, 0.8),
+                            .sd_mm = sd_mm,
+                            .share = random.Uniform(0.5, 2)});
+  }
+  const LevelView view = ViewOfLevel(surface, surface, target, 0);
+  EXPECT_NEAR(TermCost(PriorShapeTerm{.weight = 3}, view, view.start), 3 * 4, 1e-11);
+}
+
+TEST(Terms, APriorsShapeIsKeptTheMoreItWeighs) {
+  const LevelView view = NoisyView();
+  double last = std::numeric_limits<double>::infinity();
+  for (const double weight : {0.0, 0.1, 10.0, 1e4}) {
+    const std::array<Term, 2> terms = {PointTerm{}, PriorShapeTerm{.weight = weight}};
+    const double misfit = TermCost(PriorShapeTerm{.weight = 1}, view, FitLevel(view, terms).net);
+    EXPECT_LT(misfit, 0.9 * last);
+    last = misfit;
+  }
+}
+
+TEST(Terms, APriorsShapeIsAskedForWhereThereIsNone) {
+  LevelView view = NoisyView();
+  view.likely.clear();
+  const std::array<Term, 2> terms = {PointTerm{}, PriorShapeTerm{}};
+  EXPECT_THROW(FitLevel(view, terms), InputError);
+  FitTarget target{.points = {{.label = {}, .position = {0, 0, 0}, .uv = {0.5, 0.5}}}};
+  EXPECT_NO_THROW(CheckTarget(target));
+  target.shape = {{.uv = {0.5, 0.5}, .position = {0, 0, 0}, .sd_mm = 0}};
+  EXPECT_THROW(CheckTarget(target), InputError);
+}
+
 TEST(Terms, BoneIsNotPenetrated) {
   LevelView view = NoisyView();
   for (BoneObservation& o : view.bone) {
