@@ -63,8 +63,8 @@ std::optional<TruthComparison> Measure(const Experiment& experiment, const Skull
   truth.implicit = CompareFaces(skin, truth.skin.region, skull.implicit.mesh, context);
   truth.depth = CompareDepths(experiment, *skull.depth_stage, context);
   if (uncertainty && experiment.uncertainty.sigma) {
-    truth.sigma =
-        MeasureCoverage(skin, truth.face.signed_mm, face, uncertainty->sigma_mm, masks, context);
+    truth.sigma = MeasureCoverage({skin, truth.face.signed_mm, truth.skin.region.part}, face,
+                                  uncertainty->sigma_mm, masks, context);
   }
   return truth;
 }
@@ -83,7 +83,7 @@ std::optional<FaceUncertainty> UncertaintyOf(const Experiment& experiment, const
     return experiment.uncertainty.sigma ? std::optional(PriorUncertainty(*prior, *made.prior, face))
                                         : std::nullopt;
   }
-  if (!std::holds_alternative<FittedTemplate>(experiment.face)) {
+  if (!std::holds_alternative<FittedTemplate>(WayToFace(experiment))) {
     return std::nullopt;
   }
   return EstimateUncertainty(experiment, bone,
@@ -137,8 +137,10 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
     return UncertaintyOf(experiment, bone, prior.get(), made, face, subject, context);
   });
   std::optional<TruthComparison> truth = step("measure", [&] {
-    return Measure(experiment, *skull, face.mesh, uncertainty, TemplateMasks(made.placed.face),
-                   context);
+    // A prior knows of nose, mouth and eyes, and so does its sigma.
+    const std::vector<Sphere> masks =
+        made.prior ? std::vector<Sphere>() : TemplateMasks(made.placed.face);
+    return Measure(experiment, *skull, face.mesh, uncertainty, masks, context);
   });
   std::vector<FeatureDistortion> features =
       MeasureFeatures(made.placed.face, made.fitted.fit.surface);

@@ -27,7 +27,7 @@ struct TruthComparison {
   FaceDetails details;  // of the face
   FaceMetrics implicit;
   DepthComparison depth;  // of the shell's vertices
-  SigmaCoverage sigma;    // outside the features' regions; empty without an uncertainty
+  SigmaCoverage sigma;    // of a fit outside the features' regions; empty without an uncertainty
 };
 
 struct RunResult {

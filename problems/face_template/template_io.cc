@@ -153,8 +153,7 @@ std::vector<TemplateFeature> FeaturesFrom(const Json& json) {
   return features;
 }
 
-std::map<std::string, Vec2> ReadSites(const std::filesystem::path& path) {
-  const std::string text = ReadFileBytes(path);
+std::map<std::string, Vec2> SitesFrom(const std::string& text, const std::filesystem::path& path) {
   CsvReader csv(text, path.string());
   const std::size_t site = csv.ColumnOf("site"), u = csv.ColumnOf("u"), v = csv.ColumnOf("v");
   std::map<std::string, Vec2> sites;
@@ -206,13 +205,20 @@ FileTemplate WriteTemplate(const std::filesystem::path& folder, const TemplateFa
 
 TemplateFace ReadTemplate(const FileTemplate& files) {
   CheckNamed(files);
-  TemplateFace face{
-      .surface = ReadHSpline(files.surface), .site_uv = ReadSites(files.sites), .features = {}};
-  For(files.sites, [&] { CheckSites(face); });
-  if (!files.features.empty()) {
-    For(files.features, [&] {
-      face.features =
-          FeaturesFrom(ParseJson(ReadFileBytes(files.features), files.features.string()));
+  return TemplateFrom(files,
+                      {.surface = ReadFileBytes(files.surface),
+                       .sites = ReadFileBytes(files.sites),
+                       .features = files.features.empty() ? "" : ReadFileBytes(files.features)});
+}
+
+TemplateFace TemplateFrom(const FileTemplate& names, const TemplateTexts& texts) {
+  TemplateFace face{.surface = HSplineFromJson(texts.surface, names.surface.string()),
+                    .site_uv = SitesFrom(texts.sites, names.sites),
+                    .features = {}};
+  For(names.sites, [&] { CheckSites(face); });
+  if (!names.features.empty()) {
+    For(names.features, [&] {
+      face.features = FeaturesFrom(ParseJson(texts.features, names.features.string()));
       CheckFeatures(face);
     });
   }

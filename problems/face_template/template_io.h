@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -44,6 +45,14 @@ FileTemplate WriteTemplate(const std::filesystem::path& folder, const TemplateFa
 // kind, one of the 32 sites missing or standing twice, a (u,v) outside [0,1] x [0,1], a feature's
 // vertex outside the surface's levels, a radius that is not positive. Sites beyond the 32 are kept.
 TemplateFace ReadTemplate(const FileTemplate& files);
+
+// What the files say.
+struct TemplateTexts {
+  std::string surface, sites, features;  // features: empty where the face has none
+};
+
+// As ReadTemplate, of texts already read. names: what errors call them.
+TemplateFace TemplateFrom(const FileTemplate& names, const TemplateTexts& texts);
 
 // Those that are named.
 std::vector<std::filesystem::path> FilesOf(const FileTemplate& files);

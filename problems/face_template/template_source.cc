@@ -1,12 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/face_template/template_source.h"
 
+#include "problems/face_template/ict_face.h"
+
 namespace semblance {
 
+namespace {
+
+TemplateFace Load(const FormulaTemplate& source) { return MakeTemplateFace(source); }
+TemplateFace Load(const FileTemplate& source) { return ReadTemplate(source); }
+TemplateFace Load(const IctTemplate&) {
+  return TemplateFrom(
+      {"the ICT face", "the ICT face's sites", "the ICT face's features"},
+      {std::string(IctSurface()), std::string(IctSites()), std::string(IctFeatures())});
+}
+
+}  // namespace
+
 TemplateFace LoadTemplate(const TemplateSource& source) {
-  const auto* const formula = std::get_if<FormulaTemplate>(&source);
-  return formula != nullptr ? MakeTemplateFace(*formula)
-                            : ReadTemplate(std::get<FileTemplate>(source));
+  return std::visit([](const auto& given) { return Load(given); }, source);
 }
 
 std::vector<std::filesystem::path> TemplateFiles(const TemplateSource& source) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <variant>
@@ -52,6 +53,16 @@ class LevelCheck {
 
 }  // namespace
 
+FaceSource WayToFace(const Experiment& experiment) {
+  if (!std::holds_alternative<AutoFace>(experiment.face)) {
+    return experiment.face;
+  }
+  const bool fits = std::holds_alternative<IctPrior>(experiment.prior)
+                        ? std::holds_alternative<IctTemplate>(experiment.face_template)
+                        : !std::holds_alternative<NoPrior>(experiment.prior);
+  return fits ? FaceSource(PriorThenFit{}) : FaceSource(FittedTemplate{});
+}
+
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   const TemplateLevels levels = LevelsOf(experiment.face_template);
   LevelCheck check(levels);
@@ -65,10 +76,31 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
     faults.push_back({"sites." + fault.path, fault.what});
   }
-  if (AsksPrior(experiment.face) && std::holds_alternative<NoPrior>(experiment.prior)) {
+  const FaceSource face = WayToFace(experiment);
+  const bool asks = AsksPrior(face);
+  if (asks && std::holds_alternative<IctPrior>(experiment.prior) &&
+      !std::holds_alternative<IctTemplate>(experiment.face_template)) {
+    faults.push_back({"face",
+                      "it asks the prior 'ict', which is one of `template: ict`; take that "
+                      "template, a prior of yours, or `face: fit`"});
+  }
+  if (asks && experiment.uncertainty.samples > 0) {
+    faults.push_back({"uncertainty.samples",
+                      "faces are drawn from the distribution of a fit alone; write 0, or "
+                      "`face: fit`"});
+  }
+  if (asks && std::holds_alternative<NoPrior>(experiment.prior)) {
     faults.push_back({"face",
                       "it asks a prior, and there is none; name one under `prior`, or take "
                       "`face: fit`"});
+  }
+  const bool holds_shape = std::ranges::any_of(experiment.fit.terms, [](const Term& term) {
+    return std::holds_alternative<PriorShapeTerm>(term);
+  });
+  if (holds_shape && !std::holds_alternative<PriorThenFit>(face)) {
+    faults.push_back({"fit.terms",
+                      "the term 'prior_shape' looks at a prior's face; leave it out, or write "
+                      "`face: prior_then_fit`"});
   }
   return faults;
 } catch (const Error& error) {  // of a template that cannot be used; its levels are not known

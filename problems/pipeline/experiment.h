@@ -111,19 +111,19 @@ using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
 struct Experiment {
   std::string title = "untitled";
-  Subject subject;                // whose skull
-  PlaceOptions landmarks;         // how they are laid onto bone
-  TissueOptions tissue;           // where the dowels' depths come from
-  ExtraSites sites;               // dowels beside the landmarks', (u,v) set by hand
-  std::filesystem::path network;  // which dowels share an area
-  DepthScheme interp;             // depth between the dowels
-  OutsideRule outside;            // depth outside the network
-  SkullFill fill;                 // how temples, orbits and gaps are bridged
-  ImplicitFaceOptions implicit;   // the implicit surface and its polygons
-  TemplateSource face_template;   // `template`: the generic face
-  PlacementOptions placement;     // how it is brought to the dowels
-  PriorSource prior;              // a statistical model of faces
-  FaceSource face;                // the way to the face
+  Subject subject;                               // whose skull
+  PlaceOptions landmarks;                        // how they are laid onto bone
+  TissueOptions tissue;                          // where the dowels' depths come from
+  ExtraSites sites;                              // dowels beside the landmarks', (u,v) set by hand
+  std::filesystem::path network;                 // which dowels share an area
+  DepthScheme interp;                            // depth between the dowels
+  OutsideRule outside;                           // depth outside the network
+  SkullFill fill;                                // how temples, orbits and gaps are bridged
+  ImplicitFaceOptions implicit;                  // the implicit surface and its polygons
+  TemplateSource face_template = IctTemplate{};  // `template`: the generic face
+  PlacementOptions placement;                    // how it is brought to the dowels
+  PriorSource prior = IctPrior{};                // a statistical model of faces
+  FaceSource face;                               // the way to the face
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;             // no seeds nearer to where the scan ends
@@ -156,16 +156,19 @@ void Fields(Visitor& visit, Experiment& o) {
   visit(FieldInfo{.name = "fill", .doc = "how temples, orbits and gaps are bridged"}, o.fill);
   visit(FieldInfo{.name = "implicit", .doc = "the implicit surface and its polygons"}, o.implicit);
   visit(FieldInfo{.name = "template",
-                  .doc = "the generic face: by the built-in formula, or from a file"},
+                  .doc = "the generic face; ict: the mean of the ICT-FaceKit model, which the "
+                         "program carries; formula: a head by formula, the phantoms' own; file: "
+                         "from files"},
         o.face_template);
   visit(FieldInfo{.name = "placement", .doc = "how the generic face is brought to the dowels"},
         o.placement);
   visit(FieldInfo{.name = "prior",
                   .doc = "a statistical model of faces: mean and modes on one mesh; `template` is "
-                         "then the H-spline of its mean"},
+                         "then the H-spline of its mean; ict is the one of `template: ict`"},
         o.prior);
   visit(FieldInfo{.name = "face",
-                  .doc = "the way to the face; placed: the template, brought to the dowels; "
+                  .doc = "the way to the face; auto: prior_then_fit where there is a prior of the "
+                         "template, else fit; placed: the template, brought to the dowels; "
                          "thin_plate: bent to their tips; fit: fitted to tips and implicit face "
                          "level by level; prior: the most likely face of the prior, given tips and "
                          "implicit face; prior_then_fit: that face as the template of the fit"},
@@ -199,6 +202,9 @@ void Fields(Visitor& visit, Experiment& o) {
                   .doc = "how dowels are left out, in `semblance depth` and studies of depth"},
         o.cross_validation);
 }
+
+// experiment.face, or what `auto` comes to: never AutoFace.
+FaceSource WayToFace(const Experiment& experiment);
 
 // Options that are right each by itself but not together, e.g. a step of the schedule at a level
 // that the generic face does not have. Told with the other faults when a configuration is read.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <type_traits>
 
 #include "problems/metrics/quantile.h"
@@ -101,22 +102,42 @@ FitTarget WithSeeds(FitTarget target, const std::vector<FitPoint>& seeds,
   return target;
 }
 
+// What a fit on top of a prior's face knows besides.
+struct PriorKnowledge {
+  std::vector<ShapePoint> shape = {};
+  std::vector<Sphere> features = {};
+  const SeedTrustOptions* trust = nullptr;  // null: all seeds weigh the same
+};
+
+void Weigh(const FitTarget& dowels, const PriorKnowledge& known, std::vector<FitPoint>& seeds) {
+  if (known.trust == nullptr) {
+    return;
+  }
+  std::vector<Vec3> tips;
+  for (const FitPoint& point : dowels.points) {
+    tips.push_back(point.position);
+  }
+  WeighSeeds(tips, known.features, *known.trust, seeds);
+}
+
 // Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
 // both (see seeding.h for why).
-FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, const TriMesh& implicit,
-                const TriMesh& shell, const RunContext& context) {
+FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, const FaceInput& in,
+                const PriorKnowledge& known, const RunContext& context) {
   const HSplineSurface& rest = placed.face.surface;
   const std::vector<VertexId> features = FeatureVertices(placed.face);
   const std::vector<Sphere> masks = TemplateMasks(placed.face);
   const FitOptions options = FitKeeping(experiment.sites, experiment.fit);
   FitTarget dowels = placed.dowels;
-  const MeshQuery query(implicit);
+  const MeshQuery query(in.implicit);
   HSplineSurface surface = FirstFit(experiment, placed.face, dowels, context);
   std::optional<FaceFit> result;
   for (int round = 0; round < experiment.rounds; ++round) {
     context.Report("fit", fmt::format("round {} of {}", round + 1, experiment.rounds));
-    SeedResult seeding = SeedDowels(surface, query, implicit, masks, experiment.seeds);
-    FitTarget target = WithSeeds(dowels, seeding.points, experiment.fit.terms, shell);
+    SeedResult seeding = SeedDowels(surface, query, in.implicit, masks, experiment.seeds);
+    Weigh(dowels, known, seeding.points);
+    FitTarget target = WithSeeds(dowels, seeding.points, experiment.fit.terms, in.shell);
+    target.shape = known.shape;
     FitResult fit = Fit(surface, rest, target, features, options, context);
     surface = fit.surface;
     for (std::size_t k = 0; k < dowels.points.size(); ++k) {
@@ -176,6 +197,10 @@ MadeFace MostLikelyFace(const ShapeFitOptions& estimate, const TableDepthOptions
   return {std::move(placed), std::move(unfitted), std::move(shape)};
 }
 
+MadeFace MakeFace(const AutoFace&, PlacedTemplate, const FaceInput&, const RunContext&) {
+  throw std::logic_error("WayToFace has no auto");
+}
+
 MadeFace MakeFace(const PlacedFace&, PlacedTemplate placed, const FaceInput&, const RunContext&) {
   FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
   return {std::move(placed), std::move(unfitted), {}};
@@ -190,7 +215,7 @@ MadeFace MakeFace(const ThinPlateFace& o, PlacedTemplate placed, const FaceInput
 
 MadeFace MakeFace(const FittedTemplate&, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
-  FaceFit fitted = FitFace(in.experiment, placed, in.implicit, in.shell, context);
+  FaceFit fitted = FitFace(in.experiment, placed, in, {}, context);
   return {std::move(placed), std::move(fitted), {}};
 }
 
@@ -199,17 +224,48 @@ MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in
   return MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
 }
 
+// By how much the tips' variance exceeds that of measured depths: a fit weighs its points among
+// themselves alone.
+double TipVarianceRatio(const PriorThenFit& o, const FaceInput& in) {
+  if (in.experiment.tissue.depths != DepthSource::kTable) {
+    return 1;
+  }
+  const double measured = std::pow(o.estimate.tip_normal_sd_mm, 2);
+  double sum = 0;
+  for (const Dowel& dowel : in.subject.dowels_on_bone) {
+    sum += measured / (measured + std::pow(DepthSd_mm(o.table_depths, dowel), 2));
+  }
+  return static_cast<double>(in.subject.dowels_on_bone.size()) / sum;
+}
+
+// The experiment with what a fit on top of the prior's face does otherwise.
+Experiment OnPrior(const PriorThenFit& o, const FaceInput& in) {
+  Experiment experiment = in.experiment;
+  experiment.first_fit.clear();  // seeds are taken on the prior's face
+  experiment.seeds.weight = o.seed_weight;
+  std::vector<Term>& terms = experiment.fit.terms;
+  const bool named = std::ranges::any_of(
+      terms, [](const Term& term) { return std::holds_alternative<PriorShapeTerm>(term); });
+  if (!named) {
+    terms.emplace_back(PriorShapeTerm{.weight = o.shape_weight * TipVarianceRatio(o, in)});
+  }
+  return experiment;
+}
+
 MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
   MadeFace made = MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
+  const HSplineSurface& surface = made.placed.face.surface;
   for (FitPoint& point : made.placed.dowels.points) {
     if (!IsHeld(in.experiment.sites, point.label)) {
-      point.uv = ProjectFrom(made.placed.face.surface, point.position, point.uv).uv;
+      point.uv = ProjectFrom(surface, point.position, point.uv).uv;
     }
   }
-  Experiment softer = in.experiment;
-  softer.seeds.weight = o.seed_weight;
-  made.fitted = FitFace(softer, made.placed, in.implicit, in.shell, context);
+  const PriorKnowledge known{
+      .shape = ShapePointsOf(surface, *made.prior, in.prior->face, in.prior->on_template),
+      .features = FeaturesOn(*made.prior, in.prior->face),
+      .trust = &o.seed_trust};
+  made.fitted = FitFace(OnPrior(o, in), made.placed, in, known, context);
   return made;
 }
 
@@ -218,7 +274,7 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
 std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
                                               const TemplateFace& generic, StageCache& cache,
                                               const RunContext& context) {
-  if (!AsksPrior(experiment.face)) {
+  if (!AsksPrior(WayToFace(experiment))) {
     return nullptr;
   }
   return cache.Get<LoadedPrior>(StageKey("prior", experiment.prior, experiment.face_template), [&] {
@@ -242,7 +298,7 @@ TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh&
 MadeFace MakeFace(const FaceInput& in, const RunContext& context) {
   PlacedTemplate placed = Place(in.generic, in.subject.dowels_on_bone, in.experiment);
   return std::visit([&](const auto& way) { return MakeFace(way, std::move(placed), in, context); },
-                    in.experiment.face);
+                    WayToFace(in.experiment));
 }
 
 FaceUncertainty PriorUncertainty(const LoadedPrior& prior, const ShapeEstimate& estimate,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fitting/uncertainty/error_propagation.h"
 #include "fitting/uncertainty/pivoted_root.h"
@@ -94,6 +95,24 @@ void AddKnownError(std::span<const DepthBehind> depths, const Eigen::VectorXd& l
   covariance += off * off.transpose();
 }
 
+// What a person's depths have in common, of a table's; and the rest of their deviations.
+struct SplitDeviations {
+  Eigen::VectorXd shared_mm;
+  std::vector<double> own_mm;
+};
+
+SplitDeviations Split(const Experiment& experiment, std::span<const DepthBehind> depths) {
+  const bool from_table = experiment.tissue.depths == DepthSource::kTable;
+  const double shared = from_table ? experiment.uncertainty.shared : 0;
+  SplitDeviations split{Eigen::VectorXd::Zero(std::ssize(depths)), {}};
+  for (std::size_t k = 0; k < depths.size(); ++k) {
+    const double sd_mm = depths[k].dowels_sd_mm;
+    split.shared_mm[static_cast<Eigen::Index>(k)] = shared * sd_mm;
+    split.own_mm.push_back(std::sqrt(1 - shared * shared) * sd_mm);
+  }
+  return split;
+}
+
 // Of the points' depths, mm^2; what kriging found goes into the result.
 Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& input,
                             std::span<const DepthBehind> depths, FaceUncertainty& result,
@@ -104,14 +123,14 @@ Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& inpu
   kriging.length_mm = result.depth_length_mm = model.length_mm;
   kriging.signal_mm = result.depth_signal_mm = model.signal_mm;
   std::vector<Vec3> bases;
-  std::vector<double> sd_mm;
   for (const DepthBehind& depth : depths) {
     bases.push_back(depth.base);
-    sd_mm.push_back(own == nullptr ? depth.dowels_sd_mm : 0);
   }
+  const SplitDeviations sd = Split(experiment, depths);
   DepthPosterior posterior = KrigingPosterior(kriging, input, bases, context);
-  AddSmoothErrors(depths, sd_mm, model.length_mm, posterior.covariance);
+  posterior.covariance += sd.shared_mm * sd.shared_mm.transpose();
   if (own == nullptr) {
+    AddSmoothErrors(depths, sd.own_mm, model.length_mm, posterior.covariance);
     AddKnownError(depths, posterior.mean_mm, posterior.covariance);
   }
   return std::move(posterior.covariance);
@@ -154,6 +173,24 @@ FitTarget AsLeft(FitTarget target, const FitResult& fit) {
   return target;
 }
 
+// The generic face's own misfit, which grows away from the points.
+void AddTemplateMisfit(const UncertaintyOptions& o, const Tessellation& face,
+                       const HSplineSurface& surface, const FitTarget& target,
+                       std::vector<double>& sigma_mm, const RunContext& context) {
+  std::vector<Vec3> points;
+  for (const FitPoint& point : target.points) {
+    points.push_back(surface.Point(point.uv));
+  }
+  ParallelFor(sigma_mm.size(), context.threads, 256, [&](std::size_t v) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Vec3& p : points) {
+      nearest = std::min(nearest, (p - face.mesh.points[v]).squaredNorm());
+    }
+    const double unseen = 1 - std::exp(-nearest / (o.unseen_reach_mm * o.unseen_reach_mm));
+    sigma_mm[v] = std::hypot(sigma_mm[v], o.template_sd_mm, o.unseen_sd_mm * std::sqrt(unseen));
+  });
+}
+
 // Sigma where a point of the fit lies in the same patch of its finest level, else NaN.
 std::vector<double> WhereHeld(const std::vector<double>& sigma_mm, const std::vector<Vec2>& uv,
                               const FitTarget& target, const HSplineShape& shape, int level) {
@@ -191,6 +228,7 @@ FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& 
   context.ThrowIfStopped();
   if (options.sigma) {
     result.sigma_mm = spread.Sigma(fitted.face.uv, fitted.face.normals);
+    AddTemplateMisfit(options, fitted.face, surface, target, result.sigma_mm, context);
     const std::vector<double> held =
         WhereHeld(result.sigma_mm, fitted.face.uv, target, surface.shape(), level);
     const std::vector<WeightedValue> by_area = SortedValues(held, VertexAreas(fitted.face.mesh));
@@ -201,26 +239,44 @@ FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& 
   return result;
 }
 
-SigmaCoverage MeasureCoverage(const TriMesh& skin, std::span<const double> signed_mm,
-                              const TriMesh& face, std::span<const double> sigma_mm,
-                              std::span<const Sphere> masks, const RunContext& context) {
+namespace {
+
+double CoverageOfPart(const TrueSkin& skin, int part, std::vector<double> sigma,
+                      const std::vector<double>& areas) {
+  for (std::size_t v = 0; v < sigma.size(); ++v) {
+    sigma[v] = skin.part[v] == part ? sigma[v] : kNaN;
+  }
+  return CoverageAt90(Coverage(skin.signed_mm, sigma, areas));
+}
+
+}  // namespace
+
+SigmaCoverage MeasureCoverage(const TrueSkin& skin, const TriMesh& face,
+                              std::span<const double> sigma_mm, std::span<const Sphere> masks,
+                              const RunContext& context) {
   const MeshQuery query(face);
-  std::vector<double> sigma(skin.points.size(), kNaN);
+  std::vector<double> sigma(skin.mesh.points.size(), kNaN);
   ParallelFor(sigma.size(), context.threads, 256, [&](std::size_t v) {
-    if (!std::isfinite(signed_mm[v])) {
+    if (!std::isfinite(skin.signed_mm[v])) {
       return;
     }
-    const MeshPoint at = query.Closest(skin.points[v]);
+    const MeshPoint at = query.Closest(skin.mesh.points[v]);
     const auto masked = [&](const Sphere& mask) { return mask.Contains(at.position); };
     if (std::none_of(masks.begin(), masks.end(), masked)) {
       sigma[v] = sigma_mm[NearestCorner(face, at)];
     }
   });
-  const std::vector<double> areas = VertexAreas(skin);
-  SigmaCoverage coverage{.curve = Coverage(signed_mm, sigma, areas), .area_cm2 = 0};
+  const std::vector<double> areas = VertexAreas(skin.mesh);
+  SigmaCoverage coverage{.curve = Coverage(skin.signed_mm, sigma, areas), .area_cm2 = 0};
   coverage.at_90 = CoverageAt90(coverage.curve);
   for (std::size_t v = 0; v < sigma.size(); ++v) {
     coverage.area_cm2 += std::isfinite(sigma[v]) ? areas[v] / 100 : 0;
+  }
+  for (std::size_t part = 0; !skin.part.empty() && part < kFaceParts.size(); ++part) {
+    const double share = CoverageOfPart(skin, static_cast<int>(part), sigma, areas);
+    if (std::isfinite(share)) {
+      coverage.of_part[kFaceParts[part]] = share;
+    }
   }
   return coverage;
 }

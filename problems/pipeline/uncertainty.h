@@ -2,6 +2,7 @@
 // How far a run's face may be off, from how far its dowels and what lies between them may be.
 #pragma once
 
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,9 +18,10 @@ namespace semblance {
 // Shares, 0..1, of the scored true skin whose distance from the face lies within the central
 // interval of a normal distribution of the stated sigma (interp/calibration.h).
 struct SigmaCoverage {
-  std::vector<double> curve;  // at 5 %, 10 %, .. 95 %
-  double at_90 = kNaN;        // 0.9 where sigma is true
-  double area_cm2 = kNaN;     // of the skin that counts
+  std::vector<double> curve;                   // at 5 %, 10 %, .. 95 %
+  double at_90 = kNaN;                         // 0.9 where sigma is true
+  double area_cm2 = kNaN;                      // of the skin that counts
+  std::map<std::string, double> of_part = {};  // at_90 of each part of the face that counts
 };
 
 struct FaceUncertainty {
@@ -49,15 +51,23 @@ struct FittedFace {
 // scheme states there (where it states none, the dowels' by inverse squared distance) and
 // resembling itself over kriging's length. A dowel's tip
 // is off along the dowel, a seed along the face's normal; a seed also by implicit_sd_mm, over the
-// same length. ErrorPropagation carries this through the fit. Throws InputError as
-// ErrorPropagation.
+// same length. Of a table's deviations the part `shared` is one error of all points.
+// ErrorPropagation carries this through the fit; sigma then has the template's own misfit too.
+// Throws InputError as ErrorPropagation.
 FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& stage,
                                 const FittedFace& fitted, const RunContext& context);
 
-// signed_mm: FaceMetrics::signed_mm. masks: where the face is the template's and no dowel or seed
-// was to be; the skin there does not count.
-SigmaCoverage MeasureCoverage(const TriMesh& skin, std::span<const double> signed_mm,
-                              const TriMesh& face, std::span<const double> sigma_mm,
-                              std::span<const Sphere> masks, const RunContext& context);
+// What sigma is measured against.
+struct TrueSkin {
+  const TriMesh& mesh;
+  std::span<const double> signed_mm;  // FaceMetrics::signed_mm
+  std::span<const int> part = {};     // FaceRegion::part; none: no figures of parts
+};
+
+// masks: where the face is the template's and no dowel or seed was to be; the skin there does not
+// count.
+SigmaCoverage MeasureCoverage(const TrueSkin& skin, const TriMesh& face,
+                              std::span<const double> sigma_mm, std::span<const Sphere> masks,
+                              const RunContext& context);
 
 }  // namespace semblance

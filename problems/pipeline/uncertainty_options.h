@@ -14,6 +14,10 @@ struct UncertaintyOptions {
   std::uint64_t random_seed = 1;  // which faces
   double dowel_sd_mm = 0;         // where the depth's source states none; 0: exact
   double implicit_sd_mm = 0.5;    // of the implicit face even where all depths are right
+  double shared = 0.7;            // part of a table's sd in which a person's depths err together
+  double template_sd_mm = 1;      // of the generic face, between points of the fit
+  double unseen_sd_mm = 4;        // of it, far from any point
+  double unseen_reach_mm = 25;    // how far that is
 };
 template <class Visitor>
 void Fields(Visitor& visit, UncertaintyOptions& o) {
@@ -42,6 +46,34 @@ void Fields(Visitor& visit, UncertaintyOptions& o) {
                   .doc = "how far the implicit face, and so a seed, is off even where all depths "
                          "are right"},
         o.implicit_sd_mm);
+  visit(FieldInfo{.name = "shared",
+                  .min = 0,
+                  .max = 1,
+                  .doc = "part of the standard deviation of a table's depths in which all depths "
+                         "of a person err together: a fat face is fat everywhere"},
+        o.shared);
+  visit(FieldInfo{.name = "template_sd_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 50,
+                  .doc = "of a fit without a prior: how far the generic face's own shape is from "
+                         "the person's between dowels and seeds; 0 for a phantom, whose template "
+                         "is its own"},
+        o.template_sd_mm);
+  visit(FieldInfo{.name = "unseen_sd_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 50,
+                  .doc = "of a fit without a prior: added to that far from every dowel and seed, "
+                         "where there is no bone or none was scanned"},
+        o.unseen_sd_mm);
+  visit(FieldInfo{.name = "unseen_reach_mm",
+                  .unit = "mm",
+                  .min = 0.1,
+                  .max = 500,
+                  .doc = "at the distance d from the nearest dowel or seed it is unseen_sd_mm "
+                         "sqrt(1 - exp(-(d / unseen_reach_mm)^2))"},
+        o.unseen_reach_mm);
 }
 
 }  // namespace semblance

@@ -73,7 +73,18 @@ void Fields(Visitor& visit, HSplinePrior& o) {
         o.count);
 }
 
-using PriorSource = std::variant<NoPrior, ModesPrior, HSplinePrior>;
+// The modes of configs/faces/ict, which the program carries, for `template: ict`.
+struct IctPrior {
+  static constexpr std::string_view kName = "ict";
+  int count = 60;
+};
+template <class Visitor>
+void Fields(Visitor& visit, IctPrior& o) {
+  visit(FieldInfo{.name = "count", .min = 1, .max = 60, .doc = "modes that are used, at most"},
+        o.count);
+}
+
+using PriorSource = std::variant<NoPrior, IctPrior, ModesPrior, HSplinePrior>;
 
 struct FacePrior {
   ShapeModel model;

@@ -6,9 +6,17 @@
 #include <variant>
 
 #include "problems/prior/prior_target.h"
+#include "problems/prior/seed_trust.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {
+
+// prior_then_fit where there is a prior of the template, else fit.
+struct AutoFace {
+  static constexpr std::string_view kName = "auto";
+};
+template <class Visitor>
+void Fields(Visitor&, AutoFace&) {}
 
 // The template, brought to the dowels and no more.
 struct PlacedFace {
@@ -62,16 +70,26 @@ void Fields(Visitor& visit, PriorFace& o) {
   PriorUseFields(visit, o.estimate, o.table_depths);
 }
 
-// The same as the template of the H-spline fit; each dowel is fitted where its tip is nearest to
-// that face. The implicit face has had its say in the prior's face, so its seeds weigh less here.
+// The same as the template of the H-spline fit, which starts from it without a first fit; each
+// dowel is fitted where its tip is nearest to that face. PriorShapeTerm holds the fit to the
+// posterior. The implicit face has had its say in the prior's face, so its seeds weigh less here.
 struct PriorThenFit {
   static constexpr std::string_view kName = "prior_then_fit";
-  double seed_weight = 0.01;
+  double shape_weight = 1;
+  double seed_weight = 0.001;
+  SeedTrustOptions seed_trust;
   ShapeFitOptions estimate;
   TableDepthOptions table_depths;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorThenFit& o) {
+  visit(
+      FieldInfo{.name = "shape_weight",
+                .min = 0,
+                .max = 1e6,
+                .doc = "of the term `prior_shape`, where fit.terms does not name it, for measured "
+                       "depths; with depths of a table it is larger, as their variance is"},
+      o.shape_weight);
   visit(
       FieldInfo{.name = "seed_weight",
                 .min = 1e-6,
@@ -79,10 +97,14 @@ void Fields(Visitor& visit, PriorThenFit& o) {
                 .doc = "of a seed in the fit, in place of seeds.weight; more follows the implicit "
                        "face, away from what the prior holds for likely"},
       o.seed_weight);
+  visit(FieldInfo{.name = "seed_trust",
+                  .doc = "where that weight falls: away from dowels; none is left at the features"},
+        o.seed_trust);
   PriorUseFields(visit, o.estimate, o.table_depths);
 }
 
-using FaceSource = std::variant<FittedTemplate, PlacedFace, ThinPlateFace, PriorFace, PriorThenFit>;
+using FaceSource =
+    std::variant<AutoFace, FittedTemplate, PlacedFace, ThinPlateFace, PriorFace, PriorThenFit>;
 
 inline bool AsksPrior(const FaceSource& face) {
   return std::holds_alternative<PriorFace>(face) || std::holds_alternative<PriorThenFit>(face);

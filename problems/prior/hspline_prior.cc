@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "problems/face_template/ict_face.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -125,6 +126,10 @@ FacePrior Load(const NoPrior&, const TemplateFace&) {
   throw InputError("prior: none is named; a face of type prior needs one");
 }
 
+FacePrior Load(const IctPrior& source, const TemplateFace& face) {
+  return PriorOf(HSplineModesFromJson(IctModes(), "the ICT face's modes"), face, source.count);
+}
+
 FacePrior Load(const ModesPrior& source, const TemplateFace&) { return LoadPrior(source); }
 
 FacePrior Load(const HSplinePrior& source, const TemplateFace& face) {
@@ -137,6 +142,7 @@ FacePrior Load(const HSplinePrior& source, const TemplateFace& face) {
 }
 
 std::vector<std::filesystem::path> FilesOfSource(const NoPrior&) { return {}; }
+std::vector<std::filesystem::path> FilesOfSource(const IctPrior&) { return {}; }
 std::vector<std::filesystem::path> FilesOfSource(const ModesPrior& source) {
   return {source.mean, source.modes, source.sites, source.features};
 }

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "fitting/problem/placement.h"
@@ -121,6 +122,39 @@ std::vector<double> SigmaAt(std::span<const Vec2> uv, const ShapeEstimate& estim
                        under.weights[2] * estimate.sigma_mm[t[2]]);
   }
   return sigma_mm;
+}
+
+std::vector<ShapePoint> ShapePointsOf(const HSplineSurface& surface, const ShapeEstimate& estimate,
+                                      const FacePrior& prior, const PriorOnTemplate& on_template) {
+  constexpr int kSide = 64;  // two along each side of a patch of level 2 of 16 patches a side
+  std::vector<Vec2> uv;
+  for (int k = 0; k < kSide * kSide; ++k) {
+    uv.emplace_back((k % kSide + 0.5) / kSide, (k / kSide + 0.5) / kSide);
+  }
+  const std::vector<double> sigma_mm = SigmaAt(uv, estimate, prior, on_template);
+  std::vector<ShapePoint> points;
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    const SurfaceFrame frame = surface.Frame(uv[k]);
+    if (const double area = frame.du.cross(frame.dv).norm(); area > 0) {
+      points.push_back(
+          {.uv = uv[k], .position = surface.Point(uv[k]), .sd_mm = sigma_mm[k], .share = area});
+    }
+  }
+  return points;
+}
+
+std::vector<Sphere> FeaturesOn(const ShapeEstimate& estimate, const FacePrior& prior) {
+  const std::vector<Vec3>& mean = prior.model.mean.points;
+  std::vector<Sphere> features;
+  for (const ShapeFeature& feature : prior.features) {
+    const auto nearest =
+        std::min_element(mean.begin(), mean.end(), [&](const Vec3& a, const Vec3& b) {
+          return (a - feature.position).squaredNorm() < (b - feature.position).squaredNorm();
+        });
+    features.push_back({.center = estimate.points[nearest - mean.begin()],
+                        .radius_mm = estimate.subject_from_model.scale * feature.clearance_mm});
+  }
+  return features;
 }
 
 }  // namespace semblance

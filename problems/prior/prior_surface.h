@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "fitting/problem/fit_target.h"
 #include "problems/face_template/template_face.h"
 #include "problems/prior/domain_grid.h"
 #include "problems/prior/face_prior.h"
@@ -33,6 +34,14 @@ HSplineSurface SurfaceOf(const ShapeEstimate& estimate, const FacePrior& prior,
 // The estimate's sigma at (u,v), mm.
 std::vector<double> SigmaAt(std::span<const Vec2> uv, const ShapeEstimate& estimate,
                             const FacePrior& prior, const PriorOnTemplate& on_template);
+
+// What PriorShapeTerm looks at: the surface of the estimate, with its sigma, at the middles of a
+// regular grid of its domain.
+std::vector<ShapePoint> ShapePointsOf(const HSplineSurface& surface, const ShapeEstimate& estimate,
+                                      const FacePrior& prior, const PriorOnTemplate& on_template);
+
+// The features of the prior on the estimated face; the radius is the clearance.
+std::vector<Sphere> FeaturesOn(const ShapeEstimate& estimate, const FacePrior& prior);
 
 // outer * inner.
 Similarity Composed(const Similarity& outer, const Similarity& inner);

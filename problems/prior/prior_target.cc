@@ -10,6 +10,10 @@
 
 namespace semblance {
 
+double DepthSd_mm(const TableDepthOptions& options, const Dowel& dowel) {
+  return std::hypot(options.sd_mm, options.share * dowel.depth_mm);
+}
+
 ShapeTarget PriorTarget(const FacePrior& prior, std::span<const Dowel> dowels,
                         const TableDepthOptions* from_table, const TriMesh* implicit) {
   ShapeTarget target{.start = {}, .tips = {}, .surface = implicit, .features = prior.features};
@@ -19,14 +23,15 @@ ShapeTarget PriorTarget(const FacePrior& prior, std::span<const Dowel> dowels,
     if (at == prior.sites.end()) {
       continue;
     }
-    const double along_sd_mm =
-        from_table == nullptr ? 0
-                              : std::hypot(from_table->sd_mm, from_table->share * dowel.depth_mm);
-    target.tips.push_back({.label = dowel.site,
-                           .at = at->second,
-                           .position = dowel.Tip(),
-                           .direction = dowel.direction,
-                           .along_sd_mm = along_sd_mm});
+    const double along_sd_mm = from_table == nullptr ? 0 : DepthSd_mm(*from_table, dowel);
+    const double stated_sd_mm = std::isfinite(dowel.sd_mm) ? dowel.sd_mm : along_sd_mm;
+    target.tips.push_back(
+        {.label = dowel.site,
+         .at = at->second,
+         .position = dowel.Tip(),
+         .direction = dowel.direction,
+         .along_sd_mm = along_sd_mm,
+         .shared_sd_mm = from_table == nullptr ? 0 : from_table->shared * stated_sd_mm});
     on_mean.push_back(PositionOf(at->second, prior.model.mean, prior.model.mean.points));
     on_subject.push_back(dowel.Tip());
   }

@@ -13,6 +13,7 @@ namespace semblance {
 struct TableDepthOptions {
   double sd_mm = 1;
   double share = 0.2;
+  double shared = 0.7;
 };
 template <class Visitor>
 void Fields(Visitor& visit, TableDepthOptions& o) {
@@ -27,7 +28,17 @@ void Fields(Visitor& visit, TableDepthOptions& o) {
                   .max = 5,
                   .doc = "added to its square: this part of the depth"},
         o.share);
+  visit(FieldInfo{.name = "shared",
+                  .min = 0,
+                  .max = 1,
+                  .doc = "part of the table's own standard deviation (where it states none, of "
+                         "the one above) in which all depths of a person err together, as those "
+                         "of a fat person do: it widens sigma and moves no face"},
+        o.shared);
 }
+
+// Standard deviation along the dowel of its depth from a table.
+double DepthSd_mm(const TableDepthOptions& options, const Dowel& dowel);
 
 // dowels: with depths, in the subject's frame; those whose site the prior does not have are left
 // out. from_table: null for measured depths. The start is the similarity that brings the mean's

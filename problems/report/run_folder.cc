@@ -91,6 +91,7 @@ Json UncertaintyJson(const RunResult& result) {
                {"samples", u.samples.size()},
                {"terms_left_out", u.left_out}};
   json["coverage_90"] = result.truth ? Json(result.truth->sigma.at_90) : Json(nullptr);
+  json["coverage_90_of"] = result.truth ? Json(result.truth->sigma.of_part) : Json(nullptr);
   json["coverage_area_cm2"] = result.truth ? Json(result.truth->sigma.area_cm2) : Json(nullptr);
   json["coverage"] = result.truth ? Json(result.truth->sigma.curve) : Json(nullptr);
   return json;

@@ -294,8 +294,8 @@ ReportSection UncertaintySection(const Json& result, const OutputFolder& folder)
       Number(uncertainty.at("sigma_median_mm")), Number(uncertainty.at("sigma_p95_mm")))};
   if (!uncertainty.at("coverage_90").is_null()) {
     section.paragraphs.push_back(
-        fmt::format("Of the true skin in front of the network, the features' regions apart, {} % "
-                    "lie within the interval that should hold 90 %.",
+        fmt::format("Of the true skin that is scored (of a fit without a prior the features' "
+                    "regions apart) {} % lie within the interval that should hold 90 %.",
                     Percent(uncertainty.at("coverage_90"))));
   }
   section.images = {

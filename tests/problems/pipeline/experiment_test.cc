@@ -28,10 +28,34 @@ std::string Faults(const std::string& text) {
   return WordsOf<ConfigError>([&] { ReadConfigText<Experiment>(text, "a.yaml"); });
 }
 
+TEST(Experiment, TheTermOfAPriorNeedsAFaceOfThePrior) {
+  const std::string terms = "fit: {terms: [points, prior_shape]}\n";
+  EXPECT_THAT(Faults(terms + "face: fit\n"), HasSubstr("1:14: fit.terms: the term 'prior_shape'"));
+  EXPECT_NO_THROW(ReadConfigText<Experiment>(terms + "face: prior_then_fit\n", "a.yaml"));
+  EXPECT_NO_THROW(ReadConfigText<Experiment>(terms, "a.yaml"));  // which is what auto comes to
+}
+
+// A prior is taken where it is one of the template.
+TEST(Experiment, TheWayToTheFaceFollowsTemplateAndPrior) {
+  const auto way = [](const std::string& text) {
+    return std::visit([](const auto& face) { return face.kName; },
+                      WayToFace(ReadConfigText<Experiment>(text, "a.yaml")));
+  };
+  EXPECT_EQ(way(""), "prior_then_fit");
+  EXPECT_EQ(way("template: formula\n"), "fit");
+  EXPECT_EQ(way("prior: none\n"), "fit");
+  EXPECT_EQ(way("template: formula\nprior: {type: hspline, modes: m.json}\n"), "prior_then_fit");
+  EXPECT_EQ(way("face: placed\n"), "placed");
+  EXPECT_THAT(Faults("template: formula\nface: prior\n"),
+              HasSubstr("a.yaml:2:7: face: it asks the prior 'ict'"));
+  EXPECT_THAT(Faults("prior: none\nface: prior\n"), HasSubstr("face: it asks a prior"));
+  EXPECT_THAT(Faults("uncertainty: {samples: 2}\n"), HasSubstr("uncertainty.samples: faces are"));
+}
+
 TEST(Experiment, TheDefaultsFitTogether) { EXPECT_THAT(FaultsBetween(Experiment{}), IsEmpty()); }
 
 TEST(Experiment, AStepAtALevelThatTheFaceLacksIsToldAtItsLine) {
-  EXPECT_EQ(Faults("template: {max_level: 2}\n"
+  EXPECT_EQ(Faults("template: {type: formula, max_level: 2}\n"
                    "fit:\n"
                    "  plan:\n"
                    "    schedule:\n"
@@ -74,7 +98,7 @@ TEST(Experiment, APlanOwnsItsOptions) {
 }
 
 TEST(Experiment, AFaultOfADefaultIsToldWhereTheFileComesNearest) {
-  EXPECT_THAT(Faults("template: {max_level: 1}\n"),
+  EXPECT_THAT(Faults("template: {type: formula, max_level: 1}\n"),
               AllOf(StartsWith("a.yaml:1:1: fit.plan.schedule[2].level: level 2"),
                     HasSubstr("fit.plan.schedule[5].level")));
 }

@@ -68,13 +68,30 @@ TEST(Uncertainty, CoverageIsTheShareOfTheSkinWithin) {
   const TriMesh skin = testing::SphereMesh({0, 0, 0}, 80, 30),
                 face = testing::SphereMesh({0, 0, 0}, 81.5, 30);
   const std::vector<double> apart(skin.points.size(), 1.5), sigma(face.points.size(), 2.0);
-  const SigmaCoverage all = MeasureCoverage(skin, apart, face, sigma, {}, {});
+  const SigmaCoverage all = MeasureCoverage({skin, apart}, face, sigma, {}, {});
   EXPECT_EQ(all.at_90, 1);
   EXPECT_EQ(all.curve[5], 0);   // 30 %
   EXPECT_EQ(all.curve[13], 1);  // 70 %
   EXPECT_NEAR(all.area_cm2, Area(skin) / 100, 1e-9);
+  EXPECT_TRUE(all.of_part.empty());
   const std::vector<Sphere> mask = {{.center = {0, 0, 81.5}, .radius_mm = 200}};
-  EXPECT_TRUE(std::isnan(MeasureCoverage(skin, apart, face, sigma, mask, {}).at_90));
+  EXPECT_TRUE(std::isnan(MeasureCoverage({skin, apart}, face, sigma, mask, {}).at_90));
+}
+
+// The upper half is 1.5 mm apart, the lower 6 mm, and sigma says 2 mm of both.
+TEST(Uncertainty, CoverageIsToldByPart) {
+  const TriMesh skin = testing::SphereMesh({0, 0, 0}, 80, 30),
+                face = testing::SphereMesh({0, 0, 0}, 81.5, 30);
+  std::vector<double> apart;
+  std::vector<int> part;
+  for (const Vec3& p : skin.points) {
+    apart.push_back(p.z() > 0 ? 1.5 : 6);
+    part.push_back(p.z() > 0 ? 0 : 2);
+  }
+  const std::vector<double> sigma(face.points.size(), 2.0);
+  const SigmaCoverage both = MeasureCoverage({skin, apart, part}, face, sigma, {}, {});
+  EXPECT_THAT(both.of_part,
+              ::testing::ElementsAre(::testing::Pair("forehead", 1), ::testing::Pair("nose", 0)));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <functional>
 #include <string>
 
+#include "problems/face_template/template_source.h"
 #include "problems/prior/hspline_prior.h"
 #include "problems/prior/prior_target.h"
 #include "surfaces/base/atomic_file.h"
@@ -151,6 +152,41 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
   }
   const std::vector<Vec2> middle = {Vec2(0.5, 0.5)};
   EXPECT_NEAR(SigmaAt(middle, estimate, prior, on_template)[0], 1.5, 1e-12);
+  // What a fit is held to, and what of the implicit face it does not follow.
+  const std::vector<ShapePoint> points = ShapePointsOf(surface, estimate, prior, on_template);
+  ASSERT_EQ(points.size(), 64u * 64);
+  double area = 0;
+  for (const ShapePoint& point : points) {
+    EXPECT_EQ(point.position, surface.Point(point.uv));
+    EXPECT_NEAR(point.sd_mm, 1.5, 1e-12);
+    area += point.share / (64 * 64);
+  }
+  EXPECT_NEAR(area, Area(Tessellate(surface, 2).mesh), 0.01 * area);
+  const std::vector<Sphere> features = FeaturesOn(estimate, prior);
+  ASSERT_EQ(features.size(), 2u);
+  EXPECT_EQ(features[0].radius_mm, prior.features[0].clearance_mm);
+  const Vec3 nose(0, -30, -36);
+  const double s = std::sin(0.02 * nose.z()) - std::sin(0.04 * nose.z());
+  const Vec3 moved = estimate.subject_from_model * Vec3(nose + Vec3(3 * s, 0, 2 * s));
+  EXPECT_LT((features[0].center - moved).norm(), 8);
+}
+
+// The program carries what configs/faces/ict has.
+TEST(IctFace, IsThatOfTheFiles) {
+  const fs::path folder = SEMBLANCE_SOURCE_DIR "/configs/faces/ict";
+  const TemplateFace carried = LoadTemplate(IctTemplate{}),
+                     read = LoadTemplate(FileTemplate{.surface = folder / "head.hspline.json",
+                                                      .sites = folder / "sites.csv",
+                                                      .features = folder / "features.json"});
+  EXPECT_EQ(carried.surface.Net(0).vertices, read.surface.Net(0).vertices);
+  EXPECT_EQ(carried.surface.Offsets(), read.surface.Offsets());
+  EXPECT_EQ(carried.site_uv, read.site_uv);
+  EXPECT_EQ(FeatureVertices(carried), FeatureVertices(read));
+  const FacePrior prior = LoadPrior(IctPrior{.count = 3}, carried),
+                  from_file = LoadPrior(HSplinePrior{folder / "modes.json", 3}, read);
+  EXPECT_EQ(prior.model.Modes(), 3);
+  EXPECT_EQ(prior.model.modes, from_file.model.modes);
+  EXPECT_EQ(prior.model.mean.points, from_file.model.mean.points);
 }
 
 TEST(HSplinePrior, ModesOnTheTemplateMoveItAsTheMeshsModesDo) {
@@ -231,8 +267,12 @@ TEST(PriorTarget, TableDepthsAreLessSureAlongTheDowel) {
   EXPECT_EQ(measured.tips[0].along_sd_mm, 0);
   EXPECT_NEAR(measured.start.scale, 1, 0.01);
   const TableDepthOptions table;
-  EXPECT_NEAR(PriorTarget(prior, dowels, &table, nullptr).tips[3].along_sd_mm, std::hypot(1, 1),
-              1e-12);
+  dowels[3].sd_mm = 3;
+  const ShapeTarget rough = PriorTarget(prior, dowels, &table, nullptr);
+  EXPECT_NEAR(rough.tips[3].along_sd_mm, std::hypot(1, 1), 1e-12);
+  EXPECT_NEAR(rough.tips[3].shared_sd_mm, 0.7 * 3, 1e-12);  // of what the table states
+  EXPECT_NEAR(rough.tips[4].shared_sd_mm, 0.7 * std::hypot(1, 1), 1e-12);
+  EXPECT_EQ(measured.tips[3].shared_sd_mm, 0);
   dowels.resize(2);
   EXPECT_THROW(PriorTarget(prior, dowels, nullptr, nullptr), InputError);
 }

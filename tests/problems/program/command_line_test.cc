@@ -256,7 +256,7 @@ TEST_F(CommandLine, CheckWarnsOfATableWhoseDepthsDoNotGrowWithTheBuild) {
 
 TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
   Write("e.yaml",
-        "template: {max_level: 1}\n"
+        "template: {type: formula, max_level: 1}\n"
         "fit: {plan: {type: coarse_to_fine, finest: 1}}\n");
   const Outcome written = Call("template e.yaml --out generic");
   EXPECT_EQ(written.code, 0) << written.err;

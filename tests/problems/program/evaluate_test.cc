@@ -40,15 +40,17 @@ class EvaluateFace : public ::testing::Test {
           s.depth_mm);
     }
     WriteBytes("marks.yaml", marks);
-    WriteBytes("e.yaml",
-               fmt::format("subject: {{type: files, skull: skull.ply, skin: skin.ply, landmarks: "
-                           "marks.yaml}}\ntissue: {{depths: measured}}\nnetwork: "
-                           "{}/configs/networks/standard32.yaml\nfill: none\n"
-                           "implicit: {{resolution: 32}}\n"
-                           "template: {{max_level: 1}}\nfit: {{plan: {{type: coarse_to_fine, "
-                           "finest: 1}}, relaxation: none}}\n"
-                           "region: {{exclude: [{{site: zy_r, radius_mm: 25}}]}}\n",
-                           SEMBLANCE_SOURCE_DIR));
+    WriteBytes(
+        "e.yaml",
+        fmt::format(
+            "subject: {{type: files, skull: skull.ply, skin: skin.ply, landmarks: "
+            "marks.yaml}}\ntissue: {{depths: measured}}\nnetwork: "
+            "{}/configs/networks/standard32.yaml\nfill: none\n"
+            "implicit: {{resolution: 32}}\n"
+            "template: {{type: formula, max_level: 1}}\nfit: {{plan: {{type: coarse_to_fine, "
+            "finest: 1}}, relaxation: none}}\n"
+            "region: {{exclude: [{{site: zy_r, radius_mm: 25}}]}}\n",
+            SEMBLANCE_SOURCE_DIR));
   }
   void WriteBytes(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;

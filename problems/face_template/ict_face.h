@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files of configs/faces/ict, the face of the ICT-FaceKit model (MIT licence, see NOTICE);
+// CMake puts their text into the program.
+#pragma once
+
+#include <string_view>
+
+namespace semblance {
+
+std::string_view IctSurface();   // head.hspline.json
+std::string_view IctSites();     // sites.csv
+std::string_view IctFeatures();  // features.json
+std::string_view IctModes();     // modes.json
+
+}  // namespace semblance
