@@ -8,7 +8,7 @@ BUILD        := $(if $(filter sanitize debug quick,$(PRESET)),build-$(PRESET),bu
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build demo test bench faults sanitize format check headers tidy configs clean
+.PHONY: all setup configure build demo demo-phantom test bench faults sanitize format check headers tidy configs clean
 
 all: build
 
@@ -31,6 +31,16 @@ demo: PRESET = quick
 demo: configure
 	@cmake --build --preset quick --target semblance
 	@build-quick/problems/semblance run configs/demo.yaml --out $(DEMO_OUT) --force
+
+# A whole head that is made up: its CT as DICOM, skull and skin of it, its face, the score. The folder is that of the configuration.
+demo-phantom: PACKAGES = $(RUN_PACKAGES)
+demo-phantom: PRESET = quick
+demo-phantom: PHANTOM = out/demo-phantom
+demo-phantom: configure
+	@cmake --build --preset quick --target semblance
+	@build-quick/problems/semblance phantom --out $(PHANTOM)/head --force
+	@build-quick/problems/semblance import-ct $(PHANTOM)/head/ct --out $(PHANTOM)/import --force
+	@build-quick/problems/semblance run configs/demo_phantom/head.yaml --out $(PHANTOM)/run --force
 
 test: build
 	@ctest --preset $(PRESET)

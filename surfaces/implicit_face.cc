@@ -85,10 +85,11 @@ TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
   }
   const Components components = ConnectedComponents(mesh);
   std::vector<double> volume(components.count, 0);
+  const Vec3 middle = Bounds(mesh).center();  // of a mesh that is open the volume depends on it
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle& c = mesh.triangles[t];
-    volume[components.of_triangle[t]] +=
-        mesh.points[c[0]].dot(mesh.points[c[1]].cross(mesh.points[c[2]]));
+    const Vec3 a = mesh.points[c[0]] - middle, b = mesh.points[c[1]] - middle;
+    volume[components.of_triangle[t]] += a.dot(b.cross(mesh.points[c[2]] - middle));
   }
   const int largest =
       static_cast<int>(std::max_element(volume.begin(), volume.end()) - volume.begin());

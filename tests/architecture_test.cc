@@ -79,6 +79,8 @@ const std::map<std::string, std::string> kLibraryPlaces = {
     {"yaml-cpp/", R"(problems/config/config\.cc)"},
     {"CGAL/", R"(\w+/(\w+/)?\w+\.cc)"},
     {"OpenMesh/", R"(surfaces/mesh_files/mesh_io\.cc)"},
+    {"itk", R"(problems/ct/itk_files\.cc)"},
+    {"gdcm", R"(problems/ct/itk_files\.cc)"},
 };
 
 std::string FloorOf(const std::string& path) { return path.substr(0, path.find('/')); }

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A CT volume in Hounsfield units, and its reading from an InVesalius project.
+// A volume of CT (in Hounsfield units) or MR, and where its voxels are.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -12,12 +11,16 @@
 
 namespace semblance {
 
-// Axial slices from the feet upwards, rows from the back to the front, columns from the subject's
-// right to the left.
+// As near as the scan's axes are to those of LPS: slices from the feet upwards, rows from the front
+// to the back, columns from the subject's right to the left.
 struct CtVolume {
   int columns = 0, rows = 0, slices = 0;
   Vec3 spacing_mm = Vec3::Constant(kNaN);  // between columns, rows, slices; > 0
-  std::vector<std::int16_t> values;        // HU, index [slice][row][column]
+  Vec3 origin = Vec3::Zero();              // centre of the first voxel, LPS, mm
+  // Unit steps along columns, rows and slices, in LPS; positive determinant. Turned where the head
+  // was not straight in the scanner, skew where its gantry was tilted.
+  Mat3 axes = Mat3::Identity();
+  std::vector<std::int16_t> values;  // HU, index [slice][row][column]
 
   std::size_t Index(int column, int row, int slice) const {
     return column + static_cast<std::size_t>(columns) *
@@ -25,7 +28,11 @@ struct CtVolume {
   }
   // The centre of a voxel in LPS, mm; fractions of voxels are allowed.
   Vec3 World(double column, double row, double slice) const {
-    return {spacing_mm.x() * column, -spacing_mm.y() * row, spacing_mm.z() * slice};
+    return origin + axes * spacing_mm.cwiseProduct(Vec3(column, row, slice));
+  }
+  // The inverse of World: column, row and slice of a point.
+  Vec3 VoxelAt(const Vec3& world) const {
+    return (axes.inverse() * (world - origin)).cwiseQuotient(spacing_mm);
   }
 };
 
@@ -34,12 +41,7 @@ struct CtVolume {
 double SampleHu(const CtVolume& volume, const Vec3& world);
 
 // Throws InputError, naming `where`, unless the volume is at least 2 voxels each way, its spacing
-// is positive and finite, and there is one value per voxel.
+// is positive and finite, its axes are right-handed, and there is one value per voxel.
 void CheckVolume(const CtVolume& volume, const std::string& where);
-
-// Reads an InVesalius project (.inv3: a tar, gzipped or not, of `main.plist` and the matrix it
-// names). Throws IoError if there is no such file, it is no such archive, or an entry is missing or
-// of the wrong size; InputError for a type other than int16 or a shape or spacing that cannot be.
-CtVolume ReadInvesalius(const std::filesystem::path& path);
 
 }  // namespace semblance

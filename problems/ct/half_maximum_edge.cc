@@ -63,16 +63,16 @@ std::vector<Vec3> Smoothed(const TriMesh& mesh, const std::vector<Vec3>& moves) 
 // Vertices on a side of the volume stay on it, for there the mesh is cut open, and none leaves the
 // volume.
 Vec3 MovedInside(const CtVolume& volume, const Vec3& p, const Vec3& move) {
-  Box3 box;
-  box.extend(volume.World(0, 0, 0));
-  box.extend(volume.World(volume.columns - 1, volume.rows - 1, volume.slices - 1));
-  Vec3 moved = (p + move).cwiseMax(box.min()).cwiseMin(box.max());
+  constexpr double kOnSide = 1e-6;  // voxels
+  const Vec3 last(volume.columns - 1, volume.rows - 1, volume.slices - 1);
+  const Vec3 from = volume.VoxelAt(p), to = volume.VoxelAt(p + move);
+  Vec3 inside = to.cwiseMax(Vec3::Zero()).cwiseMin(last);
   for (int axis = 0; axis < 3; ++axis) {
-    if (p[axis] == box.min()[axis] || p[axis] == box.max()[axis]) {
-      moved[axis] = p[axis];
+    if (from[axis] < kOnSide || from[axis] > last[axis] - kOnSide) {
+      inside[axis] = from[axis];
     }
   }
-  return moved;
+  return inside == to ? Vec3(p + move) : volume.World(inside.x(), inside.y(), inside.z());
 }
 
 }  // namespace

@@ -27,6 +27,8 @@ struct CtImportOptions {
   double thinnest_head_mm = 8;          // thinner things apart from the head are dropped
   double widest_opening_mm = 12;        // air behind narrower openings is inside
   double smallest_bone_cm2 = 3;         // smaller pieces of bone are dropped
+  double metal_hu = 3000;               // what has more is metal
+  double thinnest_bone_mm = 1.5;        // thinner bone in slices with metal is a streak
 };
 template <class Visitor>
 void Fields(Visitor& visit, CtImportOptions& o) {
@@ -67,6 +69,18 @@ void Fields(Visitor& visit, CtImportOptions& o) {
                   .max = 1000,
                   .doc = "pieces of the skull's surface with less area than this are dropped"},
         o.smallest_bone_cm2);
+  visit(FieldInfo{.name = "metal_hu",
+                  .min = 1500,
+                  .max = 32767,
+                  .doc = "Hounsfield value above which a voxel is metal (enamel has up to 3000)"},
+        o.metal_hu);
+  visit(FieldInfo{.name = "thinnest_bone_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 10,
+                  .doc = "bone thinner than this in slices with metal is taken for a streak; more "
+                         "takes thin walls too; 0 keeps all"},
+        o.thinnest_bone_mm);
 }
 
 struct CtImport {

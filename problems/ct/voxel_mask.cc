@@ -3,119 +3,217 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <numeric>
 
 #include "surfaces/base/parallel.h"
 
 namespace semblance {
 namespace {
 
-// Calls visit(index) for each voxel that shares a face with the given one.
-template <class Visit>
-void ForNeighbours(const VoxelGrid& grid, std::int64_t index, const Visit& visit) {
-  std::int64_t rest = index, stride = 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    const std::int64_t at = rest % grid.counts[axis];
-    if (at > 0) {
-      visit(index - stride);
+constexpr float kFar = std::numeric_limits<float>::infinity();
+
+// Appends the runs of the line of voxels that begins at `start`.
+void AppendRuns(const VoxelMask& mask, std::int64_t start, int count, std::vector<VoxelRun>& runs) {
+  const std::uint8_t* const begin = mask.data() + start;
+  const std::uint8_t* const end = begin + count;
+  for (const std::uint8_t* at = begin; at < end;) {
+    const auto* first = static_cast<const std::uint8_t*>(std::memchr(at, 1, end - at));
+    if (!first) {
+      return;
     }
-    if (at + 1 < grid.counts[axis]) {
-      visit(index + stride);
-    }
-    rest /= grid.counts[axis];
-    stride *= grid.counts[axis];
+    const auto* past = static_cast<const std::uint8_t*>(std::memchr(first, 0, end - first));
+    past = past ? past : end;
+    runs.push_back({start + (first - begin), static_cast<std::int32_t>(past - first)});
+    at = past;
   }
 }
 
-// Lowers each squared distance to that over a neighbour on the same line along `axis`, if that is
-// within the reach.
-void DistancePass(int axis, const VoxelGrid& grid, double reach_mm, int threads,
-                  std::vector<float>& squared) {
-  std::int64_t stride = 1;
-  for (int a = 0; a < axis; ++a) {
-    stride *= grid.counts[a];
+// Sets of runs that hang together; the representative of a set is its first run.
+class RunSets {
+ public:
+  explicit RunSets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0);
   }
-  const int count = grid.counts[axis];
-  const double spacing = grid.spacing_mm[axis];
-  const int window = std::min(count - 1, static_cast<int>(reach_mm / spacing));
-  const std::size_t lines = static_cast<std::size_t>(grid.Count() / count);
-  ParallelFor(lines, threads, 512, [&](std::size_t line) {
-    const auto l = static_cast<std::int64_t>(line);
-    const std::int64_t first = l % stride + l / stride * stride * count;
-    std::vector<float> before(count);
-    for (int n = 0; n < count; ++n) {
-      before[n] = squared[first + n * stride];
+  std::int32_t Find(std::int32_t run) {
+    while (parent_[run] != run) {
+      parent_[run] = parent_[parent_[run]];
+      run = parent_[run];
     }
-    for (int n = 0; n < count; ++n) {
-      float best = before[n];
-      for (int m = std::max(0, n - window); m <= std::min(count - 1, n + window); ++m) {
-        best =
-            std::min(best, before[m] + static_cast<float>(spacing * spacing * (m - n) * (m - n)));
+    return run;
+  }
+  void Join(std::int32_t a, std::int32_t b) {
+    const std::int32_t first = Find(a), second = Find(b);
+    parent_[std::max(first, second)] = std::min(first, second);
+  }
+
+ private:
+  std::vector<std::int32_t> parent_;
+};
+
+// Joins the runs of two lines that lie side by side; `apart` is the difference of their indices.
+void JoinLines(const std::vector<VoxelRun>& runs, const std::vector<std::int32_t>& line_start,
+               std::int64_t line, std::int64_t other, std::int64_t apart, RunSets& sets) {
+  std::int32_t a = line_start[line], b = line_start[other];
+  while (a < line_start[line + 1] && b < line_start[other + 1]) {
+    const std::int64_t a_past = runs[a].first + runs[a].length;
+    const std::int64_t b_first = runs[b].first + apart, b_past = b_first + runs[b].length;
+    if (runs[a].first < b_past && b_first < a_past) {
+      sets.Join(a, b);
+    }
+    (a_past < b_past ? a : b) += 1;
+  }
+}
+
+// Numbers the sets in order of their first run, and counts their voxels.
+void NumberComponents(RunSets& sets, VoxelComponents& components) {
+  for (std::size_t r = 0; r < components.runs.size(); ++r) {
+    VoxelRun& run = components.runs[r];
+    const std::int32_t first = sets.Find(static_cast<std::int32_t>(r));
+    if (first == static_cast<std::int32_t>(r)) {
+      run.component = static_cast<std::int32_t>(components.sizes.size());
+      components.sizes.push_back(0);
+    } else {
+      run.component = components.runs[first].component;
+    }
+    components.sizes[run.component] += run.length;
+  }
+}
+
+// Lines of floats side by side, at first + r * stride for r in [0, rows).
+struct LineStack {
+  std::int64_t first = 0, stride = 0;
+  int rows = 0, columns = 0;
+};
+
+// Lowers each squared distance to that over another line of the stack; cost[n]: that of n lines.
+void LowerOverLines(const LineStack& stack, const std::vector<float>& cost,
+                    std::vector<float>& squared) {
+  const int reach = static_cast<int>(cost.size()) - 1;
+  std::vector<float> before(static_cast<std::size_t>(stack.rows) * stack.columns);
+  std::vector<bool> any(stack.rows);
+  for (int r = 0; r < stack.rows; ++r) {
+    const float* const line = squared.data() + stack.first + r * stack.stride;
+    std::copy(line, line + stack.columns,
+              before.begin() + static_cast<std::ptrdiff_t>(r) * stack.columns);
+    any[r] = std::any_of(line, line + stack.columns, [](float d) { return d < kFar; });
+  }
+  for (int r = 0; r < stack.rows; ++r) {
+    float* const line = squared.data() + stack.first + r * stack.stride;
+    for (int m = std::max(0, r - reach); m <= std::min(stack.rows - 1, r + reach); ++m) {
+      if (!any[m] || m == r) {
+        continue;
       }
-      squared[first + n * stride] = best;
+      const float* const other = before.data() + static_cast<std::ptrdiff_t>(m) * stack.columns;
+      const float more = cost[std::abs(m - r)];
+      for (int i = 0; i < stack.columns; ++i) {
+        const float over = other[i] + more;
+        line[i] = over < line[i] ? over : line[i];
+      }
     }
-  });
+  }
+}
+
+// The squared way of n steps for each n within reach.
+std::vector<float> StepCosts(double spacing_mm, double reach_mm, int count) {
+  const int steps = std::min(count - 1, static_cast<int>(reach_mm / spacing_mm));
+  std::vector<float> cost;
+  for (int n = 0; n <= steps; ++n) {
+    cost.push_back(static_cast<float>(spacing_mm * spacing_mm * n * n));
+  }
+  return cost;
+}
+
+// Squared distances along one line of voxels, from its runs.
+void DistancesInLine(const std::uint8_t* mask, int count, const std::vector<float>& cost,
+                     float* squared) {
+  const int reach = static_cast<int>(cost.size()) - 1;
+  int steps = reach + 1;
+  for (int i = 0; i < count; ++i) {
+    steps = mask[i] ? 0 : std::min(steps + 1, reach + 1);
+    squared[i] = steps <= reach ? cost[steps] : kFar;
+  }
+  steps = reach + 1;
+  for (int i = count - 1; i >= 0; --i) {
+    steps = mask[i] ? 0 : std::min(steps + 1, reach + 1);
+    squared[i] = steps <= reach ? std::min(squared[i], cost[steps]) : squared[i];
+  }
 }
 
 }  // namespace
 
+int VoxelComponents::Largest() const {
+  return sizes.empty()
+             ? -1
+             : static_cast<int>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
+}
+
 VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid) {
   VoxelComponents components;
-  components.of_voxel.assign(mask.size(), -1);
-  std::vector<std::int64_t> open;
-  for (std::int64_t start = 0; start < grid.Count(); ++start) {
-    if (!mask[start] || components.of_voxel[start] >= 0) {
-      continue;
+  const std::int64_t width = grid.counts[0], lines = std::int64_t{grid.counts[1]} * grid.counts[2];
+  std::vector<std::int32_t> line_start = {0};
+  for (std::int64_t line = 0; line < lines; ++line) {
+    AppendRuns(mask, line * width, grid.counts[0], components.runs);
+    line_start.push_back(static_cast<std::int32_t>(components.runs.size()));
+  }
+  RunSets sets(components.runs.size());
+  for (std::int64_t line = 0; line < lines; ++line) {
+    if (line % grid.counts[1] > 0) {
+      JoinLines(components.runs, line_start, line, line - 1, width, sets);
     }
-    const auto component = static_cast<std::int32_t>(components.sizes.size());
-    components.sizes.push_back(1);
-    components.of_voxel[start] = component;
-    open.assign(1, start);
-    while (!open.empty()) {
-      const std::int64_t voxel = open.back();
-      open.pop_back();
-      ForNeighbours(grid, voxel, [&](std::int64_t next) {
-        if (mask[next] && components.of_voxel[next] < 0) {
-          components.of_voxel[next] = component;
-          ++components.sizes[component];
-          open.push_back(next);
-        }
-      });
+    if (line >= grid.counts[1]) {
+      JoinLines(components.runs, line_start, line, line - grid.counts[1], width * grid.counts[1],
+                sets);
     }
   }
+  NumberComponents(sets, components);
   return components;
 }
 
-VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGrid& grid) {
-  VoxelMask reached(allowed.size(), 0);
-  std::vector<std::int64_t> open;
-  const auto visit = [&](std::int64_t voxel) {
-    if (allowed[voxel] && !reached[voxel]) {
-      reached[voxel] = 1;
-      open.push_back(voxel);
-    }
-  };
-  for (std::int64_t start = 0; start < grid.Count(); ++start) {
-    if (starts[start]) {
-      visit(start);
-    }
-    while (!open.empty()) {
-      const std::int64_t voxel = open.back();
-      open.pop_back();
-      ForNeighbours(grid, voxel, visit);
+VoxelMask MaskOf(const VoxelComponents& components, const std::vector<bool>& keep,
+                 const VoxelGrid& grid) {
+  VoxelMask mask(static_cast<std::size_t>(grid.Count()), 0);
+  for (const VoxelRun& run : components.runs) {
+    if (keep[run.component]) {
+      std::fill_n(mask.begin() + run.first, run.length, std::uint8_t{1});
     }
   }
-  return reached;
+  return mask;
+}
+
+VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGrid& grid) {
+  const VoxelComponents components = LabelComponents(allowed, grid);
+  std::vector<bool> wet(components.sizes.size(), false);
+  for (const VoxelRun& run : components.runs) {
+    if (!wet[run.component]) {
+      wet[run.component] = std::memchr(starts.data() + run.first, 1,
+                                       static_cast<std::size_t>(run.length)) != nullptr;
+    }
+  }
+  return MaskOf(components, wet, grid);
 }
 
 VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads) {
+  const auto [columns, rows, slices] = grid.counts;
+  const std::int64_t row = columns, slice = row * rows;
+  const auto cost = [&](int axis) {
+    return StepCosts(grid.spacing_mm[axis], distance_mm, grid.counts[axis]);
+  };
+  const std::vector<float> along = cost(0), over_rows = cost(1), over_slices = cost(2);
   std::vector<float> squared(mask.size());
-  std::transform(mask.begin(), mask.end(), squared.begin(), [](std::uint8_t in) {
-    return in ? 0.0F : std::numeric_limits<float>::infinity();
+  ParallelFor(slices, threads, 1, [&, columns = columns, rows = rows](std::size_t k) {
+    const std::int64_t first = static_cast<std::int64_t>(k) * slice;
+    for (int j = 0; j < rows; ++j) {
+      DistancesInLine(mask.data() + first + j * row, columns, along,
+                      squared.data() + first + j * row);
+    }
+    LowerOverLines({first, row, rows, columns}, over_rows, squared);
   });
-  for (int axis = 0; axis < 3; ++axis) {
-    DistancePass(axis, grid, distance_mm, threads, squared);
-  }
+  ParallelFor(rows, threads, 1, [&, columns = columns, slices = slices](std::size_t j) {
+    LowerOverLines({static_cast<std::int64_t>(j) * row, slice, slices, columns}, over_slices,
+                   squared);
+  });
   const auto limit = static_cast<float>(distance_mm * distance_mm * (1 + 1e-6));
   VoxelMask grown(mask.size());
   std::transform(squared.begin(), squared.end(), grown.begin(),

@@ -24,19 +24,32 @@ struct VoxelGrid {
 // One entry per voxel, 1 in the set, 0 not.
 using VoxelMask = std::vector<std::uint8_t>;
 
-// The component of each voxel by shared faces, numbered 0, 1, ... in order of the first voxel; -1
-// where the mask is 0.
+// Voxels of a mask that follow each other along the first axis.
+struct VoxelRun {
+  std::int64_t first = -1;  // index of the first voxel
+  std::int32_t length = 0;
+  std::int32_t component = -1;
+};
+
+// The components of a mask by shared faces, numbered 0, 1, ... in order of the first voxel.
 struct VoxelComponents {
-  std::vector<std::int32_t> of_voxel;
+  std::vector<VoxelRun> runs;       // in order; together all voxels of the mask
   std::vector<std::int64_t> sizes;  // voxels, one per component
+
+  int Largest() const;  // the first of the largest; -1 if there is none
 };
 VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid);
+
+// The voxels of the components for which keep[component] is true.
+VoxelMask MaskOf(const VoxelComponents& components, const std::vector<bool>& keep,
+                 const VoxelGrid& grid);
 
 // The voxels of `allowed` that can be reached by shared faces from those of `starts` that are in
 // it.
 VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGrid& grid);
 
-// The voxels whose centre is within distance_mm (>= 0) of the centre of one in the mask. Exact.
+// The voxels whose centre is within distance_mm (>= 0) of the centre of one in the mask. Exact for
+// axes that are square.
 VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads);
 
 }  // namespace semblance

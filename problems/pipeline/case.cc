@@ -9,14 +9,16 @@
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_file.h"
+#include "problems/subject/phantom_landmarks.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {
 
-void Append(std::vector<std::string>& notes, const std::vector<std::string>& more) {
-  notes.insert(notes.end(), more.begin(), more.end());
+template <class Item>
+void Append(std::vector<Item>& items, const std::vector<Item>& more) {
+  items.insert(items.end(), more.begin(), more.end());
 }
 
 TriMesh ReadHeadMesh(const FileSubject& options, const std::filesystem::path& path,
@@ -51,17 +53,7 @@ LandmarkFile Load(const PhantomOptions& options, SubjectData& subject, const Run
   Phantom phantom = MakePhantom(options);
   subject.skull = std::move(phantom.skull);
   subject.skin = std::move(phantom.face);
-  LandmarkFile file;
-  file.subject = fmt::format("phantom {}", options.random_seed);
-  for (const PhantomSite& site : phantom.sites) {
-    Landmark landmark;
-    landmark.site = site.site;
-    landmark.point = {site.base.x(), site.base.y(), site.base.z()};
-    landmark.normal = {site.normal.x(), site.normal.y(), site.normal.z()};
-    landmark.depth_along_normal_mm = site.depth_mm;
-    file.landmarks.push_back(landmark);
-  }
-  return file;
+  return PhantomLandmarks(phantom, options.random_seed);
 }
 
 void Mirror(const MirrorOptions& options, LandmarkFile& landmarks, SubjectData& subject,
@@ -87,11 +79,22 @@ LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunCon
 
 LandmarkFile Load(const CtSubject& options, SubjectData& subject, const RunContext& context) {
   if (options.volume.empty()) {
-    throw InputError("subject.volume: no file is named; give the path of an InVesalius project");
+    throw InputError(
+        "subject.volume: no file is named; give a folder of DICOM files, or a volume as .nii, "
+        ".nrrd, .mha or .inv3");
   }
   LandmarkFile landmarks = LandmarksOf(options.landmarks, subject);
-  subject.inputs.push_back(options.volume);
-  CtImport import = ImportCt(ReadInvesalius(options.volume), options.import, context);
+  const VolumeReading reading = ReadVolume(options.volume, options.read, context);
+  if (reading.modality == Modality::kMr) {
+    throw InputError(fmt::format(
+        "{}: an MR shows no bone (it is as dark as air), and a run needs a skull: take it from a "
+        "CT of the same head; `semblance import-ct` makes the skin of an MR, which may stand under "
+        "subject: {{type: files, skin: ...}}",
+        options.volume.string()));
+  }
+  Append(subject.notes, reading.notes);
+  Append(subject.inputs, VolumeFiles(options.volume));
+  CtImport import = ImportCt(reading.volume, options.import, context);
   subject.skull = std::move(import.skull);
   subject.skin = std::move(import.skin);
   Append(subject.notes, import.notes);

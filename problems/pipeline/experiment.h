@@ -17,6 +17,7 @@
 #include "interp/schemes/outside_rule.h"
 #include "problems/config/config_errors.h"
 #include "problems/ct/import_ct.h"
+#include "problems/ct/read_volume.h"
 #include "problems/face_template/template_source.h"
 #include "problems/metrics/face_region.h"
 #include "problems/pipeline/uncertainty_options.h"
@@ -73,13 +74,25 @@ void Fields(Visitor& visit, FileSubject& o) {
 struct CtSubject {
   static constexpr std::string_view kName = "ct";
   std::filesystem::path volume;
+  ReadVolumeOptions read;
   std::filesystem::path landmarks;
   CtImportOptions import;
   MirrorOptions mirror;  // what one side lacks
 };
 template <class Visitor>
 void Fields(Visitor& visit, CtSubject& o) {
-  visit(FieldInfo{.name = "volume", .doc = "InVesalius project (.inv3) of a head CT"}, o.volume);
+  visit(FieldInfo{.name = "volume",
+                  .doc = "head CT: a folder of DICOM files, or NIfTI (.nii, .nii.gz), NRRD (.nrrd, "
+                         ".nhdr), MetaImage (.mha, .mhd), InVesalius (.inv3)"},
+        o.volume);
+  visit(FieldInfo{.name = "series",
+                  .doc = "of a DICOM folder: number or UID of the series; needed where several "
+                         "could be meant"},
+        o.read.series);
+  visit(FieldInfo{.name = "fill_slices",
+                  .doc = "of a DICOM folder: true interpolates missing slices over up to 10 mm and "
+                         "takes the first of doubled ones; false refuses them"},
+        o.read.fill_slices);
   visit(FieldInfo{.name = "landmarks",
                   .doc = "landmarks on the skull: .yaml, or a file of Slicer, MeshLab or "
                          "CloudCompare, or .csv"},

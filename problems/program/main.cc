@@ -12,6 +12,7 @@
 #include "problems/program/face_commands.h"
 #include "problems/program/failure.h"
 #include "problems/program/landmark_commands.h"
+#include "problems/program/phantom_commands.h"
 #include "problems/program/run_commands.h"
 #include "problems/program/stop_signals.h"
 #include "problems/program/study_commands.h"
@@ -39,8 +40,8 @@ int ParseAndRun(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   app.require_subcommand(1);
   CommandLine line{.stop = StopOnSignals(), .chosen = {}};
-  for (const auto& commands :
-       {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(), TemplateCommands()}) {
+  for (const auto& commands : {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(),
+                               TemplateCommands(), PhantomCommands()}) {
     Declare(commands, app, line);
   }
   try {

@@ -18,6 +18,8 @@
 #include <thread>
 #include <vector>
 
+#include "problems/ct/mr_skin.h"
+#include "problems/ct/read_volume.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
@@ -52,6 +54,9 @@ struct Arguments {
   std::vector<std::string> exclude;
   CtImportOptions ct;
   std::string ct_edges = "threshold";
+  ReadVolumeOptions reading;
+  MrSkinOptions mr;
+  std::string modality = "auto";
   std::stop_token stop;
 };
 
@@ -232,25 +237,68 @@ int OptionsCommand(const Arguments& arguments) {
   return kDone;
 }
 
-int ImportCtCommand(const Arguments& arguments) {
-  const std::filesystem::path volume = arguments.files.at(0);
-  CtImportOptions options = arguments.ct;
-  options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
-  StagedFolder folder = MakeFolder(arguments, "out/" + volume.stem().string());
-  const CtImport import = ImportCt(ReadInvesalius(volume), options, MakeContext(arguments));
-  CheckHeadMesh(import.skull, "the imported skull");  // as whoever reads it will
-  CheckHeadMesh(import.skin, "the imported skin");
-  folder.Files().Write("skull.ply", EncodeMesh(import.skull, ".ply"));
-  folder.Files().Write("skin.ply", EncodeMesh(import.skin, ".ply"));
-  folder.Publish();
-  fmt::print("skull.ply: {} triangles; {} pieces below {} cm^2 dropped\n",
-             import.skull.triangles.size(), import.dropped_bone, options.smallest_bone_cm2);
-  fmt::print("skin.ply: {} triangles; {} pieces apart from the largest dropped\n",
-             import.skin.triangles.size(), import.dropped_skin);
-  for (const std::string& note : import.notes) {
+// The name of a folder or file without its endings.
+std::string VolumeName(const std::filesystem::path& path) {
+  const std::filesystem::path plain = std::filesystem::absolute(path / "").lexically_normal();
+  const std::string name = plain.parent_path().filename().string();
+  return name.substr(0, name.find('.', 1));
+}
+
+void PrintNotes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) {
     fmt::print("note: {}\n", note);
   }
-  fmt::print("folder: {}\n", folder.Root().string());
+}
+
+// Checked as whoever reads it will.
+void WriteSkin(const TriMesh& skin, int dropped, OutputFolder& folder) {
+  CheckHeadMesh(skin, "the imported skin");
+  folder.Write("skin.ply", EncodeMesh(skin, ".ply"));
+  fmt::print("skin.ply: {} triangles; {} pieces apart from the largest dropped\n",
+             skin.triangles.size(), dropped);
+}
+
+void WriteImport(const CtImport& import, OutputFolder& folder) {
+  CheckHeadMesh(import.skull, "the imported skull");
+  folder.Write("skull.ply", EncodeMesh(import.skull, ".ply"));
+  fmt::print("skull.ply: {} triangles\n", import.skull.triangles.size());
+  WriteSkin(import.skin, import.dropped_skin, folder);
+  PrintNotes(import.notes);
+}
+
+bool IsMr(const Arguments& arguments, const VolumeReading& reading) {
+  return arguments.modality == "auto" ? reading.modality == Modality::kMr
+                                      : arguments.modality == "mr";
+}
+
+int ImportCtCommand(const Arguments& arguments) {
+  const std::filesystem::path path = arguments.files.at(0);
+  CtImportOptions options = arguments.ct;
+  options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
+  const RunContext context = MakeContext(arguments);
+  const VolumeReading reading = ReadVolume(path, arguments.reading, context);
+  const bool mr = IsMr(arguments, reading);
+  if (!mr && arguments.mr.skin_value > 0) {
+    throw InputError("--skin-value is for an MR; the skin of a CT is at --skin-hu");
+  }
+  PrintNotes(reading.notes);
+  StagedFolder folder = MakeFolder(arguments, "out/" + VolumeName(path));
+  if (mr) {
+    const MrSkin import = ImportMrSkin(reading.volume, arguments.mr, context);
+    WriteSkin(import.skin, import.dropped, folder.Files());
+    PrintNotes(import.notes);
+  } else {
+    WriteImport(ImportCt(reading.volume, options, context), folder.Files());
+  }
+  folder.Publish();
+  const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();
+  fmt::print("folder: {}\n", root.string());
+  if (!mr) {
+    fmt::print(
+        "next: pick landmarks on skull.ply (3D Slicer, MeshLab, CloudCompare; docs/first-face.md), "
+        "then\n  semblance landmarks convert PICKED {}\n",
+        (folder.Root() / "landmarks.yaml").string());
+  }
   return kDone;
 }
 
@@ -338,7 +386,25 @@ void DeclareFit(CLI::App& command, CommandLine& line) {
 
 void DeclareImportCt(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &ImportCtCommand);
-  command.add_option("VOLUME", a.files, "InVesalius project (.inv3)")->required()->expected(1);
+  command
+      .add_option("VOLUME", a.files,
+                  "folder of DICOM files; or .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .inv3")
+      ->required()
+      ->expected(1);
+  command.add_option("--series", a.reading.series,
+                     "of a DICOM folder: number or UID of the series, where there are several");
+  command.add_flag("--fill-slices", a.reading.fill_slices,
+                   "interpolate missing slices (over up to 10 mm), take the first of doubled ones");
+  command
+      .add_option("--modality", a.modality,
+                  "ct, or mr, of which the skin alone is taken; auto: as DICOM says, else ct")
+      ->check(CLI::IsMember({"auto", "ct", "mr"}))
+      ->capture_default_str();
+  command
+      .add_option("--skin-value", a.mr.skin_value,
+                  "of an MR: grey value of the skin's surface; 0 finds it by Otsu's method")
+      ->check(CLI::Range(0.0, 32767.0))
+      ->capture_default_str();
   command.add_option("--bone-hu", a.ct.bone_hu, "Hounsfield value of the skull's surface")
       ->check(Finite())
       ->check(CLI::Range(50.0, 3000.0))
@@ -402,7 +468,9 @@ constexpr std::array kCommands = {
                    "interpolate depth alone: against the true skin, and with dowels left out",
                    &DeclareDepth},
     ProgramCommand{"fit", "fit an H-spline surface to any scattered points", &DeclareFit},
-    ProgramCommand{"import-ct", "make meshes of skull and skin from a CT volume, in mm",
+    ProgramCommand{"import-ct",
+                   "make meshes of skull and skin from a CT volume, or of the skin from an MR, in "
+                   "mm",
                    &DeclareImportCt},
     ProgramCommand{"check",
                    "check configurations of experiments, studies and fits, and the experiments' "

@@ -228,7 +228,18 @@ class ExperimentHash {
  private:
   std::string HashOf(const fs::path& file) {
     auto& hash = file_hashes_[file.string()];
-    return hash = hash.empty() ? Sha256OfFile(file) : hash;
+    return hash = hash.empty() ? NewHashOf(file) : hash;
+  }
+  // Of a folder (a DICOM series): that of the hashes of its files.
+  static std::string NewHashOf(const fs::path& file) {
+    if (!fs::is_directory(file)) {
+      return Sha256OfFile(file);
+    }
+    std::string all;
+    for (const fs::path& part : VolumeFiles(file)) {
+      all += Sha256OfFile(part);
+    }
+    return Sha256OfText(all);
   }
   std::map<std::string, std::string> file_hashes_;
 };

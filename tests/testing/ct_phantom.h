@@ -20,6 +20,7 @@ struct CtPhantom {
     volume.columns = volume.rows = 81;
     volume.slices = 54;
     volume.spacing_mm = Vec3(1.5, 1.5, 1.5);
+    volume.origin = Vec3(0, -120, 0);
     for (int k = 0; k < volume.slices; ++k) {
       for (int j = 0; j < volume.rows; ++j) {
         for (int i = 0; i < volume.columns; ++i) {

@@ -1,122 +1,68 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/ct/ct_volume.h"
 
-#include <archive.h>
-#include <archive_entry.h>
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstring>
-#include <fstream>
-#include <map>
-
 #include "tests/testing/scratch_file.h"
-#include "tests/testing/scratch_folder.h"
 
 namespace semblance {
 namespace {
 
-using ::testing::AllOf;
 using ::testing::HasSubstr;
-using testing::ScratchFolder;
 using testing::WordsOf;
 
-std::string Plist(const std::string& dtype, const std::string& shape) {
-  return fmt::format(
-      "<?xml version=\"1.0\"?><plist version=\"1.0\"><dict>"
-      "<key>matrix</key><dict><key>dtype</key><string>{}</string>"
-      "<key>filename</key><string>matrix.dat</string><key>shape</key><array>{}</array></dict>"
-      "<key>orientation</key><integer>1</integer>"
-      "<key>spacing</key><array><real>0.5</real><real>0.75</real><real>2</real></array>"
-      "</dict></plist>",
-      dtype, shape);
-}
-
-constexpr const char* kShape =
-    "<integer>4</integer><integer>3</integer><integer>2</integer>";  // slices, rows, columns
-
-std::string Values() {
-  std::string bytes;
-  for (std::int16_t n = 0; n < 24; ++n) {
-    bytes.append(reinterpret_cast<const char*>(&n), sizeof n);
-  }
-  return bytes;
-}
-
-void WriteTar(const std::filesystem::path& path, const std::map<std::string, std::string>& files) {
-  archive* a = archive_write_new();
-  archive_write_add_filter_gzip(a);
-  archive_write_set_format_pax_restricted(a);
-  ASSERT_EQ(archive_write_open_filename(a, path.c_str()), ARCHIVE_OK);
-  for (const auto& [name, bytes] : files) {
-    archive_entry* entry = archive_entry_new();
-    archive_entry_set_pathname(entry, ("tmp/" + name).c_str());
-    archive_entry_set_size(entry, static_cast<la_int64_t>(bytes.size()));
-    archive_entry_set_filetype(entry, AE_IFREG);
-    archive_entry_set_perm(entry, 0644);
-    archive_write_header(a, entry);
-    archive_write_data(a, bytes.data(), bytes.size());
-    archive_entry_free(entry);
-  }
-  archive_write_free(a);
-}
-
-TEST(CtVolume, AProjectIsReadAsItStands) {
-  const ScratchFolder folder;
-  WriteTar(folder / "x.inv3", {{"main.plist", Plist("int16", kShape)}, {"matrix.dat", Values()}});
-  const CtVolume volume = ReadInvesalius(folder / "x.inv3");
-  EXPECT_EQ(volume.columns, 2);
-  EXPECT_EQ(volume.rows, 3);
-  EXPECT_EQ(volume.slices, 4);
-  EXPECT_EQ(volume.spacing_mm, Vec3(0.5, 0.75, 2));
-  EXPECT_EQ(volume.values[volume.Index(1, 2, 3)], 23);
-  EXPECT_EQ(volume.World(1, 2, 3), Vec3(0.5, -1.5, 6));  // LPS
-}
-
-TEST(CtVolume, SamplingIsExactOnVoxelsAndLinearBetween) {
+// 5 x 6 x 7 voxels, turned and skew.
+CtVolume SkewVolume() {
   CtVolume volume;
   volume.columns = 5;
   volume.rows = 6;
   volume.slices = 7;
   volume.spacing_mm = Vec3(1, 2, 3);
-  const auto linear = [](const Vec3& p) { return 10 * p.x() - 4 * p.y() + 7 * p.z() + 30; };
+  volume.origin = Vec3(-20, 40, 100);
+  volume.axes.col(0) = Vec3(1, 0.2, 0).normalized();
+  volume.axes.col(1) = Vec3(-0.2, 1, 0.1).normalized();
+  volume.axes.col(2) = Vec3(0, -0.4, 1).normalized();
+  volume.values.assign(5 * 6 * 7, 0);
+  return volume;
+}
+
+TEST(CtVolume, VoxelsAreFoundWhereTheyLie) {
+  const CtVolume volume = SkewVolume();
+  EXPECT_EQ(volume.World(0, 0, 0), volume.origin);
+  for (const Vec3& at : {Vec3(0, 0, 0), Vec3(4, 5, 6), Vec3(1.25, 3.5, -2.75)}) {
+    EXPECT_LT((volume.VoxelAt(volume.World(at.x(), at.y(), at.z())) - at).norm(), 1e-12);
+  }
+}
+
+TEST(CtVolume, SamplingIsExactOnVoxelsAndLinearBetween) {
+  CtVolume volume = SkewVolume();
+  const auto linear = [](const Vec3& v) { return 10 * v.x() - 4 * v.y() + 7 * v.z() + 30; };
   for (int k = 0; k < 7; ++k) {
     for (int j = 0; j < 6; ++j) {
       for (int i = 0; i < 5; ++i) {
-        volume.values.push_back(static_cast<std::int16_t>(linear(volume.World(i, j, k))));
+        volume.values[volume.Index(i, j, k)] = static_cast<std::int16_t>(linear(Vec3(i, j, k)));
       }
     }
   }
   for (const Vec3& at :
        {Vec3(0, 0, 0), Vec3(4, 5, 6), Vec3(1.25, 3.5, 2.75), Vec3(3.9, 0.1, 5.5)}) {
-    const Vec3 p = volume.World(at.x(), at.y(), at.z());
-    EXPECT_NEAR(SampleHu(volume, p), linear(p), 1e-9);
+    EXPECT_NEAR(SampleHu(volume, volume.World(at.x(), at.y(), at.z())), linear(at), 1e-9);
   }
-  EXPECT_NEAR(SampleHu(volume, {-100, 100, -100}), linear(volume.World(0, 0, 0)), 1e-9);
+  EXPECT_NEAR(SampleHu(volume, volume.World(-9, -9, -9)), linear({0, 0, 0}), 1e-9);
 }
 
-TEST(CtVolume, EachFaultIsNamed) {
-  const ScratchFolder folder;
-  const auto words = [&](const std::map<std::string, std::string>& files) {
-    WriteTar(folder / "x.inv3", files);
-    return WordsOf<Error>([&] { ReadInvesalius(folder / "x.inv3"); });
+TEST(CtVolume, WhatIsNoVolumeIsToldSo) {
+  const auto words = [](const auto& spoil) {
+    CtVolume volume = SkewVolume();
+    spoil(volume);
+    return WordsOf<InputError>([&] { CheckVolume(volume, "x"); });
   };
-  const std::string plist = Plist("int16", kShape);
-  EXPECT_THAT(WordsOf<IoError>([&] { ReadInvesalius(folder / "none.inv3"); }),
-              HasSubstr("none.inv3: no such file"));
-  EXPECT_THAT(words({{"matrix.dat", Values()}}), HasSubstr("no entry 'main.plist'"));
-  EXPECT_THAT(words({{"main.plist", plist}}), HasSubstr("no entry 'matrix.dat'"));
-  EXPECT_THAT(words({{"main.plist", plist}, {"matrix.dat", Values().substr(2)}}),
-              AllOf(HasSubstr("46 bytes"), HasSubstr("need 48")));
-  EXPECT_THAT(words({{"main.plist", Plist("uint8", kShape)}, {"matrix.dat", Values()}}),
-              HasSubstr("only int16 is read"));
-  EXPECT_THAT(words({{"main.plist", Plist("int16", "<integer>4</integer>")}}),
-              HasSubstr("'shape' has 1 numbers"));
-  EXPECT_THAT(words({{"main.plist", "<plist"}}), HasSubstr("no property list"));
-  std::ofstream(folder / "y.inv3") << "not an archive";
-  EXPECT_THAT(WordsOf<IoError>([&] { ReadInvesalius(folder / "y.inv3"); }),
-              HasSubstr("no InVesalius project"));
+  EXPECT_THAT(words([](CtVolume& v) { v.slices = 1; }), HasSubstr("needs 2 each way"));
+  EXPECT_THAT(words([](CtVolume& v) { v.spacing_mm.y() = 0; }), HasSubstr("each must be > 0"));
+  EXPECT_THAT(words([](CtVolume& v) { v.axes.col(1) = v.axes.col(0); }),
+              HasSubstr("three different directions"));
+  EXPECT_THAT(words([](CtVolume& v) { v.values.pop_back(); }), HasSubstr("do not fill"));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
@@ -26,6 +27,15 @@ Vec3 Centre(std::int64_t n) {
   return Vec3(static_cast<double>(n % 9), static_cast<double>(n / 9 % 8),
               static_cast<double>(n / 72))
       .cwiseProduct(kGrid.spacing_mm);
+}
+
+// The component of each voxel, -1 where there is none.
+std::vector<int> OfVoxel(const VoxelComponents& pieces) {
+  std::vector<int> of_voxel(kGrid.Count(), -1);
+  for (const VoxelRun& run : pieces.runs) {
+    std::fill_n(of_voxel.begin() + run.first, run.length, run.component);
+  }
+  return of_voxel;
 }
 
 bool ShareAFace(std::int64_t a, std::int64_t b) {
@@ -55,13 +65,43 @@ TEST(VoxelMask, PiecesAreThoseOfAGraphSearch) {
     total += size;
   }
   EXPECT_EQ(total, std::count(mask.begin(), mask.end(), 1));
+  const std::vector<int> of_voxel = OfVoxel(pieces);
   for (std::int64_t a = 0; a < kGrid.Count(); ++a) {
-    EXPECT_EQ(pieces.of_voxel[a] < 0, mask[a] == 0);
+    EXPECT_EQ(of_voxel[a] < 0, mask[a] == 0);
     for (std::int64_t b = 0; b < a; ++b) {
       if (mask[a] && mask[b] && ShareAFace(a, b)) {
-        EXPECT_EQ(pieces.of_voxel[a], pieces.of_voxel[b]);
+        EXPECT_EQ(of_voxel[a], of_voxel[b]);
       }
     }
+  }
+}
+
+// Numbers that are as few as the pieces: no two numbers touch, and each is one piece.
+TEST(VoxelMask, PiecesAreNumberedInOrderOfTheirFirstVoxelAndHangTogether) {
+  const VoxelMask mask = RandomMask(5, 0.35);
+  const VoxelComponents pieces = LabelComponents(mask, kGrid);
+  const std::vector<int> of_voxel = OfVoxel(pieces);
+  int next = 0;
+  for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
+    EXPECT_LE(of_voxel[n], next);
+    next = std::max(next, of_voxel[n] + 1);
+  }
+  for (int piece = 0; piece < next; ++piece) {
+    VoxelMask start(mask.size(), 0);
+    start[std::find(of_voxel.begin(), of_voxel.end(), piece) - of_voxel.begin()] = 1;
+    bool more = true;
+    while (more) {  // grown voxel by voxel
+      more = false;
+      for (std::int64_t a = 0; a < kGrid.Count(); ++a) {
+        for (std::int64_t b = 0; b < kGrid.Count() && mask[a] && !start[a]; ++b) {
+          if (start[b] && ShareAFace(a, b)) {
+            start[a] = 1;
+            more = true;
+          }
+        }
+      }
+    }
+    EXPECT_EQ(std::count(start.begin(), start.end(), 1), pieces.sizes[piece]);
   }
 }
 
@@ -69,14 +109,15 @@ TEST(VoxelMask, AFloodIsThePiecesThatItsSeedsTouch) {
   const VoxelMask allowed = RandomMask(3, 0.4), seeds = RandomMask(4, 0.05);
   const VoxelMask reached = Flood(allowed, seeds, kGrid);
   const VoxelComponents pieces = LabelComponents(allowed, kGrid);
+  const std::vector<int> of_voxel = OfVoxel(pieces);
   std::vector<bool> wet(pieces.sizes.size(), false);
   for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
     if (allowed[n] && seeds[n]) {
-      wet[pieces.of_voxel[n]] = true;
+      wet[of_voxel[n]] = true;
     }
   }
   for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
-    EXPECT_EQ(reached[n] != 0, allowed[n] && wet[pieces.of_voxel[n]]);
+    EXPECT_EQ(reached[n] != 0, allowed[n] && wet[of_voxel[n]]);
   }
 }
 

@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/ct/itk_files.h"
+
+// First, else ITK's headers bring a part of an older Eigen of their own.
+#include <Eigen/Dense>
+
+#include <fmt/format.h>
+#include <gdcmImageWriter.h>
+#include <gdcmScanner.h>
+#include <gdcmTrace.h>
+#include <itkGDCMImageIO.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+// Both libraries tell their troubles on the terminal too.
+void SilenceLibraries() {
+  itk::Object::SetGlobalWarningDisplay(false);
+  gdcm::Trace::DebugOff();
+  gdcm::Trace::WarningOff();
+  gdcm::Trace::ErrorOff();
+}
+
+// Of ITK's words the last sentence, without the address of an object in memory.
+std::string WordsOf(const itk::ExceptionObject& error) {
+  std::string words = error.GetDescription();
+  const std::size_t address = words.find("): ");
+  words = address == words.npos ? words : words.substr(address + 3);
+  std::replace(words.begin(), words.end(), '\n', ' ');
+  return words;
+}
+
+template <class Value>
+void AppendRounded(const void* buffer, std::size_t count, VoxelArray& array) {
+  using Limits = std::numeric_limits<std::int16_t>;
+  const Value* const values = static_cast<const Value*>(buffer);
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto value = static_cast<double>(values[n]);
+    if (std::isfinite(value)) {
+      const double rounded = std::round(value);
+      const double inside = std::clamp<double>(rounded, Limits::min(), Limits::max());
+      array.clipped += inside != rounded ? 1 : 0;
+      array.values.push_back(static_cast<std::int16_t>(inside));
+    } else {
+      ++array.not_finite;
+      array.values.push_back(Limits::min());
+    }
+  }
+}
+
+void AppendRounded(const itk::ImageIOBase& io, const void* buffer, std::size_t count,
+                   VoxelArray& array, const std::string& where) {
+  using Type = itk::IOComponentEnum;
+  switch (io.GetComponentType()) {
+    case Type::UCHAR:
+      return AppendRounded<unsigned char>(buffer, count, array);
+    case Type::CHAR:
+      return AppendRounded<signed char>(buffer, count, array);
+    case Type::USHORT:
+      return AppendRounded<unsigned short>(buffer, count, array);
+    case Type::SHORT:
+      return AppendRounded<short>(buffer, count, array);
+    case Type::UINT:
+      return AppendRounded<unsigned int>(buffer, count, array);
+    case Type::INT:
+      return AppendRounded<int>(buffer, count, array);
+    case Type::ULONG:
+      return AppendRounded<unsigned long>(buffer, count, array);
+    case Type::LONG:
+      return AppendRounded<long>(buffer, count, array);
+    case Type::FLOAT:
+      return AppendRounded<float>(buffer, count, array);
+    case Type::DOUBLE:
+      return AppendRounded<double>(buffer, count, array);
+    default:
+      throw InputError(
+          fmt::format("{}: voxels of type '{}' are not read", where,
+                      itk::ImageIOBase::GetComponentTypeAsString(io.GetComponentType())));
+  }
+}
+
+// The file's voxels, all of them; throws unless there are as many as expected.
+void AppendVoxels(itk::ImageIOBase& io, std::size_t expected, VoxelArray& array,
+                  const std::string& where) {
+  if (io.GetNumberOfComponents() != 1) {
+    throw InputError(fmt::format("{}: {} values per voxel (colours, vectors); one is needed", where,
+                                 io.GetNumberOfComponents()));
+  }
+  itk::ImageIORegion region(io.GetNumberOfDimensions());
+  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) {
+    region.SetIndex(axis, 0);
+    region.SetSize(axis, io.GetDimensions(axis));
+  }
+  io.SetIORegion(region);
+  const auto count = static_cast<std::size_t>(io.GetImageSizeInPixels());
+  if (count != expected) {
+    throw InputError(fmt::format("{}: {} voxels instead of {}", where, count, expected));
+  }
+  constexpr char kUntouched = 0x5a;  // no scanner's value, were all voxels of a part to have it
+  constexpr std::size_t kTail = 1024;
+  std::vector<char> buffer(static_cast<std::size_t>(io.GetImageSizeInBytes()), kUntouched);
+  io.Read(buffer.data());
+  const auto tail = buffer.end() - static_cast<std::ptrdiff_t>(std::min(kTail, buffer.size()));
+  if (std::all_of(tail, buffer.end(), [](char byte) { return byte == kUntouched; })) {
+    throw IoError(fmt::format("{}: the file is cut short; copy or export it again", where));
+  }
+  AppendRounded(io, buffer.data(), count, array, where);
+}
+
+struct Reader {
+  itk::ImageIOBase::Pointer io;
+  const char* name;
+};
+
+Reader ReaderOf(VolumeFormat format) {
+  switch (format) {
+    case VolumeFormat::kNifti:
+      return {itk::NiftiImageIO::New().GetPointer(), "NIfTI"};
+    case VolumeFormat::kNrrd:
+      return {itk::NrrdImageIO::New().GetPointer(), "NRRD"};
+    default:
+      return {itk::MetaImageIO::New().GetPointer(), "MetaImage"};
+  }
+}
+
+// Counts, origin and steps, in LPS and mm as ITK gives them for every format.
+VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::string& where) {
+  const unsigned axes = io.GetNumberOfDimensions();
+  for (unsigned axis = 3; axis < axes; ++axis) {
+    if (io.GetDimensions(axis) != 1) {
+      throw InputError(fmt::format("{}: {} axes; a volume has 3: choose one of the {} volumes",
+                                   where, axes, io.GetDimensions(axis)));
+    }
+  }
+  if (axes < 3) {
+    throw InputError(fmt::format("{}: {} axes; a volume has 3", where, axes));
+  }
+  VoxelArray array;
+  for (int axis = 0; axis < 3; ++axis) {
+    array.counts[axis] = static_cast<int>(io.GetDimensions(axis));
+    array.origin[axis] = io.GetOrigin(axis);
+    const std::vector<double> direction = io.GetDirection(axis);
+    array.steps.col(axis) = io.GetSpacing(axis) * Vec3(direction[0], direction[1], direction[2]);
+  }
+  return array;
+}
+
+// Neither NIfTI's nor MetaImage's library says that a file ends too early. What can be seen from
+// its size is: of NIfTI, and of a MetaImage that is one file and not compressed.
+void CheckWhole(const std::filesystem::path& file, VolumeFormat format, std::uintmax_t needed) {
+  constexpr std::uintmax_t kHeader = 348, kMostHeader = 1 << 20;
+  std::uintmax_t has = std::filesystem::file_size(file);
+  std::ifstream in(file, std::ios::binary);
+  std::string head(std::min<std::uintmax_t>(has, 4096), ' ');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  std::uintmax_t most = std::numeric_limits<std::uintmax_t>::max();
+  if (format == VolumeFormat::kNifti && head.starts_with("\x1f\x8b")) {
+    std::uint32_t unpacked = 0;  // the last four bytes of gzip: the size before, modulo 2^32
+    in.clear();
+    in.seekg(-4, std::ios::end);
+    in.read(reinterpret_cast<char*>(&unpacked), sizeof unpacked);
+    has = unpacked;
+    needed &= 0xffffffff;
+    most = needed + kMostHeader;
+  } else if (format == VolumeFormat::kMetaImage &&
+             (head.find("LOCAL") == head.npos || head.find("CompressedData = True") != head.npos)) {
+    return;
+  } else if (format == VolumeFormat::kNrrd) {
+    return;
+  }
+  if (has < needed + (format == VolumeFormat::kNifti ? kHeader : 0) || has > most) {
+    throw IoError(
+        fmt::format("{}: the file is cut short: {} bytes of voxels are needed; copy or "
+                    "export it again",
+                    file.string(), needed));
+  }
+}
+
+std::size_t VoxelCount(const VoxelArray& array) {
+  return static_cast<std::size_t>(array.counts[0]) * array.counts[1] * array.counts[2];
+}
+
+namespace tags {
+const gdcm::Tag kImageType(0x0008, 0x0008), kSopClass(0x0008, 0x0016), kSopInstance(0x0008, 0x0018);
+const gdcm::Tag kStudyDate(0x0008, 0x0020), kStudyTime(0x0008, 0x0030);
+const gdcm::Tag kModality(0x0008, 0x0060), kDescription(0x0008, 0x103e), kPatient(0x0010, 0x0010);
+const gdcm::Tag kPatientId(0x0010, 0x0020), kThickness(0x0018, 0x0050);
+const gdcm::Tag kPatientPosition(0x0018, 0x5100), kStudy(0x0020, 0x000d), kSeries(0x0020, 0x000e);
+const gdcm::Tag kSeriesNumber(0x0020, 0x0011), kInstance(0x0020, 0x0013);
+const gdcm::Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kFrame(0x0020, 0x0052);
+const gdcm::Tag kFrames(0x0028, 0x0008), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011);
+const gdcm::Tag kSpacing(0x0028, 0x0030), kPixels(0x7fe0, 0x0010);
+}  // namespace tags
+
+std::string Text(const gdcm::Scanner& scanner, const std::string& file, const gdcm::Tag& tag) {
+  const char* const value = scanner.GetValue(file.c_str(), tag);
+  std::string text = value ? value : "";
+  text.erase(0, std::min(text.size(), text.find_first_not_of(' ')));
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text;
+}
+
+// The numbers of a tag, which backslashes part; empty unless there are as many as expected.
+std::vector<double> Numbers(const std::string& text, std::size_t expected) {
+  std::vector<double> numbers;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, '\\');) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(part.c_str(), &end));
+    if (end == part.c_str()) {
+      return {};
+    }
+  }
+  return numbers.size() == expected ? numbers : std::vector<double>();
+}
+
+int Count(const std::string& text, int otherwise) {
+  const std::vector<double> number = Numbers(text, 1);
+  return number.empty() ? otherwise : static_cast<int>(number[0]);
+}
+
+DicomHeader HeaderOf(const gdcm::Scanner& scanner, const std::string& file) {
+  const auto text = [&](const gdcm::Tag& tag) { return Text(scanner, file, tag); };
+  DicomHeader header{.file = file,
+                     .series_uid = text(tags::kSeries),
+                     .series_number = text(tags::kSeriesNumber),
+                     .description = text(tags::kDescription),
+                     .modality = text(tags::kModality),
+                     .image_type = text(tags::kImageType),
+                     .rows = Count(text(tags::kRows), -1),
+                     .columns = Count(text(tags::kColumns), -1),
+                     .frames = Count(text(tags::kFrames), 1),
+                     .position = {},
+                     .along_columns = {},
+                     .along_rows = {},
+                     .spacing_mm = {}};
+  const std::vector<double> p = Numbers(text(tags::kPosition), 3);
+  const std::vector<double> o = Numbers(text(tags::kOrientation), 6);
+  const std::vector<double> s = Numbers(text(tags::kSpacing), 2);
+  if (!p.empty()) {
+    header.position = Vec3(p[0], p[1], p[2]);
+  }
+  if (!o.empty()) {
+    header.along_columns = Vec3(o[0], o[1], o[2]).normalized();
+    header.along_rows = Vec3(o[3], o[4], o[5]).normalized();
+  }
+  if (!s.empty()) {
+    header.spacing_mm = Vec2(s[1], s[0]);  // the tag has that between rows first
+  }
+  return header;
+}
+
+// "DICM" behind 128 bytes, and not the table of contents of a disc. GDCM looks into other files
+// too, and some of them end the program.
+bool CanBeSlice(const std::filesystem::path& file) {
+  if (file.filename().string().starts_with("DICOMDIR")) {
+    return false;
+  }
+  std::array<char, 132> head = {};
+  std::ifstream in(file, std::ios::binary);
+  in.read(head.data(), head.size());
+  return in && std::string_view(head.data() + 128, 4) == "DICM";
+}
+
+void Put(gdcm::DataSet& data, const gdcm::Tag& tag, const gdcm::VR& vr, std::string text) {
+  if (text.size() % 2 != 0) {
+    text.push_back(vr == gdcm::VR::UI ? '\0' : ' ');
+  }
+  gdcm::DataElement element(tag);
+  element.SetVR(vr);
+  element.SetByteValue(text.data(), static_cast<std::uint32_t>(text.size()));
+  data.Replace(element);
+}
+
+void PutNames(const DicomSeriesNames& names, int slice, double thickness_mm, gdcm::DataSet& data) {
+  using gdcm::VR;
+  const auto uid = [&](int part) { return fmt::format("2.25.{}{:05}", names.number, part); };
+  Put(data, tags::kImageType, VR::CS, "DERIVED\\SECONDARY\\AXIAL");
+  Put(data, tags::kSopClass, VR::UI, "1.2.840.10008.5.1.4.1.1.2");  // CT image
+  Put(data, tags::kSopInstance, VR::UI, uid(100 + slice));
+  Put(data, tags::kStudy, VR::UI, uid(1));
+  Put(data, tags::kSeries, VR::UI, uid(2));
+  Put(data, tags::kFrame, VR::UI, uid(3));
+  Put(data, tags::kStudyDate, VR::DA, "20000101");  // else GDCM writes today's
+  Put(data, tags::kStudyTime, VR::TM, "000000");
+  Put(data, tags::kModality, VR::CS, "CT");
+  Put(data, tags::kDescription, VR::LO, names.description);
+  Put(data, tags::kPatient, VR::PN, names.patient);
+  Put(data, tags::kPatientId, VR::LO, names.patient);
+  Put(data, tags::kPatientPosition, VR::CS, "HFS");
+  Put(data, tags::kSeriesNumber, VR::IS, "1");
+  Put(data, tags::kInstance, VR::IS, fmt::format("{}", slice + 1));
+  Put(data, tags::kThickness, VR::DS, fmt::format("{:.6g}", thickness_mm));
+}
+
+void PutVoxels(const CtVolume& volume, int slice, gdcm::Image& image) {
+  image.SetNumberOfDimensions(2);
+  image.SetDimension(0, volume.columns);
+  image.SetDimension(1, volume.rows);
+  image.SetPixelFormat(gdcm::PixelFormat(gdcm::PixelFormat::INT16));
+  image.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+  image.SetTransferSyntax(gdcm::TransferSyntax::ExplicitVRLittleEndian);
+  image.SetIntercept(0);
+  image.SetSlope(1);
+  const Vec3 origin = volume.World(0, 0, slice);
+  for (int a = 0; a < 3; ++a) {
+    image.SetOrigin(a, origin[a]);
+    image.SetSpacing(a, volume.spacing_mm[a]);
+    image.SetDirectionCosines(a, volume.axes(a, 0));
+    image.SetDirectionCosines(3 + a, volume.axes(a, 1));
+  }
+  gdcm::DataElement pixels(tags::kPixels);
+  const std::size_t bytes = sizeof(std::int16_t) * volume.columns * volume.rows;
+  pixels.SetByteValue(reinterpret_cast<const char*>(&volume.values[volume.Index(0, 0, slice)]),
+                      static_cast<std::uint32_t>(bytes));
+  image.SetDataElement(pixels);
+}
+
+}  // namespace
+
+bool HasItk() { return true; }
+
+VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format) {
+  SilenceLibraries();
+  const std::string where = file.string();
+  const Reader reader = ReaderOf(format);
+  try {
+    if (!reader.io->CanReadFile(where.c_str())) {
+      throw IoError(
+          fmt::format("{}: it is no {} file, or its header is damaged", where, reader.name));
+    }
+    reader.io->SetFileName(where);
+    reader.io->ReadImageInformation();
+    VoxelArray array = GeometryOf(*reader.io, where);
+    CheckWhole(file, format, static_cast<std::uintmax_t>(reader.io->GetImageSizeInBytes()));
+    array.values.reserve(VoxelCount(array));
+    AppendVoxels(*reader.io, VoxelCount(array), array, where);
+    return array;
+  } catch (const itk::ExceptionObject& error) {
+    throw IoError(
+        fmt::format("{}: the {} file cannot be read: {}", where, reader.name, WordsOf(error)));
+  }
+}
+
+std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& files) {
+  SilenceLibraries();
+  gdcm::Scanner scanner;
+  for (const gdcm::Tag& tag : {tags::kImageType, tags::kModality, tags::kDescription, tags::kSeries,
+                               tags::kSeriesNumber, tags::kPosition, tags::kOrientation,
+                               tags::kFrames, tags::kRows, tags::kColumns, tags::kSpacing}) {
+    scanner.AddTag(tag);
+  }
+  gdcm::Directory::FilenamesType names;
+  for (const std::filesystem::path& file : files) {
+    if (CanBeSlice(file)) {
+      names.push_back(file.string());
+    }
+  }
+  scanner.Scan(names);
+  std::vector<DicomHeader> headers;
+  for (const std::string& name : names) {
+    if (scanner.IsKey(name.c_str())) {
+      headers.push_back(HeaderOf(scanner, name));
+    }
+  }
+  return headers;
+}
+
+void AppendDicomSlice(const DicomHeader& header, VoxelArray& array) {
+  const std::string where = header.file.string();
+  try {
+    const auto io = itk::GDCMImageIO::New();
+    io->SetFileName(where);
+    io->ReadImageInformation();
+    AppendVoxels(*io, static_cast<std::size_t>(header.columns) * header.rows, array, where);
+  } catch (const itk::ExceptionObject& error) {
+    throw IoError(fmt::format("{}: its pixels cannot be read: {}", where, WordsOf(error)));
+  }
+}
+
+std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSeriesNames& names) {
+  SilenceLibraries();
+  gdcm::ImageWriter writer;
+  PutVoxels(volume, slice, writer.GetImage());
+  PutNames(names, slice, volume.spacing_mm.z(), writer.GetFile().GetDataSet());
+  std::ostringstream bytes(std::ios::binary);
+  writer.SetStream(bytes);
+  if (!writer.Write()) {
+    throw IoError(
+        fmt::format("DICOM: slice {} of '{}' could not be encoded", slice + 1, names.description));
+  }
+  return bytes.str();
+}
+
+}  // namespace semblance

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Files that ITK and its GDCM read and write. The only place where the project knows of them:
+// itk_files.cc where they are installed, itk_files_off.cc, where each of these throws, elsewhere.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "problems/ct/ct_volume.h"
+#include "problems/ct/voxel_array.h"
+
+namespace semblance {
+
+// Whether the program was built with ITK.
+bool HasItk();
+
+enum class VolumeFormat { kNifti, kNrrd, kMetaImage };
+
+// Reads one volume of grey values. Throws IoError if it cannot be read, InputError for colours and
+// for more than three axes.
+VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format);
+
+// What a DICOM file says of itself; empty where it says nothing.
+struct DicomHeader {
+  std::filesystem::path file;
+  std::string series_uid, series_number, description, modality, image_type;
+  int rows = -1, columns = -1, frames = 1;
+  std::optional<Vec3> position;                   // of the first voxel, LPS, mm
+  std::optional<Vec3> along_columns, along_rows;  // unit: from a column, a row, to the next
+  std::optional<Vec2> spacing_mm;                 // between columns, between rows
+};
+
+// Of those of the files that are DICOM (with its mark behind 128 bytes), in the order given.
+std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& files);
+
+// Appends the values of one slice of header.columns x header.rows, slope and intercept applied.
+void AppendDicomSlice(const DicomHeader& header, VoxelArray& array);
+
+// What is written into the files of a series beside the voxels.
+struct DicomSeriesNames {
+  std::string patient, description;
+  std::uint64_t number = 1;  // of all UIDs: another number, another study
+};
+
+// The bytes of a DICOM file (CT image, 16 bit, uncompressed) with one slice of the volume.
+std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSeriesNames& names);
+
+}  // namespace semblance

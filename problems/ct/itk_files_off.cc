@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Built where ITK is not installed.
+#include <fmt/format.h>
+
+#include "problems/ct/itk_files.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+[[noreturn]] void ThrowNoItk(const std::string& what) {
+  throw IoError(fmt::format(
+      "{}: this program was built without ITK, and so knows no DICOM, NIfTI, NRRD or MetaImage; "
+      "install libinsighttoolkit5-dev and build again",
+      what));
+}
+
+}  // namespace
+
+bool HasItk() { return false; }
+
+VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat) {
+  ThrowNoItk(file.string());
+}
+
+std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& files) {
+  ThrowNoItk(files.empty() ? "DICOM" : files.front().parent_path().string());
+}
+
+void AppendDicomSlice(const DicomHeader& header, VoxelArray&) { ThrowNoItk(header.file.string()); }
+
+std::string EncodeDicomSlice(const CtVolume&, int, const DicomSeriesNames&) {
+  ThrowNoItk("DICOM files");
+}
+
+}  // namespace semblance

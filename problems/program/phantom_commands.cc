@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/program/phantom_commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <thread>
+
+#include "problems/ct/itk_files.h"
+#include "problems/landmark_files/read_landmarks.h"
+#include "problems/output/files.h"
+#include "problems/program/exit_code.h"
+#include "problems/subject/phantom_ct.h"
+#include "problems/subject/phantom_landmarks.h"
+#include "surfaces/mesh_files/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+// What the user typed.
+struct PhantomArguments {
+  std::string out;
+  PhantomOptions phantom;
+  PhantomCtOptions ct;
+  bool force = false;
+};
+
+void WriteSlices(const CtVolume& volume, std::uint64_t random_seed, OutputFolder& folder) {
+  const DicomSeriesNames names{.patient = fmt::format("Phantom^{}", random_seed),
+                               .description = fmt::format("phantom head {}", random_seed),
+                               .number = random_seed};
+  for (int slice = 0; slice < volume.slices; ++slice) {
+    folder.Write(fmt::format("ct/slice{:04}.dcm", slice + 1),
+                 EncodeDicomSlice(volume, slice, names), Durability::kUnsynced);
+  }
+}
+
+int WritePhantom(const PhantomArguments& a) {
+  OutputFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
+  const Phantom phantom = MakePhantom(a.phantom);
+  const CtVolume volume = VoxelisePhantom(phantom, a.ct);
+  WriteSlices(volume, a.phantom.random_seed, folder);
+  folder.Write("landmarks.yaml",
+               EncodeLandmarks(PhantomLandmarks(phantom, a.phantom.random_seed), "landmarks.yaml"));
+  folder.Write("true_skin.ply", EncodeMesh(phantom.face, ".ply"));
+  fmt::print(
+      "ct: {} DICOM slices of {} x {} voxels, {} x {} x {} mm\n"
+      "landmarks.yaml: {} sites, with their true depths\n"
+      "true_skin.ply: {} triangles\n",
+      volume.slices, volume.columns, volume.rows, a.ct.pixel_mm, a.ct.pixel_mm, a.ct.slice_mm,
+      phantom.sites.size(), phantom.face.triangles.size());
+  fmt::print("next: semblance import-ct {}\n", (folder.Root() / "ct").string());
+  return kDone;
+}
+
+void DeclarePhantom(CLI::App& command, CommandLine& line) {
+  PhantomArguments& a = *Bind(command, line, &WritePhantom);
+  a.ct.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  command.add_option("--out", a.out, "folder for ct/, landmarks.yaml and true_skin.ply")
+      ->required();
+  command.add_option("--seed", a.phantom.random_seed, "which head")->capture_default_str();
+  command.add_option("--pixel-mm", a.ct.pixel_mm, "between columns and rows")
+      ->check(CLI::Range(0.3, 5.0))
+      ->capture_default_str();
+  command.add_option("--slice-mm", a.ct.slice_mm, "between slices")
+      ->check(CLI::Range(0.3, 10.0))
+      ->capture_default_str();
+  command.add_flag("--force", a.force,
+                   "replace files of the same name in a folder that is not empty");
+}
+
+constexpr std::array kCommands = {
+    ProgramCommand{"phantom", "write a made-up head as a CT in DICOM, with its landmarks",
+                   &DeclarePhantom},
+};
+
+}  // namespace
+
+std::span<const ProgramCommand> PhantomCommands() { return kCommands; }
+
+}  // namespace semblance

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A phantom as a CT scan of it would show it, to try the whole way from the scanner's files.
+#pragma once
+
+#include "problems/ct/ct_volume.h"
+#include "problems/subject/phantom.h"
+
+namespace semblance {
+
+struct PhantomCtOptions {
+  double pixel_mm = 1;      // between columns and rows
+  double slice_mm = 1.5;    // between slices
+  double margin_mm = 12;    // of air about the head
+  double bone_mm = 7;       // about how thick the skull is
+  bool head_holder = true;  // a sheet of plastic behind the head
+  int threads = 1;
+};
+
+// Air -1000, tissue and brain 40, bone 1000, plastic 100 HU; each voxel the mean of what is in it
+// (exact along x, of 3 x 3 lines across). In the phantom's frame; the mesh must be closed. Throws
+// InputError for spacings that are not positive.
+CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options);
+
+}  // namespace semblance

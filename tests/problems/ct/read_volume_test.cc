@@ -1,0 +1,347 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A phantom's head in every kind of file, written by ITK and read back.
+#include "problems/ct/read_volume.h"
+
+#include <Eigen/Dense>  // before ITK, which else brings a part of an older one
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <itkMetaImageIO.h>
+#include <itkNiftiImageIO.h>
+#include <itkNrrdImageIO.h>
+
+#include <array>
+#include <cstring>
+
+#include "problems/ct/import_ct.h"
+#include "problems/ct/itk_files.h"
+#include "problems/ct/mr_skin.h"
+#include "problems/subject/phantom_ct.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/mesh/mesh_query.h"
+#include "tests/testing/itk_writers.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+using testing::SliceWords;
+using testing::WordsOf;
+using testing::WriteDicom;
+using testing::WriteItk;
+
+struct Head {
+  Phantom phantom = MakePhantom({.rings = 40});
+  CtVolume volume = VoxelisePhantom(phantom, {.pixel_mm = 2.5, .slice_mm = 3.5});
+};
+
+const Head& TheHead() {
+  static const Head head;
+  return head;
+}
+
+VoxelArray ArrayOf(const CtVolume& volume) {
+  VoxelArray array;
+  array.counts = {volume.columns, volume.rows, volume.slices};
+  array.origin = volume.origin;
+  array.steps = volume.axes * volume.spacing_mm.asDiagonal();
+  array.values = volume.values;
+  return array;
+}
+
+// The same voxels as a file may have them: sagittal slices, rows from above, from left to right.
+VoxelArray SagittalArrayOf(const CtVolume& v) {
+  VoxelArray array;
+  array.counts = {v.rows, v.slices, v.columns};
+  array.origin = v.World(v.columns - 1, 0, v.slices - 1);
+  array.steps << v.spacing_mm.y() * v.axes.col(1), -v.spacing_mm.z() * v.axes.col(2),
+      -v.spacing_mm.x() * v.axes.col(0);
+  for (int i = v.columns - 1; i >= 0; --i) {
+    for (int k = v.slices - 1; k >= 0; --k) {
+      for (int j = 0; j < v.rows; ++j) {
+        array.values.push_back(v.values[v.Index(i, j, k)]);
+      }
+    }
+  }
+  return array;
+}
+
+// The values as a grid elsewhere in space has them.
+CtVolume Resampled(const CtVolume& from, CtVolume to) {
+  to.values.resize(to.Index(0, 0, to.slices));
+  for (int k = 0; k < to.slices; ++k) {
+    for (int j = 0; j < to.rows; ++j) {
+      for (int i = 0; i < to.columns; ++i) {
+        to.values[to.Index(i, j, k)] = static_cast<std::int16_t>(SampleHu(from, to.World(i, j, k)));
+      }
+    }
+  }
+  return to;
+}
+
+class ReadVolumeTest : public ::testing::Test {
+ protected:
+  VolumeReading Read(const fs::path& name, const ReadVolumeOptions& options = {}) const {
+    return ReadVolume(folder_ / name, options, {});
+  }
+  std::string Words(const fs::path& name, const ReadVolumeOptions& options = {}) const {
+    return WordsOf<Error>([&] { Read(name, options); });
+  }
+
+  // What was read is what was written, at the same places.
+  void ExpectTheHead(const VolumeReading& reading) const {
+    const CtVolume& read = reading.volume;
+    ASSERT_EQ(read.columns, head_.volume.columns);
+    ASSERT_EQ(read.rows, head_.volume.rows);
+    ASSERT_EQ(read.slices, head_.volume.slices);
+    EXPECT_EQ(read.values, head_.volume.values);
+    for (const Vec3& at : {Vec3(0, 0, 0), Vec3(read.columns, read.rows, read.slices)}) {
+      EXPECT_LT(
+          (read.World(at.x(), at.y(), at.z()) - head_.volume.World(at.x(), at.y(), at.z())).norm(),
+          1e-3);
+    }
+  }
+
+  // The skull of what was read lies within half a voxel of the phantom's, at its outer side.
+  void ExpectTheSkull(const CtVolume& volume) const {
+    const TriMesh skull = ImportCt(volume, {.bone_hu = 520}, {}).skull;
+    const MeshQuery query(skull);
+    double furthest = 0, sum = 0;
+    for (const Vec3& p : head_.phantom.skull.points) {
+      const double off = query.Closest(p).distance_mm;
+      furthest = std::max(furthest, off);
+      sum += off;
+    }
+    EXPECT_LT(furthest, 0.5 * volume.spacing_mm.norm());
+    EXPECT_LT(sum / static_cast<double>(head_.phantom.skull.points.size()),
+              0.25 * volume.spacing_mm.minCoeff());
+  }
+
+  const Head& head_ = TheHead();
+  VoxelArray array_ = ArrayOf(head_.volume);
+  ScratchFolder folder_;
+};
+
+TEST_F(ReadVolumeTest, NiftiNrrdAndMetaImageAreReadWithTheirPlaces) {
+  const VoxelArray sagittal = SagittalArrayOf(head_.volume);
+  for (const VoxelArray* array : std::array<const VoxelArray*, 2>{&array_, &sagittal}) {
+    for (const char* name : {"a.nii", "a.nii.gz"}) {
+      WriteItk(folder_ / name, *array, *itk::NiftiImageIO::New());
+      ExpectTheHead(Read(name));
+    }
+    for (const char* name : {"a.nrrd", "a.nhdr"}) {
+      WriteItk(folder_ / name, *array, *itk::NrrdImageIO::New());
+      ExpectTheHead(Read(name));
+    }
+    for (const char* name : {"a.mha", "a.mhd"}) {
+      WriteItk(folder_ / name, *array, *itk::MetaImageIO::New());
+      ExpectTheHead(Read(name));
+    }
+  }
+  ExpectTheSkull(Read("a.nii.gz").volume);
+}
+
+// NIfTI's own frame is RAS. Read without ITK: bytes 280 to 327 are the rows of the affine.
+TEST_F(ReadVolumeTest, NiftisFrameIsTurnedToLps) {
+  WriteItk(folder_ / "a.nii", array_, *itk::NiftiImageIO::New());
+  const std::string bytes = ReadFileBytes(folder_ / "a.nii");
+  std::array<float, 12> rows;
+  std::memcpy(rows.data(), bytes.data() + 280, sizeof rows);
+  const Vec3 ras(rows[3], rows[7], rows[11]);
+  EXPECT_LT((Read("a.nii").volume.origin - Vec3(-ras.x(), -ras.y(), ras.z())).norm(), 1e-3);
+}
+
+TEST_F(ReadVolumeTest, BigEndianFilesAreRead) {
+  std::string swapped;
+  for (const std::int16_t value : array_.values) {
+    const auto bits = static_cast<std::uint16_t>(value);
+    swapped.push_back(static_cast<char>(bits >> 8));
+    swapped.push_back(static_cast<char>(bits & 255));
+  }
+  const Vec3& o = array_.origin;
+  const std::string sizes = fmt::format("{}", fmt::join(array_.counts, " "));
+  WriteFileAtomically(
+      folder_ / "big.mha",
+      fmt::format("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = "
+                  "True\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = {} {} {}\nElementSpacing = "
+                  "2.5 2.5 3.5\nDimSize = {}\nElementType = MET_SHORT\nElementDataFile = LOCAL\n{}",
+                  o.x(), o.y(), o.z(), sizes, swapped));
+  ExpectTheHead(Read("big.mha"));
+  // In RAS: x and y negated.
+  WriteFileAtomically(
+      folder_ / "big.nrrd",
+      fmt::format("NRRD0004\ntype: short\ndimension: 3\nspace: right-anterior-superior\nsizes: "
+                  "{}\nspace directions: (-2.5,0,0) (0,-2.5,0) (0,0,3.5)\nkinds: domain domain "
+                  "domain\nendian: big\nencoding: raw\nspace origin: ({},{},{})\n\n{}",
+                  sizes, -o.x(), -o.y(), o.z(), swapped));
+  ExpectTheHead(Read("big.nrrd"));
+}
+
+TEST_F(ReadVolumeTest, DicomIsSortedBySpaceAndDecompressed) {
+  for (const char* compression : {"", "JPEG", "JPEG2000"}) {
+    const std::string name = fmt::format("ct{}", compression);
+    WriteDicom(folder_ / name, array_, {.compression = compression});
+    WriteFileAtomically(folder_ / name / "notes.txt", "not DICOM");
+    const VolumeReading reading = Read(name);
+    ExpectTheHead(reading);
+    EXPECT_EQ(reading.modality, Modality::kCt);
+  }
+  ExpectTheSkull(Read("ct").volume);
+}
+
+TEST_F(ReadVolumeTest, DicomOfSagittalSlicesAndInFoldersOfFoldersIsRead) {
+  WriteDicom(folder_ / "disc/PA0/SE0", SagittalArrayOf(head_.volume));
+  ExpectTheHead(Read("disc"));
+}
+
+TEST_F(ReadVolumeTest, SlopeAndInterceptMakeHounsfieldUnits) {
+  WriteDicom(folder_ / "ct", array_, {.slope = 2, .intercept = -1024});
+  const CtVolume read = Read("ct").volume;
+  ASSERT_EQ(read.values.size(), head_.volume.values.size());
+  for (std::size_t n = 0; n < read.values.size(); ++n) {
+    ASSERT_LE(std::abs(read.values[n] - head_.volume.values[n]), 2) << n;
+  }
+}
+
+// A turned head in the scanner: the slices' axes are not those of the head.
+TEST_F(ReadVolumeTest, DirectionCosinesPlaceTheSkull) {
+  CtVolume grid = head_.volume;
+  const Mat3 turn = Eigen::AngleAxisd(0.2, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  const Vec3 middle = head_.volume.World(grid.columns / 2, grid.rows / 2, grid.slices / 2);
+  grid.axes = turn;
+  grid.origin = middle + turn * (head_.volume.origin - middle);
+  WriteDicom(folder_ / "ct", ArrayOf(Resampled(head_.volume, grid)));
+  WriteItk(folder_ / "a.nii", ArrayOf(Resampled(head_.volume, grid)), *itk::NiftiImageIO::New());
+  for (const char* name : {"ct", "a.nii"}) {
+    const CtVolume read = Read(name).volume;
+    EXPECT_LT((read.axes - turn).norm(), 1e-4);
+    ExpectTheSkull(read);
+  }
+}
+
+TEST_F(ReadVolumeTest, ATiltedGantryPlacesTheSkull) {
+  CtVolume grid = head_.volume;
+  grid.axes.col(2) = Vec3(0, std::sin(0.3), std::cos(0.3));
+  grid.origin.y() -= 0.5 * std::tan(0.3) * grid.slices * grid.spacing_mm.z();
+  grid.spacing_mm.z() /= std::cos(0.3);
+  WriteDicom(folder_ / "ct", ArrayOf(Resampled(head_.volume, grid)));
+  const VolumeReading reading = Read("ct");
+  EXPECT_LT((reading.volume.axes - grid.axes).norm(), 1e-4);
+  EXPECT_THAT(reading.notes, Contains(HasSubstr("tilted by 17.2 deg")));
+  ExpectTheSkull(reading.volume);
+}
+
+TEST_F(ReadVolumeTest, MissingAndDoubledSlicesAreToldOrFilled) {
+  WriteDicom(folder_ / "ct", array_);
+  const fs::path tenth = folder_ / "ct" / fmt::format("IM{:03}", (10 * 37 + 11) % 101);
+  fs::copy(tenth, folder_ / "ct" / "copy");
+  EXPECT_THAT(Words("ct"), AllOf(HasSubstr("series 1: 1 doubled slices"), HasSubstr("and copy")));
+  fs::remove(folder_ / "ct" / "copy");
+  fs::remove(tenth);
+  EXPECT_THAT(Words("ct"), HasSubstr("series 1: 1 missing slices, between"));
+  const VolumeReading filled = Read("ct", {.series = "", .fill_slices = true});
+  EXPECT_THAT(filled.notes, Contains(HasSubstr("interpolated")));
+  ASSERT_EQ(filled.volume.slices, head_.volume.slices);
+  ExpectTheSkull(filled.volume);
+}
+
+TEST_F(ReadVolumeTest, OfSeveralSeriesOneIsChosen) {
+  VoxelArray scout = array_;
+  scout.counts[2] = 2;
+  WriteDicom(folder_ / "ct/a", array_, {.series = "1.2.3.1", .number = "2"});
+  WriteDicom(folder_ / "ct/b", scout, {.series = "1.2.3.9", .number = "1", .description = "scout"});
+  const VolumeReading alone = Read("ct");  // the scout cannot be a head
+  ExpectTheHead(alone);
+  EXPECT_THAT(alone.notes, Contains(HasSubstr("series left out: 1: CT, 2 slices")));
+  for (std::int16_t& value : array_.values) {
+    value = static_cast<std::int16_t>(value + 7);
+  }
+  WriteDicom(folder_ / "ct/c", array_, {.series = "1.2.3.2", .number = "3"});
+  EXPECT_THAT(Words("ct"), AllOf(HasSubstr("2 series; choose one"), HasSubstr("\n  2: CT"),
+                                 HasSubstr("\n  3: CT"), HasSubstr("UID 1.2.3.2")));
+  ExpectTheHead(Read("ct", {.series = "2"}));
+  ExpectTheHead(Read("ct", {.series = "1.2.3.1"}));
+  EXPECT_EQ(Read("ct", {.series = "3"}).volume.values, array_.values);
+  EXPECT_THAT(Words("ct", {.series = "4"}), HasSubstr("no series is called '4'; the series are:"));
+}
+
+TEST_F(ReadVolumeTest, OfAnMrTheSkinIsTaken) {
+  VoxelArray mr = array_;
+  for (std::int16_t& value : mr.values) {  // bone dark, tissue bright, some noise in the air
+    value = static_cast<std::int16_t>(value > 400 ? 30 : 20 + std::max(0, (value + 1000) / 3));
+  }
+  WriteDicom(folder_ / "mr", mr, {.modality = "MR"});
+  const VolumeReading reading = Read("mr");
+  EXPECT_EQ(reading.modality, Modality::kMr);
+  const MrSkin import = ImportMrSkin(reading.volume, {}, {});
+  EXPECT_GT(import.skin_value, 60);
+  EXPECT_LT(import.skin_value, 330);
+  const MeshQuery query(head_.phantom.face);
+  for (const Vec3& p : import.skin.points) {
+    ASSERT_LT(query.Closest(p).distance_mm, 0.5 * reading.volume.spacing_mm.norm());
+  }
+  EXPECT_THAT(import.notes, Contains(HasSubstr("no skull")));
+}
+
+TEST_F(ReadVolumeTest, FloatsAreRoundedAndWhatCannotBeIsTold) {
+  WriteItk<float>(folder_ / "a.mha", array_, *itk::MetaImageIO::New());
+  ExpectTheHead(Read("a.mha"));
+  VoxelArray flat = array_;
+  for (std::int16_t& value : flat.values) {
+    value = value > 0 ? 1 : 0;
+  }
+  WriteItk(folder_ / "flat.nrrd", flat, *itk::NrrdImageIO::New());
+  EXPECT_THAT(Words("flat.nrrd"), HasSubstr("run from 0 to 1 only"));
+}
+
+TEST_F(ReadVolumeTest, WhatIsNoVolumeIsOneClearError) {
+  fs::create_directories(folder_ / "empty");
+  WriteFileAtomically(folder_ / "empty/readme", "nothing here");
+  WriteFileAtomically(folder_ / "text.nii", "dear reader");
+  WriteFileAtomically(folder_ / "text.nrrd", "dear reader");
+  WriteFileAtomically(folder_ / "text.mha", "dear reader");
+  WriteFileAtomically(folder_ / "picture.png", "x");
+  EXPECT_THAT(Words("none"), HasSubstr("no such file or folder"));
+  EXPECT_THAT(Words("empty"), HasSubstr("none of the 1 files in the folder is DICOM"));
+  EXPECT_THAT(Words("text.nii"), HasSubstr("it is no NIfTI file"));
+  EXPECT_THAT(Words("text.nrrd"), HasSubstr("it is no NRRD file"));
+  EXPECT_THAT(Words("text.mha"), HasSubstr("it is no MetaImage file"));
+  EXPECT_THAT(Words("picture.png"), HasSubstr("not a kind of volume"));
+  EXPECT_THAT(Words("text.nii", {.series = "1"}), HasSubstr("are for folders of DICOM"));
+}
+
+TEST_F(ReadVolumeTest, FilesCutShortAreOneClearError) {
+  const auto cut = [&](const char* name) {
+    const std::string bytes = ReadFileBytes(folder_ / name);
+    WriteFileAtomically(folder_ / name, bytes.substr(0, bytes.size() / 2));
+    EXPECT_THAT(Words(name), HasSubstr(fmt::format("{}: ", name)));
+  };
+  WriteItk(folder_ / "a.nii", array_, *itk::NiftiImageIO::New());
+  WriteItk(folder_ / "a.nrrd", array_, *itk::NrrdImageIO::New());
+  WriteItk(folder_ / "a.mha", array_, *itk::MetaImageIO::New());
+  cut("a.nii");
+  cut("a.nrrd");
+  cut("a.mha");
+}
+
+// What the program writes itself.
+TEST_F(ReadVolumeTest, EncodedSlicesAreReadBack) {
+  fs::create_directories(folder_ / "ct");
+  const DicomSeriesNames names{.patient = "P", .description = "d", .number = 4};
+  for (int k = 0; k < head_.volume.slices; ++k) {
+    const std::string bytes = EncodeDicomSlice(head_.volume, k, names);
+    EXPECT_EQ(bytes, EncodeDicomSlice(head_.volume, k, names));
+    WriteFileAtomically(folder_ / "ct" / fmt::format("{}.dcm", k), bytes, Durability::kUnsynced);
+  }
+  ExpectTheHead(Read("ct"));
+}
+
+}  // namespace
+}  // namespace semblance

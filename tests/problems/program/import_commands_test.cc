@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The commands phantom and import-ct as users meet them, from the scanner's files to a face.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/testing/program_call.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using testing::CallProgram;
+using ::testing::HasSubstr;
+
+const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs";
+
+class ImportCommands : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(CallProgram(folder_, "phantom --out head --pixel-mm 2.5 --slice-mm 3").code, 0);
+  }
+  // One line, exit code 2, nothing left behind.
+  void ExpectRefused(const std::string& arguments, const std::string& words) {
+    const testing::Outcome outcome = CallProgram(folder_, arguments + " --quiet --out out");
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out")) << arguments;
+  }
+  testing::ScratchFolder folder_;
+};
+
+TEST_F(ImportCommands, ASeriesBecomesSkullAndSkinAndTheNextCommandIsTold) {
+  const testing::Outcome outcome = CallProgram(folder_, "import-ct head/ct --quiet --out out");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(fs::exists(folder_ / "out/skull.ply"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/skin.ply"));
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("note: series 1: CT"), HasSubstr("head holder"),
+                                 HasSubstr("next: pick landmarks on skull.ply")));
+}
+
+TEST_F(ImportCommands, TheSkinAloneIsTakenWhereAnMrIsMeant) {
+  const testing::Outcome outcome =
+      CallProgram(folder_, "import-ct head/ct --modality mr --skin-value 1 --quiet --out out");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_FALSE(fs::exists(folder_ / "out/skull.ply"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/skin.ply"));
+}
+
+TEST_F(ImportCommands, WrongInputIsOneLine) {
+  ExpectRefused("import-ct nowhere", "nowhere: no such file or folder");
+  ExpectRefused("import-ct head/landmarks.yaml", "not a kind of volume");
+  ExpectRefused("import-ct head/ct/slice0001.dcm", "name its folder");
+  ExpectRefused("import-ct head/ct --skin-value 30", "--skin-value is for an MR");
+  fs::remove(folder_ / "head/ct/slice0031.dcm");
+  ExpectRefused("import-ct head/ct", "1 missing slices");
+}
+
+TEST_F(ImportCommands, ASubjectMayBeAFolderOfDicom) {
+  WriteFileAtomically(
+      folder_ / "run.yaml",
+      fmt::format("subject: {{type: ct, volume: head/ct, landmarks: head/landmarks.yaml}}\n"
+                  "tissue: {{depths: measured}}\nnetwork: {}/networks/standard32.yaml\n",
+                  kConfigs));
+  const testing::Outcome outcome = CallProgram(folder_, "check run.yaml");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("no fault found"));
+}
+
+}  // namespace
+}  // namespace semblance
