@@ -78,6 +78,7 @@ std::string List(const std::vector<const DicomSeries*>& some) {
 
 std::vector<const DicomSeries*> Pointers(const std::vector<DicomSeries>& all) {
   std::vector<const DicomSeries*> pointers;
+  pointers.reserve(all.size());
   for (const DicomSeries& series : all) {
     pointers.push_back(&series);
   }

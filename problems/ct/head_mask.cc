@@ -111,9 +111,8 @@ double LengthOf(const VoxelComponents& components, int component, const VoxelGri
   const std::int64_t row = grid.counts[0], slice = row * grid.counts[1];
   for (const VoxelRun& run : components.runs) {
     if (run.component == component) {
-      const Vec3 first(static_cast<double>(run.first % row),
-                       static_cast<double>(run.first % slice / row),
-                       static_cast<double>(run.first / slice));
+      const std::int64_t i = run.first % row, j = run.first % slice / row, k = run.first / slice;
+      const Vec3 first(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
       box.extend(first.cwiseProduct(grid.spacing_mm));
       box.extend((first + Vec3(run.length, 1, 1)).cwiseProduct(grid.spacing_mm));
     }

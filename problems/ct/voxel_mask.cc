@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-constexpr float kFar = std::numeric_limits<float>::infinity();
+const float kFar = std::numeric_limits<float>::infinity();
 
 // Appends the runs of the line of voxels that begins at `start`.
 void AppendRuns(const VoxelMask& mask, std::int64_t start, int count, std::vector<VoxelRun>& runs) {
@@ -132,7 +132,10 @@ void DistancesInLine(const std::uint8_t* mask, int count, const std::vector<floa
   int steps = reach + 1;
   for (int i = 0; i < count; ++i) {
     steps = mask[i] ? 0 : std::min(steps + 1, reach + 1);
-    squared[i] = steps <= reach ? cost[steps] : kFar;
+    squared[i] = kFar;
+    if (steps <= reach) {
+      squared[i] = cost[steps];
+    }
   }
   steps = reach + 1;
   for (int i = count - 1; i >= 0; --i) {

@@ -11,8 +11,11 @@
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <string>
 
 #include "problems/ct/import_ct.h"
 #include "problems/ct/itk_files.h"
