@@ -67,6 +67,11 @@ bool CanBeBeside(const fs::path& root) {
                            ::access(above.c_str(), W_OK | X_OK) == 0 && OnOneDevice(root, above));
 }
 
+// Throws as OutputFolder does.
+void RequireUsable(const fs::path& root, WhenNotEmpty when_not_empty) {
+  const OutputFolder tried(root, when_not_empty);
+}
+
 // Makes the folders above `folder`; returns those that were not there.
 std::vector<fs::path> MakeAbove(const fs::path& folder, const fs::path& said) {
   std::vector<fs::path> missing;
@@ -118,7 +123,7 @@ fs::path FreeNameBeside(const fs::path& root) {
 StagedFolder::StagedFolder(const fs::path& root, WhenNotEmpty when_not_empty)
     : root_(Resolved(root)), when_not_empty_(when_not_empty) {
   if (Exists(root_)) {
-    OutputFolder(root_, HoldsNothing(root_) ? WhenNotEmpty::kReplaceFiles : when_not_empty);
+    RequireUsable(root_, HoldsNothing(root_) ? WhenNotEmpty::kReplaceFiles : when_not_empty);
   }
   beside_ = CanBeBeside(root_);
   made_ = MakeAbove(root_, root);
@@ -128,7 +133,7 @@ StagedFolder::StagedFolder(const fs::path& root, WhenNotEmpty when_not_empty)
     claim_.Take(beside_ ? beside : root_ / kPart, root.string());
     files_.emplace(claim_.Folder(), WhenNotEmpty::kReplaceFiles);
     if (when_not_empty == WhenNotEmpty::kRefuse && Exists(root_) && !HoldsNothing(root_)) {
-      OutputFolder(root_, when_not_empty);  // came up just now, and is refused
+      RequireUsable(root_, when_not_empty);  // came up just now, and is refused
     }
   } catch (...) {
     Undo();

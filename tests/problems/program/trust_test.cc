@@ -114,14 +114,6 @@ TEST_F(Trust, OfTwoProcessesOnOneFolderTheSecondIsRefused) {
 
 TEST_F(Trust, ARefusalLeavesNoFolder) {
   ExpectRefused(kDepth + " --out out/a/b --set landmarks.max_distance_mm=0", "max_distance_mm");
-  std::string csv = "x,y,z\n";
-  for (int k = 0; k < 144; ++k) {
-    csv += fmt::format("{},{},{}\n", k % 12, k / 12, (k % 12) * (k / 12) % 7 * 10000);
-  }
-  Write("points.csv", csv);
-  Write("fit.yaml", "parameters: plane\npatches_u: 4\npatches_v: 4\n");
-  ExpectRefused("fit points.csv fit.yaml --out out --quiet --set chord_mm=1e-9",
-                "needs too many triangles");
 }
 
 TEST_F(Trust, AFullDiskLeavesNoFolderAndTheOldFiles) {
