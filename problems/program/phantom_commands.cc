@@ -14,7 +14,7 @@
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/output/files.h"
 #include "problems/program/exit_code.h"
-#include "problems/subject/phantom_ct.h"
+#include "problems/program/phantom_ct.h"
 #include "problems/subject/phantom_landmarks.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

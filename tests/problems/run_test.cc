@@ -111,7 +111,12 @@ TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
 
 TEST(Run, AFaceOfAPriorNeedsOne) {
   EXPECT_THAT([] { SmallPhantom({"face=prior"}); },
-              ::testing::ThrowsMessage<ConfigError>(HasSubstr("name one under `prior`")));
+              ::testing::ThrowsMessage<ConfigError>(HasSubstr("which is one of `template: ict`")));
+  EXPECT_THAT(
+      [] {
+        SmallPhantom({"face=prior", "prior=none"});
+      },
+      ::testing::ThrowsMessage<ConfigError>(HasSubstr("name one under `prior`")));
 }
 
 // The largest angle between the normals of two triangles that share an edge; 180 is a fold.

@@ -214,7 +214,7 @@ TEST(HSplinePrior, WhatCannotBeUsedIsNamed) {
   const auto fault = [](const std::string& text) -> std::string {
     try {
       HSplineModesFromJson(text, "modes.json");
-    } catch (const InputError& error) {
+    } catch (const Error& error) {
       return error.what();
     }
     return "none";
