@@ -15,22 +15,22 @@
 namespace semblance {
 
 struct ShapeFitOptions {
-  double tip_normal_sd_mm = 0.5;
-  double tip_tangent_sd_mm = 4;
-  double tip_loss_width = 3;
-  double scale_sd = 0.03;
-  double mode_sd = 1;
-  SmoothFieldOptions field;
-  int surface_points = 300;
-  double surface_worth = 80;
-  double surface_sd_mm = 2.5;
-  double surface_loss_width_mm = 2;
-  double surface_reach_mm = 15;
-  double surface_max_angle_deg = 60;
-  double surface_range_mm = 60;
-  int rounds = 12;
-  double population_sd = 2;
-  double discrepancy_mm = 1.25;
+  double tip_normal_sd_mm = 0.5;      // of a dowel's tip along the face's normal
+  double tip_tangent_sd_mm = 4;       // and across it
+  double tip_loss_width = 3;          // Huber, in standard deviations
+  double scale_sd = 0.03;             // of the logarithm of the model's scale
+  double mode_sd = 1;                 // of a coefficient
+  SmoothFieldOptions field;           // what the modes cannot express
+  int surface_points = 300;           // drawn to the implicit face; 0: the dowels alone
+  double surface_worth = 80;          // how many independent points those count as
+  double surface_sd_mm = 2.5;         // of the implicit face along its normal
+  double surface_loss_width_mm = 2;   // Huber
+  double surface_reach_mm = 15;       // farther off a point is not drawn
+  double surface_max_angle_deg = 60;  // nor where normals differ by more
+  double surface_range_mm = 60;       // nor farther than this from every dowel
+  int rounds = 12;                    // at most
+  double population_sd = 2;           // of a coefficient among people; for sigma
+  double discrepancy_mm = 1.25;       // what neither modes nor field can express; for sigma
 };
 template <class Visitor>
 void Fields(Visitor& visit, ShapeFitOptions& o) {

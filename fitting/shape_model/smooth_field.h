@@ -12,13 +12,13 @@
 namespace semblance {
 
 struct SmoothFieldOptions {
-  int centres = 110;
-  double wide_sd_mm = 2;
-  double wide_length_mm = 45;
-  double fine_sd_mm = 1;
-  double fine_length_mm = 20;
-  double at_features = 0.5;
-  double feature_reach_mm = 15;
+  int centres = 110;             // points that span the field; 0: no field
+  double wide_sd_mm = 2;         // of its wide part
+  double wide_length_mm = 45;    // over which that resembles itself
+  double fine_sd_mm = 1;         // of its fine part
+  double fine_length_mm = 20;    // over which that resembles itself
+  double at_features = 0.5;      // factor at nose, mouth and eyes
+  double feature_reach_mm = 15;  // where the factor has risen to 1
 };
 template <class Visitor>
 void Fields(Visitor& visit, SmoothFieldOptions& o) {
