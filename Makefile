@@ -43,7 +43,7 @@ demo-phantom: configure
 	@build-quick/problems/semblance run configs/demo_phantom/head.yaml --out $(PHANTOM)/run --force
 
 test: build
-	@ctest --preset $(PRESET)
+	@ctest --preset $(PRESET) -j "$$(nproc)"
 
 # Measures against peers in one run; build/bench.json holds the lines and the machine.
 bench: build
