@@ -238,11 +238,7 @@ double ProximalShift(std::span<const Term> terms, std::size_t vertices) {
 
 SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
   ceres::Problem problem;
-  for (const Term& term : terms) {
-    if (WeightOf(term) > 0) {
-      std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
-    }
-  }
+  AddResiduals(terms, view, net, problem);
   SolverOutcome outcome{.free_vertices = problem.NumParameterBlocks()};
   if (outcome.free_vertices == 0) {
     return outcome;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "fitting/solve/auto_weight.h"
+#include "fitting/solve/coupled_solver.h"
 #include "fitting/solve/refinement_marking.h"
 #include "fitting/terms/robust_loss.h"
 #include "fitting/terms/term_cost.h"
@@ -241,9 +242,11 @@ LevelSummary SpaceSolve::Settle() {
 LevelSummary SpaceSolve::Solve(SolveTolerance until) {
   Begin();
   const double auto_weight = ChooseSmoothness();
-  const bool direct = GoesDirectly();
   const Standing before = Stand();
-  const SolverOutcome outcome = direct ? Descend(until) : SolveWithCeres(until);
+  const bool direct = solver_ == Solver::kFastest && (GoesDirectly() || AllLinear(terms_));
+  const SolverOutcome outcome = GoesDirectly() ? Descend(until)
+                                : direct       ? SolveAtOnce()
+                                               : SolveWithCeres(until);
   if (!outcome.usable) {
     Take(start_);
   }
@@ -412,6 +415,13 @@ double SpaceSolve::Take(const ControlNet& net) {
     size += net.vertices[k].squaredNorm();
   }
   return std::sqrt(move / std::max(size, 1e-26));
+}
+
+SolverOutcome SpaceSolve::SolveAtOnce() {
+  ControlNet net = start_;
+  const SolverOutcome outcome = SolveCoupled(View(), terms_, net);
+  Take(net);
+  return outcome;
 }
 
 SolverOutcome SpaceSolve::SolveWithCeres(SolveTolerance until) {

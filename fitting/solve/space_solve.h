@@ -32,10 +32,11 @@ struct SpaceProblem {
 };
 
 // Two ways to the same minimum. With `fastest`, and terms that treat x, y and z alike, damped
-// Gauss-Newton steps by one sparse Cholesky factor, assembled from moments of each leaf's points;
-// else Ceres, with a view of the space, which takes rows: those are reduced by QR and keep the
-// condition that moments square. Either goes with a loss by iterative reweighting, unless a term
-// couples x, y and z.
+// Gauss-Newton steps by one sparse Cholesky factor, assembled from moments of each leaf's points
+// (with terms that couple x, y and z and are linear: one factor over all coordinates); else Ceres,
+// with a view of the space, which takes rows: those are reduced by QR and keep the condition that
+// moments square. Either goes with a loss by iterative reweighting, unless a term couples x, y and
+// z.
 class SpaceSolve {
  public:
   // Throw InputError for sizes that disagree, more than one `weight: auto`, and a term that has
@@ -86,6 +87,7 @@ class SpaceSolve {
   double Move(const Eigen::MatrixX3d& step, const Eigen::MatrixX3d& right);
   double Take(const ControlNet& net);
   SolverOutcome Descend(SolveTolerance until);
+  SolverOutcome SolveAtOnce();
   SolverOutcome SolveWithCeres(SolveTolerance until);
   SolverOutcome Reweigh(double least_move);
   bool GoesDirectly() const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "fitting/least_squares/triangle_sum.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
@@ -25,7 +26,8 @@ class Assembler {
         point_scale_(point_scale),
         forms_(forms),
         both_(part == SystemPart::kBoth),
-        column_of_(space.rows(), -1) {
+        column_of_(space.rows(), -1),
+        lower_(space.rows()) {
     system_.right = Eigen::MatrixX3d::Zero(space.rows(), 3);
   }
 
@@ -34,11 +36,7 @@ class Assembler {
       Collect(static_cast<int>(k));
     }
     if (both_) {
-      Flush();
-      system_.lower = std::move(parts_.front());
-      for (std::size_t k = 1; k < parts_.size(); ++k) {
-        system_.lower += parts_[k];
-      }
+      system_.lower = lower_.Take();
     }
     return std::move(system_);
   }
@@ -54,12 +52,9 @@ class Assembler {
   PatchPart Leaf(const QuadtreeNode& node) const {
     PatchPart part;
     if (point_scale_ > 0 && node.range.size() > 0) {
+      part.right = point_scale_ * space_.ResidualOf(node);
       if (both_) {
-        const PatchSystem points = space_.SystemOf(node);
-        part.matrix = point_scale_ * points.gram;
-        part.right = point_scale_ * points.residual;
-      } else {
-        part.right = point_scale_ * space_.ResidualOf(node);
+        part.matrix = point_scale_ * space_.GramOf(node);
       }
     }
     if (!forms_.empty()) {
@@ -144,24 +139,14 @@ class Assembler {
       system_.right.row(rows[k]) += part.right.row(k);
       for (int l = 0; both_ && l < 16; ++l) {
         if (rows[l] >= 0 && rows[k] >= rows[l]) {
-          triplets_.emplace_back(rows[k], rows[l], part.matrix(k, l));
+          lower_.Add(rows[k], rows[l], part.matrix(k, l));
         }
       }
       for (std::size_t f = 0; f < part.finer.size(); ++f) {
         const auto [low, high] = std::minmax(rows[k], part.finer[f]);
-        triplets_.emplace_back(high, low, part.cross(k, static_cast<Eigen::Index>(f)));
+        lower_.Add(high, low, part.cross(k, static_cast<Eigen::Index>(f)));
       }
     }
-    constexpr std::size_t kMost = 1 << 20;  // 16 MB
-    if (triplets_.size() > kMost) {
-      Flush();
-    }
-  }
-
-  void Flush() {
-    SparseMatrix& part = parts_.emplace_back(space_.rows(), space_.rows());
-    part.setFromTriplets(triplets_.begin(), triplets_.end());
-    triplets_.clear();
   }
 
   const HierarchicalSplineSpace& space_;
@@ -169,15 +154,15 @@ class Assembler {
   std::span<const LevelStiffness> forms_;
   bool both_;
   std::vector<int> column_of_;  // of an unknown in the part at hand
-  std::vector<Eigen::Triplet<double>> triplets_;
-  std::vector<SparseMatrix> parts_;
+  TriangleSum lower_;
   NormalSystem system_;
 };
 
 // The misfit is taken row by row, which is more precise than the difference of A^T B and A^T A X.
 class RowSystem final : public RowSink {
  public:
-  RowSystem(const ControlNet& net, NormalSystem& system) : net_(net), system_(system) {}
+  RowSystem(const ControlNet& net, NormalSystem& system)
+      : net_(net), system_(system), more_(system.right.rows()) {}
 
   void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
            std::span<const int> vertices) override {
@@ -192,22 +177,18 @@ class RowSystem final : public RowSink {
       system_.right.row(vertices[k]) += right.row(k);
       for (std::size_t l = 0; l < vertices.size(); ++l) {
         if (vertices[k] >= vertices[l]) {
-          triplets_.emplace_back(vertices[k], vertices[l], gram(k, l));
+          more_.Add(vertices[k], vertices[l], gram(k, l));
         }
       }
     }
   }
 
-  void AddMatrix() const {
-    SparseMatrix more(system_.lower.rows(), system_.lower.cols());
-    more.setFromTriplets(triplets_.begin(), triplets_.end());
-    system_.lower += more;
-  }
+  void AddMatrix() { system_.lower += more_.Take(); }
 
  private:
   const ControlNet& net_;
   NormalSystem& system_;
-  std::vector<Eigen::Triplet<double>> triplets_;
+  TriangleSum more_;
 };
 
 }  // namespace

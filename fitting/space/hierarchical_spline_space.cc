@@ -10,8 +10,8 @@
 namespace semblance {
 namespace {
 
-// Points of a leaf below which its sums are made point by point.
-constexpr std::size_t kFew = 32;
+// Whether a leaf has so few points that its sums are made point by point.
+bool IsSparse(const QuadtreeNode& leaf) { return leaf.range.size() < 32; }
 
 PatchMatrix MatrixOf(const std::array<Vec3, 16>& vertices) {
   PatchMatrix matrix;
@@ -197,18 +197,19 @@ void HierarchicalSplineSpace::LinkDofs() {
 void HierarchicalSplineSpace::Refresh() {
   for (QuadtreeNode& node : nodes_) {
     const PatchId& p = node.patch;
-    const PatchMatrix before = node.vertices;
-    if (node.parent < 0) {
-      node.vertices.setZero();
-    } else {
-      node.vertices = RefinementMatrix(p.i % 2, p.j % 2) * nodes_[node.parent].vertices;
+    PatchMatrix vertices = PatchMatrix::Zero();
+    if (node.parent >= 0) {
+      vertices.noalias() = RefinementMatrix(p.i % 2, p.j % 2) * nodes_[node.parent].vertices;
     }
     for (int k = 0; k < 16; ++k) {
       if (node.dofs[k] >= 0) {
-        node.vertices.row(k) += dofs_[node.dofs[k]].value.transpose();
+        vertices.row(k) += dofs_[node.dofs[k]].value.transpose();
       }
     }
-    node.measured = node.measured && node.vertices == before;
+    if (vertices != node.vertices) {
+      node.vertices = vertices;
+      node.measured = false;
+    }
   }
 }
 
@@ -236,35 +237,39 @@ void HierarchicalSplineSpace::Measure(std::vector<double> factors, int threads,
   }
   ParallelFor(stale.size(), threads, 1, [&](std::size_t k) {
     QuadtreeNode& node = nodes_[stale[k]];
-    const bool moments = node.range.size() >= kFew && (!node.has_moments || !factors_.empty());
-    PatchMoments sums;
-    if (!moments) {
-      std::copy(&node.sums.moments[0][0], &node.sums.moments[0][0] + 56, &sums.moments[0][0]);
-    }
-    AddMoments(cloud_.Of(node.range), node.patch, node.vertices, moments,
-               {.factors = FactorsOf(node),
-                .squares = squares == nullptr ? nullptr : squares->data() + node.range.begin},
-               sums);
-    node.sums = sums;
-    node.has_moments = factors_.empty();
-    node.measured = true;
+    MeasureLeaf({.factors = FactorsOf(node),
+                 .squares = squares == nullptr ? nullptr : squares->data() + node.range.begin},
+                node);
   });
+}
+
+void HierarchicalSplineSpace::MeasureLeaf(const PointFactors& each, QuadtreeNode& leaf) const {
+  const auto points = cloud_.Of(leaf.range);
+  leaf.sums.ForgetResidual();
+  if (IsSparse(leaf)) {
+    AddPoints(points, leaf.patch, leaf.vertices, each, leaf.sums);
+  } else {
+    const bool moments = !leaf.has_moments || each.factors != nullptr;
+    if (moments) {
+      leaf.sums = {};
+    }
+    AddMoments(points, leaf.patch, leaf.vertices, moments, each, leaf.sums);
+  }
+  leaf.has_moments = each.factors == nullptr;
+  leaf.measured = true;
 }
 
 const double* HierarchicalSplineSpace::FactorsOf(const QuadtreeNode& leaf) const {
   return factors_.empty() ? nullptr : factors_.data() + leaf.range.begin;
 }
 
-PatchSystem HierarchicalSplineSpace::SystemOf(const QuadtreeNode& leaf) const {
-  return leaf.range.size() < kFew
-             ? SystemOfPoints(cloud_.Of(leaf.range), leaf.patch, leaf.vertices, FactorsOf(leaf))
-             : PatchSystem{GramOfMoments(leaf.sums), ResidualOfMoments(leaf.sums)};
+Matrix16 HierarchicalSplineSpace::GramOf(const QuadtreeNode& leaf) const {
+  return IsSparse(leaf) ? GramOfPoints(cloud_.Of(leaf.range), leaf.patch, FactorsOf(leaf))
+                        : GramOfMoments(leaf.sums);
 }
 
 PatchMatrix HierarchicalSplineSpace::ResidualOf(const QuadtreeNode& leaf) const {
-  return leaf.range.size() < kFew
-             ? ResidualOfPoints(cloud_.Of(leaf.range), leaf.patch, leaf.vertices, FactorsOf(leaf))
-             : ResidualOfMoments(leaf.sums);
+  return IsSparse(leaf) ? ResidualOfPoints(leaf.sums) : ResidualOfMoments(leaf.sums);
 }
 
 int HierarchicalSplineSpace::LeafAt(const Vec2& uv) const {

@@ -67,7 +67,7 @@ class HierarchicalSplineSpace {
   void Measure(std::vector<double> factors, int threads, std::vector<double>* squares);
   double Squares() const;  // of w |e|^2 over all points
   // What a leaf's points, as measured, add to the normal equations of its sixteen vertices.
-  PatchSystem SystemOf(const QuadtreeNode& leaf) const;
+  Matrix16 GramOf(const QuadtreeNode& leaf) const;
   PatchMatrix ResidualOf(const QuadtreeNode& leaf) const;
 
   // After the cloud was made anew, of points that have moved.
@@ -88,6 +88,7 @@ class HierarchicalSplineSpace {
   bool IsCovered(const VertexId& vertex) const;
   void LinkDofs();
   void Refresh();
+  void MeasureLeaf(const PointFactors& each, QuadtreeNode& leaf) const;
   const double* FactorsOf(const QuadtreeNode& leaf) const;  // null: none
 
   HSplineShape shape_;

@@ -60,6 +60,10 @@ Polynomial PolynomialOf(const PatchId& patch, const PatchMatrix& vertices) {
 
 constexpr double kOutlier = 0.5;  // a point of a smaller factor
 
+inline double FactorOf(const double* factors, std::size_t k) {
+  return factors == nullptr ? 1 : factors[k];
+}
+
 struct Batch {
   const CloudPoint* points;
   std::size_t count;
@@ -120,6 +124,41 @@ SEMBLANCE_KERNEL void Accumulate(const Batch& batch, const Polynomial& p, PatchM
   __builtin_memcpy(sums.residual, residual, sizeof residual);
 }
 
+[[gnu::always_inline]] inline Vec4 Along(const std::array<double, 4>& w, const Vec4* vertices) {
+  return w[0] * vertices[0] + w[1] * vertices[1] + w[2] * vertices[2] + w[3] * vertices[3];
+}
+
+SEMBLANCE_KERNEL void AccumulateByVertex(const Batch& batch, const PatchId& patch,
+                                         const PatchMatrix& vertices, PatchMoments& sums) {
+  Vec4 vertex[16], residual[16];
+  for (int k = 0; k < 16; ++k) {
+    vertex[k] = Vec4{vertices(k, 0), vertices(k, 1), vertices(k, 2), 0};
+  }
+  __builtin_memcpy(residual, sums.residual, sizeof residual);
+  const double scale = 1 << patch.level;
+  for (std::size_t k = 0; k < batch.count; ++k) {
+    const CloudPoint& p = batch.points[k];
+    const auto u = CubicWeights(p.x * scale - patch.i, 0),
+               v = CubicWeights(p.y * scale - patch.j, 0);
+    Vec4 position;
+    __builtin_memcpy(&position, p.position.data(), sizeof position);
+    const Vec4 e = position - (v[0] * Along(u, vertex) + v[1] * Along(u, vertex + 4) +
+                               v[2] * Along(u, vertex + 8) + v[3] * Along(u, vertex + 12));
+    const Vec4 ee = e * e;
+    const double square = ee[0] + ee[1] + ee[2], factor = FactorOf(batch.factors, k);
+    sums.squares += p.weight * factor * square;
+    sums.largest = factor >= kOutlier && square > sums.largest ? square : sums.largest;
+    if (batch.squares != nullptr) {
+      batch.squares[k] = square;
+    }
+    const Vec4 pull = e * (p.weight * factor);
+    for (int m = 0; m < 16; ++m) {
+      residual[m] += pull * (u[m % 4] * v[m / 4]);
+    }
+  }
+  __builtin_memcpy(sums.residual, residual, sizeof residual);
+}
+
 Matrix16 MakeRefinement(int right, int upper) {
   Matrix16 refinement = Matrix16::Zero();
   for (int k = 0; k < 16; ++k) {
@@ -133,27 +172,17 @@ Matrix16 MakeRefinement(int right, int upper) {
   return refinement;
 }
 
-// A point's weights of the sixteen vertices, and its misfit.
-struct PointRow {
-  Eigen::Matrix<double, 16, 1> weights;
-  Eigen::RowVector3d misfit;
-};
+using VertexWeights = Eigen::Matrix<double, 16, 1>;
 
-PointRow RowOf(const CloudPoint& p, const PatchId& patch, const PatchMatrix& vertices) {
+VertexWeights WeightsAt(const CloudPoint& p, const PatchId& patch) {
   const double scale = 1 << patch.level;
   const auto along_u = CubicWeights(p.x * scale - patch.i, 0),
              along_v = CubicWeights(p.y * scale - patch.j, 0);
-  PointRow row;
-  for (int v = 0; v < 16; ++v) {
-    row.weights[v] = along_u[v % 4] * along_v[v / 4];
+  VertexWeights weights;
+  for (int k = 0; k < 16; ++k) {
+    weights[k] = along_u[k % 4] * along_v[k / 4];
   }
-  const Eigen::RowVector3d position(p.position[0], p.position[1], p.position[2]);
-  row.misfit = position - row.weights.transpose() * vertices;
-  return row;
-}
-
-double WeightOf(const CloudPoint& p, const double* factors, std::size_t k) {
-  return factors == nullptr ? p.weight : p.weight * factors[k];
+  return weights;
 }
 
 }  // namespace
@@ -176,32 +205,29 @@ Matrix16 GramOfMoments(const PatchMoments& sums) {
 }
 
 PatchMatrix ResidualOfMoments(const PatchMoments& sums) {
-  PatchMatrix of_powers;
+  return PowersOfVertices() * ResidualOfPoints(sums);
+}
+
+void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
+               const PatchMatrix& vertices, const PointFactors& each, PatchMoments& sums) {
+  AccumulateByVertex({points.data(), points.size(), each.factors, each.squares, /*moments=*/false},
+                     patch, vertices, sums);
+}
+
+Matrix16 GramOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
+                      const double* factors) {
+  Matrix16 gram = Matrix16::Zero();
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const VertexWeights weights = WeightsAt(points[k], patch);
+    gram.noalias() += points[k].weight * FactorOf(factors, k) * weights * weights.transpose();
+  }
+  return gram;
+}
+
+PatchMatrix ResidualOfPoints(const PatchMoments& sums) {
+  PatchMatrix residual;
   for (int k = 0; k < 16; ++k) {
-    of_powers.row(k) << sums.residual[k][0], sums.residual[k][1], sums.residual[k][2];
-  }
-  return PowersOfVertices() * of_powers;
-}
-
-PatchSystem SystemOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
-                           const PatchMatrix& vertices, const double* factors) {
-  PatchSystem system;
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const PointRow row = RowOf(points[k], patch, vertices);
-    const Eigen::Matrix<double, 16, 1> weighted = WeightOf(points[k], factors, k) * row.weights;
-    system.gram += weighted * row.weights.transpose();
-    system.residual += weighted * row.misfit;
-  }
-  return system;
-}
-
-PatchMatrix ResidualOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
-                             const PatchMatrix& vertices, const double* factors) {
-  PatchMatrix residual = PatchMatrix::Zero();
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const PointRow row = RowOf(points[k], patch, vertices);
-    const Eigen::Matrix<double, 16, 1> weighted = WeightOf(points[k], factors, k) * row.weights;
-    residual += weighted * row.misfit;
+    residual.row(k) << sums.residual[k][0], sums.residual[k][1], sums.residual[k][2];
   }
   return residual;
 }

@@ -3,6 +3,7 @@
 // pass over the points.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 
@@ -19,6 +20,12 @@ struct PatchMoments {
   alignas(64) double residual[16][4] = {};  // [a + 4 b]: of w z_u^a z_v^b e, e the residual p - S
   double squares = 0;                       // of w |e|^2
   double largest = 0;                       // |e|^2, of points whose factor is 0.5 or more
+
+  // All but `moments`, which stay as they are when the surface moves.
+  void ForgetResidual() {
+    std::fill(&residual[0][0], &residual[0][0] + 64, 0.0);
+    squares = largest = 0;
+  }
 };
 
 // What AddMoments takes and gives per point; each may be null.
@@ -37,16 +44,15 @@ void AddMoments(std::span<const CloudPoint> points, const PatchId& patch,
 Matrix16 GramOfMoments(const PatchMoments& sums);
 PatchMatrix ResidualOfMoments(const PatchMoments& sums);
 
-struct PatchSystem {
-  Matrix16 gram = Matrix16::Zero();
-  PatchMatrix residual = PatchMatrix::Zero();
-};
 // The same point by point: faster for few points, and where a point's weight is nothing or next to
-// nothing the sums are so too. factors: of the points' weights, or null.
-PatchSystem SystemOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
-                           const PatchMatrix& vertices, const double* factors);
-PatchMatrix ResidualOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
-                             const PatchMatrix& vertices, const double* factors);
+// nothing the sums are so too. Then sums.residual is of w N_k e, at k, and sums.moments are
+// nothing.
+void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
+               const PatchMatrix& vertices, const PointFactors& each, PatchMoments& sums);
+// factors: of the points' weights, or null.
+Matrix16 GramOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
+                      const double* factors);
+PatchMatrix ResidualOfPoints(const PatchMoments& sums);
 
 // The vertices of the child (right, upper: 0 or 1) of a patch: RefinePatch as a matrix.
 const Matrix16& RefinementMatrix(int right, int upper);

@@ -64,6 +64,19 @@ inline bool SeparableButForLoss(std::span<const Term> terms) {
   });
 }
 
+// Terms whose residuals are linear in the vertices, whether or not they couple x, y and z.
+inline bool IsLinear(const TangentPointTerm&) { return true; }
+inline bool IsLinear(const SymmetryTerm&) { return true; }
+template <class T>
+bool IsLinear(const T& term) {
+  return IsSeparable(term);
+}
+inline bool AllLinear(std::span<const Term> terms) {
+  return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
+    return WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsLinear(t); }, term);
+  });
+}
+
 // What the term costs on one patch of a level of patches_u x patches_v, mm^2: x^T form x for each
 // coordinate x of the patch's sixteen f. lengths_mm: what [0,1] stands for along u and v.
 ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
@@ -91,6 +104,16 @@ template <RowTerm T>
 void AddResiduals(const T& term, const LevelView& view, ControlNet& net, ceres::Problem& problem) {
   ProblemSink sink(net, problem);
   AddRows(term, view, sink);
+}
+
+// Of all terms that have a weight.
+inline void AddResiduals(std::span<const Term> terms, const LevelView& view, ControlNet& net,
+                         ceres::Problem& problem) {
+  for (const Term& term : terms) {
+    if (WeightOf(term) > 0) {
+      std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
+    }
+  }
 }
 
 // scale * rho of a squared distance in mm^2, for a term with a loss.

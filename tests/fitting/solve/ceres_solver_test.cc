@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "fitting/solve/coupled_solver.h"
+#include "fitting/solve/level_fit.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
@@ -92,6 +94,34 @@ TEST(TileSolver, TilesCoverNetsOfAnySize) {
                 static_cast<int>(net.vertices.size()));
       EXPECT_EQ(net.vertices.back(), view.start.vertices.back());  // to the bit
     }
+  }
+}
+
+// Terms that couple x, y and z, each with all that do not, and those that are left to Ceres.
+TEST(CoupledSolver, FindsWhatCeresFinds) {
+  int coupled = 0;
+  for (const Term& term : AllTerms()) {
+    const std::vector<Term> terms = {PointTerm{.weight = 0.1}, SmoothnessTerm{.weight = 0.1}, term};
+    if (!AllLinear(terms) || AllSeparable(terms)) {
+      continue;
+    }
+    ++coupled;
+    const LevelView view = NoisyView();
+    ControlNet at_once = view.start, by_steps = view.start;
+    const SolverOutcome outcome = SolveCoupled(view, terms, at_once);
+    const SolverOutcome ceres = SolveByCeres(view, terms, by_steps);
+    EXPECT_EQ(outcome.termination, "convergence") << TermName(term);
+    EXPECT_EQ(outcome.free_vertices, ceres.free_vertices);
+    EXPECT_LT(Distance(at_once, by_steps), 1e-5) << TermName(term);
+    EXPECT_LE(CostOf(terms, view, at_once), CostOf(terms, view, by_steps) * (1 + 1e-12));
+    EXPECT_GT(Distance(at_once, view.start), 1e-3);
+    EXPECT_EQ(FitLevel(view, terms, Solver::kFastest).summary.solver, "direct");
+    EXPECT_EQ(FitLevel(view, terms, Solver::kCeres).summary.solver, "ceres");
+  }
+  EXPECT_GE(coupled, 2);  // tangent points and symmetry
+  for (const Term& term : {Term(SpringTerm{}), Term(DistortionTerm{}), Term(NonPenetrationTerm{}),
+                           Term(PointTerm{.loss = RobustLoss::kHuber})}) {
+    EXPECT_FALSE(AllLinear(std::span(&term, 1))) << TermName(term);
   }
 }
 
