@@ -91,6 +91,18 @@ std::optional<FaceUncertainty> UncertaintyOf(const Experiment& experiment, const
                              subject, context);
 }
 
+// Before anything long is done: a bust that cannot be used ends the run.
+std::shared_ptr<const BustModel> GivenBust(const Experiment& experiment, StageCache& cache,
+                                           const RunContext& context) {
+  if (std::holds_alternative<NoBust>(experiment.bust)) {
+    return nullptr;
+  }
+  const auto model = cache.Get<std::optional<BustModel>>(
+      StageKey("bust", experiment.bust, experiment.face_template),
+      [&] { return LoadBust(experiment.bust, experiment.face_template, context); });
+  return *model ? std::shared_ptr<const BustModel>(model, &**model) : nullptr;
+}
+
 }  // namespace
 
 std::vector<std::string> RunResult::Faults() const {
@@ -115,6 +127,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   StepClock step(context);
   StageCache own_cache(4);
   StageCache& shared = cache ? *cache : own_cache;
+  const auto bust_model = step("load bust", [&] { return GivenBust(experiment, shared, context); });
   const auto skull = MakeSkullStage(experiment, shared, step, context);
   const DepthStage& bone = *skull->depth_stage;
   Case subject = bone.subject;
@@ -144,6 +157,14 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   });
   std::vector<FeatureDistortion> features =
       MeasureFeatures(made.placed.face, made.fitted.fit.surface);
+  std::optional<Bust> bust;
+  if (bust_model) {
+    std::ranges::copy(BustFiles(experiment.bust), std::back_inserter(subject.inputs));
+    bust = step("bust", [&] {
+      return PoseBust({*bust_model, made.fitted.fit.surface, made.placed.face.site_uv, seedable},
+                      context);
+    });
+  }
   return {.subject = std::move(subject),
           .shell = bone.shell,
           .origin = std::move(origin),
@@ -159,6 +180,8 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
           .uncertainty = std::move(uncertainty),
           .truth = std::move(truth),
           .features = std::move(features),
+          .bust_model = bust_model,
+          .bust = std::move(bust),
           .times = step.Take()};
 }
 

@@ -2,10 +2,12 @@
 // The main job: from an experiment to a face, as values.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "problems/bust/pose_bust.h"
 #include "problems/metrics/face_details.h"
 #include "problems/metrics/feature_distortion.h"
 #include "problems/pipeline/case.h"
@@ -47,7 +49,9 @@ struct RunResult {
   std::optional<FaceUncertainty> uncertainty;  // where it was asked for
   std::optional<TruthComparison> truth;
   std::vector<FeatureDistortion> features;
-  std::vector<StepTime> times;  // not part of the result proper
+  std::shared_ptr<const BustModel> bust_model;  // null: no bust was asked for
+  std::optional<Bust> bust;                     // of bust_model
+  std::vector<StepTime> times;                  // not part of the result proper
 
   // Why the face cannot be used; empty if it can.
   std::vector<std::string> Faults() const;

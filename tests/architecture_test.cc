@@ -58,7 +58,7 @@ const std::map<std::string, Layers> kRooms = {
       {"pictures", "subject"},
       {"landmark_files", "preparation"},
       {"face_template"},
-      {"metrics", "prior"},
+      {"bust", "metrics", "prior"},
       {"pipeline", "propose"},
       {kHall},
       {"report"},

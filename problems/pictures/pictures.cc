@@ -51,6 +51,11 @@ SceneObject SkinObject(TriMesh mesh, double opacity) {
   return {.mesh = std::move(mesh), .material = SkinMaterial(), .opacity = opacity};
 }
 
+SceneObject EyeObject(TriMesh mesh, const Colour& colour) {
+  return {.mesh = std::move(mesh),
+          .material = {.colour = colour, .wrap = 0.1, .gloss = 0.9, .gloss_log2 = 7}};
+}
+
 SceneObject DowelObject(std::span<const Dowel> dowels, double radius_mm) {
   SceneObject object{.mesh = {}, .material = PlasticMaterial(HexColour(0xc8321f))};
   for (const Dowel& dowel : dowels) {

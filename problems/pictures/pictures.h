@@ -17,6 +17,9 @@ namespace semblance {
 SceneObject SkullObject(TriMesh mesh);
 SceneObject SkinObject(TriMesh mesh, double opacity = 1);
 
+// Wet and glossy.
+SceneObject EyeObject(TriMesh mesh, const Colour& colour);
+
 // One red cylinder per dowel from base to tip, with a sphere at the tip. radius_mm > 0. A dowel
 // with no finite tip, or no depth, is left out.
 SceneObject DowelObject(std::span<const Dowel> dowels, double radius_mm = 1.1);

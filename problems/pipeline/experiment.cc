@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "fitting/plan/fit_check.h"
+#include "problems/bust/bust_model.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -50,6 +51,19 @@ class LevelCheck {
   TemplateLevels levels_;
   std::vector<OptionFault> faults_;
 };
+
+// Of a bust that the user brings; the program's own is known to be sound.
+void CheckBust(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  if (!std::holds_alternative<MeshBust>(experiment.bust) &&
+      !std::holds_alternative<HSplineBust>(experiment.bust)) {
+    return;
+  }
+  try {
+    LoadBust(experiment.bust, experiment.face_template, {});
+  } catch (const Error& error) {
+    faults.push_back({"bust", error.what()});
+  }
+}
 
 }  // namespace
 
@@ -102,6 +116,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
                       "the term 'prior_shape' looks at a prior's face; leave it out, or write "
                       "`face: prior_then_fit`"});
   }
+  CheckBust(experiment, faults);
   return faults;
 } catch (const Error& error) {  // of a template that cannot be used; its levels are not known
   return {{"template", error.what()}};

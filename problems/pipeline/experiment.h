@@ -15,6 +15,7 @@
 #include "interp/evaluation/depth_truth.h"
 #include "interp/interpolate_depth.h"
 #include "interp/schemes/outside_rule.h"
+#include "problems/bust/bust_source.h"
 #include "problems/config/config_errors.h"
 #include "problems/ct/import_ct.h"
 #include "problems/ct/read_volume.h"
@@ -120,6 +121,23 @@ void Fields(Visitor& visit, CrossValidationOptions& o) {
         o.random_seed);
 }
 
+// The same experiment with some options otherwise.
+struct Alternative {
+  std::string name;
+  std::vector<std::string> set;
+};
+template <class Visitor>
+void Fields(Visitor& visit, Alternative& o) {
+  visit(FieldInfo{.name = "name",
+                  .doc = "letters, digits, '_', '-' and '+': its folder below the run's, and its "
+                         "heading"},
+        o.name);
+  visit(FieldInfo{.name = "set",
+                  .doc = "what is otherwise, as --set takes it: [\"tissue.build=obese\"], or "
+                         "[\"tissue.sds=1\"]; files by whole paths, or from the current folder"},
+        o.set);
+}
+
 using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
 struct Experiment {
@@ -137,6 +155,8 @@ struct Experiment {
   PlacementOptions placement;                    // how it is brought to the dowels
   PriorSource prior = IctPrior{};                // a statistical model of faces
   FaceSource face;                               // the way to the face
+  BustSource bust;                               // the head that it is put into
+  std::vector<Alternative> alternatives;         // other answers, beside this one
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;             // no seeds nearer to where the scan ends
@@ -186,6 +206,17 @@ void Fields(Visitor& visit, Experiment& o) {
                          "level by level; prior: the most likely face of the prior, given tips and "
                          "implicit face; prior_then_fit: that face as the template of the fit"},
         o.face);
+  visit(FieldInfo{.name = "bust",
+                  .doc = "the head that the face is put into for people to look at, with ears, "
+                         "neck and eyes; auto: ict where the template is ict, else none; ict: the "
+                         "head of the ICT-FaceKit model; hspline: the template's own; mesh: any "
+                         "head. No figure is measured on it"},
+        o.bust);
+  visit(FieldInfo{.name = "alternatives",
+                  .doc = "the same skull with other options, each in a folder of its own below the "
+                         "run's, and side by side in the report, e.g. [{name: obese, set: "
+                         "[\"tissue.build=obese\"]}]"},
+        o.alternatives);
   visit(FieldInfo{.name = "first_fit",
                   .doc = "levels fitted to the dowels alone before seeds are taken; may be empty"},
         o.first_fit);

@@ -7,10 +7,12 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "problems/bust/whole_head.h"
 #include "problems/face_template/template_io.h"
 #include "problems/face_template/template_summary.h"
 #include "problems/output/staged_folder.h"
@@ -33,7 +35,7 @@ struct TemplateArguments {
   std::string out;
   TemplateFitOptions fit;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool force = false, quiet = false;
+  bool bust = false, force = false, quiet = false;
   std::stop_token stop;
 };
 
@@ -54,6 +56,9 @@ void Write(const TemplateFace& face, StagedFolder& folder) {
 
 // The generic face that a configuration asks for.
 int FromConfig(const TemplateArguments& a) {
+  if (a.bust) {
+    throw InputError("--bust is for a head with landmarks; a configuration has no mesh of one");
+  }
   const auto experiment = ReadConfig<Experiment>(a.input, a.overrides);
   StagedFolder folder = MakeFolder(a);
   Write(LoadTemplate(experiment.face_template), folder);
@@ -69,8 +74,13 @@ int FromHead(const TemplateArguments& a) {
   if (!a.quiet) {
     context.on_event = ProgressPrinter(stderr);
   }
+  const TriMesh mesh = ReadMesh(a.input);
   const OuterHead head =
-      PrepareHead(ReadMesh(a.input), ReadSkinLandmarks(a.landmarks), a.input.string(), context);
+      PrepareHead(mesh, ReadSkinLandmarks(a.landmarks), a.input.string(), context);
+  std::optional<WholeHeadFit> whole;
+  if (a.bust) {
+    whole = FitWholeHead(mesh, a.input.string(), context);
+  }
   StagedFolder folder = MakeFolder(a);
   const TemplateFit fit = FitTemplate(head, a.fit, context);
   folder.Files().Write("template.json", TemplateJson(fit, head, a.fit));
@@ -79,8 +89,14 @@ int FromHead(const TemplateArguments& a) {
     fmt::print("note: {}\n", note);
   }
   fmt::print("{}", TemplateText(fit, a.fit));
+  if (whole) {
+    folder.Files().Write("bust.json", WholeHeadToJson(whole->head));
+    fmt::print("bust.json: {} eyes; {:.3f} mm RMS, at most {:.2f} mm, from the mesh\n",
+               whole->head.eyeballs.size(), whole->rms_mm, whole->max_mm);
+  }
   Write(fit.face, folder);
-  return fit.usable && fit.met && fit.folds == 0 ? kDone : kNotUsable;
+  const bool bust_usable = !whole || whole->usable;
+  return fit.usable && fit.met && fit.folds == 0 && bust_usable ? kDone : kNotUsable;
 }
 
 int Template(const TemplateArguments& a) {
@@ -110,6 +126,10 @@ void DeclareTemplate(CLI::App& command, CommandLine& line) {
   command
       .add_option("--set", a.overrides, "path=value, laid over the configuration; may be repeated")
       ->allow_extra_args(false);
+  command.add_flag("--bust", a.bust,
+                   "write bust.json too: the whole head, ears and neck, which `bust: {type: "
+                   "hspline, file: bust.json}` takes; the mesh must be one piece, open at the "
+                   "neck alone but for eyes and mouth");
   command.add_option("--out", a.out, "folder for the results");
   command.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");

@@ -10,8 +10,9 @@
     return made;
   };
 
-  // What the first look shows: the face as glass over bone and dowels.
-  const SHOWN = ['skull', 'dowels', 'face'];
+  // What the first look shows: the head, else the face as glass over bone and dowels.
+  const headed = scenes.every((scene) => scene.layers.some((layer) => layer.id === 'bust'));
+  const SHOWN = headed ? ['skull', 'dowels', 'bust'] : ['skull', 'dowels', 'face'];
   const OPACITY = {face: 0.6, implicit: 0.6, skin: 0.5};
   const shared = {layers: new Map(), mapped: false, range_mm: 8, exaggeration: 1, camera: null};
   const labels = new Map();

@@ -55,6 +55,12 @@ class SemblanceStage {
     const material = new THREE.MeshPhongMaterial({side: THREE.DoubleSide, shininess: 12, specular: 0x222222});
     const mesh = new THREE.Mesh(SemblanceGeometry.geometryOf(blobs[layer.mesh]), material);
     mesh.userData.values = layer.values && SemblanceGeometry.valuesOf(blobs[layer.values]);
+    for (const part of layer.parts || []) {  // eyes: of one colour, never glass
+      const wet = new THREE.MeshPhongMaterial({color: part.colour, shininess: 120, specular: 0x999999});
+      const eye = new THREE.Mesh(SemblanceGeometry.geometryOf(blobs[part.mesh]), wet);
+      eye.raycast = () => {};
+      mesh.add(eye);
+    }
     return mesh;
   }
 

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "fitting/problem/seeding.h"
+#include "problems/bust/bust_files.h"
 #include "problems/metrics/face_metrics_json.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
@@ -118,6 +119,16 @@ Json PriorJson(const ShapeEstimate& estimate) {
           {"rounds", estimate.rounds},
           {"last_move_mm", estimate.last_move_mm},
           {"usable", estimate.usable}};
+}
+
+Json BustJson(const Bust& bust) {
+  return {{"scale", bust.subject_from_model.scale},
+          {"on_face", bust.on_face},
+          {"face_rms_mm", bust.face_rms_mm},
+          {"on_skull", bust.on_skull},
+          {"skull_rms_mm", bust.skull_rms_mm},
+          {"turned_over", bust.turned_over},
+          {"released", bust.released}};
 }
 
 // Where a dowel stands in the fit's target; -1 if it is not fitted.
@@ -236,6 +247,11 @@ void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext
   if (result.uncertainty) {
     WriteSamples(*result.uncertainty, folder);
   }
+  if (result.bust) {
+    for (const NamedBytes& file : BustToFiles(*result.bust, *result.bust_model)) {
+      folder.Write(file.name, file.bytes);
+    }
+  }
   folder.Write("depth.ply",
                MappedPly(result.shell, "scalar_depth_mm", result.depth.depth_mm, DepthColours(),
                          {OriginScalar(result.shell, result, context)}));
@@ -290,6 +306,9 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
   json["fit"] = FitJson(result);
   if (result.prior) {
     json["prior"] = PriorJson(*result.prior);
+  }
+  if (result.bust) {
+    json["bust"] = BustJson(*result.bust);
   }
   json["uncertainty"] = UncertaintyJson(result);
   json["notes"] = result.subject.notes;

@@ -18,6 +18,9 @@ constexpr int kWidth = 560, kHeight = 640;
 Box3 Region(const RunResult& result) {
   Box3 box = Bounds(result.face.mesh);
   box.extend(Bounds(result.shell));
+  if (result.bust) {
+    box.extend(Bounds(result.bust->skin));
+  }
   for (const Dowel& dowel : result.subject.dowels_on_bone) {
     box.extend(dowel.Tip());
   }
@@ -26,6 +29,19 @@ Box3 Region(const RunResult& result) {
 
 RenderOptions Options(Lighting lighting) {
   return {.width = kWidth, .height = kHeight, .lighting = lighting};
+}
+
+// The head with open eyes, where there is one; else the face.
+Scene HeadScene(const RunResult& result) {
+  if (!result.bust) {
+    return {{SkinObject(result.face.mesh)}};
+  }
+  Scene scene{{SkinObject(result.bust->skin)}};
+  for (const EyePart& part : result.bust->eyes) {
+    const auto& c = part.colour;
+    scene.objects.push_back(EyeObject(part.mesh, {c[0], c[1], c[2]}));
+  }
+  return scene;
 }
 
 void WriteViews(const Scene& scene, const RunResult& result, const Sheet& sheet, Lighting lighting,
@@ -53,6 +69,10 @@ void WriteOverview(const RunResult& result, OutputFolder& folder, int threads) {
   Sheet sheet{.title = "",
               .captions = {"skull and dowels", "implicit face", "H-spline face"},
               .legend = std::nullopt};
+  if (result.bust) {
+    pictures.push_back(Front(HeadScene(result), result, threads));
+    sheet.captions.push_back("head");
+  }
   if (result.subject.skin) {
     pictures.push_back(Front({{SkinObject(*result.subject.skin)}}, result, threads));
     sheet.captions.push_back("true skin");
@@ -178,6 +198,10 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
              Lighting::kStudio, folder, "pictures/implicit.png", threads);
   WriteViews({{SkinObject(result.face.mesh)}}, result, {"H-spline face", {}, std::nullopt},
              Lighting::kStudio, folder, "pictures/face.png", threads);
+  if (result.bust) {
+    WriteViews(HeadScene(result), result, {"", {}, std::nullopt}, Lighting::kStudio, folder,
+               "pictures/bust.png", threads);
+  }
   WriteOrigin(result, folder, threads);
   Scene over = SkullScene(result);
   over.objects.push_back(SkinObject(result.face.mesh, 0.55));

@@ -22,7 +22,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kTriangles = 24000;  // of a decimated mesh
+constexpr std::size_t kTriangles = 24000;      // of a decimated mesh
+constexpr std::size_t kHeadTriangles = 50000;  // of one with ears and lids
 
 // One vertex a cell of a grid, for meshes that are no manifolds.
 TriMesh Clustered(const TriMesh& mesh, double cell_mm) {
@@ -48,12 +49,12 @@ TriMesh Clustered(const TriMesh& mesh, double cell_mm) {
   return out;
 }
 
-TriMesh ForView(const TriMesh& mesh) {
-  if (mesh.triangles.size() <= kTriangles) {
+TriMesh ForView(const TriMesh& mesh, std::size_t most = kTriangles) {
+  if (mesh.triangles.size() <= most) {
     return mesh;
   }
   try {
-    return Decimate(mesh, {.target_triangles = kTriangles}).mesh;
+    return Decimate(mesh, {.target_triangles = static_cast<int>(most)}).mesh;
   } catch (const InputError&) {  // a scan may hold edges that no decimation takes
     return Clustered(mesh, std::sqrt(2.3 * Area(mesh) / kTriangles));
   }
@@ -85,20 +86,22 @@ Json Numbers(const Vec3& p) {
 
 // The meshes of a run, thinned out.
 struct ViewMeshes {
-  TriMesh skull, shell, implicit, face, skin;
+  TriMesh skull, shell, implicit, face, skin, bust;
 };
 
 ViewMeshes MakeViewMeshes(const RunResult& result, int threads) {
   ViewMeshes view;
-  const std::array<std::pair<const TriMesh*, TriMesh*>, 5> jobs = {
+  const std::array<std::pair<const TriMesh*, TriMesh*>, 6> jobs = {
       {{&result.subject.skull, &view.skull},
        {result.subject.skin ? &*result.subject.skin : nullptr, &view.skin},
        {&result.shell, &view.shell},
        {&result.implicit.mesh, &view.implicit},
+       {result.bust ? &result.bust->skin : nullptr, &view.bust},
        {&result.face.mesh, &view.face}}};
-  ParallelFor(jobs.size(), threads, 1, [&jobs](std::size_t k) {
+  ParallelFor(jobs.size(), threads, 1, [&jobs, &view](std::size_t k) {
     if (jobs[k].first != nullptr) {
-      *jobs[k].second = ForView(*jobs[k].first);
+      const bool head = jobs[k].second == &view.bust;
+      *jobs[k].second = ForView(*jobs[k].first, head ? kHeadTriangles : kTriangles);
     }
   });
   return view;
@@ -115,6 +118,7 @@ class SceneWriter {
     Depth();
     Face("implicit", "Implicit face", view_.implicit, "#d9b38c");
     Face("face", "H-spline face", view_.face, "#d8a58a");
+    Head();
     if (result_.uncertainty && !result_.uncertainty->sigma_mm.empty()) {
       Mesh("sigma", "Uncertainty of face", view_.face, "#8f8f8f");
       Map("sigma", NearestValues(view_.face, result_.face.mesh, result_.uncertainty->sigma_mm));
@@ -144,6 +148,18 @@ class SceneWriter {
     if (result_.truth) {
       layers_.back()["map"] = "error";
       layers_.back()["values"] = blobs_.AddValues(SignedErrorOf(mesh, result_, context_));
+    }
+  }
+
+  void Head() {
+    if (!result_.bust) {
+      return;
+    }
+    Mesh("bust", "Head", view_.bust, "#d8a58a");
+    for (const EyePart& part : result_.bust->eyes) {
+      const auto& c = part.colour;
+      layers_.back()["parts"].push_back(
+          {{"colour", Hex({c[0], c[1], c[2]})}, {"mesh", blobs_.AddMesh(part.mesh)}});
     }
   }
 

@@ -210,9 +210,17 @@ class StudyRunner {
     return quiet;
   }
 
+  // A bust is for those who open a run's folder; nothing is measured on it.
+  Experiment AsLookedAt(Experiment experiment) const {
+    if (plan_.keep != TrialFiles::kRun) {
+      experiment.bust = NoBust{};
+    }
+    return experiment;
+  }
+
   Files Face(const StudyTrial& trial, double cpu_before_s, Json& json) {
-    auto result =
-        std::make_shared<const RunResult>(semblance::Run(trial.experiment, Quiet(), &cache_));
+    auto result = std::make_shared<const RunResult>(
+        semblance::Run(AsLookedAt(trial.experiment), Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = Json::parse(ResultJson(trial.experiment, *result));
     return FilesOfRun(trial, result, ThreadCpu_s() - cpu_before_s);
@@ -225,8 +233,8 @@ class StudyRunner {
           "{} is not in the gallery, as files of the study's base are missing", trial.subject));
     }
     auto result = std::make_shared<const IdentifyResult>(Identify(
-        trial.experiment, plan_.gallery, static_cast<std::size_t>(own - plan_.gallery.begin()),
-        plan_.identify, Quiet(), cache_));
+        AsLookedAt(trial.experiment), plan_.gallery,
+        static_cast<std::size_t>(own - plan_.gallery.begin()), plan_.identify, Quiet(), cache_));
     SetStatus(result->run.Faults(), json);
     json["result"] = Json::parse(IdentifyResultJson(trial.experiment, *result));
     return FilesOfRun(trial, {result, &result->run}, ThreadCpu_s() - cpu_before_s);

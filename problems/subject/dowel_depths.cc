@@ -85,9 +85,14 @@ void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::s
   }
 }
 
-void SetDepth(const TissueTable& table, const TissueDepth& depth, Dowel& dowel, Notes& notes) {
+void SetDepth(const TissueTable& table, const TissueDepth& depth, double sds, Dowel& dowel,
+              Notes& notes) {
+  constexpr double kThinnest_mm = 0.5;
   dowel.depth_mm = depth.mean_mm;
   dowel.sd_mm = depth.sd_mm.value_or(kNaN);
+  if (sds != 0 && depth.sd_mm) {
+    dowel.depth_mm = std::max(depth.mean_mm + sds * *depth.sd_mm, kThinnest_mm);
+  }
   if (depth.flag == CellFlag::kSuspect) {
     notes.push_back(fmt::format("site {}: the depth of {:.2f} mm in table '{}' is suspect: {}",
                                 SiteInWords(dowel.site), depth.mean_mm, table.id, depth.note));
@@ -98,16 +103,25 @@ void SetDepth(const TissueTable& table, const TissueDepth& depth, Dowel& dowel, 
 std::vector<Dowel*> ApplyTable(const TissueOptions& options, const TissueTable& table,
                                const std::vector<Dowel*>& open, Notes& notes) {
   std::vector<Dowel*> left;
-  std::vector<std::string> sites;
+  std::vector<std::string> sites, without_sd;
   for (Dowel* dowel : open) {
     if (const auto depth = FindDepth(table, options.sex, options.build, dowel->site)) {
-      SetDepth(table, *depth, *dowel, notes);
+      SetDepth(table, *depth, options.sds, *dowel, notes);
       sites.push_back(dowel->site);
+      if (options.sds != 0 && !depth->sd_mm) {
+        without_sd.push_back(dowel->site);
+      }
     } else {
       left.push_back(dowel);
     }
   }
   NoteUnorderedRows(table, options.sex, sites, notes);
+  if (!without_sd.empty()) {
+    notes.push_back(
+        fmt::format("tissue table '{}' states no standard deviation for {}: their mean stays, "
+                    "whatever `sds` says",
+                    table.id, fmt::join(without_sd, ", ")));
+  }
   return left;
 }
 

@@ -29,6 +29,7 @@ struct TissueOptions {
   std::filesystem::path fill_from;           // another table, for the sites that `table` lacks
   Sex sex = Sex::kMale;                      // of the subject; a pooled table does not ask
   Build build = Build::kNormal;              // of the subject; never interpolated between builds
+  double sds = 0;                            // added to the depths of a table
   std::map<std::string, double> set_mm;      // by site, before all others
 };
 
@@ -48,6 +49,13 @@ void Fields(Visitor& visit, TissueOptions& o) {
   visit(FieldInfo{.name = "build",
                   .doc = "of the subject: emaciated, normal or obese; not for pooled adults"},
         o.build);
+  visit(FieldInfo{.name = "sds",
+                  .min = -3,
+                  .max = 3,
+                  .doc = "standard deviations that are added to each depth of a table, for faces "
+                         "fatter (1) or leaner (-1) than its mean; where a table states none, its "
+                         "mean stays, with a note; a depth stays at 0.5 mm at least"},
+        o.sds);
   visit(FieldInfo{.name = "set_mm",
                   .unit = "mm",
                   .min = 0.01,

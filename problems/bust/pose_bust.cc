@@ -1,0 +1,352 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/bust/pose_bust.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "fitting/problem/placement.h"
+#include "problems/bust/soft_deformation.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/parallel.h"
+#include "surfaces/base/thin_plate.h"
+#include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kQuadsPerPatch = 4;
+constexpr double kOnFace_mm = 1;   // what at rest lies so near to the template is of the face
+constexpr double kSameSide = 0.6;  // cosine between normals
+constexpr double kLids = 1.45;     // radii of the eyeball, round its centre
+constexpr double kLidTrust = 0.05;
+constexpr double kSkullTrust = 0.1;  // of the scalp, against 1 of the face
+constexpr double kScalpReach_mm = 20;
+constexpr double kEar_mm = 45;  // round the ear
+constexpr int kRounds = 3;
+
+double SmoothStep(double x) {
+  const double t = std::clamp(x, 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+// How far a face is to be followed: not at its border, where nothing holds it.
+double TrustAt(const Vec2& uv) {
+  const double side = SmoothStep(std::min(uv.x(), 1 - uv.x()) / 0.08);
+  return side * SmoothStep((uv.y() - 0.02) / 0.09) * SmoothStep((1 - uv.y()) / 0.09);
+}
+
+// A vertex of the bust and what of the face it follows.
+struct OnFace {
+  std::int32_t vertex = -1;
+  int triangle = -1;
+  Vec3 weights = Vec3::Constant(kNaN);
+  double above_mm = 0;  // along the normal of the face
+  double trust = 0;
+};
+
+class FaceMesh {
+ public:
+  explicit FaceMesh(const HSplineSurface& surface)
+      : tessellation_(Tessellate(surface, kQuadsPerPatch)) {}
+
+  const TriMesh& mesh() const { return tessellation_.mesh; }
+  template <class Value>
+  Value At(const std::vector<Value>& values, int triangle, const Vec3& weights) const {
+    const Triangle& t = mesh().triangles[triangle];
+    return values[t[0]] * weights[0] + values[t[1]] * weights[1] + values[t[2]] * weights[2];
+  }
+  Vec3 Point(int triangle, const Vec3& weights) const {
+    return At(mesh().points, triangle, weights);
+  }
+  Vec3 Normal(int triangle, const Vec3& weights) const {
+    return At(tessellation_.normals, triangle, weights).normalized();
+  }
+  Vec2 Uv(int triangle, const Vec3& weights) const {
+    return At(tessellation_.uv, triangle, weights);
+  }
+
+ private:
+  Tessellation tessellation_;
+};
+
+// The vertices of `mesh` that lie on the face, or within reach of it.
+std::vector<OnFace> FindOnFace(const TriMesh& mesh, const FaceMesh& face, double reach_mm,
+                               std::span<const Sphere> eyes, int threads) {
+  const MeshQuery query(face.mesh());
+  const std::vector<Vec3> normals = VertexNormals(mesh);
+  std::vector<OnFace> found(mesh.points.size());
+  ParallelFor(mesh.points.size(), threads, 256, [&](std::size_t v) {
+    const Vec3& p = mesh.points[v];
+    const MeshPoint at = query.Closest(p);
+    const Vec3 normal = face.Normal(at.triangle, at.weights);
+    if (at.distance_mm > reach_mm || normal.dot(normals[v]) < kSameSide) {
+      return;
+    }
+    double trust = TrustAt(face.Uv(at.triangle, at.weights));
+    for (const Sphere& eye : eyes) {
+      const double lids = (p - eye.center).norm() / eye.radius_mm;
+      trust *= kLidTrust + (1 - kLidTrust) * SmoothStep((lids - kLids) / 0.5);
+    }
+    found[v] = {static_cast<std::int32_t>(v), at.triangle, at.weights, normal.dot(p - at.position),
+                trust};
+  });
+  std::erase_if(found, [](const OnFace& f) { return f.vertex < 0 || f.trust < 1e-3; });
+  return found;
+}
+
+// The part of the head over the brain case, in the subject's frame: above the ears and the lower
+// border of the orbits, and not the ears.
+class Scalp {
+ public:
+  Scalp(const HSplineSurface& face, const std::map<std::string, Vec2>& site_uv) {
+    const auto at = [&](const char* code) { return face.Point(site_uv.at(code)); };
+    const Vec3 left = at("sgl_l"), right = at("sgl_r");
+    const Vec3 front = (at("mio_l") + at("mio_r")) / 2, middle = (left + right) / 2;
+    const Vec3 back = (middle - front).normalized();
+    up_ = back.cross(left - right).normalized();
+    middle_ = middle;
+    for (const Vec3& side : {left, right}) {
+      ears_.push_back({side + 14 * back - 12 * up_, kEar_mm});
+    }
+  }
+  // 0 to 1: how much of the scalp a point is.
+  double At(const Vec3& p) const {
+    constexpr double kFirst_mm = 20, kWidth_mm = 25, kBeside_mm = 20;
+    double part = SmoothStep((up_.dot(p - middle_) - kFirst_mm) / kWidth_mm);
+    for (const Sphere& ear : ears_) {
+      part *= SmoothStep(((p - ear.center).norm() - ear.radius_mm) / kBeside_mm);
+    }
+    return part;
+  }
+
+ private:
+  Vec3 up_, middle_;
+  std::vector<Sphere> ears_;
+};
+
+class BustPoser {
+ public:
+  BustPoser(const BustInput& in, const RunContext& context)
+      : in_(in), context_(context), face_(in.face), released_(in.model.mesh.points.size(), false) {}
+
+  Bust Pose() {
+    Place();
+    if (!in_.over_skull.triangles.empty()) {
+      over_skull_.emplace(in_.over_skull);
+    }
+    posed_ = placed_;
+    for (int round = 0; round < kRounds; ++round) {
+      context_.ThrowIfStopped();
+      Follow(round);
+    }
+    Release();
+    return Result();
+  }
+
+ private:
+  void Place() {
+    std::vector<Vec3> from, to;
+    std::vector<double> weights;
+    if (in_.model.rest) {
+      const FaceMesh rest(in_.model.rest->surface);
+      on_face_ = FindOnFace(in_.model.mesh, rest, kOnFace_mm, in_.model.eyeballs, context_.threads);
+      for (const OnFace& f : on_face_) {
+        from.push_back(rest.Point(f.triangle, f.weights));
+        to.push_back(face_.Point(f.triangle, f.weights));
+        weights.push_back(f.trust);
+      }
+    } else {
+      for (const auto& [code, uv] : in_.site_uv) {
+        if (const auto site = in_.model.sites.find(code); site != in_.model.sites.end()) {
+          from.push_back(site->second);
+          to.push_back(in_.face.Point(uv));
+        }
+      }
+    }
+    if (from.size() < 4) {
+      throw InputError(fmt::format("{}: it shares {} sites with the face; at least 4 are needed",
+                                   in_.model.name, from.size()));
+    }
+    subject_from_model_ = PlaceTemplate(from, to, weights);
+    placed_ = Transformed(in_.model.mesh, subject_from_model_);
+    if (!in_.model.rest) {
+      BendToSites(from, to);
+    }
+  }
+
+  void BendToSites(std::vector<Vec3> from, const std::vector<Vec3>& to) {
+    for (Vec3& p : from) {
+      p = subject_from_model_ * p;
+    }
+    const ThinPlate bend = FitThinPlate(from, to, {}, {.stiffness_mm = 1});
+    for (Vec3& p : placed_.points) {
+      p = bend(p);
+    }
+  }
+
+  void Follow(int round) {
+    if (!in_.model.rest) {
+      constexpr std::array kReach_mm = {12.0, 6.0, 4.0};
+      on_face_ = FindOnFace(posed_, face_, kReach_mm[round], {}, context_.threads);
+      for (OnFace& f : on_face_) {
+        f.above_mm = 0;
+      }
+    }
+    FindScalp();
+    Solve();
+  }
+
+  void FindScalp() {
+    scalp_.clear();
+    if (!over_skull_) {
+      return;
+    }
+    const Scalp scalp(in_.face, in_.site_uv);
+    const std::vector<Vec3> normals = VertexNormals(posed_), skull = VertexNormals(in_.over_skull);
+    std::vector<SoftTarget> found(posed_.points.size());
+    ParallelFor(found.size(), context_.threads, 256, [&](std::size_t v) {
+      const Vec3& p = posed_.points[v];
+      const double part = scalp.At(p);
+      if (part < 1e-3) {
+        return;
+      }
+      const MeshPoint at = over_skull_->Closest(p);
+      const Triangle& t = in_.over_skull.triangles[at.triangle];
+      const Vec3 normal =
+          (skull[t[0]] * at.weights[0] + skull[t[1]] * at.weights[1] + skull[t[2]] * at.weights[2])
+              .normalized();
+      if (at.distance_mm < kScalpReach_mm && normal.dot(normals[v]) > kSameSide) {
+        found[v] = {static_cast<std::int32_t>(v), p + normal * normal.dot(at.position - p),
+                    kSkullTrust * part};
+      }
+    });
+    for (const OnFace& f : on_face_) {
+      found[f.vertex].weight *= std::max(1 - f.trust, 0.0);
+    }
+    for (const SoftTarget& target : found) {
+      if (target.vertex >= 0 && target.weight > 1e-3 * kSkullTrust) {
+        scalp_.push_back(target);
+      }
+    }
+  }
+
+  Vec3 TargetOf(const OnFace& f) const {
+    return face_.Point(f.triangle, f.weights) +
+           subject_from_model_.scale * f.above_mm * face_.Normal(f.triangle, f.weights);
+  }
+
+  void Solve() {
+    std::vector<SoftTarget> targets;
+    for (const OnFace& f : on_face_) {
+      if (!released_[f.vertex]) {
+        targets.push_back({f.vertex, TargetOf(f), f.trust});
+      }
+    }
+    for (const SoftTarget& target : scalp_) {
+      if (!released_[target.vertex]) {
+        targets.push_back(target);
+      }
+    }
+    posed_.points = Deform(placed_, targets, {});
+  }
+
+  // Lets go of what turns a triangle over, a little further round each time.
+  void Release() {
+    constexpr int kMost = 6;
+    for (int time = 0; time < kMost; ++time) {
+      const std::vector<std::int32_t> turned = TurnedOver(placed_, posed_, Mat3::Identity());
+      if (turned.empty()) {
+        return;
+      }
+      context_.ThrowIfStopped();
+      std::vector<bool> wider = released_;
+      for (const std::int32_t t : turned) {
+        for (const std::int32_t v : placed_.triangles[t]) {
+          wider[v] = true;
+        }
+      }
+      for (int ring = 0; ring < 2; ++ring) {
+        Widen(wider);
+      }
+      released_ = std::move(wider);
+      Solve();
+    }
+  }
+
+  void Widen(std::vector<bool>& chosen) const {
+    const std::vector<bool> before = chosen;
+    for (const Triangle& t : placed_.triangles) {
+      if (before[t[0]] || before[t[1]] || before[t[2]]) {
+        chosen[t[0]] = chosen[t[1]] = chosen[t[2]] = true;
+      }
+    }
+  }
+
+  // The eye goes with its lids, which touch it.
+  void PoseEyes(Bust& bust) const {
+    for (const Sphere& eye : in_.model.eyeballs) {
+      std::vector<Vec3> from, to;
+      for (std::size_t v = 0; v < posed_.points.size(); ++v) {
+        const Vec3& p = in_.model.mesh.points[v];
+        if (std::abs((p - eye.center).norm() - eye.radius_mm) < 1 && p.y() < eye.center.y()) {
+          from.push_back(p);
+          to.push_back(posed_.points[v]);
+        }
+      }
+      const Similarity moved = from.size() < 10 ? subject_from_model_ : PlaceTemplate(from, to);
+      const Sphere ball{moved * eye.center, moved.scale * eye.radius_mm};
+      for (EyePart& part : EyeParts(ball, subject_from_model_.rotation * -Vec3::UnitY(),
+                                    subject_from_model_.rotation * Vec3::UnitZ())) {
+        bust.eyes.push_back(std::move(part));
+      }
+    }
+  }
+
+  Bust Result() const {
+    Bust bust{.skin = posed_, .eyes = {}, .subject_from_model = subject_from_model_};
+    double sum = 0, weight = 0;
+    for (const OnFace& f : on_face_) {
+      sum += f.trust * (posed_.points[f.vertex] - TargetOf(f)).squaredNorm();
+      weight += f.trust;
+    }
+    bust.on_face = static_cast<int>(on_face_.size());
+    bust.face_rms_mm = weight > 0 ? std::sqrt(sum / weight) : kNaN;
+    double skull = 0;
+    for (const SoftTarget& target : scalp_) {
+      skull += (posed_.points[target.vertex] - target.position).squaredNorm();
+    }
+    bust.on_skull = static_cast<int>(scalp_.size());
+    bust.skull_rms_mm =
+        scalp_.empty() ? kNaN : std::sqrt(skull / static_cast<double>(scalp_.size()));
+    bust.turned_over = static_cast<int>(TurnedOver(placed_, posed_, Mat3::Identity()).size());
+    bust.released = static_cast<int>(std::ranges::count(released_, true));
+    PoseEyes(bust);
+    return bust;
+  }
+
+  const BustInput& in_;
+  const RunContext& context_;
+  const FaceMesh face_;
+  std::optional<MeshQuery> over_skull_;
+  std::vector<bool> released_;
+  std::vector<OnFace> on_face_;
+  std::vector<SoftTarget> scalp_;
+  Similarity subject_from_model_;
+  TriMesh placed_, posed_;
+};
+
+}  // namespace
+
+Bust PoseBust(const BustInput& in, const RunContext& context) {
+  return BustPoser(in, context).Pose();
+}
+
+}  // namespace semblance

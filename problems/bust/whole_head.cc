@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/bust/whole_head.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "fitting/fit.h"
+#include "fitting/problem/start_surface.h"
+#include "problems/bust/eyeball.h"
+#include "problems/bust/head_samples.h"
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/hspline_files/json_parts.h"
+
+namespace semblance {
+namespace {
+
+using json_parts::Json;
+
+constexpr HSplineShape kShape = {
+    .patches_u = 16, .patches_v = 12, .max_level = 4, .closure = Closure::kPeriodicU};
+constexpr int kSamplesPerPatch = 2;  // of the finest level, along each side
+constexpr double kTolerance_mm = 0.12;
+constexpr double kWave_mm = 1;  // of the displacement, that smoothness halves
+constexpr double kUnit_mm = 1e-3;
+
+FitOptions HeadFitOptions() {
+  constexpr double kLength_mm = 10;
+  const double wave = kWave_mm / (2 * std::numbers::pi * kLength_mm);
+  return {
+      .plan =
+          AdaptivePlan{.tolerance_mm = kTolerance_mm, .finest = kShape.max_level, .min_points = 4},
+      .terms = {PointTerm{}, SmoothnessTerm{.weight = std::pow(wave, 4), .length_mm = kLength_mm}},
+      .features = FreeFeatures{},
+      .relaxation = NoRelaxation{},
+      .solver = Solver::kFastest};
+}
+
+Vec3 Rounded(const Vec3& v) {
+  return {std::round(v.x() / kUnit_mm) * kUnit_mm, std::round(v.y() / kUnit_mm) * kUnit_mm,
+          std::round(v.z() / kUnit_mm) * kUnit_mm};
+}
+
+// What is written with fewer digits.
+Vec3 Shortened(const Vec3& v) {
+  const auto number = [](double x) { return std::stod(fmt::format("{:.3f}", x)) + 0.0; };
+  return {number(v.x()), number(v.y()), number(v.z())};
+}
+
+HSplineSurface Shortened(const HSplineSurface& surface) {
+  ControlNet net = surface.Net(0);
+  std::ranges::transform(net.vertices, net.vertices.begin(),
+                         [](const Vec3& v) { return Shortened(Rounded(v)); });
+  HSplineSurface result(surface.shape(), net);
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  for (const auto& [vertex, offset] : surface.Offsets()) {
+    const Vec3 rounded = Shortened(Rounded(offset));
+    if (!rounded.isZero()) {
+      offsets[vertex] = rounded;
+    }
+  }
+  result.SetOffsets(offsets);
+  return result;
+}
+
+// The openings of the eyes: off the midline, and as wide as an eye.
+std::vector<Sphere> Eyeballs(const HeadDomain& domain) {
+  constexpr double kNarrowest_mm = 15, kWidest_mm = 40, kOffMidline_mm = 15;
+  constexpr double kBehindLid_mm = 0.1;
+  const double midline = Bounds(domain.mesh).center().x();
+  std::vector<Sphere> eyes;
+  for (const auto& rim : domain.rims) {
+    std::vector<Vec3> points;
+    Box3 box;
+    for (const std::int32_t v : rim) {
+      points.push_back(domain.mesh.points[v]);
+      box.extend(points.back());
+    }
+    const double width = box.sizes().x(), aside = std::abs(box.center().x() - midline);
+    if (width > kNarrowest_mm && width < kWidest_mm && aside > kOffMidline_mm) {
+      Sphere ball = SphereThrough(points);
+      ball.radius_mm -= kBehindLid_mm;
+      eyes.push_back({Shortened(ball.center), Shortened(Vec3::Constant(ball.radius_mm)).x()});
+    }
+  }
+  std::ranges::sort(eyes, {}, [](const Sphere& eye) { return eye.center.x(); });
+  return eyes;
+}
+
+}  // namespace
+
+WholeHeadFit FitWholeHead(const TriMesh& mesh, const std::string& name, const RunContext& context) {
+  const HeadDomain domain = LayOutHead(mesh, name);
+  const HeadSamples samples =
+      SampleHead(domain, kSamplesPerPatch * kShape.PatchesU(kShape.max_level),
+                 kSamplesPerPatch * kShape.PatchesV(kShape.max_level));
+  const HSplineSurface start = StartSurface(kShape, samples.points, samples.uv);
+  const FitResult fit =
+      Fit(start, TargetOf(samples.points, samples.uv), {}, HeadFitOptions(), context);
+  WholeHeadFit result{.head = {Shortened(fit.surface), Eyeballs(domain)}, .usable = fit.usable};
+  double sum = 0, most = 0;
+  for (std::size_t k = 0; k < samples.uv.size(); ++k) {
+    const double off = (result.head.surface.Point(samples.uv[k]) - samples.points[k]).norm();
+    sum += off * off;
+    most = std::max(most, off);
+  }
+  result.rms_mm = std::sqrt(sum / static_cast<double>(samples.uv.size()));
+  result.max_mm = most;
+  return result;
+}
+
+std::string WholeHeadToJson(const WholeHead& head) {
+  Json eyeballs = Json::array();
+  for (const Sphere& eye : head.eyeballs) {
+    eyeballs.push_back({eye.center.x(), eye.center.y(), eye.center.z(), eye.radius_mm});
+  }
+  const Json json = {{"format", "semblance-head"},
+                     {"version", 1},
+                     {"units", "mm"},
+                     {"eyeballs", eyeballs},
+                     {"surface", Json::parse(HSplineToJson(head.surface))}};
+  return json.dump() + "\n";
+}
+
+WholeHead WholeHeadFromJson(std::string_view text, const std::string& name) try {
+  const Json json = json_parts::ParseWithoutRepeats(text);
+  json_parts::RequireKeys(json, {"format", "version", "units", "eyeballs", "surface"});
+  json_parts::RequireFormat(json, "semblance-head", 1);
+  std::vector<Sphere> eyeballs;
+  for (const Json& row : json_parts::ListFromJson(json, "eyeballs")) {
+    json_parts::RequireSize(row, 4);
+    const Vec3 radius = json_parts::VecFromJson(row, 1);
+    if (!(radius.z() > 0)) {
+      throw IoError("an eyeball's radius must be positive");
+    }
+    eyeballs.push_back({json_parts::VecFromJson(row, 0), radius.z()});
+  }
+  HSplineSurface surface = HSplineFromJson(json.at("surface").dump(), "its surface");
+  if (surface.shape().closure != Closure::kPeriodicU) {
+    throw IoError("its surface must go round in u");
+  }
+  return {std::move(surface), std::move(eyeballs)};
+} catch (const IoError& error) {
+  throw IoError(fmt::format("{}: {}", name, error.what()));
+}
+
+TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows) {
+  TriMesh mesh;
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      mesh.points.push_back(head.surface.Point({double(i) / columns, double(j) / rows}));
+    }
+  }
+  Vec3 crown = Vec3::Zero();
+  for (int i = 0; i < columns; ++i) {
+    crown += head.surface.Point({double(i) / columns, 1}) / columns;
+  }
+  mesh.points.push_back(crown);
+  const int top = columns * rows;
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      const int next = (i + 1) % columns, a = j * columns + i, b = j * columns + next;
+      if (j + 1 == rows) {
+        mesh.triangles.push_back({a, b, top});
+        continue;
+      }
+      mesh.triangles.push_back({a, b, b + columns});
+      mesh.triangles.push_back({a, b + columns, a + columns});
+    }
+  }
+  return mesh;
+}
+
+}  // namespace semblance
