@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "fitting/plan/fit_faults.h"
+#include "problems/pipeline/hand_edits.h"
 #include "problems/pipeline/make_face.h"
 #include "problems/pipeline/stage_key.h"
 #include "problems/prior/hspline_prior.h"
@@ -143,6 +144,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const TriMesh seedable = SeedableFace(experiment, subject, skull->implicit.dense);
   const FaceInput input{experiment, *generic, prior.get(), subject, seedable, bone.shell};
   MadeFace made = step("fit", [&] { return MakeFace(input, context); });
+  std::optional<HSplineSurface> before_edits = EditByHand(experiment, made.fitted, subject);
   CheckFinite(made.fitted.fit.surface);
   Tessellation face =
       step("tessellate", [&] { return Tessellate(made.fitted.fit.surface, kFaceQuadsPerPatch); });
@@ -176,6 +178,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
           .seeding = std::move(made.fitted.seeding),
           .target = std::move(made.fitted.target),
           .fit = std::move(made.fitted.fit),
+          .before_edits = std::move(before_edits),
           .face = std::move(face),
           .uncertainty = std::move(uncertainty),
           .truth = std::move(truth),

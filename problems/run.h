@@ -45,7 +45,8 @@ struct RunResult {
   SeedResult seeding;                  // of the last round
   FitTarget target;                    // of the last round: dowel tips at their (u,v), then seeds
   FitResult fit;                       // of the last round
-  Tessellation face;                   // of fit.surface
+  std::optional<HSplineSurface> before_edits;  // fit.surface, before experiment.edits
+  Tessellation face;                           // of fit.surface
   std::optional<FaceUncertainty> uncertainty;  // where it was asked for
   std::optional<TruthComparison> truth;
   std::vector<FeatureDistortion> features;

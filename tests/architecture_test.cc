@@ -55,14 +55,14 @@ const std::map<std::string, Layers> kRooms = {
       {kHall}}},
     {"problems",
      {{"config", "ct", "output"},
-      {"pictures", "subject"},
+      {"edits", "page", "pictures", "subject", "view"},
       {"landmark_files", "preparation"},
       {"face_template"},
       {"bust", "metrics", "prior"},
       {"pipeline", "propose"},
       {kHall},
       {"report"},
-      {"points", "study"},
+      {"points", "study", "workbench"},
       {"program"}}},
 };
 
@@ -81,6 +81,7 @@ const std::map<std::string, std::string> kLibraryPlaces = {
     {"OpenMesh/", R"(surfaces/mesh_files/mesh_io\.cc)"},
     {"itk", R"(problems/ct/itk_files\.cc)"},
     {"gdcm", R"(problems/ct/itk_files\.cc)"},
+    {"httplib", R"(problems/workbench/http_server\.cc)"},
 };
 
 std::string FloorOf(const std::string& path) { return path.substr(0, path.find('/')); }

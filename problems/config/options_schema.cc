@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
+#include "problems/config/value_json.h"
+
 namespace semblance {
 namespace {
 
@@ -163,6 +165,8 @@ Json TypeSchema(const ConfigType& type, const FieldInfo& info) {
 }
 
 }  // namespace
+
+Json ValueJson(const ConfigNode& tree, const ConfigType& type) { return ToJson(tree, type); }
 
 std::string SchemaText(const ConfigType& type) {
   Json schema{{"$schema", "https://json-schema.org/draft/2020-12/schema"}};

@@ -73,14 +73,6 @@ constexpr Definition kDefinitions[] = {
     {"mmb", "the lower border of the lower jaw, halfway between chin and angle"},
 };
 
-std::string_view DefinitionOf(const Site& site) {
-  const auto* const found = std::ranges::find(kDefinitions, site.landmark, &Definition::landmark);
-  if (found == std::end(kDefinitions)) {
-    throw InputError(fmt::format("sites: {} has no definition; write one", site.code));
-  }
-  return found->words;
-}
-
 // "a" where the table has the row; "a (part)" where cells of it are missing.
 std::vector<std::string> TablesWith(const Site& site, std::span<const TissueTable> tables) {
   std::vector<std::string> names;
@@ -101,7 +93,7 @@ std::string Row(const Site& site, std::span<const TissueTable> tables) {
                      site.side == Side::kMidline ? fmt::format("`{}`", site.code)
                                                  : fmt::format("`{0}_l` `{0}_r`", site.landmark),
                      site.number == 0 ? "" : std::to_string(site.number), site.name,
-                     fmt::join(OtherNamesOf(site.landmark), ", "), DefinitionOf(site),
+                     fmt::join(OtherNamesOf(site.landmark), ", "), SiteDefinition(site.landmark),
                      fmt::join(TablesWith(site, tables), ", "));
 }
 
@@ -158,6 +150,14 @@ Image SeenFrom(View view, const Phantom& phantom, const Box3& region, int thread
 }
 
 }  // namespace
+
+std::string_view SiteDefinition(std::string_view landmark) {
+  const auto* const found = std::ranges::find(kDefinitions, landmark, &Definition::landmark);
+  if (found == std::end(kDefinitions)) {
+    throw InputError(fmt::format("sites: {} has no definition; write one", landmark));
+  }
+  return found->words;
+}
 
 std::string SitePage(std::span<const TissueTable> tables, const std::string& picture) {
   std::string page =

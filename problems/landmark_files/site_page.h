@@ -4,6 +4,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "problems/pictures/image.h"
 #include "problems/subject/tissue_table.h"
@@ -13,6 +14,10 @@ namespace semblance {
 // The page, for the sites of sites.h in their order; picture: the file's name beside it. tables: in
 // whose order they are named; all of them are explained below. The same input, the same text.
 std::string SitePage(std::span<const TissueTable> tables, const std::string& picture);
+
+// Where a site lies on the bone, in words. landmark: its code without side. Throws InputError for
+// one that is not in sites.h.
+std::string_view SiteDefinition(std::string_view landmark);
 
 // A phantom's skull from the front and from its left, with the standard sites by their numbers.
 Image SitePicture(int threads);

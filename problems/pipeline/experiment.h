@@ -162,6 +162,7 @@ struct Experiment {
   double cut_margin_mm = 5;             // no seeds nearer to where the scan ends
   int rounds = 1;                       // of seeding and fitting
   FitOptions fit = {.relaxation = FootpointRelaxation{}};
+  std::filesystem::path edits;              // made by hand, on the face that comes out
   UncertaintyOptions uncertainty;           // how far the face may be off
   FaceRegionOptions region;                 // which skin is scored
   DepthDirection direction;                 // along which depths are compared
@@ -234,6 +235,10 @@ void Fields(Visitor& visit, Experiment& o) {
                   .doc = "how often seeds are taken anew and the schedule is run"},
         o.rounds);
   visit(FieldInfo{.name = "fit", .doc = "the level-by-level fit"}, o.fit);
+  visit(FieldInfo{.name = "edits",
+                  .doc = "edit script (.yaml, as `semblance edit` takes it) that is replayed on "
+                         "the face that comes out; empty: the face stays as it is"},
+        o.edits);
   visit(FieldInfo{.name = "uncertainty", .doc = "how far the face may be off, and by what"},
         o.uncertainty);
   visit(FieldInfo{.name = "region", .doc = "which part of the true skin is scored"}, o.region);

@@ -13,4 +13,6 @@ template std::string WriteConfig(const Experiment& value);
 template std::string OptionsReference<Experiment>();
 template std::string OptionsSchema<Experiment>();
 
+ConfigType DescribeExperiment() { return config_internal::DescribeType(Experiment{}); }
+
 }  // namespace semblance

@@ -19,4 +19,7 @@ extern template std::string WriteConfig(const Experiment& value);
 extern template std::string OptionsReference<Experiment>();
 extern template std::string OptionsSchema<Experiment>();
 
+// All options as data, with their defaults: for whatever offers them to people.
+ConfigType DescribeExperiment();
+
 }  // namespace semblance

@@ -183,11 +183,11 @@ MadeFace MostLikelyFace(const ShapeFitOptions& estimate, const TableDepthOptions
                         PlacedTemplate placed, const FaceInput& in, const RunContext& context) {
   const bool from_table = in.experiment.tissue.depths == DepthSource::kTable;
   const LoadedPrior& prior = *in.prior;
-  ShapeEstimate shape =
-      EstimateShape(prior.face.model,
-                    PriorTarget(prior.face, in.subject.dowels_on_bone,
-                                from_table ? &table_depths : nullptr, &in.implicit),
-                    estimate, context);
+  ShapeEstimate shape = EstimateShape(
+      prior.face.model,
+      PriorTarget(prior.face, in.subject.dowels_on_bone, from_table ? &table_depths : nullptr,
+                  in.implicit.triangles.empty() ? nullptr : &in.implicit),
+      estimate, context);
   placed.face_from_template =
       Composed(shape.subject_from_model, prior.on_template.mean_from_template);
   placed.face = InSubjectFrame(in.generic, placed.face_from_template);

@@ -41,7 +41,8 @@ struct FaceInput {
   const TemplateFace& generic;
   const LoadedPrior* prior;  // null without one
   const Case& subject;
-  const TriMesh& implicit;  // what of it may be seeded
+  const TriMesh&
+      implicit;  // what of it may be seeded; without triangles: `prior` takes the tips alone
   const TriMesh& shell;
 };
 

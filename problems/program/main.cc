@@ -17,6 +17,7 @@
 #include "problems/program/stop_signals.h"
 #include "problems/program/study_commands.h"
 #include "problems/program/template_commands.h"
+#include "problems/program/workbench_command.h"
 
 namespace semblance {
 namespace {
@@ -41,7 +42,7 @@ int ParseAndRun(int argc, char** argv) {
   app.require_subcommand(1);
   CommandLine line{.stop = StopOnSignals(), .chosen = {}};
   for (const auto& commands : {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(),
-                               TemplateCommands(), PhantomCommands()}) {
+                               TemplateCommands(), PhantomCommands(), WorkbenchCommands()}) {
     Declare(commands, app, line);
   }
   try {

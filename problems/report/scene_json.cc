@@ -12,9 +12,9 @@
 
 #include "problems/report/run_pictures.h"
 #include "problems/report/scene_blobs.h"
+#include "problems/view/view_mesh.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/decimate/decimate.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -22,43 +22,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kTriangles = 24000;      // of a decimated mesh
-constexpr std::size_t kHeadTriangles = 50000;  // of one with ears and lids
-
-// One vertex a cell of a grid, for meshes that are no manifolds.
-TriMesh Clustered(const TriMesh& mesh, double cell_mm) {
-  std::map<std::array<long, 3>, std::int32_t> of_cell;
-  std::vector<std::int32_t> to(mesh.points.size());
-  TriMesh out;
-  for (std::size_t v = 0; v < to.size(); ++v) {
-    const Vec3 at = mesh.points[v] / cell_mm;
-    const auto [it, is_new] =
-        of_cell.try_emplace({std::lround(at.x()), std::lround(at.y()), std::lround(at.z())},
-                            static_cast<std::int32_t>(out.points.size()));
-    if (is_new) {
-      out.points.push_back(mesh.points[v]);
-    }
-    to[v] = it->second;
-  }
-  for (const Triangle& t : mesh.triangles) {
-    const Triangle s = {to[t[0]], to[t[1]], to[t[2]]};
-    if (s[0] != s[1] && s[1] != s[2] && s[2] != s[0]) {
-      out.triangles.push_back(s);
-    }
-  }
-  return out;
-}
-
-TriMesh ForView(const TriMesh& mesh, std::size_t most = kTriangles) {
-  if (mesh.triangles.size() <= most) {
-    return mesh;
-  }
-  try {
-    return Decimate(mesh, {.target_triangles = static_cast<int>(most)}).mesh;
-  } catch (const InputError&) {  // a scan may hold edges that no decimation takes
-    return Clustered(mesh, std::sqrt(2.3 * Area(mesh) / kTriangles));
-  }
-}
+constexpr int kHeadTriangles = 50000;  // of a mesh with ears and lids
 
 std::string Hex(const Colour& c) {
   const auto byte = [](double x) { return std::lround(255 * std::clamp(x, 0.0, 1.0)); };
@@ -101,7 +65,7 @@ ViewMeshes MakeViewMeshes(const RunResult& result, int threads) {
   ParallelFor(jobs.size(), threads, 1, [&jobs, &view](std::size_t k) {
     if (jobs[k].first != nullptr) {
       const bool head = jobs[k].second == &view.bust;
-      *jobs[k].second = ForView(*jobs[k].first, head ? kHeadTriangles : kTriangles);
+      *jobs[k].second = ForView(*jobs[k].first, head ? kHeadTriangles : kViewTriangles);
     }
   });
   return view;

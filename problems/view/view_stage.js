@@ -17,6 +17,8 @@ class SemblanceStage {
       end: new THREE.MeshPhongMaterial({color: 0x1d2126, shininess: 25}),
       residual: new THREE.MeshPhongMaterial({color: 0x7b1fa2, shininess: 25}),
     };
+    this.extra = new THREE.Group();  // what others draw
+    this.afterDraw = [];             // called after each picture
     canvas.addEventListener('pointermove', (event) => this.point(event));
     canvas.addEventListener('pointerleave', () => { this.tip.hidden = true; });
   }
@@ -39,16 +41,30 @@ class SemblanceStage {
     this.description = description;
     this.scene = new THREE.Scene();
     this.rig = this.lights();
-    this.scene.add(this.rig);
+    this.scene.add(this.rig, this.extra);
     this.layers = new Map();
-    for (const [order, layer] of description.layers.entries()) {
-      const object = layer.mesh ? this.surface(layer, blobs) : layer.lines ? this.lines(layer, blobs)
-                                                                           : new THREE.Group();
-      object.renderOrder = order;  // translucent layers are drawn from the inside out
-      this.layers.set(layer.id, {layer, object});
-      this.scene.add(object);
-    }
+    for (const layer of description.layers) { this.put(layer, blobs); }
     this.update();
+  }
+
+  // Adds a layer, in place of one of the same name.
+  put(layer, blobs) {
+    const former = this.layers.get(layer.id);
+    const object = layer.mesh ? this.surface(layer, blobs) : layer.lines ? this.lines(layer, blobs)
+                                                                         : new THREE.Group();
+    // Translucent layers are drawn from the inside out.
+    object.renderOrder = former ? former.object.renderOrder : this.layers.size;
+    this.drop(layer.id);
+    this.layers.set(layer.id, {layer, object});
+    this.scene.add(object);
+  }
+
+  drop(id) {
+    const former = this.layers.get(id);
+    if (!former) { return; }
+    this.scene.remove(former.object);
+    if (former.object.geometry) { former.object.geometry.dispose(); }
+    this.layers.delete(id);
   }
 
   surface(layer, blobs) {
@@ -122,7 +138,7 @@ class SemblanceStage {
 
   draw() {
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
-    if (!this.scene || width === 0 || height === 0) { return; }
+    if (!this.scene || !this.shared.camera || width === 0 || height === 0) { return; }
     const camera = this.shared.camera.camera, size = this.renderer.getSize(new THREE.Vector2());
     if (size.x !== width || size.y !== height) { this.renderer.setSize(width, height, false); }
     camera.aspect = width / height;
@@ -132,17 +148,28 @@ class SemblanceStage {
     camera.updateProjectionMatrix();
     this.rig.quaternion.copy(camera.quaternion);
     this.renderer.render(this.scene, camera);
+    for (const act of this.afterDraw) { act(); }
+  }
+
+  // What of the visible layers `ids` (all if none are named) lies under the pointer; null if nothing does.
+  hit(event, ids) {
+    if (!this.scene || !this.shared.camera) { return null; }
+    const box = this.canvas.getBoundingClientRect();
+    const at = new THREE.Vector2(2 * (event.clientX - box.left) / box.width - 1,
+                                 1 - 2 * (event.clientY - box.top) / box.height);
+    this.ray.setFromCamera(at, this.shared.camera.camera);
+    const shown = [...this.layers.values()]
+        .filter(({layer, object}) => object.visible && !object.isLineSegments && (!ids || ids.includes(layer.id)))
+        .map(({object}) => object);
+    const planes = this.renderer.clippingPlanes;
+    return this.ray.intersectObjects(shown, true)
+        .find(({point}) => planes.every((plane) => plane.distanceToPoint(point) >= 0)) || null;
   }
 
   // Says what is under the pointer.
   point(event) {
     if (event.buttons || !this.scene) { this.tip.hidden = true; return; }
-    const box = this.canvas.getBoundingClientRect();
-    const at = new THREE.Vector2(2 * (event.clientX - box.left) / box.width - 1,
-                                 1 - 2 * (event.clientY - box.top) / box.height);
-    this.ray.setFromCamera(at, this.shared.camera.camera);
-    const shown = this.scene.children.filter((child) => child.visible && !child.isLineSegments && child !== this.rig);
-    const hit = this.ray.intersectObjects(shown, true)[0];
+    const box = this.canvas.getBoundingClientRect(), hit = this.hit(event);
     this.tip.hidden = !hit;
     if (hit) {
       this.tip.textContent = this.textOf(hit);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/edit_script.h"
+#include "problems/edits/edit_script.h"
 
 #include <fmt/format.h>
 

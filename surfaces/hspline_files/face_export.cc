@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/face_export.h"
+#include "surfaces/hspline_files/face_export.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/edits/pull.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kLeastReach = 1, kMostReach = 8;
+
+void Check(const Pull& pull, const HSplineSurface& face) {
+  if (pull.level < 0 || pull.level > face.shape().max_level) {
+    throw InputError(fmt::format("pull: the face has no level {}; its levels are 0 to {}",
+                                 pull.level, face.shape().max_level));
+  }
+  if (!pull.uv.allFinite() || !pull.by_mm.allFinite() || pull.by_mm.norm() > 1000) {
+    throw InputError("pull: (u,v) and the way must be finite, and the way at most 1000 mm long");
+  }
+  if (!(pull.reach >= kLeastReach && pull.reach <= kMostReach)) {
+    throw InputError(fmt::format("pull: a reach of {} patches; give {} to {}", pull.reach,
+                                 kLeastReach, kMostReach));
+  }
+}
+
+// How much each vertex of the level goes along with the point at uv, [index]; the surface there
+// moves by 1 if each vertex moves by its share.
+std::vector<double> SharesAround(const HSplineShape& shape, int level, const Vec2& uv,
+                                 double reach) {
+  std::vector<double> shares(static_cast<std::size_t>(shape.Columns(level)) * shape.Rows(level));
+  for (int j = 0; j < shape.Rows(level); ++j) {
+    for (int i = 0; i < shape.Columns(level); ++i) {
+      const Vec2 at = ParameterOf(shape, {level, i, j});
+      double du = std::abs(at.x() - uv.x());
+      du = shape.closure == Closure::kPeriodicU ? std::min(du, 1 - du) : du;
+      const double squared = std::pow(du * shape.PatchesU(level), 2) +
+                             std::pow((at.y() - uv.y()) * shape.PatchesV(level), 2);
+      shares[i + static_cast<std::size_t>(shape.Columns(level)) * j] =
+          std::pow(std::max(0.0, 1 - squared / (reach * reach)), 2);
+    }
+  }
+  return shares;
+}
+
+double MoveAt(const Stencil& stencil, const std::vector<double>& shares) {
+  double sum = 0;
+  for (int k = 0; k < 16; ++k) {
+    sum += stencil.weight[k] * shares[stencil.index[k]];
+  }
+  return sum;
+}
+
+void MoveBy(const std::vector<double>& shares, const Vec3& by, ControlNet& net) {
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    if (shares[k] > 0) {
+      net.vertices[k] += shares[k] * by;
+    }
+  }
+}
+
+// Both sides move alike: with m the movement of a point by its own vertices and o by those of the
+// other side, along the plane (m + o) d = by, across it (m - o) d = by.
+void MoveBothSides(const Pull& pull, const HSplineSurface& face, ControlNet& net) {
+  constexpr double kMidline = 0.5;  // a part of m: nearer to the midline, the sides hold each other
+  const Vec3 left = LeftOf(face);
+  const Vec2 other_uv(1 - pull.uv.x(), pull.uv.y());
+  const auto own = SharesAround(face.shape(), pull.level, pull.uv, pull.reach);
+  const auto other = SharesAround(face.shape(), pull.level, other_uv, pull.reach);
+  const Stencil here = face.StencilAt(pull.level, pull.uv);
+  const double m = MoveAt(here, own), o = MoveAt(here, other);
+  const Vec3 across = left.dot(pull.by_mm) * left;
+  const Vec3 along = (pull.by_mm - across) / (m + o);
+  const Vec3 sideways = m - o > kMidline * m ? Vec3(across / (m - o)) : Vec3(Vec3::Zero());
+  MoveBy(own, along + sideways, net);
+  MoveBy(other, along - sideways, net);
+}
+
+std::optional<std::array<double, 3>> ToArray(const std::optional<Vec3>& v) {
+  return v ? std::optional(std::array{v->x(), v->y(), v->z()}) : std::nullopt;
+}
+
+void AddMoves(const ControlNet& before, const ControlNet& after, EditScript& script) {
+  for (int j = 0; j < before.rows; ++j) {
+    for (int i = 0; i < before.columns; ++i) {
+      const Vec3 move = after.At(i, j) - before.At(i, j);
+      if (move == Vec3::Zero()) {
+        continue;
+      }
+      const auto said = std::ranges::find_if(script.edits, [i, j](const VertexEdit& edit) {
+        return edit.level == 0 && edit.i == i && edit.j == j;
+      });
+      if (said == script.edits.end()) {
+        script.edits.push_back({0, i, j, ToArray(move)});
+      } else {
+        const auto& had = *said->offset;
+        said->offset = ToArray(Vec3(Vec3(had[0], had[1], had[2]) + move));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Vec3 LeftOf(const HSplineSurface& face) {
+  Vec3 sum = Vec3::Zero();
+  for (const double v : {0.2, 0.35, 0.5, 0.65, 0.8}) {
+    for (const double u : {0.55, 0.6, 0.65, 0.7, 0.75}) {
+      sum += face.Point({u, v}) - face.Point({1 - u, v});
+    }
+  }
+  if (!(sum.norm() > 1e-6)) {
+    throw InputError("pull: the face does not say where left and right are; pull without mirror");
+  }
+  return sum.normalized();
+}
+
+EditScript WithOffsets(EditScript script, const std::map<VertexId, std::optional<Vec3>>& offsets) {
+  std::erase_if(script.edits, [&offsets](const VertexEdit& edit) {
+    return offsets.contains({edit.level, edit.i, edit.j});
+  });
+  for (const auto& [vertex, offset] : offsets) {
+    script.edits.push_back({vertex.level, vertex.i, vertex.j, ToArray(offset)});
+  }
+  return script;
+}
+
+EditScript Pulled(const Pull& pull, const HSplineSurface& face, const EditScript& script) {
+  Check(pull, face);
+  const ControlNet before = face.Net(pull.level);
+  ControlNet after = before;
+  if (pull.mirror) {
+    MoveBothSides(pull, face, after);
+  } else {
+    const auto shares = SharesAround(face.shape(), pull.level, pull.uv, pull.reach);
+    const double moved = MoveAt(face.StencilAt(pull.level, pull.uv), shares);
+    MoveBy(shares, pull.by_mm / moved, after);
+  }
+  if (pull.level == 0) {
+    EditScript next = script;
+    AddMoves(before, after, next);
+    return next;
+  }
+  HSplineSurface pulled = face;
+  pulled.SetNet(pull.level, after);
+  std::map<VertexId, std::optional<Vec3>> changed;
+  for (const auto& [vertex, offset] : pulled.Offsets(pull.level)) {
+    if (face.Offset(vertex) != offset) {
+      changed[vertex] = offset;
+    }
+  }
+  return WithOffsets(script, changed);
+}
+
+}  // namespace semblance

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Landmarks: a list of the sites, what the chosen one is, and clicks on the bone.
+import {button, element, field, group, lines, millimetres, select} from './dom.js';
+import {fileChooser} from './skull_panel.js';
+import {act, choose, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
+
+const FORMATS = [['.yaml', 'YAML (Semblance)'], ['.mrk.json', '3D Slicer (.mrk.json)'], ['.fcsv', '3D Slicer (.fcsv)'],
+                 ['.pp', 'MeshLab (.pp)'], ['.csv', 'table (.csv)'], ['.txt', 'CloudCompare (.txt)']];
+const DOUBTFUL = {from_bone_mm: 2, from_mirror_mm: 8, from_foreseen_mm: 12};
+const MEANINGS = {from_bone_mm: 'from the bone', from_mirror_mm: 'from the mirror image of its partner',
+                  from_foreseen_mm: 'from where the others foresee it'};
+
+const standardSites = () => store.sites.filter((site) => site.standard);
+const isAbsent = (code) => store.state.absent.some((absent) => absent.site === code);
+
+// The next site after `code` that is neither placed nor absent; null when there is none.
+const nextOpen = (code) => {
+  const codes = standardSites().map((site) => site.site), at = codes.indexOf(code);
+  return [...codes.slice(at + 1), ...codes.slice(0, at + 1)].find((other) => !landmarkOf(other) && !isAbsent(other)) || null;
+};
+
+const doubts = (landmark) =>
+    Object.keys(DOUBTFUL).filter((check) => landmark[check] !== null && landmark[check] > DOUBTFUL[check]);
+
+function row(site) {
+  const landmark = landmarkOf(site.site), absent = isAbsent(site.site);
+  const mark = landmark ? (landmark.proposed ? '\u25cc' : '\u25cf') : absent ? '\u2013' : '\u25cb';
+  const words = landmark ? (landmark.proposed ? 'proposed: look at it' : doubts(landmark).length ? 'look again' : '')
+                         : absent ? 'absent' : '';
+  const made = button('', () => choose(site.site), {className: 'site', dataset: {site: site.site}});
+  made.setAttribute('aria-pressed', String(store.site === site.site));
+  made.append(element('i', {textContent: mark, className: landmark && doubts(landmark).length ? 'bad' : ''}),
+              element('span', {textContent: nameOf(site.site)}), element('code', {textContent: site.site}),
+              element('small', {textContent: words}));
+  return made;
+}
+
+function remarks(landmark) {
+  const change = (what) => act('remark', {site: landmark.site, certainty: landmark.certainty, note: landmark.note,
+                                          depth_mm: landmark.depth_along_normal_mm, ...what});
+  return group('What is known of it',
+      field('certainty', select([['high', 'high'], ['medium', 'medium'], ['low', 'low']], landmark.certainty,
+                                (certainty) => change({certainty}))),
+      field('depth measured here (mm)', element('input', {type: 'number', min: 0.01, max: 100, step: 0.1,
+          value: landmark.depth_along_normal_mm ?? '',
+          onchange: (event) => change({depth_mm: event.target.value === '' ? null : Number(event.target.value)})}),
+          'used where the depths are "measured"'),
+      field('note', element('input', {type: 'text', maxLength: 300, value: landmark.note,
+                                      onchange: (event) => change({note: event.target.value})})));
+}
+
+function detail(code) {
+  if (!code) {
+    return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. A ball that is there is chosen by a click on it.'})];
+  }
+  const site = siteOf(code), landmark = landmarkOf(code);
+  const checks = landmark ? Object.keys(MEANINGS).filter((check) => landmark[check] !== null && landmark[check] !== undefined)
+      .map((check) => element('li', {className: landmark[check] > DOUBTFUL[check] ? 'bad' : ''},
+          element('strong', {textContent: millimetres(landmark[check])}), ` ${MEANINGS[check]}`)) : [];
+  const names = store.sites.map((other) => [other.site, `${other.site}: ${nameOf(other.site)}`]);
+  return [
+    element('h2', {textContent: nameOf(code)}),
+    element('p', {textContent: `${site.definition}.`}),
+    checks.length ? element('ul', {className: 'checks'}, ...checks) : null,
+    element('div', {className: 'row'},
+        landmark && landmark.proposed ? button('It is right', () => act('confirm', {site: code}), {className: 'primary'}) : null,
+        landmark ? button('Remove', () => act('remove', {site: code})) : null,
+        isAbsent(code) ? null : button('It is not there', () => act('absent', {site: code, reason: 'the bone is not there'})),
+        button('Next open site', () => choose(nextOpen(code)), {title: 'N'})),
+    landmark ? field('it is another site', select(names, code, async (name) => {
+      if (await act('rename', {site: code, name})) { choose(name); }
+    })) : element('p', {className: 'hint', textContent: 'Click on the bone where it lies.'}),
+    landmark ? remarks(landmark) : null,
+    element('details', {}, element('summary', {textContent: site.number ? `Picture: number ${site.number}` : 'Picture of the sites'}),
+            element('img', {src: 'api/sites.png', alt: 'the sites on a made-up skull, by number', loading: 'lazy'}))
+  ].filter((part) => part);
+}
+
+export function landmarkPanel(bench) {
+  const {scene} = bench;
+  const head = element('div'), about = element('div', {className: 'about'}), list = element('div', {className: 'sites'});
+  const format = select(FORMATS, '.yaml', () => {});
+  format.setAttribute('aria-label', 'kind of file');
+  const files = element('details', {}, element('summary', {textContent: 'Load and save landmarks'}),
+      fileChooser('Landmarks', 'landmarks', '.yaml,.yml,.json,.fcsv,.pp,.csv,.txt,.asc'),
+      element('div', {className: 'row'}, format, button('Save as', () =>
+          element('a', {href: `api/landmarks?format=${encodeURIComponent(format.value)}`, download: ''}).click())),
+      button('Remove all', () => act('clear_landmarks')));
+  const root = element('div', {}, head, about, list, files);
+
+  const marks = () => {
+    const state = store.state;
+    scene.putMarks([
+      ...state.landmarks.map((landmark) => ({
+        site: landmark.site, point: landmark.point, hollow: landmark.proposed, chosen: landmark.site === store.site,
+        colour: landmark.site === store.site ? '#0b5c8f' : doubts(landmark).length ? '#b3261e' : landmark.proposed ? '#b57d00' : '#1b7f3b'})),
+      ...state.foreseen.filter((foreseen) => foreseen.site === store.site)
+          .map(({site, point}) => ({site: null, point, hollow: true, colour: '#0b5c8f', text: `${site} may be here`}))]);
+  };
+
+  const draw = () => {
+    const state = store.state, placed = state.landmarks.filter(({site}) => siteOf(site).standard);
+    const proposed = state.landmarks.filter((landmark) => landmark.proposed).length;
+    head.replaceChildren(
+        element('p', {textContent: `${placed.length} of ${standardSites().length} sites are placed${proposed ? `, ${proposed} of them proposed` : ''}.`}),
+        element('div', {className: 'row'},
+            state.foreseen.length ? button(`Suggest the other ${state.foreseen.length}`, () => act('take_foreseen'),
+                                           {title: 'from those that are placed and an average skull'}) : null,
+            button('Propose by shape', () => act('propose'), {title: 'looks for all sites on the bone; takes a minute'}),
+            proposed ? button('All are right', () => act('confirm_all')) : null),
+        lines(state.errors, 'bad') || '', lines(state.notes, 'soft') || '');
+    about.replaceChildren(...detail(store.site));
+    const further = store.sites.filter((site) => !site.standard);
+    list.replaceChildren(...standardSites().map(row),
+        element('details', {open: further.some((site) => landmarkOf(site.site))},
+                element('summary', {textContent: 'Further sites of other tables'}), ...further.map(row)));
+    marks();
+  };
+
+  const pick = async (hitOf, ray, among) => {
+    const skull = hitOf(['skull']), ball = among(scene.marks.children);
+    if (ball && ball.object.userData.site && (!skull || ball.distance <= skull.distance + 4)) {
+      choose(ball.object.userData.site);
+      return;
+    }
+    if (!skull || !store.site) { return; }
+    const site = store.site, isNew = !landmarkOf(site);
+    const done = await act('place', {site, origin: ray.origin.toArray(), direction: ray.direction.toArray(), near: skull.point.toArray()});
+    if (done && isNew) { choose(nextOpen(site)); }
+  };
+
+  onChoice(() => { if (root.isConnected) { draw(); } });
+  document.addEventListener('keydown', (event) => {
+    if (!root.isConnected || ['INPUT', 'SELECT'].includes(event.target.tagName)) { return; }
+    if (event.key.toLowerCase() === 'n' && !event.ctrlKey) { choose(nextOpen(store.site || '')); }
+    if (event.key === 'Delete' && store.site && landmarkOf(store.site)) { act('remove', {site: store.site}); }
+    if (event.key === 'Enter' && event.target.tagName !== 'BUTTON' && store.site && landmarkOf(store.site)) { act('confirm', {site: store.site}); }
+  });
+  return {
+    element: root,
+    state: draw,
+    show: () => {
+      scene.onPick = pick;
+      scene.shared.layers.get('face').shown = false;
+      scene.shared.layers.get('dowels').shown = false;
+      scene.update();
+      if (store.state && !store.site) { store.site = nextOpen(''); }
+    },
+    hide: () => {
+      scene.onPick = null;
+      scene.shared.layers.get('face').shown = true;
+      scene.shared.layers.get('dowels').shown = true;
+      scene.putMarks([]);
+      scene.update();
+    }
+  };
+}

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is seen: skull, skin, landmarks, dowels and faces on one or several canvases under one camera. The canvases,
+// the camera and the measuring are those of a report's view (SemblanceStage, SemblanceCamera, SemblanceMeasure).
+import {element} from './dom.js';
+import {changeBetween} from './changes.js';
+
+const LAYERS = {
+  skull: {label: 'Skull', colour: '#e8dcc4'},
+  skin: {label: 'True skin', colour: '#b9c7d6'},
+  dowels: {label: 'Dowels', colour: '#b3261e'},
+  face: {label: 'Face', colour: '#d8a58a'},
+};
+const MAPS = {
+  change: {title: 'change along the face, outwards +', low_mm: -8, high_mm: 8, no_data: '#8f8f8f',
+           colours: ['#053061', '#2166ac', '#4393c3', '#92c5de', '#d1e5f0', '#f7f7f7', '#fddbc7', '#f4a582', '#d6604d',
+                     '#b2182b', '#67001f']},
+};
+
+export class Scene {
+  constructor(root) {
+    this.root = root;
+    this.blobs = {};
+    this.shared = {layers: new Map(), mapped: false, range_mm: 4, exaggeration: 1, camera: null};
+    for (const id of Object.keys(LAYERS)) {
+      this.shared.layers.set(id, {shown: id !== 'skin', opacity: id === 'face' ? 0.75 : id === 'skin' ? 0.4 : 1});
+    }
+    this.due = false;
+    this.drawSoon = () => this.draw();
+    this.frames = element('div', {className: 'view3d-frames'});
+    this.main = this.makeFrame('');
+    this.others = [];
+    root.append(this.frames);
+    this.marks = new THREE.Group();
+    this.main.stage.extra.add(this.marks);
+    this.onPick = null;  // ({hit, ray}) => whether it was for somebody
+    this.compass = element('canvas', {className: 'view3d-compass', width: 224, height: 224});
+    this.compass.setAttribute('aria-hidden', 'true');
+    this.legend = element('div', {className: 'legend'});
+    root.append(this.compass, this.legend);
+    new ResizeObserver(this.drawSoon).observe(this.frames);
+  }
+
+  makeFrame(title) {
+    const canvas = element('canvas', {tabIndex: 0});
+    canvas.setAttribute('aria-label', `3-D view ${title}; arrow keys turn it, plus and minus zoom`);
+    const tip = element('div', {className: 'view3d-tip', hidden: true});
+    const head = element('div', {className: 'view3d-head', textContent: title, hidden: !title});
+    const frame = element('div', {className: 'view3d-frame'}, head, element('div', {className: 'view3d-stage'}, canvas, tip));
+    this.frames.append(frame);
+    const stage = new SemblanceStage(canvas, tip, this.shared);
+    stage.show({layers: [], maps: MAPS}, {});
+    if (this.shared.camera) { this.shared.camera.attach(canvas); }
+    return {frame, canvas, stage, head};
+  }
+
+  // A mesh, as the program sends it; null takes it away.
+  put(id, blob, frame = this.main) {
+    if (!blob) { frame.stage.drop(id); this.draw(); return; }
+    this.blobs = {...this.blobs, [id]: blob};
+    frame.stage.put({id, ...LAYERS[id], mesh: id}, {[id]: blob});
+    frame.stage.update();
+    if (id === 'skull' && frame === this.main) { this.lookAt(); }
+    this.draw();
+  }
+
+  putDowels(dowels, frame = this.main) {
+    frame.stage.put({id: 'dowels', ...LAYERS.dowels, dowels}, {});
+    frame.stage.update();
+  }
+
+  // Colours the face by how far it lies outside `former`, a face of the same vertices.
+  colourChange(former, frame = this.main) {
+    const face = frame.stage.layers.get('face');
+    if (!face) { return null; }
+    const values = former && changeBetween(former, face.object.geometry);
+    face.object.userData.values = values || undefined;
+    face.layer.map = values ? 'change' : undefined;
+    face.layer.always_mapped = Boolean(values);
+    frame.stage.update();
+    this.showLegend();
+    this.draw();
+    return values;
+  }
+
+  // Of the colours that are on show.
+  showLegend() {
+    const shown = this.others.length ? this.others : [this.main];
+    const mapped = shown.some(({stage}) => stage.layers.get('face')?.layer.always_mapped);
+    this.legend.replaceChildren(...(mapped ? [SemblanceGuides.legendOf(MAPS.change, this.shared.range_mm)] : []));
+  }
+
+  faceGeometry(frame = this.main) {
+    const face = frame.stage.layers.get('face');
+    return face ? face.object.geometry : null;
+  }
+
+  // The camera goes round the skull.
+  lookAt() {
+    const skull = this.main.stage.layers.get('skull');
+    skull.object.geometry.computeBoundingBox();
+    const box = skull.object.geometry.boundingBox.clone();
+    box.expandByScalar(0.12 * box.getSize(new THREE.Vector3()).length());  // room for a face
+    if (!this.shared.camera) {
+      this.shared.camera = new SemblanceCamera(box, this.drawSoon);
+      this.shared.camera.attach(this.main.canvas);
+      this.attachPick(this.main);
+      this.measure = new SemblanceMeasure([this.main.stage], this.drawSoon, box);
+      this.shared.camera.look(25, 5);
+      return;
+    }
+    const camera = this.shared.camera;
+    camera.centre = box.getCenter(new THREE.Vector3());
+    camera.extent = box.getSize(new THREE.Vector3()).length();
+    this.measure.box = box;
+    camera.look(25, 5);
+  }
+
+  // A click that is no drag goes to whoever wants it.
+  attachPick({canvas, stage}) {
+    let press = null;
+    canvas.addEventListener('pointerdown', (event) => { press = {x: event.clientX, y: event.clientY}; });
+    canvas.addEventListener('pointerup', (event) => {
+      const still = press && Math.hypot(event.clientX - press.x, event.clientY - press.y) < 5;
+      press = null;
+      const busy = this.measure && this.measure.tool !== 'none';
+      if (!still || event.button !== 0 || busy || !this.onPick) { return; }
+      this.onPick((ids) => stage.hit(event, ids), stage.ray.ray, (groups) => stage.ray.intersectObjects(groups, true)[0]);
+    });
+  }
+
+  // Landmarks as balls: [{site, point, colour, hollow, chosen, text}].
+  putMarks(marks) {
+    this.marks.remove(...this.marks.children);
+    const size = this.shared.camera ? 0.006 * this.shared.camera.extent : 2;
+    for (const mark of marks) {
+      const ball = new THREE.Mesh(
+          new THREE.SphereBufferGeometry((mark.chosen ? 1.5 : 1) * size, 16, 12),
+          new THREE.MeshPhongMaterial({color: mark.colour, transparent: mark.hollow, opacity: mark.hollow ? 0.45 : 1,
+                                       depthTest: !mark.chosen}));
+      ball.position.set(...mark.point);
+      ball.userData = {site: mark.site, text: mark.text};
+      ball.renderOrder = mark.chosen ? 900 : 0;
+      this.marks.add(ball);
+    }
+    this.draw();
+  }
+
+  // A line from a to b, or none.
+  putArrow(from, to) {
+    if (this.arrow) { this.main.stage.extra.remove(this.arrow); this.arrow = null; }
+    if (from) {
+      const way = to.clone().sub(from);
+      this.arrow = new THREE.ArrowHelper(way.clone().normalize(), from, Math.max(1, way.length()), 0x0b5c8f, 4, 2.5);
+      this.main.stage.extra.add(this.arrow);
+    }
+    this.draw();
+  }
+
+  // Further canvases beside the main one, for faces to compare: [{title, face, dowels, former}].
+  compare(variants) {
+    for (const other of this.others) { other.frame.remove(); other.stage.renderer.dispose(); }
+    this.others = [];
+    this.root.classList.toggle('comparing', variants.length > 0);
+    this.main.frame.hidden = variants.length > 0;
+    for (const variant of variants) {
+      const frame = this.makeFrame(variant.title);
+      this.others.push(frame);
+      if (this.blobs.skull) { this.put('skull', this.blobs.skull, frame); }
+      this.putDowels(variant.dowels, frame);
+      this.put('face', variant.face, frame);
+      if (variant.former) { this.colourChange(variant.former, frame); }
+    }
+    this.showLegend();
+    this.draw();
+  }
+
+  update() {
+    for (const {stage} of [this.main, ...this.others]) { stage.update(); }
+    this.draw();
+  }
+
+  draw() {
+    if (this.due || !this.shared.camera) { return; }
+    this.due = true;
+    requestAnimationFrame(() => {
+      this.due = false;
+      for (const {stage} of [this.main, ...this.others]) { stage.draw(); }
+      SemblanceGuides.drawCompass(this.compass, this.shared.camera.camera);
+    });
+  }
+
+  picture() {
+    const shown = this.others.length ? this.others : [this.main];
+    shown.forEach(({stage, canvas}, n) => {
+      stage.draw();
+      element('a', {href: canvas.toDataURL('image/png'), download: `workbench-${n + 1}.png`}).click();
+    });
+  }
+}

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/program/workbench_command.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <thread>
+
+#include "problems/program/exit_code.h"
+#include "problems/workbench/http_server.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the user typed.
+struct WorkbenchArguments {
+  std::string source, out;
+  std::vector<std::pair<std::string, std::string>> references;
+  int port = 0;
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  bool open = false;
+  std::stop_token stop;
+};
+
+// A folder with work in it stands for itself.
+BenchOptions BenchOptionsOf(const WorkbenchArguments& a) {
+  BenchOptions options;
+  options.references = a.references;
+  options.threads = a.threads;
+  if (a.out.empty() && fs::exists(fs::path(a.source) / "workbench.yaml")) {
+    options.folder = a.source;
+    return options;
+  }
+  options.source = a.source;
+  const std::string name = a.source.empty() ? "workbench" : fs::path(a.source).stem().string();
+  options.folder = a.out.empty() ? "out/" + name + "_workbench" : a.out;
+  if (!a.source.empty() && !fs::exists(a.source)) {
+    throw IoError(fmt::format("{}: no such file or folder", a.source));
+  }
+  return options;
+}
+
+void OpenBrowser(const std::string& url) {
+  if (::fork() == 0) {
+    ::execlp("xdg-open", "xdg-open", url.c_str(), nullptr);
+    ::_exit(127);
+  }
+}
+
+int Workbench(const WorkbenchArguments& a) {
+  Bench bench(BenchOptionsOf(a));
+  HttpServerOptions listening;
+  listening.port = a.port;
+  HttpServer server(bench, listening);
+  fmt::print("folder: {}\nopen in a browser on this machine: {}\nCtrl-C ends it; nothing is lost\n",
+             bench.Folder().string(), server.Url());
+  std::fflush(stdout);
+  if (a.open) {
+    OpenBrowser(server.Url());
+  }
+  server.Serve(a.stop);
+  return kDone;
+}
+
+void DeclareWorkbench(CLI::App& workbench, CommandLine& line) {
+  WorkbenchArguments& a = *Bind(workbench, line, &Workbench);
+  a.stop = line.stop;
+  workbench.add_option(
+      "SOURCE", a.source,
+      "mesh of a skull, CT (file or DICOM folder), configuration, or the folder of "
+      "a workbench to go on with; none: choose in the page");
+  workbench.add_option("--out", a.out,
+                       "folder that holds the work; with work in it, that goes on "
+                       "[out/NAME_workbench]");
+  workbench.add_option("--port", a.port, "of 127.0.0.1 [any that is free]")
+      ->check(CLI::Range(0, 65535));
+  workbench.add_option("--reference", a.references,
+                       "a marked skull and its landmarks, for proposals; may stand several times");
+  workbench.add_option("--threads", a.threads, "threads to use; no result depends on it")
+      ->check(CLI::Range(1, 1024));
+  workbench.add_flag("--open", a.open, "open the page in the desktop's browser (xdg-open)");
+}
+
+constexpr std::array kCommands = {
+    ProgramCommand{"workbench",
+                   "place landmarks and make a face in a browser, on this machine alone",
+                   &DeclareWorkbench},
+};
+
+}  // namespace
+
+std::span<const ProgramCommand> WorkbenchCommands() { return kCommands; }
+
+}  // namespace semblance

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// `semblance workbench`: from a skull to a face in a browser.
+#pragma once
+
+#include <span>
+
+#include "problems/program/commands.h"
+
+namespace semblance {
+
+std::span<const ProgramCommand> WorkbenchCommands();
+
+}  // namespace semblance

@@ -1,0 +1,413 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/workbench/bench_api.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <new>
+#include <nlohmann/json.hpp>
+
+#include "problems/config/config.h"
+#include "problems/landmark_files/read_landmarks.h"
+#include "problems/landmark_files/site_page.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/report/report_assets.h"
+#include "problems/workbench/bench_actions.h"
+#include "problems/workbench/bench_assets.h"
+#include "problems/workbench/bench_json.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kJson = "application/json";
+
+BenchReply JsonReply(std::string body) { return {200, kJson, std::move(body), {}}; }
+
+BenchReply Refusal(int status, const std::string& words) {
+  return {status,
+          kJson,
+          Json{{"error", words}}.dump(-1, ' ', false, Json::error_handler_t::replace),
+          {}};
+}
+
+BenchReply StateReply(const Bench& bench) {
+  return JsonReply(SnapshotJson(bench.Look(), bench.Folder()));
+}
+
+// ---------------------------------------------------------------------------------------------
+// The page and its files
+// ---------------------------------------------------------------------------------------------
+
+const char* TypeOf(const std::string& name) {
+  constexpr std::array<std::pair<const char*, const char*>, 7> kTypes = {
+      {{".html", "text/html; charset=utf-8"},
+       {".css", "text/css; charset=utf-8"},
+       {".js", "text/javascript; charset=utf-8"},
+       {".json", kJson},
+       {".png", "image/png"},
+       {".svg", "image/svg+xml"},
+       {".yaml", "text/plain; charset=utf-8"}}};
+  const std::string extension = fs::path(name).extension().string();
+  const auto* const found =
+      std::ranges::find_if(kTypes, [&](const auto& type) { return extension == type.first; });
+  return found == kTypes.end() ? "application/octet-stream" : found->second;
+}
+
+// Only what the program carries: no name leads to the disk.
+BenchReply PageFile(const std::string& path) {
+  const std::string name = path.empty() ? "index.html" : path;
+  if (name == "three.js") {
+    return {200, TypeOf(name), std::string(ThreeScript()), {}};
+  }
+  if (name == "report.css") {
+    return {200, TypeOf(name), std::string(ReportStyle()), {}};
+  }
+  if (name == "view.js") {
+    return {200, TypeOf(name), std::string(ReportPartsScript()), {}};
+  }
+  for (const BenchAsset& file : PageFiles()) {
+    if (file.name == name) {
+      return {200, TypeOf(name), std::string(file.text), {}};
+    }
+  }
+  return Refusal(404, fmt::format("there is no '{}' here", name));
+}
+
+// A file of the last run: one that its manifest or its report names, never one outside run/.
+BenchReply RunFile(const Bench& bench, const std::string& name) {
+  const fs::path root = bench.Folder() / "run";
+  std::error_code error;
+  const fs::path path = fs::canonical(root / name, error);
+  const fs::path inside = error ? fs::path() : path.lexically_relative(fs::canonical(root));
+  const bool is_inside = !inside.empty() && inside.begin()->string() != "..";
+  if (error || !is_inside || !fs::is_regular_file(path)) {
+    return Refusal(404, fmt::format("the last run has no '{}'", name));
+  }
+  return {200, TypeOf(name), ReadFileBytes(path), {}};
+}
+
+// ---------------------------------------------------------------------------------------------
+// Asking
+// ---------------------------------------------------------------------------------------------
+
+BenchReply Meshes(Bench& bench, const BenchRequest&) {
+  return JsonReply(MeshesJson(*bench.Look().subject));
+}
+
+BenchReply Sites(Bench&, const BenchRequest&) { return JsonReply(SitesJson()); }
+
+BenchReply SitesPicture(Bench&, const BenchRequest&) {
+  static const std::string kPicture = EncodePng(SitePicture(/*threads=*/1));
+  return {200, "image/png", kPicture, {}};
+}
+
+BenchReply Schema(Bench&, const BenchRequest&) { return JsonReply(OptionsSchema<Experiment>()); }
+
+// Files that an option may name: those of the folder that fit.
+BenchReply Files(Bench& bench, const BenchRequest&) {
+  Json json = {{"tables", Json::array()}, {"networks", Json::array()}};
+  for (const auto& [kind, list] : json.items()) {
+    const fs::path folder = bench.Folder() / kind;
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      names.push_back(fs::path(kind) / entry.path().filename());
+    }
+    std::ranges::sort(names);
+    for (const std::string& name : names) {
+      const fs::path path = bench.Folder() / name;
+      json[kind].push_back({{"path", path.string()},
+                            {"title", kind == "tables" ? ReadTissueTable(path).title : name}});
+    }
+  }
+  json["parts"] = bench.PartsOfFace();
+  json["features"] = bench.KeptFeatures();
+  return JsonReply(json.dump());
+}
+
+BenchReply Timed(const std::function<BenchFace()>& make) {
+  const auto start = std::chrono::steady_clock::now();
+  const BenchFace face = make();
+  return JsonReply(FaceJson(
+      face, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()));
+}
+
+BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
+  constexpr std::array<std::string_view, 6> kNames = {"as_is", "emaciated", "normal",
+                                                      "obese", "thinner",   "thicker"};
+  const auto path = request.query.find("path"), value = request.query.find("value");
+  if (path != request.query.end() && value != request.query.end()) {
+    return Timed([&] { return bench.CoarseWith({path->second, value->second}); });
+  }
+  const auto asked = request.query.find("variant");
+  const std::string name = asked == request.query.end() ? "as_is" : asked->second;
+  const auto* const found = std::ranges::find(kNames, name);
+  if (found == kNames.end()) {
+    return Refusal(400, fmt::format("variant: there is no '{}'", name));
+  }
+  const auto variant = static_cast<BenchVariant>(found - kNames.begin());
+  return Timed([&] { return bench.Coarse(variant); });
+}
+
+BenchReply FullReply(Bench& bench, const BenchRequest&) {
+  return Timed([&] { return bench.Full(); });
+}
+
+BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
+  const auto format = request.query.find("format");
+  const std::string name =
+      "landmarks" + (format == request.query.end() ? std::string(".yaml") : format->second);
+  const LandmarkFile file = LandmarksOf(Now(bench.Look().history));
+  return {200, "application/octet-stream", EncodeLandmarks(file, name), name};
+}
+
+// ---------------------------------------------------------------------------------------------
+// Doing
+// ---------------------------------------------------------------------------------------------
+
+Vec3 VectorOf(const Json& json, const char* key) {
+  const auto numbers = json.at(key).get<std::array<double, 3>>();
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+std::string TextOf(const Json& json, const char* key) { return json.at(key).get<std::string>(); }
+
+LandmarkRemarks RemarksOf(const Json& json) {
+  constexpr auto kWords = EnumNames(Certainty{});
+  const auto* const word = std::ranges::find(kWords, TextOf(json, "certainty"));
+  if (word == kWords.end()) {
+    throw InputError("certainty: give high, medium or low");
+  }
+  LandmarkRemarks remarks{.certainty = static_cast<Certainty>(word - kWords.begin()),
+                          .note = TextOf(json, "note")};
+  if (!json.at("depth_mm").is_null()) {
+    remarks.depth_along_normal_mm = json.at("depth_mm").get<double>();
+  }
+  return remarks;
+}
+
+using Action = void (*)(Bench&, const Json&);
+
+void Place(Bench& bench, const Json& json) {
+  bench.PlaceByRay(TextOf(json, "site"), VectorOf(json, "origin"), VectorOf(json, "direction"),
+                   VectorOf(json, "near"));
+}
+void Remove(Bench& bench, const Json& json) {
+  const std::string site = TextOf(json, "site");
+  bench.Do("removed " + site, [&](BenchState s) { return RemoveLandmark(std::move(s), site); });
+}
+void Rename(Bench& bench, const Json& json) {
+  const std::string site = TextOf(json, "site"), name = TextOf(json, "name");
+  bench.Do(fmt::format("renamed {} to {}", site, name),
+           [&](BenchState s) { return RenameLandmark(std::move(s), site, name); });
+}
+void Absent(Bench& bench, const Json& json) {
+  const std::string site = TextOf(json, "site");
+  bench.Do("called " + site + " absent",
+           [&](BenchState s) { return CallAbsent(std::move(s), site, TextOf(json, "reason")); });
+}
+void Remark(Bench& bench, const Json& json) {
+  const std::string site = TextOf(json, "site");
+  bench.Do("remarked on " + site,
+           [&](BenchState s) { return RemarkLandmark(std::move(s), site, RemarksOf(json)); });
+}
+void Confirm(Bench& bench, const Json& json) {
+  const std::string site = TextOf(json, "site");
+  bench.Do("confirmed " + site, [&](BenchState s) { return ConfirmLandmark(std::move(s), site); });
+}
+void ConfirmAll(Bench& bench, const Json&) {
+  bench.Do("confirmed all", [](BenchState s) { return ConfirmAllLandmarks(std::move(s)); });
+}
+void ClearLandmarks(Bench& bench, const Json&) {
+  bench.Do("removed all landmarks", [](BenchState s) { return TakeLandmarks(std::move(s), {}); });
+}
+void Foreseen(Bench& bench, const Json&) { bench.TakeForeseen(); }
+void Set(Bench& bench, const Json& json) {
+  const std::string path = TextOf(json, "path");
+  bench.Do("set " + path, [&](BenchState s) {
+    return ChangeSetting(std::move(s), path, json.at("value").dump());
+  });
+}
+void Unset(Bench& bench, const Json& json) {
+  const std::string path = TextOf(json, "path");
+  bench.Do("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
+}
+void PullFace(Bench& bench, const Json& json) {
+  bench.PullAt(VectorOf(json, "at"), {.level = json.at("level").get<int>(),
+                                      .by_mm = VectorOf(json, "by"),
+                                      .reach = json.at("reach").get<double>(),
+                                      .mirror = json.at("mirror").get<bool>()});
+}
+void ClearEdits(Bench& bench, const Json&) {
+  bench.Do("took all edits back", [](BenchState s) { return TakeEdits(std::move(s), {}); });
+}
+void Keep(Bench& bench, const Json& json) {
+  bench.KeepFeature(TextOf(json, "part"), TextOf(json, "name"));
+}
+void Blend(Bench& bench, const Json& json) {
+  bench.BlendFeature(TextOf(json, "name"), json.at("weight").get<double>());
+}
+void UndoStep(Bench& bench, const Json&) { bench.Undo(); }
+void RedoStep(Bench& bench, const Json&) { bench.Redo(); }
+void RunFace(Bench& bench, const Json&) { bench.StartRun(); }
+void ProposeSites(Bench& bench, const Json&) { bench.StartProposal(); }
+void Cancel(Bench& bench, const Json&) { bench.CancelJob(); }
+
+constexpr std::array<std::pair<std::string_view, Action>, 20> kActions = {
+    {{"place", &Place},
+     {"remove", &Remove},
+     {"rename", &Rename},
+     {"absent", &Absent},
+     {"remark", &Remark},
+     {"confirm", &Confirm},
+     {"confirm_all", &ConfirmAll},
+     {"clear_landmarks", &ClearLandmarks},
+     {"take_foreseen", &Foreseen},
+     {"set", &Set},
+     {"unset", &Unset},
+     {"pull", &PullFace},
+     {"clear_edits", &ClearEdits},
+     {"keep_feature", &Keep},
+     {"blend_feature", &Blend},
+     {"undo", &UndoStep},
+     {"redo", &RedoStep},
+     {"run", &RunFace},
+     {"propose", &ProposeSites},
+     {"cancel", &Cancel}}};
+
+BenchReply Act(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseJson(request.body, "the request");
+  const std::string name = TextOf(json, "do");
+  const auto* const found =
+      std::ranges::find(kActions, name, &decltype(kActions)::value_type::first);
+  if (found == kActions.end()) {
+    return Refusal(400, fmt::format("there is no action '{}'", name));
+  }
+  found->second(bench, json);
+  return StateReply(bench);
+}
+
+// A name that is safe as a file's own: letters, digits, dot, minus and underscore.
+std::string SafeName(const std::string& name) {
+  const bool is_safe = !name.empty() && name.size() <= 100 && name[0] != '.' &&
+                       std::ranges::all_of(name, [](unsigned char c) {
+                         return std::isalnum(c) || c == '.' || c == '-' || c == '_';
+                       });
+  if (!is_safe) {
+    throw InputError(fmt::format(
+        "upload: a file may be named with letters, digits, '.', '-' and '_', not '{}'", name));
+  }
+  return name;
+}
+
+// A file from the browser: kept in subject/, then taken for what it is said to be.
+BenchReply Upload(Bench& bench, const BenchRequest& request) {
+  const auto text = [&request](const char* key) {
+    const auto at = request.query.find(key);
+    return at == request.query.end() ? std::string() : at->second;
+  };
+  const std::string as = text("as");
+  const fs::path path = bench.Folder() / "subject" / SafeName(text("name"));
+  if (as != "skull" && as != "skin" && as != "landmarks") {
+    return Refusal(400, "upload: say as=skull, skin or landmarks");
+  }
+  fs::create_directories(path.parent_path());
+  WriteFileAtomically(path, request.body);
+  if (as == "landmarks") {
+    const LandmarkReading reading = ReadLandmarks(path);
+    bench.Do("loaded landmarks",
+             [&](BenchState s) { return TakeLandmarks(std::move(s), reading.file); });
+  } else {
+    bench.Do("opened " + as, [&](BenchState s) {
+      return ChangeSetting(std::move(s), "subject." + as, Json(path.string()).dump());
+    });
+  }
+  return StateReply(bench);
+}
+
+// A file of this machine by its path, likewise.
+BenchReply Open(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseJson(request.body, "the request");
+  const std::string as = TextOf(json, "as"), path = TextOf(json, "path");
+  if (as == "landmarks") {
+    const LandmarkReading reading = ReadLandmarks(path);
+    bench.Do("loaded landmarks",
+             [&](BenchState s) { return TakeLandmarks(std::move(s), reading.file); });
+  } else if (as == "skull" || as == "skin") {
+    bench.Do("opened " + as, [&](BenchState s) {
+      return ChangeSetting(std::move(s), "subject." + as, Json(fs::absolute(path).string()).dump());
+    });
+  } else {
+    return Refusal(400, "open: say as: skull, skin or landmarks");
+  }
+  return StateReply(bench);
+}
+
+BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); }
+
+using Handler = BenchReply (*)(Bench&, const BenchRequest&);
+struct Route {
+  std::string_view method, path;
+  Handler handle;
+};
+
+constexpr std::array kRoutes = {
+    Route{"GET", "api/state", &State},
+    Route{"GET", "api/schema", &Schema},
+    Route{"GET", "api/sites", &Sites},
+    Route{"GET", "api/sites.png", &SitesPicture},
+    Route{"GET", "api/files", &Files},
+    Route{"GET", "api/meshes", &Meshes},
+    Route{"GET", "api/coarse", &CoarseReply},
+    Route{"GET", "api/face", &FullReply},
+    Route{"GET", "api/landmarks", &LandmarksFile},
+    Route{"POST", "api/act", &Act},
+    Route{"POST", "api/open", &Open},
+    Route{"POST", "api/upload", &Upload},
+};
+
+BenchReply Find(Bench& bench, const BenchRequest& request) {
+  for (const Route& route : kRoutes) {
+    if (route.path == request.path) {
+      return route.method == request.method
+                 ? route.handle(bench, request)
+                 : Refusal(405, fmt::format("{} takes {}", route.path, route.method));
+    }
+  }
+  if (request.method != "GET") {
+    return Refusal(404, "there is nothing to post to here");
+  }
+  constexpr std::string_view kRun = "run/";
+  return request.path.starts_with(kRun) ? RunFile(bench, request.path.substr(kRun.size()))
+                                        : PageFile(request.path);
+}
+
+}  // namespace
+
+BenchReply Answer(Bench& bench, const BenchRequest& request) {
+  try {
+    return Find(bench, request);
+  } catch (const Error& error) {
+    return Refusal(400, error.what());
+  } catch (const nlohmann::json::exception& error) {
+    return Refusal(400, fmt::format("the request cannot be used: {}", error.what()));
+  } catch (const Cancelled&) {
+    return Refusal(409, "stopped");
+  } catch (const std::bad_alloc&) {
+    return Refusal(507, "not enough memory");
+  } catch (const std::exception& error) {
+    return Refusal(500, fmt::format("the work failed: {}", error.what()));
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files that the workbench carries; CMake puts their text into the program.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace semblance {
+
+struct BenchAsset {
+  std::string_view name;  // e.g. "main.js", "tables/rhine_caucasoid.yaml"
+  std::string_view text;
+};
+
+std::span<const BenchAsset> PageFiles();     // of problems/page
+std::span<const BenchAsset> StarterFiles();  // tables of depths and the dowel network
+
+}  // namespace semblance

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/workbench/bench_config.h"
+
+#include <nlohmann/json.hpp>
+
+#include "problems/config/config.h"
+#include "problems/config/value_json.h"
+#include "problems/pipeline/experiment_config.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the state says beside its settings.
+std::vector<BenchSetting> SettingsOf(const BenchState& state) {
+  std::vector<BenchSetting> settings = state.settings;
+  if (!state.landmarks.empty()) {
+    settings.push_back({"subject.landmarks", "landmarks.yaml"});
+  }
+  if (!state.edits.edits.empty() || !state.edits.resets.empty()) {
+    settings.push_back({"edits", "edits.yaml"});
+  }
+  return settings;
+}
+
+bool SameText(const ConfigNode* a, const ConfigNode* b) {
+  return a != nullptr && b != nullptr && a->text == b->text;
+}
+
+bool Same(const ConfigNode& a, const ConfigNode& b) { return ToFlowYaml(a) == ToFlowYaml(b); }
+
+// What `tree` says that `defaults` does not.
+ConfigNode Difference(const ConfigNode& tree, const ConfigNode& defaults) {
+  const ConfigNode *type = tree.Find("type"), *default_type = defaults.Find("type");
+  const bool merges =
+      tree.IsMap() && defaults.IsMap() &&
+      ((type == nullptr && default_type == nullptr) || SameText(type, default_type));
+  if (!merges) {
+    return tree;
+  }
+  ConfigNode difference = ConfigNode::Map();
+  for (const ConfigNode::Entry& entry : tree.entries) {
+    const ConfigNode* usual = defaults.Find(entry.key);
+    if (usual == nullptr || !Same(entry.value, *usual)) {
+      difference.Set(entry.key, usual ? Difference(entry.value, *usual) : entry.value);
+    }
+  }
+  return difference;
+}
+
+// Paths are written absolute; in the folder they need not be.
+void MakeRelative(ConfigNode& node, const std::string& folder) {
+  if (node.IsScalar() && node.text.starts_with(folder)) {
+    node.text = node.text.substr(folder.size());
+  }
+  for (ConfigNode& item : node.items) {
+    MakeRelative(item, folder);
+  }
+  for (ConfigNode::Entry& entry : node.entries) {
+    MakeRelative(entry.value, folder);
+  }
+}
+
+}  // namespace
+
+Experiment ExperimentOf(std::string_view start, const fs::path& folder, const BenchState& state) {
+  ConfigErrors errors;
+  ConfigNode tree =
+      ParseConfigText(start, {.name = (folder / "start.yaml").string(), .folder = folder}, errors);
+  const ConfigNode defaults = ConfigTreeOf(Experiment{});
+  int order = 1;
+  for (const BenchSetting& setting : SettingsOf(state)) {
+    const ConfigNode value = ParseConfigText(
+        setting.value,
+        {.name = setting.path, .folder = folder, .order = order++, .has_lines = false}, errors);
+    SetPath(tree, setting.path, value, &defaults);
+  }
+  Experiment experiment = ReadConfigTree<Experiment>(tree, errors);
+  errors.ThrowIfAny();
+  return experiment;
+}
+
+std::string ShortConfig(const Experiment& experiment, const fs::path& folder) {
+  ConfigNode tree = Difference(ConfigTreeOf(experiment), ConfigTreeOf(Experiment{}));
+  MakeRelative(tree, (fs::absolute(folder).lexically_normal() / "").string());
+  return "# Made by `semblance workbench`; "
+         "`semblance run` takes it. What it does not say is the default.\n" +
+         ToYaml(tree);
+}
+
+std::string ExperimentJson(const Experiment& experiment) {
+  static const ConfigType kType = DescribeExperiment();
+  return ValueJson(ConfigTreeOf(experiment), kType).dump();
+}
+
+}  // namespace semblance

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/workbench/bench_faces.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/edits/edit_script.h"
+#include "problems/pipeline/case.h"
+#include "problems/pipeline/make_face.h"
+#include "problems/pipeline/stage_key.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+PriorFace PriorFaceOf(const FaceSource& way) {
+  if (const auto* fitted = std::get_if<PriorThenFit>(&way)) {
+    return {.estimate = fitted->estimate, .table_depths = fitted->table_depths};
+  }
+  const auto* prior = std::get_if<PriorFace>(&way);
+  return prior ? *prior : PriorFace{};
+}
+
+FaceSource CoarseWay(const Experiment& experiment) {
+  const FaceSource way = WayToFace(experiment);
+  if (std::holds_alternative<PlacedFace>(way) || std::holds_alternative<ThinPlateFace>(way)) {
+    return way;
+  }
+  return AsksPrior(way) ? FaceSource(PriorFaceOf(way)) : FaceSource(ThinPlateFace{});
+}
+
+SubjectData ThinnedOut(const BenchSubject& subject, const BenchState& state) {
+  return {.skull = subject.skull.view,
+          .origin = {},
+          .skin = std::nullopt,
+          .landmarks = LandmarksOf(state),
+          .notes = {},
+          .inputs = {}};
+}
+
+}  // namespace
+
+BenchFace CoarseFace(const BenchSubject& subject, const Experiment& given, const BenchState& state,
+                     StageCache& cache, const RunContext& context) {
+  Experiment experiment = given;
+  experiment.face = CoarseWay(given);
+  Case head = MakeCase(ThinnedOut(subject, state), experiment);
+  const auto generic = cache.Get<TemplateFace>(StageKey("template", experiment.face_template), [&] {
+    return LoadTemplate(experiment.face_template);
+  });
+  const auto prior = GivenPrior(experiment, *generic, cache, context);
+  const TriMesh none;
+  MadeFace made =
+      MakeFace({experiment, *generic, prior.get(), head, none, subject.skull.view}, context);
+  ApplyEdits(state.edits, made.fitted.fit.surface);
+  return {.surface = std::move(made.fitted.fit.surface),
+          .dowels = std::move(head.dowels_on_bone),
+          .notes = std::move(head.notes)};
+}
+
+Experiment VariantOf(const Experiment& experiment, BenchVariant variant,
+                     const std::vector<Dowel>& dowels, double fallback_sd_mm) {
+  constexpr double kLeast_mm = 0.5;
+  Experiment other = experiment;
+  const auto shift = [&](double sds) {
+    for (const Dowel& dowel : dowels) {
+      const double sd = std::isfinite(dowel.sd_mm) ? dowel.sd_mm : fallback_sd_mm;
+      other.tissue.set_mm[dowel.site] = std::max(kLeast_mm, dowel.depth_mm + sds * sd);
+    }
+  };
+  switch (variant) {
+    case BenchVariant::kAsIs:
+      break;
+    case BenchVariant::kEmaciated:
+      other.tissue.build = Build::kEmaciated;
+      break;
+    case BenchVariant::kNormal:
+      other.tissue.build = Build::kNormal;
+      break;
+    case BenchVariant::kObese:
+      other.tissue.build = Build::kObese;
+      break;
+    case BenchVariant::kThinner:
+      shift(-1);
+      break;
+    case BenchVariant::kThicker:
+      shift(1);
+      break;
+  }
+  return other;
+}
+
+}  // namespace semblance

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/workbench/bench_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <system_error>
+
+#include "problems/landmark_files/read_landmarks.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/workbench/bench_assets.h"
+#include "problems/workbench/bench_config.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kHistory = "workbench.yaml";
+constexpr const char* kStart = "start.yaml";
+constexpr const char* kClaim = ".semblance-workbench";
+
+fs::path Made(const fs::path& root) {
+  std::error_code error;
+  fs::create_directories(root, error);
+  if (error) {
+    throw IoError(fmt::format("{}: the folder cannot be created: {}; choose another one",
+                              root.string(), error.message()));
+  }
+  return fs::canonical(root);
+}
+
+// Replaced where it differs, removed where there is nothing to say.
+void WriteOrRemove(const fs::path& path, const std::string& text) {
+  if (text.empty()) {
+    fs::remove(path);
+  } else if (!fs::exists(path) || ReadFileBytes(path) != text) {
+    WriteFileAtomically(path, text);
+  }
+}
+
+}  // namespace
+
+std::string LandmarksText(const BenchState& state) {
+  return state.landmarks.empty() ? "" : EncodeLandmarks(LandmarksOf(state), "landmarks.yaml");
+}
+
+std::string EditsText(const BenchState& state) {
+  return state.edits.edits.empty() && state.edits.resets.empty() ? "" : WriteConfig(state.edits);
+}
+
+BenchFolder::BenchFolder(const fs::path& root) : root_(Made(root)) {
+  claim_.Take(root_ / kClaim, root_.string());
+}
+
+bool BenchFolder::HasWork() const { return fs::exists(root_ / kHistory); }
+
+void BenchFolder::Begin(const std::string& start, const BenchState& state) {
+  for (const BenchAsset& file : StarterFiles()) {
+    const fs::path path = root_ / file.name;
+    fs::create_directories(path.parent_path());
+    if (!fs::exists(path)) {
+      WriteFileAtomically(path, file.text);
+    }
+  }
+  start_ = start;
+  WriteFileAtomically(root_ / kStart, start);
+  Write(BeginHistory(state), ExperimentOf(state));
+}
+
+BenchHistory BenchFolder::Read() {
+  start_ = ReadFileBytes(root_ / kStart);
+  const fs::path path = root_ / kHistory;
+  return HistoryFromText(ReadFileBytes(path), path.string());
+}
+
+void BenchFolder::Write(const BenchHistory& history, const Experiment& experiment) const {
+  const BenchState& state = Now(history);
+  WriteFileAtomically(root_ / kHistory, HistoryText(history));
+  WriteOrRemove(root_ / "landmarks.yaml", LandmarksText(state));
+  WriteOrRemove(root_ / "edits.yaml", EditsText(state));
+  WriteOrRemove(root_ / "config.yaml", ShortConfig(experiment, root_));
+}
+
+Experiment BenchFolder::ExperimentOf(const BenchState& state) const {
+  return semblance::ExperimentOf(start_, root_, state);
+}
+
+Experiment BenchFolder::ExperimentAsSaved() const {
+  return ReadConfig<Experiment>(root_ / "config.yaml");
+}
+
+}  // namespace semblance

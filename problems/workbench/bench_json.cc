@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/workbench/bench_json.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "problems/landmark_files/site_page.h"
+#include "problems/report/scene_blobs.h"
+#include "problems/subject/average_skull.h"
+#include "problems/subject/sites.h"
+#include "problems/workbench/bench_config.h"
+#include "surfaces/hspline_query/tessellate.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kQuadsPerPatch = 2;
+
+Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json Numbers(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+
+Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
+  Json json = {{"site", l.site},
+               {"point", l.point},
+               {"certainty", EnumNames(l.certainty).at(static_cast<std::size_t>(l.certainty))},
+               {"note", l.note},
+               {"proposed", l.proposed}};
+  json["depth_along_normal_mm"] = l.depth_along_normal_mm ? Json(*l.depth_along_normal_mm) : Json();
+  if (const auto at = checks.sites.find(l.site); at != checks.sites.end()) {
+    json["from_bone_mm"] = Number(at->second.from_bone_mm);
+    json["from_foreseen_mm"] = Number(at->second.from_foreseen_mm);
+    json["from_mirror_mm"] = Number(at->second.from_mirror_mm);
+  }
+  return json;
+}
+
+Json SubjectJson(const Bench::Snapshot& shot) {
+  const BenchSubject& subject = *shot.subject;
+  const auto& files = std::get<FileSubject>(shot.experiment.subject);
+  Json json = {{"name", Now(shot.history).subject},
+               {"revision", shot.subject_revision},
+               {"skull", files.skull.string()},
+               {"skin", files.skin.string()},
+               {"triangles", subject.skull.mesh.triangles.size()},
+               {"faults", subject.faults},
+               {"notes", subject.notes}};
+  if (!subject.skull.mesh.points.empty()) {
+    const Box3 box = Bounds(subject.skull.mesh);
+    json["size_mm"] = Numbers(box.sizes());
+  }
+  return json;
+}
+
+const char* WordOf(JobState state) {
+  switch (state) {
+    case JobState::kRunning:
+      return "running";
+    case JobState::kFinished:
+      return "done";
+    case JobState::kFailed:
+      return "failed";
+    case JobState::kStopped:
+      return "stopped";
+    default:
+      return "none";
+  }
+}
+
+Json JobJson(const JobStatus& job) {
+  return {{"name", job.name},
+          {"state", WordOf(job.state)},
+          {"step", job.step},
+          {"fraction", Number(job.fraction)},
+          {"seconds", Number(job.seconds)},
+          {"words", job.words}};
+}
+
+Json ForeseenJson(const LandmarkChecks& checks) {
+  Json json = Json::array();
+  for (const auto& [site, point] : checks.foreseen) {
+    json.push_back({{"site", site}, {"point", Numbers(point)}});
+  }
+  return json;
+}
+
+Json StepsJson(const BenchHistory& history) {
+  const auto what = [&history](int step) { return history.steps.at(step).what; };
+  return {{"undo", CanUndo(history) ? Json(what(history.now)) : Json()},
+          {"redo", CanRedo(history) ? Json(what(history.now + 1)) : Json()}};
+}
+
+Json DowelsJson(const std::vector<Dowel>& dowels) {
+  Json json = Json::array();
+  for (const Dowel& dowel : dowels) {
+    if (dowel.Tip().allFinite()) {
+      json.push_back({{"site", dowel.site},
+                      {"base", Numbers(dowel.base)},
+                      {"tip", Numbers(dowel.Tip())},
+                      {"depth_mm", dowel.depth_mm},
+                      {"sd_mm", Number(dowel.sd_mm)}});
+    }
+  }
+  return json;
+}
+
+Json BlobOf(const TriMesh& mesh) {
+  SceneBlobs blobs;
+  const std::string name = blobs.AddMesh(mesh);
+  return blobs.All().at(name);
+}
+
+Json SiteJson(const Site& site) {
+  Json json = {{"site", site.code},
+               {"name", site.name},
+               {"number", site.number},
+               {"mirror", site.mirror},
+               {"definition", SiteDefinition(site.landmark)},
+               {"standard", IsStandardSite(site.code)}};
+  if (IsStandardSite(site.code)) {
+    json["average"] = Numbers(AverageSite(site.code));
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::path& folder) {
+  const BenchState& state = Now(shot.history);
+  Json json = {{"revision", shot.revision},
+               {"folder", folder.string()},
+               {"subject", SubjectJson(shot)},
+               {"landmarks", Json::array()},
+               {"absent", Json::array()},
+               {"foreseen", ForeseenJson(shot.checks)},
+               {"errors", shot.checks.errors},
+               {"notes", shot.checks.notes},
+               {"settings", Json::array()},
+               {"values", Json::parse(ExperimentJson(shot.experiment))},
+               {"steps", StepsJson(shot.history)},
+               {"edited_vertices", state.edits.edits.size()},
+               {"job", JobJson(shot.job)},
+               {"face",
+                {{"there", shot.has_face},
+                 {"fresh", shot.face_fresh},
+                 {"saved", shot.run_saved},
+                 {"revision", shot.face_revision}}}};
+  for (const BenchLandmark& landmark : state.landmarks) {
+    json["landmarks"].push_back(LandmarkJson(landmark, shot.checks));
+  }
+  for (const BenchAbsent& absent : state.absent) {
+    json["absent"].push_back({{"site", absent.site}, {"reason", absent.reason}});
+  }
+  for (const BenchSetting& setting : state.settings) {
+    json["settings"].push_back({{"path", setting.path}, {"value", setting.value}});
+  }
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string FaceJson(const BenchFace& face, double seconds) {
+  return Json{{"mesh", BlobOf(Tessellate(face.surface, kQuadsPerPatch).mesh)},
+              {"dowels", DowelsJson(face.dowels)},
+              {"notes", face.notes},
+              {"finest_level", face.surface.shape().max_level},
+              {"seconds", seconds}}
+      .dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string MeshesJson(const BenchSubject& subject) {
+  Json json = {{"skull", nullptr}, {"skin", nullptr}};
+  if (!subject.skull.view.triangles.empty()) {
+    json["skull"] = BlobOf(subject.skull.view);
+  }
+  if (subject.skin) {
+    json["skin"] = BlobOf(subject.skin->view);
+  }
+  return json.dump();
+}
+
+std::string SitesJson() {
+  Json json = Json::array();
+  for (const std::vector<Site>* sites : {&StandardSites(), &FurtherSites()}) {
+    for (const Site& site : *sites) {
+      json.push_back(SiteJson(site));
+    }
+  }
+  return json.dump();
+}
+
+}  // namespace semblance

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the page is told, as JSON.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "problems/workbench/bench.h"
+
+namespace semblance {
+
+// Landmarks with their checks, settings, values of all options, what can be undone, the job.
+std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::path& folder);
+
+// {mesh: {blobs of scene_blobs.h}, dowels, notes, seconds}.
+std::string FaceJson(const BenchFace& face, double seconds);
+
+// {skull, skin}: blobs, null where there is none.
+std::string MeshesJson(const BenchSubject& subject);
+
+// Every site: code, name, number, partner, its place on the bone in words, and where it lies on a
+// phantom's skull, for the picture.
+std::string SitesJson();
+
+}  // namespace semblance

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/workbench/bench_subject.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <initializer_list>
+
+#include "problems/ct/read_volume.h"
+#include "problems/landmark_files/read_landmarks.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/subject/phantom_landmarks.h"
+#include "problems/view/view_mesh.h"
+#include "problems/workbench/bench_actions.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_check.h"
+#include "surfaces/mesh_files/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kSkullTriangles = 60000;  // landmarks are clicked on it
+
+TriMesh ReadInMm(const fs::path& path, const FileSubject& files) {
+  TriMesh mesh = ReadMesh(path);
+  for (Vec3& p : mesh.points) {
+    p = ToLpsMm(p, files.axes, files.units);
+  }
+  return mesh;
+}
+
+void Append(const TriMesh& more, TriMesh& mesh) {
+  const auto first = static_cast<std::int32_t>(mesh.points.size());
+  mesh.points.insert(mesh.points.end(), more.points.begin(), more.points.end());
+  for (const Triangle& t : more.triangles) {
+    mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+}
+
+// A fault is told and does not hinder looking.
+void Check(const TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
+  try {
+    std::ranges::move(CheckHeadMesh(mesh, path.filename().string()),
+                      std::back_inserter(subject.notes));
+  } catch (const InputError& error) {
+    subject.faults.emplace_back(error.what());
+  }
+}
+
+void TakeLandmarksOf(const fs::path& path, BenchBeginning& beginning) {
+  if (!path.empty()) {
+    beginning.state = TakeLandmarks(std::move(beginning.state), ReadLandmarks(path).file);
+  }
+}
+
+FileSubject WriteMeshes(const TriMesh& skull, const TriMesh& skin, const fs::path& folder) {
+  FileSubject files;
+  files.skull = folder / "skull.ply";
+  files.skin = folder / "skin.ply";
+  fs::create_directories(folder);
+  WriteFileAtomically(files.skull, EncodeMesh(skull, ".ply"));
+  WriteFileAtomically(files.skin, EncodeMesh(skin, ".ply"));
+  return files;
+}
+
+FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchBeginning& beginning,
+                    const RunContext&) {
+  TakeLandmarksOf(subject.landmarks, beginning);
+  FileSubject files = subject;
+  files.landmarks.clear();
+  return files;
+}
+
+FileSubject ToFiles(const PhantomOptions& subject, const fs::path& folder,
+                    BenchBeginning& beginning, const RunContext&) {
+  const Phantom phantom = MakePhantom(subject);
+  beginning.state =
+      TakeLandmarks(std::move(beginning.state), PhantomLandmarks(phantom, subject.random_seed));
+  return WriteMeshes(phantom.skull, phantom.face, folder / "subject");
+}
+
+FileSubject ToFiles(const CtSubject& subject, const fs::path& folder, BenchBeginning& beginning,
+                    const RunContext& context) {
+  const VolumeReading reading = ReadVolume(subject.volume, subject.read, context);
+  if (reading.modality == Modality::kMr) {
+    throw InputError(
+        fmt::format("{}: an MR shows no bone, and the workbench needs a skull: give a CT, or a "
+                    "mesh of the skull",
+                    subject.volume.string()));
+  }
+  const CtImport import = ImportCt(reading.volume, subject.import, context);
+  TakeLandmarksOf(subject.landmarks, beginning);
+  FileSubject files = WriteMeshes(import.skull, import.skin, folder / "subject");
+  files.mirror = subject.mirror;
+  return files;
+}
+
+bool IsOneOf(const std::string& extension, std::initializer_list<const char*> extensions) {
+  return std::ranges::find(extensions, extension) != extensions.end();
+}
+
+// What a person gets who brings no configuration.
+Experiment UsualExperiment(const fs::path& folder) {
+  Experiment experiment;
+  experiment.title = "Workbench";
+  experiment.tissue.table = folder / "tables/rhine_caucasoid.yaml";
+  experiment.network = folder / "networks/standard32.yaml";
+  return experiment;
+}
+
+}  // namespace
+
+BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context) {
+  BenchSubject subject;
+  if (files.skull.empty()) {
+    return subject;
+  }
+  context.Report("read skull");
+  subject.skull.mesh = ReadInMm(files.skull, files);
+  if (!files.mandible.mesh.empty()) {
+    Append(ReadInMm(files.mandible.mesh, files), subject.skull.mesh);
+  }
+  Check(subject.skull.mesh, files.skull, subject);
+  subject.skull.view = ForView(subject.skull.mesh, kSkullTriangles);
+  subject.bone = std::make_shared<const MeshQuery>(subject.skull.mesh);
+  if (!files.skin.empty()) {
+    context.Report("read skin");
+    BenchMesh skin{.mesh = ReadInMm(files.skin, files), .view = {}};
+    Check(skin.mesh, files.skin, subject);
+    skin.view = ForView(skin.mesh);
+    subject.skin = std::move(skin);
+  }
+  return subject;
+}
+
+namespace {
+
+// A configuration's own options; of other sources the usual ones.
+void TakeConfig(const fs::path& source, BenchBeginning& beginning) {
+  beginning.experiment = ReadConfig<Experiment>(source);
+  if (!beginning.experiment.edits.empty()) {
+    beginning.state.edits = ReadEditScript(beginning.experiment.edits);
+    beginning.experiment.edits.clear();
+  }
+}
+
+Subject SubjectIn(const fs::path& source, BenchBeginning& beginning) {
+  std::string extension = source.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return std::tolower(c); });
+  FileSubject files;
+  if (source.empty()) {
+    return files;
+  }
+  if (IsOneOf(extension, {".yaml", ".yml"})) {
+    TakeConfig(source, beginning);
+    return beginning.experiment.subject;
+  }
+  if (IsOneOf(extension, {".ply", ".obj", ".stl", ".off"})) {
+    files.skull = fs::absolute(source);
+    return files;
+  }
+  CtSubject ct;
+  ct.volume = fs::absolute(source);
+  return ct;
+}
+
+}  // namespace
+
+BenchBeginning BeginBench(const fs::path& source, const fs::path& folder,
+                          const RunContext& context) {
+  BenchBeginning beginning{.experiment = UsualExperiment(folder), .state = {}};
+  const Subject subject = SubjectIn(source, beginning);
+  beginning.experiment.subject = std::visit(
+      [&](const auto& given) { return ToFiles(given, folder, beginning, context); }, subject);
+  if (beginning.state.subject.empty()) {
+    beginning.state.subject = source.empty() ? "subject" : source.stem().string();
+  }
+  return beginning;
+}
+
+}  // namespace semblance

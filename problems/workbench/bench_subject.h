@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The head on the workbench: its meshes in mm and LPS, also where they cannot be used yet, for it
+// is by looking that a person finds the right frame and unit.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/pipeline/experiment.h"
+#include "problems/workbench/bench_state.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+
+struct BenchMesh {
+  TriMesh mesh;  // all of it
+  TriMesh view;  // thinned out
+};
+
+struct BenchSubject {
+  BenchMesh skull;                // with the mandible, where that is a mesh of its own, as it lies
+  std::optional<BenchMesh> skin;  // where it is known
+  std::shared_ptr<const MeshQuery> bone;  // of the whole skull
+  std::vector<std::string> faults;        // why a run would refuse the meshes
+  std::vector<std::string> notes;
+};
+
+// Throws IoError or InputError if a file cannot be read at all.
+BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context);
+
+// What a workbench begins with.
+struct BenchBeginning {
+  Experiment experiment;  // its subject is of files
+  BenchState state;
+};
+
+// source: empty (nothing yet), a mesh of a skull, a volume (CT), or a configuration. Phantoms and
+// volumes become meshes below folder/subject; landmarks move into the state. Throws as LoadSubject
+// does.
+BenchBeginning BeginBench(const std::filesystem::path& source, const std::filesystem::path& folder,
+                          const RunContext& context);
+
+}  // namespace semblance

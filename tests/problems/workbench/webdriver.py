@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A browser driven over the WebDriver protocol (W3C), with Python's standard library alone."""
+import base64
+import json
+import shutil
+import socket
+import subprocess
+import time
+import urllib.error
+import urllib.request
+
+ELEMENT = "element-6066-11e4-a52e-4f735466cecf"  # the protocol's own name for a reference
+
+
+def missing():
+    """What is not installed, or an empty text."""
+    return " and ".join(name for name in ("chromium", "chromedriver") if not shutil.which(name))
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Browser:
+    """Headless Chromium with a window of width x height pixels."""
+
+    def __init__(self, width, height):
+        port = free_port()
+        self.driver = subprocess.Popen(["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.DEVNULL)
+        self.base = f"http://127.0.0.1:{port}"
+        self._await_driver()
+        options = {"args": ["--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
+                            "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--force-device-scale-factor=1"]}
+        answer = self._call("POST", "/session", {"capabilities": {"alwaysMatch": {
+            "browserName": "chrome", "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}}})
+        self.session = "/session/" + answer["sessionId"]
+        self.resize(width, height)
+
+    def _await_driver(self):
+        for _ in range(100):
+            try:
+                self._call("GET", "/status")
+                return
+            except OSError:
+                time.sleep(0.1)
+        raise RuntimeError("chromedriver does not answer")
+
+    def _call(self, method, path, body=None):
+        data = json.dumps(body).encode() if method == "POST" else None
+        request = urllib.request.Request(self.base + path, data, {"Content-Type": "application/json"}, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=120) as reply:
+                return json.load(reply)["value"]
+        except urllib.error.HTTPError as error:
+            raise RuntimeError(json.load(error)["value"]["message"]) from None
+
+    def close(self):
+        try:
+            self._call("DELETE", self.session)
+        finally:
+            self.driver.terminate()
+            self.driver.wait()
+
+    def resize(self, width, height):
+        self._call("POST", self.session + "/goog/cdp/execute", {
+            "cmd": "Emulation.setDeviceMetricsOverride",
+            "params": {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}})
+
+    def open(self, url):
+        self._call("POST", self.session + "/url", {"url": url})
+
+    def run(self, script, *arguments):
+        """The value of a piece of JavaScript with `return`; a promise is awaited."""
+        return self._call("POST", self.session + "/execute/sync", {"script": script, "args": list(arguments)})
+
+    def wait(self, script, *arguments, seconds=60):
+        """Until the script's value is true."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            value = self.run(script, *arguments)
+            if value:
+                return value
+            time.sleep(0.1)
+        raise AssertionError(f"after {seconds} s still not: {script}")
+
+    def click_at(self, x, y):
+        """A press and a release of the left button at a point of the window."""
+        self._call("POST", self.session + "/actions", {"actions": [
+            {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": [
+                {"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y), "origin": "viewport"},
+                {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]}]})
+
+    def click(self, selector):
+        """A click on the element of a CSS selector, scrolled into view."""
+        box = self.run("const e = document.querySelector(arguments[0]); if (!e) { return null; }"
+                       "e.scrollIntoView({block: 'center'}); const b = e.getBoundingClientRect();"
+                       "return [b.left + b.width / 2, b.top + b.height / 2];", selector)
+        assert box, f"there is no {selector}"
+        self.click_at(*box)
+
+    def press(self, *keys):
+        """Keys one after the other; a tuple is pressed together."""
+        steps = []
+        for key in keys:
+            together = key if isinstance(key, tuple) else (key,)
+            steps += [{"type": "keyDown", "value": k} for k in together]
+            steps += [{"type": "keyUp", "value": k} for k in reversed(together)]
+        self._call("POST", self.session + "/actions", {"actions": [{"type": "key", "id": "keys", "actions": steps}]})
+
+    def picture(self, path):
+        with open(path, "wb") as file:
+            file.write(base64.b64decode(self._call("GET", self.session + "/screenshot")))
+
+    def complaints(self):
+        """What the console said that a person would call an error."""
+        entries = self._call("POST", self.session + "/se/log", {"type": "browser"})
+        return [entry["message"] for entry in entries if entry["level"] in ("SEVERE", "ERROR")]
