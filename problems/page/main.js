@@ -79,7 +79,8 @@ async function main() {
       textContent: `This browser shows no 3-D pictures (WebGL): ${error.message}. The workbench needs them.`}));
     return;
   }
-  const bench = {scene, faces: new Faces(scene)};
+  const bench = {scene, faces: new Faces(scene), store};
+  window.semblance = bench;  // for a look from the console, and for tests
   const job = new Job(byId('job'), byId('run'));
   const show = makeTabs(bench);
   bench.show = show;

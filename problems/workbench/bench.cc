@@ -91,6 +91,7 @@ Bench::Bench(const BenchOptions& options) : options_(options), folder_(options.f
     }
     history_ = folder_.Read();
   } else {
+    folder_.CheckFree();
     const BenchBeginning beginning = BeginBench(options.source, folder_.Root(), context);
     folder_.Begin(WriteConfig(beginning.experiment), beginning.state);
     history_ = BeginHistory(beginning.state);

@@ -310,47 +310,53 @@ std::string SafeName(const std::string& name) {
   return name;
 }
 
-// A file from the browser: kept in subject/, then taken for what it is said to be.
-BenchReply Upload(Bench& bench, const BenchRequest& request) {
-  const auto text = [&request](const char* key) {
-    const auto at = request.query.find(key);
-    return at == request.query.end() ? std::string() : at->second;
-  };
-  const std::string as = text("as");
-  const fs::path path = bench.Folder() / "subject" / SafeName(text("name"));
-  if (as != "skull" && as != "skin" && as != "landmarks") {
-    return Refusal(400, "upload: say as=skull, skin or landmarks");
+// "a.ply", or "a-2.ply" and so on where that is taken: no file is replaced.
+fs::path FreePath(const fs::path& wanted) {
+  fs::path path = wanted;
+  for (int n = 2; fs::exists(path); ++n) {
+    path.replace_filename(
+        fmt::format("{}-{}{}", wanted.stem().string(), n, wanted.extension().string()));
   }
-  fs::create_directories(path.parent_path());
-  WriteFileAtomically(path, request.body);
-  if (as == "landmarks") {
-    const LandmarkReading reading = ReadLandmarks(path);
-    bench.Do("loaded landmarks",
-             [&](BenchState s) { return TakeLandmarks(std::move(s), reading.file); });
-  } else {
-    bench.Do("opened " + as, [&](BenchState s) {
-      return ChangeSetting(std::move(s), "subject." + as, Json(path.string()).dump());
-    });
-  }
-  return StateReply(bench);
+  return path;
 }
 
-// A file of this machine by its path, likewise.
-BenchReply Open(Bench& bench, const BenchRequest& request) {
-  const Json json = ParseJson(request.body, "the request");
-  const std::string as = TextOf(json, "as"), path = TextOf(json, "path");
+// Takes a file for what it is said to be.
+BenchReply OpenFile(Bench& bench, const std::string& as, const fs::path& path) {
   if (as == "landmarks") {
     const LandmarkReading reading = ReadLandmarks(path);
     bench.Do("loaded landmarks",
              [&](BenchState s) { return TakeLandmarks(std::move(s), reading.file); });
   } else if (as == "skull" || as == "skin") {
-    bench.Do("opened " + as, [&](BenchState s) {
+    bench.Do("opened the " + as, [&](BenchState s) {
       return ChangeSetting(std::move(s), "subject." + as, Json(fs::absolute(path).string()).dump());
     });
   } else {
-    return Refusal(400, "open: say as: skull, skin or landmarks");
+    throw InputError("a file is opened as skull, skin or landmarks");
   }
   return StateReply(bench);
+}
+
+// A file from the browser: kept in subject/.
+BenchReply Upload(Bench& bench, const BenchRequest& request) {
+  const auto text = [&request](const char* key) {
+    const auto at = request.query.find(key);
+    return at == request.query.end() ? std::string() : at->second;
+  };
+  const fs::path path = FreePath(bench.Folder() / "subject" / SafeName(text("name")));
+  fs::create_directories(path.parent_path());
+  WriteFileAtomically(path, request.body);
+  try {
+    return OpenFile(bench, text("as"), path);
+  } catch (...) {
+    fs::remove(path);
+    throw;
+  }
+}
+
+// A file of this machine by its path.
+BenchReply Open(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseJson(request.body, "the request");
+  return OpenFile(bench, TextOf(json, "as"), TextOf(json, "path"));
 }
 
 BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); }

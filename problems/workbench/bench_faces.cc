@@ -26,7 +26,10 @@ FaceSource CoarseWay(const Experiment& experiment) {
   if (std::holds_alternative<PlacedFace>(way) || std::holds_alternative<ThinPlateFace>(way)) {
     return way;
   }
-  return AsksPrior(way) ? FaceSource(PriorFaceOf(way)) : FaceSource(ThinPlateFace{});
+  // Nearly to the tips, as a fit goes: a stiff plate would hide what one depth does.
+  constexpr double kStiffness_mm = 0.3;
+  return AsksPrior(way) ? FaceSource(PriorFaceOf(way))
+                        : FaceSource(ThinPlateFace{.stiffness_mm = kStiffness_mm});
 }
 
 SubjectData ThinnedOut(const BenchSubject& subject, const BenchState& state) {

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 #include <system_error>
 
 #include "problems/landmark_files/read_landmarks.h"
@@ -56,6 +58,20 @@ BenchFolder::BenchFolder(const fs::path& root) : root_(Made(root)) {
 }
 
 bool BenchFolder::HasWork() const { return fs::exists(root_ / kHistory); }
+
+void BenchFolder::CheckFree() const {
+  // What a beginning that was cut short may have left.
+  constexpr std::array<std::string_view, 5> kOwn = {kClaim, kStart, "subject", "tables",
+                                                    "networks"};
+  for (const auto& entry : fs::directory_iterator(root_)) {
+    const std::string name = entry.path().filename().string();
+    if (std::ranges::find(kOwn, name) == kOwn.end()) {
+      throw IoError(fmt::format(
+          "{}: the folder holds other things ({}); give one that is empty or not there yet",
+          root_.string(), name));
+    }
+  }
+}
 
 void BenchFolder::Begin(const std::string& start, const BenchState& state) {
   for (const BenchAsset& file : StarterFiles()) {

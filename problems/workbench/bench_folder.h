@@ -29,8 +29,10 @@ class BenchFolder {
   // Whether a workbench has been here before.
   bool HasWork() const;
 
-  // The first files. start: resolved. Throws IoError if the folder holds other things, which are
-  // not touched.
+  // Throws IoError if the folder holds things that are no workbench's.
+  void CheckFree() const;
+
+  // The first files. start: resolved.
   void Begin(const std::string& start, const BenchState& state);
 
   // What the last workbench left. Throws IoError, ConfigError.

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A workbench from a phantom to a face, without a browser: what a person does, what the folder
+// holds after it, and that a run of the folder gives the same.
+#include "problems/workbench/bench.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "problems/pipeline/experiment_config.h"
+#include "problems/report/run_folder.h"
+#include "problems/run.h"
+#include "problems/workbench/bench_actions.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/hspline_query/hspline_project.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+using ::testing::SizeIs;
+
+// Quick: a coarse head, its generic face bent to the tips.
+class WorkbenchBench : public ::testing::Test {
+ protected:
+  BenchOptions Options() {
+    const fs::path config = folder_ / "phantom.yaml";
+    WriteFileAtomically(config, fmt::format("base: {}/configs/phantom.yaml\n"
+                                            "subject: {{rings: 30}}\n"
+                                            "implicit: {{resolution: 24}}\nface: thin_plate\n",
+                                            SEMBLANCE_SOURCE_DIR));
+    BenchOptions options;
+    options.source = config;
+    options.folder = folder_ / "bench";
+    return options;
+  }
+  BenchOptions Again() {
+    BenchOptions options;
+    options.folder = folder_ / "bench";
+    return options;
+  }
+  static void RunToTheEnd(Bench& bench) {
+    bench.StartRun();
+    while (bench.Look().job.state == JobState::kRunning) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    ASSERT_EQ(bench.Look().job.state, JobState::kFinished) << bench.Look().job.words;
+  }
+
+  ScratchFolder folder_;
+};
+
+double DistanceFrom(const HSplineSurface& surface, const Vec3& point) {
+  return SurfaceProjector(surface).Project(point).distance_mm;
+}
+
+TEST_F(WorkbenchBench, ARayPlacesASiteWhereItFirstMeetsTheBone) {
+  Bench bench(Options());
+  const Box3 box = Bounds(bench.Look().subject->skull.mesh);
+  bench.PlaceByRay("g", {0, box.min().y() - 100, 0}, {0, 1, 0}, {0, 0, 0});
+  const Bench::Snapshot shot = bench.Look();
+  EXPECT_LT(shot.checks.sites.at("g").from_bone_mm, 1e-9);
+  const BenchLandmark& g =
+      *std::ranges::find(Now(shot.history).landmarks, "g", &BenchLandmark::site);
+  EXPECT_NEAR(g.point[0], 0, 1e-9);
+  EXPECT_LT(g.point[1], box.center().y()) << "the front, not the back";
+}
+
+TEST_F(WorkbenchBench, WhatWasDoneIsThereAfterACrash) {
+  const BenchOptions begin = Options();
+  int undone = 0;
+  {
+    Bench bench(begin);
+    bench.Do("set a depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.g", "9"); });
+    bench.Do("removed n", [](BenchState s) { return RemoveLandmark(s, "n"); });
+    bench.Undo();
+    undone = bench.Look().history.now;
+  }
+  Bench bench(Again());
+  EXPECT_EQ(bench.Look().history.now, undone);
+  EXPECT_EQ(bench.Look().experiment.tissue.set_mm.at("g"), 9);
+  EXPECT_TRUE(CanRedo(bench.Look().history));
+  EXPECT_THAT(Now(bench.Look().history).landmarks, SizeIs(32));
+}
+
+TEST_F(WorkbenchBench, ARefusedActionLeavesAllAsItWas) {
+  Bench bench(Options());
+  const std::string before = ReadFileBytes(bench.Folder() / "workbench.yaml");
+  const auto set = [&bench](const char* path, const char* value) {
+    bench.Do("set", [&](BenchState s) { return ChangeSetting(s, path, value); });
+  };
+  EXPECT_THROW(set("tissue.build", "\"fat\""), ConfigError);
+  EXPECT_THROW(set("subject.skull", "\"/no/such.ply\""), IoError);
+  EXPECT_THROW(set("subject.type", "\"phantom\""), Error);
+  EXPECT_EQ(ReadFileBytes(bench.Folder() / "workbench.yaml"), before);
+  EXPECT_FALSE(CanUndo(bench.Look().history));
+}
+
+TEST_F(WorkbenchBench, AnotherUnitAndFrameAreSeenAtOnce) {
+  Bench bench(Options());
+  const Vec3 before = Bounds(bench.Look().subject->skull.mesh).center();
+  bench.Do("set", [](BenchState s) { return ChangeSetting(s, "subject.axes", "\"RAS\""); });
+  EXPECT_NEAR(Bounds(bench.Look().subject->skull.mesh).center().y(), -before.y(), 1e-9);
+  bench.Do("set", [](BenchState s) { return ChangeSetting(s, "subject.units", "\"m\""); });
+  EXPECT_THAT(bench.Look().subject->faults, SizeIs(2)) << "skull and skin are no head's in metres";
+}
+
+TEST_F(WorkbenchBench, TheFolderRunsToTheSameBytesEditsAndAll) {
+  Bench bench(Options());
+  bench.Do("set a depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.g", "9"); });
+  EXPECT_THROW(bench.PullAt({0, -100, 0}, {.level = 1, .by_mm = {0, -3, 0}}), InputError)
+      << "the face is sculpted once it is made";
+  RunToTheEnd(bench);
+  const HSplineSurface plain = bench.Full().surface;
+  const Vec3 nose = plain.Point({0.5, 0.5});
+  bench.PullAt(nose, {.level = 1, .uv = {}, .by_mm = {0, -3, 0}, .reach = 2, .mirror = true});
+  EXPECT_FALSE(bench.Look().run_saved);
+  EXPECT_TRUE(bench.Look().face_fresh);
+  const HSplineSurface pulled = bench.Full().surface;
+  EXPECT_GT((pulled.Point({0.5, 0.5}) - nose).norm(), 1);
+  RunToTheEnd(bench);
+  EXPECT_TRUE(bench.Look().run_saved);
+  const HSplineSurface saved = ReadHSpline(bench.Folder() / "run/face.hspline.json");
+  EXPECT_EQ(saved.Offsets(), pulled.Offsets());
+
+  // As from the command line.
+  const auto experiment = ReadConfig<Experiment>(bench.Folder() / "config.yaml");
+  OutputFolder again(folder_ / "again", WhenNotEmpty::kRefuse);
+  WriteRun(experiment, semblance::Run(experiment, {}), again, {});
+  for (const std::string& name : again.Written()) {
+    if (name != "timing.json") {
+      EXPECT_EQ(ReadFileBytes(again.Root() / name), ReadFileBytes(bench.Folder() / "run" / name))
+          << name;
+    }
+  }
+}
+
+TEST_F(WorkbenchBench, AChangeDuringARunIsNotMixedIntoIt) {
+  Bench bench(Options());
+  bench.StartRun();
+  bench.Do("set a depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.g", "9"); });
+  while (bench.Look().job.state == JobState::kRunning) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_EQ(bench.Look().job.state, JobState::kStopped);
+  EXPECT_FALSE(bench.Look().has_face);
+  EXPECT_FALSE(fs::exists(bench.Folder() / "run/manifest.json"));
+}
+
+TEST_F(WorkbenchBench, ACoarseFaceFollowsADepth) {
+  Bench bench(Options());
+  const BenchFace before = bench.Coarse(), after = bench.CoarseWith({"tissue.set_mm.g", "14"});
+  const auto dowel = std::ranges::find(before.dowels, "g", &Dowel::site);
+  ASSERT_NE(dowel, before.dowels.end());
+  const Vec3 tip = dowel->base + 14 * dowel->direction;
+  EXPECT_LT(DistanceFrom(after.surface, tip), 1.5);
+  EXPECT_GT(DistanceFrom(before.surface, tip), 4);
+  EXPECT_FALSE(CanUndo(bench.Look().history)) << "only tried out";
+}
+
+TEST_F(WorkbenchBench, VariantsDifferAsTheirDepthsDo) {
+  Bench bench(Options());
+  const BenchFace thin = bench.Coarse(BenchVariant::kThinner);
+  const BenchFace thick = bench.Coarse(BenchVariant::kThicker);
+  for (std::size_t k = 0; k < thin.dowels.size(); ++k) {
+    EXPECT_GT(thick.dowels[k].depth_mm, thin.dowels[k].depth_mm) << thin.dowels[k].site;
+  }
+}
+
+TEST_F(WorkbenchBench, AFeatureThatIsKeptBlendsBackToItself) {
+  Bench bench(Options());
+  RunToTheEnd(bench);
+  const auto before = bench.Full().surface.Offsets();
+  bench.KeepFeature("nose", "mine");
+  EXPECT_THROW(bench.KeepFeature("nose", "mine"), InputError);
+  EXPECT_THROW(bench.KeepFeature("ear", "other"), InputError);
+  bench.BlendFeature("mine", 0.5);
+  for (const auto& [vertex, offset] : bench.Full().surface.Offsets()) {
+    EXPECT_LT((offset - before.at(vertex)).norm(), 1e-12);
+  }
+  EXPECT_THROW(bench.BlendFeature("theirs", 0.5), InputError);
+}
+
+TEST_F(WorkbenchBench, AFolderWithOtherThingsIsRefused) {
+  const BenchOptions options = Options();
+  fs::create_directories(options.folder);
+  WriteFileAtomically(options.folder / "notes.txt", "mine");
+  EXPECT_THROW(Bench{options}, IoError);
+  EXPECT_FALSE(fs::exists(options.folder / "workbench.yaml"));
+}
+
+}  // namespace
+}  // namespace semblance
