@@ -18,7 +18,7 @@
 namespace semblance {
 namespace {
 
-bool TakesTableAsExact(const Experiment& experiment, const Case& subject) {
+bool TakesPublishedDeviations(const Experiment& experiment, const Case& subject) {
   return experiment.tissue.depths == DepthSource::kTable &&
          experiment.uncertainty.dowel_sd_mm == 0 &&
          std::ranges::any_of(subject.dowels_on_bone,
@@ -39,11 +39,10 @@ std::optional<FaceUncertainty> EstimateUncertainty(const Experiment& experiment,
         "z: it is rather too large than too small",
         term));
   }
-  if (TakesTableAsExact(experiment, subject)) {
+  if (TakesPublishedDeviations(experiment, subject)) {
     subject.notes.push_back(
-        "the table states no standard deviation: the uncertainty of the face takes its depths as "
-        "exact for this head, and is too small; set uncertainty.dowel_sd_mm (3 mm is the mean of "
-        "tables/t_table_2023.yaml)");
+        "the table states no standard deviation: the uncertainty of the face takes those of the "
+        "T-Table 2023 (Hona & Stephan 2024), or uncertainty.dowel_sd_mm where it is given");
   }
   return result;
 }
@@ -175,6 +174,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
           .face_from_template = made.placed.face_from_template,
           .placed = std::move(made.placed.face),
           .prior = std::move(made.prior),
+          .rules = std::move(made.rules),
           .seeding = std::move(made.fitted.seeding),
           .target = std::move(made.fitted.target),
           .fit = std::move(made.fitted.fit),

@@ -42,6 +42,7 @@ struct RunResult {
   TemplateFace placed;  // the generic face brought to the dowels; the prior's most likely face
                         // where it was asked for
   std::optional<ShapeEstimate> prior;  // where it was asked for
+  std::vector<AppliedRule> rules;      // that took part in it
   SeedResult seeding;                  // of the last round
   FitTarget target;                    // of the last round: dowel tips at their (u,v), then seeds
   FitResult fit;                       // of the last round

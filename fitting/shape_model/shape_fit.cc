@@ -9,9 +9,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "fitting/shape_model/farthest_points.h"
@@ -43,6 +45,19 @@ void CheckTips(const ShapeModel& model, const ShapeTarget& target) {
       throw InputError(
           fmt::format("shape model: the tip of '{}' is not finite; leave it out", tip.label));
     }
+  }
+  for (const ShapeMark& mark : target.marks) {
+    if (mark.at.empty() || !mark.position.allFinite() || !mark.direction.allFinite() ||
+        !(mark.sd_mm > 0)) {
+      throw InputError(fmt::format(
+          "shape model: the mark '{}' has no point, place, direction or deviation", mark.label));
+    }
+  }
+  if (target.surface != nullptr && !target.surface_sd_mm.empty() &&
+      target.surface_sd_mm.size() != target.surface->points.size()) {
+    throw InputError(fmt::format(
+        "shape model: {} deviations for the {} points of the surface; give one per point or none",
+        target.surface_sd_mm.size(), target.surface->points.size()));
   }
   if (!(target.start.scale > 0)) {
     throw InputError(
@@ -87,6 +102,20 @@ NearestTip NearestTipTo(const Vec3& p, const ShapeModel& model, const ShapeTarge
   return nearest;
 }
 
+// How much less is known of a point far from all that was seen than the modes tell; 0 where nothing
+// was seen, for then the modes are all that is known.
+double UnseenSd_mm(const Vec3& p, std::span<const ShapeObservation> seen,
+                   const ShapeFitOptions& options) {
+  if (seen.empty()) {
+    return 0;
+  }
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const ShapeObservation& one : seen) {
+    nearest = std::min(nearest, (one.row.mean - p).squaredNorm());
+  }
+  return options.unseen_rate * std::max(0.0, std::sqrt(nearest) - options.unseen_reach_mm);
+}
+
 // A point of the model that is drawn to the surface.
 struct DrawnPoint {
   int vertex = -1;
@@ -120,8 +149,10 @@ std::vector<DrawnPoint> DrawnPoints(const ShapeModel& model, const ShapeTarget& 
 
 class DrawingSurface {
  public:
-  DrawingSurface(const TriMesh& mesh, const ShapeFitOptions& options)
+  DrawingSurface(const TriMesh& mesh, std::span<const double> sd_mm, const ShapeFitOptions& options)
       : mesh_(mesh),
+        sd_mm_(sd_mm),
+        otherwise_sd_mm_(options.surface_sd_mm),
         normals_(VertexNormals(mesh)),
         on_border_(mesh.points.size(), 0),
         query_(mesh),
@@ -134,6 +165,7 @@ class DrawingSurface {
 
   struct Foot {
     Vec3 position, normal;
+    double sd_mm;
   };
   // Where a point with this normal is drawn to, if anywhere.
   std::optional<Foot> FootOf(const Vec3& p, const Vec3& normal) const {
@@ -146,11 +178,23 @@ class DrawingSurface {
     const Vec3 out = (at.weights[0] * normals_[t[0]] + at.weights[1] * normals_[t[1]] +
                       at.weights[2] * normals_[t[2]])
                          .normalized();
-    return out.dot(normal) >= least_cosine_ ? std::optional(Foot{at.position, out}) : std::nullopt;
+    return out.dot(normal) >= least_cosine_ ? std::optional(Foot{at.position, out, SdAt(at)})
+                                            : std::nullopt;
   }
 
  private:
+  double SdAt(const MeshPoint& at) const {
+    if (sd_mm_.empty()) {
+      return otherwise_sd_mm_;
+    }
+    const Triangle& t = mesh_.triangles[at.triangle];
+    return at.weights[0] * sd_mm_[t[0]] + at.weights[1] * sd_mm_[t[1]] +
+           at.weights[2] * sd_mm_[t[2]];
+  }
+
   const TriMesh& mesh_;
+  std::span<const double> sd_mm_;  // one per point; none: the same everywhere
+  double otherwise_sd_mm_;
   std::vector<Vec3> normals_;
   std::vector<char> on_border_;
   MeshQuery query_;
@@ -175,7 +219,7 @@ class ShapeEstimator {
     parameters_ = StartParameters(frame_, target.start, model.Modes(), std::ssize(centres));
     start_pose_ = parameters_.pose;
     if (target.surface != nullptr && options.surface_points > 0 && options.surface_worth > 0) {
-      surface_.emplace(*target.surface, options);
+      surface_.emplace(*target.surface, target.surface_sd_mm, options);
       drawn_ = DrawnPoints(model, target, options);
     }
   }
@@ -187,6 +231,7 @@ class ShapeEstimator {
  private:
   void Place();
   void SeeTips();
+  void SeeMarks();
   void SeeSurface();
   void Solve(bool pose_alone);
   void AddPriors(ceres::Problem& problem);
@@ -234,16 +279,37 @@ void ShapeEstimator::SeeTips() {
   }
 }
 
+ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
+                 const std::vector<ModelPoint>& at) {
+  ShapeRow mean = RowAt(model, field, at.front());
+  for (std::size_t k = 1; k < at.size(); ++k) {
+    const ShapeRow row = RowAt(model, field, at[k]);
+    mean.mean += row.mean;
+    mean.modes += row.modes;
+    mean.field += row.field;
+  }
+  const auto count = static_cast<double>(at.size());
+  return {mean.mean / count, mean.modes / count, mean.field / count};
+}
+
+void ShapeEstimator::SeeMarks() {
+  for (const ShapeMark& mark : target_.marks) {
+    seen_.push_back({.row = MeanRow(model_, field_, mark.at),
+                     .position = mark.position,
+                     .whitening = mark.direction.transpose() / mark.sd_mm,
+                     .loss_width = options_.tip_loss_width});
+  }
+}
+
 void ShapeEstimator::SeeSurface() {
   surface_points_ = 0;
-  const double weight = options_.surface_worth /
-                        (options_.surface_points * options_.surface_sd_mm * options_.surface_sd_mm);
+  const double weight = options_.surface_worth / options_.surface_points;
   for (const auto& [v, shared_sd_mm] : drawn_) {
     if (const auto foot = surface_->FootOf(placed_.points[v], normals_[v])) {
       seen_.push_back({.row = RowOfVertex(model_, field_, v),
                        .position = foot->position,
-                       .whitening = foot->normal.transpose(),
-                       .loss_width = options_.surface_loss_width_mm,
+                       .whitening = foot->normal.transpose() / foot->sd_mm,
+                       .loss_width = options_.surface_loss_width,
                        .weight = weight,
                        .shared_mm = shared_sd_mm * foot->normal});
       ++surface_points_;
@@ -307,6 +373,7 @@ void ShapeEstimator::Round(int round) {
   Place();
   seen_.clear();
   SeeTips();
+  SeeMarks();
   if (surface_ && round >= kFirstSurfaceRound) {
     SeeSurface();
   }
@@ -333,13 +400,21 @@ ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   result.sigma_mm =
       DeviationsAlong(frame_, parameters_, posterior, {options_.mode_sd, options_.population_sd},
                       rows, normals_, context.threads);
-  for (double& sigma : result.sigma_mm) {
-    sigma = std::hypot(sigma, options_.discrepancy_mm);
+  for (std::size_t v = 0; v < result.sigma_mm.size(); ++v) {
+    const double unseen_mm = UnseenSd_mm(model_.mean.points[v], seen_, options_);
+    result.sigma_mm[v] = std::hypot(result.sigma_mm[v], options_.discrepancy_mm, unseen_mm);
   }
   for (const ShapeTip& tip : target_.tips) {
     result.tip_residual_mm.push_back(
         (tip.position - PositionOf(tip.at, model_.mean, placed_.points))
             .dot(NormalAt(tip.at, model_.mean, normals_)));
+  }
+  for (const ShapeMark& mark : target_.marks) {
+    Vec3 at = Vec3::Zero();
+    for (const ModelPoint& point : mark.at) {
+      at += PositionOf(point, model_.mean, placed_.points) / static_cast<double>(mark.at.size());
+    }
+    result.mark_residual_mm.push_back((mark.position - at).dot(mark.direction));
   }
   result.field_rms_mm = Rms(
       field_ *

@@ -22,15 +22,17 @@ struct ShapeFitOptions {
   double mode_sd = 1;                 // of a coefficient
   SmoothFieldOptions field;           // what the modes cannot express
   int surface_points = 300;           // drawn to the implicit face; 0: the dowels alone
-  double surface_worth = 80;          // how many independent points those count as
-  double surface_sd_mm = 2.5;         // of the implicit face along its normal
-  double surface_loss_width_mm = 2;   // Huber
+  double surface_worth = 20;          // how many independent points those count as
+  double surface_sd_mm = 2.5;         // of the surface along its normal, where it states none
+  double surface_loss_width = 0.8;    // Huber, in standard deviations
   double surface_reach_mm = 15;       // farther off a point is not drawn
   double surface_max_angle_deg = 60;  // nor where normals differ by more
   double surface_range_mm = 60;       // nor farther than this from every dowel
   int rounds = 12;                    // at most
-  double population_sd = 2;           // of a coefficient among people; for sigma
+  double population_sd = 1.3;         // of a coefficient among people; for sigma
   double discrepancy_mm = 1.25;       // what neither modes nor field can express; for sigma
+  double unseen_reach_mm = 20;        // farther from all that is observed sigma grows
+  double unseen_rate = 0.2;           // by this, mm per mm
 };
 template <class Visitor>
 void Fields(Visitor& visit, ShapeFitOptions& o) {
@@ -83,14 +85,15 @@ void Fields(Visitor& visit, ShapeFitOptions& o) {
                   .unit = "mm",
                   .min = 1e-3,
                   .max = 100,
-                  .doc = "standard deviation of the implicit face along its normal"},
+                  .doc = "standard deviation of the surface along its normal, where nothing is "
+                         "known of it; that of the implicit face is `implicit_spread`'s"},
         o.surface_sd_mm);
-  visit(FieldInfo{.name = "surface_loss_width_mm",
-                  .unit = "mm",
+  visit(FieldInfo{.name = "surface_loss_width",
                   .min = 1e-3,
                   .max = 1e6,
-                  .doc = "a point farther from the implicit face counts less (Huber's loss)"},
-        o.surface_loss_width_mm);
+                  .doc = "in standard deviations; a point farther from the surface counts less "
+                         "(Huber's loss)"},
+        o.surface_loss_width);
   visit(FieldInfo{.name = "surface_reach_mm",
                   .unit = "mm",
                   .min = 0,
@@ -131,6 +134,18 @@ void Fields(Visitor& visit, ShapeFitOptions& o) {
                   .doc = "standard deviation of what neither modes nor the smooth rest can "
                          "express; part of the stated sigma"},
         o.discrepancy_mm);
+  visit(FieldInfo{.name = "unseen_reach_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 1000,
+                  .doc = "farther than this from every dowel and every point that is drawn to the "
+                         "implicit face, as where no bone was scanned, sigma has a further part"},
+        o.unseen_reach_mm);
+  visit(FieldInfo{.name = "unseen_rate",
+                  .min = 0,
+                  .max = 10,
+                  .doc = "which grows by so many mm with each mm farther"},
+        o.unseen_rate);
 }
 
 // A dowel's tip and the point of the model that is expected there.
@@ -141,6 +156,15 @@ struct ShapeTip {
   Vec3 direction = Vec3::Zero();         // unit, along which it may be off besides
   double along_sd_mm = 0;                // by this
   double shared_sd_mm = 0;               // and by this, in which all tips of a person err together
+};
+
+// What is known of one coordinate of the mean of some points of the model.
+struct ShapeMark {
+  std::string label;
+  std::vector<ModelPoint> at;             // at least one
+  Vec3 position = Vec3::Constant(kNaN);   // mm; only its coordinate along `direction` counts
+  Vec3 direction = Vec3::Constant(kNaN);  // unit
+  double sd_mm = kNaN;                    // > 0
 };
 
 // Points of the model nearer to it than this are not drawn to the surface.
@@ -154,31 +178,38 @@ struct ShapeTarget {
   std::vector<ShapeTip> tips;        // may be empty
   const TriMesh* surface = nullptr;  // outward, in the subject's frame; none: the tips alone
   std::vector<ShapeFeature> features;
+  std::vector<double> surface_sd_mm = {};  // one per point of the surface; none: of the options
+  std::vector<ShapeMark> marks = {};
 };
 
 struct ShapeEstimate {
   Similarity subject_from_model;
-  Eigen::VectorXd coefficients;         // one per mode
-  std::vector<Vec3> points;             // one per point of the model, in the subject's frame, mm
-  std::vector<double> sigma_mm;         // one per point: along its normal, with the discrepancy
-  std::vector<double> tip_residual_mm;  // one per tip: from the point of the shape to the tip, > 0
-                                        // outside, along the shape's normal
-  double field_rms_mm = kNaN;           // of the smooth rest over the points
-  int surface_points = -1;              // that were drawn to the surface in the last round
+  Eigen::VectorXd coefficients;          // one per mode
+  std::vector<Vec3> points;              // one per point of the model, in the subject's frame, mm
+  std::vector<double> sigma_mm;          // one per point: along its normal, with all its parts
+  std::vector<double> tip_residual_mm;   // one per tip: from the point of the shape to the tip, > 0
+                                         // outside, along the shape's normal
+  std::vector<double> mark_residual_mm;  // one per mark: from the shape to the mark, along its
+                                         // direction
+  double field_rms_mm = kNaN;            // of the smooth rest over the points
+  int surface_points = -1;               // that were drawn to the surface in the last round
   int rounds = -1;
   double last_move_mm = kNaN;  // of an observed point, in the last round
   bool usable = false;
 };
 
 // Minimises, in Ceres, over s, R, t, w and a of shape_parameters.h
-//   sum_tips Huber_width(r' C^-1 r) + worth / (points * sd^2) sum_surface Huber_width((n . (c -
-//   x))^2)
+//   sum_tips Huber_width(r' C^-1 r) + sum_marks Huber_width((d . (m - x))^2 / sd^2)
+//     + worth / points sum_surface Huber_width((n . (c - x))^2 / sd(c)^2)
 //     + |w / mode_sd|^2 + |a|^2 + (ln s / scale_sd)^2,
 // C of shape_observation.h with the shape's own normal, c the surface's closest point to x and n
 // its normal; and a prior of 1 rad and 100 mm on the pose, so weak that it matters only where
 // nothing else speaks. Points and normals are taken anew in each round. The posterior is the normal
 // distribution of the last linearisation, widened as DeviationsAlong says; the surface shares the
-// error of the nearest tip. One thread apart from sigma; same bytes whatever their
+// error of the nearest tip. Sigma has two parts besides, added in squares: discrepancy_mm, and
+// unseen_rate (d - unseen_reach_mm) where d, the distance on the mean from the nearest point that
+// was observed, is larger than that: modes alone are too sure of a jaw whose bone nobody saw.
+// One thread apart from sigma; same bytes whatever their
 // number. Throws InputError as CheckShapeModel (name: "shape model"), for a tip that is not on the
 // model or not finite, and for a start without a positive scale; Cancelled.
 ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,

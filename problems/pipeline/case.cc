@@ -166,12 +166,16 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
       .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks),
       .open_dowels = {},
       .network = {},
+      .points = {},
       .basis = {},
       .notes = data.notes,
       .inputs = data.inputs};
   Append(subject.notes, remarks);
   Append(subject.notes, FillDepths(WithSiteDepths(experiment, data.landmarks), data.landmarks,
                                    subject.dowels_on_bone));
+  for (const Landmark& landmark : data.landmarks.landmarks) {
+    subject.points[landmark.site] = {landmark.point[0], landmark.point[1], landmark.point[2]};
+  }
   subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
   InsertDowels(experiment, data, query, subject);
   const NetworkPlan plan = ReadNetworkPlan(experiment.network);

@@ -87,6 +87,9 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back(
         {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
+  for (const OptionFault& fault : FaultsOfRules(experiment.rules)) {
+    faults.push_back({"rules." + fault.path, fault.what});
+  }
   for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
     faults.push_back({"sites." + fault.path, fault.what});
   }

@@ -25,6 +25,7 @@
 #include "problems/preparation/hinge.h"
 #include "problems/preparation/mirror.h"
 #include "problems/prior/face_source.h"
+#include "problems/prior/feature_rules.h"
 #include "problems/subject/dowel_depths.h"
 #include "problems/subject/extra_sites.h"
 #include "problems/subject/landmarks.h"
@@ -157,6 +158,7 @@ struct Experiment {
   FaceSource face;                               // the way to the face
   BustSource bust;                               // the head that it is put into
   std::vector<Alternative> alternatives;         // other answers, beside this one
+  FeatureRules rules;                            // for what bone does not carry
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;             // no seeds nearer to where the scan ends
@@ -218,6 +220,10 @@ void Fields(Visitor& visit, Experiment& o) {
                          "run's, and side by side in the report, e.g. [{name: obese, set: "
                          "[\"tissue.build=obese\"]}]"},
         o.alternatives);
+  visit(FieldInfo{.name = "rules",
+                  .doc = "rules of the literature for eyes, mouth and nose, as observations of a "
+                         "face that asks the prior; each is on when its points are there"},
+        o.rules);
   visit(FieldInfo{.name = "first_fit",
                   .doc = "levels fitted to the dowels alone before seeds are taken; may be empty"},
         o.first_fit);

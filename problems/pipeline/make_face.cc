@@ -178,23 +178,69 @@ HSplineSurface UnderThinPlate(const HSplineSurface& surface, const FitTarget& do
   return SurfaceThrough(surface.shape(), grid, samples);
 }
 
+// Dowels at sites that the prior lacks: where the ray of the dowel meets the placed template.
+std::map<std::string, ModelPoint> OtherSites(const FitTarget& dowels, const LoadedPrior& prior) {
+  std::map<std::string, ModelPoint> others;
+  for (const FitPoint& point : dowels.points) {
+    if (!prior.face.sites.contains(point.label)) {
+      others[point.label] = prior.on_template.under[prior.on_template.grid.NearestTo(point.uv)];
+    }
+  }
+  return others;
+}
+
+// Their points on the model, found on a face that was only placed, become those nearest to the
+// tips on the estimated face. False if there are none.
+bool MeetAnew(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& target) {
+  const MeshQuery query(TriMesh{shape.points, prior.model.mean.triangles});
+  bool any = false;
+  for (ShapeTip& tip : target.tips) {
+    if (!prior.sites.contains(tip.label)) {
+      const MeshPoint at = query.Closest(tip.position);
+      tip.at = {at.triangle, at.weights};
+      any = true;
+    }
+  }
+  return any;
+}
+
+// None of a subject whose pose is not known.
+RuleMarks RulesOf(const FaceInput& in, const FacePrior& prior) {
+  return in.subject.basis.sites ? MarksOfRules(in.experiment.rules, in.subject.points,
+                                               in.subject.basis.sites->skull_from_average, prior)
+                                : RuleMarks();
+}
+
 // The prior's most likely face as a placed template.
-MadeFace MostLikelyFace(const ShapeFitOptions& estimate, const TableDepthOptions& table_depths,
-                        PlacedTemplate placed, const FaceInput& in, const RunContext& context) {
-  const bool from_table = in.experiment.tissue.depths == DepthSource::kTable;
+MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceInput& in,
+                        const RunContext& context) {
   const LoadedPrior& prior = *in.prior;
-  ShapeEstimate shape = EstimateShape(
-      prior.face.model,
-      PriorTarget(prior.face, in.subject.dowels_on_bone, from_table ? &table_depths : nullptr,
-                  in.implicit.triangles.empty() ? nullptr : &in.implicit),
-      estimate, context);
+  const std::vector<Dowel>& dowels = in.subject.dowels_on_bone;
+  const TableDepthOptions* const table =
+      in.experiment.tissue.depths == DepthSource::kTable ? &use.table_depths : nullptr;
+  const TriMesh* const implicit = in.implicit.triangles.empty() ? nullptr : &in.implicit;
+  ShapeTarget target =
+      PriorTarget(prior.face, dowels, table, implicit, OtherSites(placed.dowels, prior));
+  if (implicit != nullptr) {
+    target.surface_sd_mm =
+        ImplicitSd_mm(use.implicit_spread, *implicit, in.shell, dowels, table, context.threads);
+  }
+  RuleMarks rules = RulesOf(in, prior.face);
+  target.marks = std::move(rules.marks);
+  ShapeEstimate shape = EstimateShape(prior.face.model, target, use.estimate, context);
+  if (MeetAnew(shape, prior.face, target)) {
+    shape = EstimateShape(prior.face.model, target, use.estimate, context);
+  }
+  for (std::size_t k = 0; k < rules.rules.size(); ++k) {
+    rules.rules[k].residual_mm = shape.mark_residual_mm[k];
+  }
   placed.face_from_template =
       Composed(shape.subject_from_model, prior.on_template.mean_from_template);
   placed.face = InSubjectFrame(in.generic, placed.face_from_template);
   placed.face.surface = SurfaceOf(shape, prior.face, prior.on_template, in.generic.surface.shape());
   FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
   unfitted.fit.usable = shape.usable;
-  return {std::move(placed), std::move(unfitted), std::move(shape)};
+  return {std::move(placed), std::move(unfitted), std::move(shape), std::move(rules.rules)};
 }
 
 MadeFace MakeFace(const AutoFace&, PlacedTemplate, const FaceInput&, const RunContext&) {
@@ -221,7 +267,7 @@ MadeFace MakeFace(const FittedTemplate&, PlacedTemplate placed, const FaceInput&
 
 MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
-  return MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
+  return MostLikelyFace(o.use, std::move(placed), in, context);
 }
 
 // By how much the tips' variance exceeds that of measured depths: a fit weighs its points among
@@ -230,10 +276,10 @@ double TipVarianceRatio(const PriorThenFit& o, const FaceInput& in) {
   if (in.experiment.tissue.depths != DepthSource::kTable) {
     return 1;
   }
-  const double measured = std::pow(o.estimate.tip_normal_sd_mm, 2);
+  const double measured = std::pow(o.use.estimate.tip_normal_sd_mm, 2);
   double sum = 0;
   for (const Dowel& dowel : in.subject.dowels_on_bone) {
-    sum += measured / (measured + std::pow(DepthSd_mm(o.table_depths, dowel), 2));
+    sum += measured / (measured + std::pow(DepthSd_mm(o.use.table_depths, dowel), 2));
   }
   return static_cast<double>(in.subject.dowels_on_bone.size()) / sum;
 }
@@ -254,7 +300,7 @@ Experiment OnPrior(const PriorThenFit& o, const FaceInput& in) {
 
 MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
-  MadeFace made = MostLikelyFace(o.estimate, o.table_depths, std::move(placed), in, context);
+  MadeFace made = MostLikelyFace(o.use, std::move(placed), in, context);
   const HSplineSurface& surface = made.placed.face.surface;
   for (FitPoint& point : made.placed.dowels.points) {
     if (!IsHeld(in.experiment.sites, point.label)) {

@@ -49,7 +49,8 @@ struct FaceInput {
 struct MadeFace {
   PlacedTemplate placed;
   FaceFit fitted;
-  std::optional<ShapeEstimate> prior;  // where a prior was asked
+  std::optional<ShapeEstimate> prior;   // where a prior was asked
+  std::vector<AppliedRule> rules = {};  // that took part in it
 };
 
 // The prior of the experiment, laid on its template; null where no face asks it. Throws as

@@ -10,6 +10,7 @@
 #include "interp/evaluation/calibration.h"
 #include "interp/kriging/kriging_process.h"
 #include "problems/metrics/quantile.h"
+#include "problems/prior/depth_spread.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -24,9 +25,18 @@ struct DepthBehind {
   double depth_mm = kNaN;
 };
 
-std::vector<Dowel> WithSd(std::vector<Dowel> dowels, double sd_mm) {
+bool FromTable(const Experiment& experiment) {
+  return experiment.tissue.depths == DepthSource::kTable;
+}
+
+// With the deviation that their source states, else the option's, else the published one.
+std::vector<Dowel> WithSd(std::vector<Dowel> dowels, const Experiment& experiment) {
+  const double otherwise_mm = experiment.uncertainty.dowel_sd_mm;
   for (Dowel& dowel : dowels) {
-    dowel.sd_mm = std::isfinite(dowel.sd_mm) ? dowel.sd_mm : sd_mm;
+    if (!std::isfinite(dowel.sd_mm)) {
+      dowel.sd_mm =
+          FromTable(experiment) && otherwise_mm == 0 ? PublishedSd_mm(dowel) : otherwise_mm;
+    }
   }
   return dowels;
 }
@@ -102,13 +112,13 @@ struct SplitDeviations {
 };
 
 SplitDeviations Split(const Experiment& experiment, std::span<const DepthBehind> depths) {
-  const bool from_table = experiment.tissue.depths == DepthSource::kTable;
-  const double shared = from_table ? experiment.uncertainty.shared : 0;
+  const double shared = FromTable(experiment) ? experiment.uncertainty.shared : 0,
+               own = FromTable(experiment) ? experiment.uncertainty.own : 1;
   SplitDeviations split{Eigen::VectorXd::Zero(std::ssize(depths)), {}};
   for (std::size_t k = 0; k < depths.size(); ++k) {
     const double sd_mm = depths[k].dowels_sd_mm;
     split.shared_mm[static_cast<Eigen::Index>(k)] = shared * sd_mm;
-    split.own_mm.push_back(std::sqrt(1 - shared * shared) * sd_mm);
+    split.own_mm.push_back(own * sd_mm);
   }
   return split;
 }
@@ -139,8 +149,7 @@ Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& inpu
 PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
                      const HSplineSurface& surface, const FitTarget& target,
                      FaceUncertainty& result, const RunContext& context) {
-  const std::vector<Dowel> dowels =
-      WithSd(stage.dowels_on_shell, experiment.uncertainty.dowel_sd_mm);
+  const std::vector<Dowel> dowels = WithSd(stage.dowels_on_shell, experiment);
   const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network};
   const std::vector<DepthBehind> depths = DepthsBehind(target, stage, dowels, context);
   Eigen::MatrixXd covariance = DepthErrors(experiment, input, depths, result, context);

@@ -51,7 +51,8 @@ struct FittedFace {
 // scheme states there (where it states none, the dowels' by inverse squared distance) and
 // resembling itself over kriging's length. A dowel's tip
 // is off along the dowel, a seed along the face's normal; a seed also by implicit_sd_mm, over the
-// same length. Of a table's deviations the part `shared` is one error of all points.
+// same length. Of a table's deviations the part `shared` is one error of all points, and the part
+// `own` resembles itself over that length.
 // ErrorPropagation carries this through the fit; sigma then has the template's own misfit too.
 // Throws InputError as ErrorPropagation.
 FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& stage,

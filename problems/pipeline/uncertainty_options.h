@@ -14,7 +14,8 @@ struct UncertaintyOptions {
   std::uint64_t random_seed = 1;  // which faces
   double dowel_sd_mm = 0;         // where the depth's source states none; 0: exact
   double implicit_sd_mm = 0.5;    // of the implicit face even where all depths are right
-  double shared = 0.7;            // part of a table's sd in which a person's depths err together
+  double own = 0.9;               // part of a table's sd in which a depth errs alone
+  double shared = 0.9;            // part of it in which a person's depths err together
   double template_sd_mm = 1;      // of the generic face, between points of the fit
   double unseen_sd_mm = 4;        // of it, far from any point
   double unseen_reach_mm = 25;    // how far that is
@@ -36,8 +37,9 @@ void Fields(Visitor& visit, UncertaintyOptions& o) {
                   .unit = "mm",
                   .min = 0,
                   .max = 50,
-                  .doc = "standard deviation of the depth of dowels whose source states none, such "
-                         "as measured ones; 0: they are exact"},
+                  .doc = "standard deviation of the depth of dowels whose source states none; 0: "
+                         "measured ones are exact, and those of a table have the published "
+                         "deviation of their site (Hona & Stephan 2024)"},
         o.dowel_sd_mm);
   visit(FieldInfo{.name = "implicit_sd_mm",
                   .unit = "mm",
@@ -46,11 +48,16 @@ void Fields(Visitor& visit, UncertaintyOptions& o) {
                   .doc = "how far the implicit face, and so a seed, is off even where all depths "
                          "are right"},
         o.implicit_sd_mm);
+  visit(FieldInfo{.name = "own",
+                  .min = 0,
+                  .max = 5,
+                  .doc = "part of the standard deviation of a table's depths by which a person's "
+                         "depths err each by itself"},
+        o.own);
   visit(FieldInfo{.name = "shared",
                   .min = 0,
-                  .max = 1,
-                  .doc = "part of the standard deviation of a table's depths in which all depths "
-                         "of a person err together: a fat face is fat everywhere"},
+                  .max = 5,
+                  .doc = "part of it in which they all err together: a fat face is fat everywhere"},
         o.shared);
   visit(FieldInfo{.name = "template_sd_mm",
                   .unit = "mm",

@@ -49,25 +49,31 @@ template <class Visitor>
 void Fields(Visitor&, FittedTemplate&) {}
 
 // What every face that asks the prior has.
+struct PriorUse {
+  ShapeFitOptions estimate;
+  TableDepthOptions table_depths;
+  ImplicitSpreadOptions implicit_spread;
+};
 template <class Visitor>
-void PriorUseFields(Visitor& visit, ShapeFitOptions& estimate, TableDepthOptions& table_depths) {
+void PriorUseFields(Visitor& visit, PriorUse& o) {
   visit(FieldInfo{.name = "estimate", .doc = "how the most likely face of the prior is found"},
-        estimate);
+        o.estimate);
   visit(FieldInfo{.name = "table_depths",
                   .doc = "how sure depths are that come from a table; measured ones are taken as "
                          "exact along the dowel"},
-        table_depths);
+        o.table_depths);
+  visit(FieldInfo{.name = "implicit_spread", .doc = "how sure the implicit face is"},
+        o.implicit_spread);
 }
 
 // The most likely face of the prior.
 struct PriorFace {
   static constexpr std::string_view kName = "prior";
-  ShapeFitOptions estimate;
-  TableDepthOptions table_depths;
+  PriorUse use;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorFace& o) {
-  PriorUseFields(visit, o.estimate, o.table_depths);
+  PriorUseFields(visit, o.use);
 }
 
 // The same as the template of the H-spline fit, which starts from it without a first fit; each
@@ -78,8 +84,7 @@ struct PriorThenFit {
   double shape_weight = 1;
   double seed_weight = 0.001;
   SeedTrustOptions seed_trust;
-  ShapeFitOptions estimate;
-  TableDepthOptions table_depths;
+  PriorUse use;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorThenFit& o) {
@@ -100,7 +105,7 @@ void Fields(Visitor& visit, PriorThenFit& o) {
   visit(FieldInfo{.name = "seed_trust",
                   .doc = "where that weight falls: away from dowels; none is left at the features"},
         o.seed_trust);
-  PriorUseFields(visit, o.estimate, o.table_depths);
+  PriorUseFields(visit, o.use);
 }
 
 using FaceSource =

@@ -16,7 +16,10 @@
 #include "problems/face_template/template_io.h"
 #include "problems/face_template/template_summary.h"
 #include "problems/output/staged_folder.h"
+#include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/prior/hspline_prior.h"
+#include "problems/prior/recentre.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/progress.h"
 #include "surfaces/base/error.h"
@@ -138,9 +141,101 @@ void DeclareTemplate(CLI::App& command, CommandLine& line) {
   command.add_flag("--quiet", a.quiet, "no progress");
 }
 
+// ---------------------------------------------------------------------------------------------
+// recentre
+// ---------------------------------------------------------------------------------------------
+
+struct RecentreArguments {
+  std::vector<fs::path> heads;
+  std::vector<std::string> overrides;
+  std::string out;
+  RecentreOptions options;
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  bool force = false;
+  std::stop_token stop;
+};
+
+Experiment ReadKnown(const fs::path& config, const RecentreArguments& a) {
+  auto experiment = ReadConfig<Experiment>(config, a.overrides);
+  if (experiment.tissue.depths != DepthSource::kMeasured) {
+    throw InputError(
+        fmt::format("{}: depths of a table; to learn of a head its depths must be "
+                    "measured (tissue: {{depths: measured}})",
+                    config.string()));
+  }
+  return experiment;
+}
+
+// The skin that is scored.
+KnownHead ReadHead(const fs::path& config, const RecentreArguments& a, const RunContext& context) {
+  const Experiment experiment = ReadKnown(config, a);
+  const Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
+  if (!subject.skin) {
+    throw InputError(fmt::format("{}: the head has no skin to learn from", config.string()));
+  }
+  const ScoredSkin scored = FindScoredSkin(subject, experiment.region);
+  std::vector<bool> keep;
+  for (const Triangle& t : subject.skin->triangles) {
+    keep.push_back(std::ranges::all_of(t, [&](std::int32_t v) { return scored.region.scored[v]; }));
+  }
+  return {.dowels = subject.dowels_on_bone, .skin = Submesh(*subject.skin, keep)};
+}
+
+int RecentreCommand(const RecentreArguments& a) {
+  const RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
+  const Experiment first = ReadKnown(a.heads.front(), a);
+  const TemplateFace face = LoadTemplate(first.face_template);
+  const FacePrior prior = LoadPrior(first.prior, face);
+  const PriorOnTemplate on_template = LayOnTemplate(prior, face, context);
+  std::vector<KnownHead> heads;
+  for (const fs::path& config : a.heads) {
+    heads.push_back(ReadHead(config, a, context));
+  }
+  StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
+  const Recentred result = Recentre(prior, on_template, face, heads, a.options, context);
+  fmt::print(
+      "{} heads: sites moved by {:.1f} mm in the median, the mean by {:.2f} mm RMS, at most "
+      "{:.2f} mm\n",
+      heads.size(), result.sites_moved_mm, result.mean_moved_mm, result.mean_moved_most_mm);
+  Write(result.face, folder);
+  return kDone;
+}
+
+void DeclareRecentre(CLI::App& command, CommandLine& line) {
+  RecentreArguments& a = *Bind(command, line, &RecentreCommand);
+  a.stop = line.stop;
+  command
+      .add_option("CONFIG", a.heads,
+                  "experiments (.yaml) of heads with skin and measured depths; template and prior "
+                  "are those of the first")
+      ->required();
+  command.add_option("--out", a.out, "folder for the new generic face")->required();
+  command
+      .add_option("--site_prior", a.options.site_prior,
+                  "how many points the present place of a site counts as")
+      ->check(Finite())
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  command
+      .add_option("--mean_prior", a.options.mean_prior,
+                  "how many points the present mean counts as")
+      ->check(Finite())
+      ->check(CLI::Range(0.1, 1e6))
+      ->capture_default_str();
+  command.add_option("--set", a.overrides, "path=value, laid over each configuration; repeatable")
+      ->allow_extra_args(false);
+  command.add_flag("--force", a.force,
+                   "replace files of the same name in a folder that is not empty");
+  command.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+}
+
 constexpr std::array kCommands = {
     ProgramCommand{"template", "make a generic H-spline face of a head mesh with landmarks",
                    &DeclareTemplate},
+    ProgramCommand{"recentre",
+                   "set a generic face right, sites and mean, by heads whose skin is known",
+                   &DeclareRecentre},
 };
 
 }  // namespace

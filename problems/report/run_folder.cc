@@ -131,6 +131,20 @@ Json BustJson(const Bust& bust) {
           {"released", bust.released}};
 }
 
+// The rules that took part, each with what it left.
+Json RulesJson(const std::vector<AppliedRule>& rules) {
+  Json json = Json::array();
+  for (const AppliedRule& rule : rules) {
+    json.push_back({{"rule", rule.rule},
+                    {"point", rule.point},
+                    {"coordinate", rule.coordinate},
+                    {"source", rule.source},
+                    {"sd_mm", rule.sd_mm},
+                    {"residual_mm", rule.residual_mm}});
+  }
+  return json;
+}
+
 // Where a dowel stands in the fit's target; -1 if it is not fitted.
 int TargetIndex(const FitTarget& target, const std::string& site) {
   const auto found = std::find_if(target.points.begin(), target.points.end(),
@@ -306,6 +320,7 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
   json["fit"] = FitJson(result);
   if (result.prior) {
     json["prior"] = PriorJson(*result.prior);
+    json["rules"] = RulesJson(result.rules);
   }
   if (result.bust) {
     json["bust"] = BustJson(*result.bust);

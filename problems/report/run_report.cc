@@ -304,6 +304,21 @@ ReportSection UncertaintySection(const Json& result, const OutputFolder& folder)
   return section;
 }
 
+ReportSection RulesSection(const Json& rules) {
+  ReportSection section{
+      .heading = "Rules for what bone does not carry",
+      .paragraphs = {"Each is one observation among the dowels. What is left over goes from the "
+                     "face to what the rule foresaw."}};
+  for (const Json& rule : rules) {
+    section.paragraphs.push_back(
+        fmt::format("{} ({}, {}): {} mm left, standard deviation {} mm. {}.",
+                    rule.at("rule").get<std::string>(), rule.at("point").get<std::string>(),
+                    rule.at("coordinate").get<std::string>(), Number(rule.at("residual_mm")),
+                    Number(rule.at("sd_mm")), rule.at("source").get<std::string>()));
+  }
+  return section;
+}
+
 ReportSection NotesSection(const Json& result) {
   ReportSection section{.heading = "Notes"};
   for (const Json& note : result.at("notes")) {
@@ -347,6 +362,9 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   sections.push_back({.heading = "Depth and implicit surface",
                       .tables = {CountsTable("Depth field", result.at("depth")),
                                  CountsTable("Implicit surface", result.at("implicit"))}});
+  if (result.contains("rules") && !result.at("rules").empty()) {
+    sections.push_back(RulesSection(result.at("rules")));
+  }
   sections.push_back(NotesSection(result));
   sections.push_back(
       {.heading = "Configuration", .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml")});

@@ -231,9 +231,11 @@ TEST(ShapeEstimate, TheSurfaceDrawsWhatNoTipReaches) {
   for (const int t : {20, 60, 100}) {
     target.tips.push_back(TipAt(model, t, shape.points));
   }
+  ShapeFitOptions options;
+  options.surface_worth = 80;
   const auto error = [&](const TriMesh* surface) {
     target.surface = surface;
-    return LargestDistance(EstimateShape(model, target, {}, {}).points, shape.points);
+    return LargestDistance(EstimateShape(model, target, options, {}).points, shape.points);
   };
   EXPECT_LT(error(&shape), 0.7 * error(nullptr));
 }
@@ -366,6 +368,30 @@ TEST(ShapePosterior, ASharedErrorCountsAsTheEstimateFollowsIt) {
     const double added = std::pow(wide.sigma_mm[v], 2) - std::pow(before.sigma_mm[v], 2);
     const double way = (after.points[v] - before.points[v]).dot(normals[v]);
     EXPECT_NEAR(std::sqrt(std::max(added, 0.0)), std::abs(way), 0.04) << v;
+  }
+}
+
+// What the modes do not tell grows with the distance from the nearest tip, and moves no point.
+TEST(ShapePosterior, SigmaGrowsWhereNoTipIsNear) {
+  const ShapeModel model = Dome();
+  ShapeTarget target;
+  for (const int t : {0, 1, 2, 3, 17, 33}) {
+    target.tips.push_back(TipAt(model, t, model.mean.points));
+  }
+  ShapeFitOptions modes_alone, unseen;
+  modes_alone.unseen_rate = 0;
+  unseen.unseen_rate = 0.3;
+  unseen.unseen_reach_mm = 25;
+  const ShapeEstimate before = EstimateShape(model, target, modes_alone, {});
+  const ShapeEstimate after = EstimateShape(model, target, unseen, {});
+  EXPECT_EQ(before.points, after.points);
+  for (std::size_t v = 0; v < before.points.size(); ++v) {
+    double nearest = 1e9;
+    for (const ShapeTip& tip : target.tips) {
+      nearest = std::min(nearest, (tip.position - model.mean.points[v]).norm());
+    }
+    const double added = std::pow(after.sigma_mm[v], 2) - std::pow(before.sigma_mm[v], 2);
+    EXPECT_NEAR(std::sqrt(std::max(added, 0.0)), 0.3 * std::max(0.0, nearest - 25), 1e-6) << v;
   }
 }
 

@@ -269,9 +269,9 @@ TEST(PriorTarget, TableDepthsAreLessSureAlongTheDowel) {
   const TableDepthOptions table;
   dowels[3].sd_mm = 3;
   const ShapeTarget rough = PriorTarget(prior, dowels, &table, nullptr);
-  EXPECT_NEAR(rough.tips[3].along_sd_mm, std::hypot(1, 1), 1e-12);
-  EXPECT_NEAR(rough.tips[3].shared_sd_mm, 0.7 * 3, 1e-12);  // of what the table states
-  EXPECT_NEAR(rough.tips[4].shared_sd_mm, 0.7 * std::hypot(1, 1), 1e-12);
+  EXPECT_NEAR(rough.tips[3].along_sd_mm, table.own * 3, 1e-12);  // of what the table states
+  EXPECT_NEAR(rough.tips[3].shared_sd_mm, table.shared * 3, 1e-12);
+  EXPECT_NEAR(rough.tips[4].shared_sd_mm, table.shared * PublishedSd_mm(dowels[4]), 1e-12);
   EXPECT_EQ(measured.tips[3].shared_sd_mm, 0);
   dowels.resize(2);
   EXPECT_THROW(PriorTarget(prior, dowels, nullptr, nullptr), InputError);

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/prior/feature_rules.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kFirstFeature = 28, kFeatures = 41;  // Multi-PIE
+constexpr double kEyeBelowMargin = 0.441;          // of the orbit's height
+constexpr double kExophthalmosMm = 16.2;
+constexpr double kCanineShare = 0.758;  // of the mouth's width
+
+// Landmarks of Multi-PIE, by side.
+struct EyeLandmarks {
+  const char* side;
+  std::array<int, 6> all;      // both corners and four points of the lids
+  std::array<int, 4> margins;  // of the lids, clear of the corners
+};
+constexpr EyeLandmarks kEyes[] = {{"r", {37, 38, 39, 40, 41, 42}, {38, 39, 41, 42}},
+                                  {"l", {43, 44, 45, 46, 47, 48}, {44, 45, 47, 48}}};
+struct MouthCorner {
+  const char* side;
+  int landmark;
+  double sign;  // of the lateral axis
+};
+constexpr MouthCorner kCorners[] = {{"r", 49, -1}, {"l", 55, 1}};
+constexpr int kPronasale = 31;
+
+class RuleBook {
+ public:
+  RuleBook(std::map<std::string, Vec3> bone, const Similarity& pose, const FacePrior& prior)
+      : bone_(std::move(bone)), prior_(prior), query_(prior.model.mean) {
+    left_ = pose.rotation * Vec3::UnitX();
+    front_ = pose.rotation * -Vec3::UnitY();
+    up_ = pose.rotation * Vec3::UnitZ();
+  }
+
+  void EyeHeight(const RuleUse& rule);
+  void EyeProtrusion(const RuleUse& rule);
+  void MouthWidth(const RuleUse& rule);
+  void Pronasale(const RuleUse& rule);
+  RuleMarks Take() { return std::move(result_); }
+
+ private:
+  const Vec3* Bone(const std::string& code) const {
+    const auto found = bone_.find(code);
+    return found == bone_.end() ? nullptr : &found->second;
+  }
+
+  std::vector<ModelPoint> FacePoints(std::span<const int> landmarks) const {
+    std::vector<ModelPoint> points;
+    for (const int n : landmarks) {
+      const MeshPoint at = query_.Closest(prior_.features.at(n - kFirstFeature).position);
+      points.push_back({at.triangle, at.weights});
+    }
+    return points;
+  }
+
+  void Add(AppliedRule rule, std::span<const int> landmarks, const Vec3& position,
+           const Vec3& direction) {
+    result_.marks.push_back({.label = rule.rule + " of " + rule.point,
+                             .at = FacePoints(landmarks),
+                             .position = position,
+                             .direction = direction,
+                             .sd_mm = rule.sd_mm});
+    result_.rules.push_back(std::move(rule));
+  }
+
+  std::map<std::string, Vec3> bone_;
+  const FacePrior& prior_;
+  MeshQuery query_;
+  Vec3 left_, front_, up_;
+  RuleMarks result_;
+};
+
+void RuleBook::EyeHeight(const RuleUse& rule) {
+  for (const EyeLandmarks& eye : kEyes) {
+    const Vec3* const upper = Bone(fmt::format("mso_{}", eye.side));
+    const Vec3* const lower = Bone(fmt::format("mio_{}", eye.side));
+    if (upper != nullptr && lower != nullptr) {
+      Add({.rule = "eye_height",
+           .point = fmt::format("eye_{}", eye.side),
+           .coordinate = "height",
+           .source = "Guyomarc'h et al. 2012; error: Humphrey et al. 2026, 58 CT",
+           .sd_mm = rule.sd_mm},
+          eye.all, *upper + kEyeBelowMargin * (*lower - *upper), up_);
+    }
+  }
+}
+
+void RuleBook::EyeProtrusion(const RuleUse& rule) {
+  for (const EyeLandmarks& eye : kEyes) {
+    if (const Vec3* const margin = Bone(fmt::format("dlom_{}", eye.side))) {
+      Add({.rule = "eye_protrusion",
+           .point = fmt::format("eye_{}", eye.side),
+           .coordinate = "front",
+           .source = "mean exophthalmos: Humphrey et al. 2026, 58 CT",
+           .sd_mm = rule.sd_mm},
+          eye.margins, *margin + kExophthalmosMm * front_, front_);
+    }
+  }
+}
+
+void RuleBook::MouthWidth(const RuleUse& rule) {
+  const Vec3 *const right = Bone("uc_r"), *const left = Bone("uc_l");
+  if (right == nullptr || left == nullptr) {
+    return;
+  }
+  const double half_mm = (*left - *right).dot(left_) / kCanineShare / 2;
+  for (const MouthCorner& corner : kCorners) {
+    // Two errors of this size, one at each corner, make one of sd_mm in the width.
+    Add({.rule = "mouth_width",
+         .point = fmt::format("ch_{}", corner.side),
+         .coordinate = "side",
+         .source = "Stephan & Henneberg 2003, 93 adults; error: Stephan & Murphy 2008, 9 cadavers",
+         .sd_mm = rule.sd_mm / std::sqrt(2)},
+        std::array{corner.landmark}, (*left + *right) / 2 + corner.sign * half_mm * left_,
+        corner.sign * left_);
+  }
+}
+
+void RuleBook::Pronasale(const RuleUse& rule) {
+  const Vec3 *const n = Bone("n"), *const pr = Bone("pr"), *const rhi = Bone("rhi"),
+                    *const ans = Bone("ans"), *const ss = Bone("ss");
+  if (n == nullptr || pr == nullptr || rhi == nullptr || ans == nullptr || ss == nullptr) {
+    return;
+  }
+  const Vec3 down = (*pr - *n).normalized(),
+             front = left_.cross(down).normalized() * (left_.cross(down).dot(front_) > 0 ? 1 : -1);
+  const Vec3 tip =
+      *n + (0.83 * (*rhi - *ss).norm() - 3.5) * front + (0.9 * (*n - *ans).norm() - 2) * down;
+  const char* const source =
+      "Rynn et al. 2010, 79 CT and 60 cephalograms; error: Zednikova Mala 2013, 86 Czechs";
+  Add({"pronasale", "prn", "front", source, rule.sd_mm}, std::array{kPronasale}, tip, front);
+  Add({"pronasale", "prn", "height", source, rule.sd_mm}, std::array{kPronasale}, tip, -down);
+}
+
+bool HasMultiPie(const FacePrior& prior) { return prior.features.size() == kFeatures; }
+
+}  // namespace
+
+const std::vector<std::string>& RulePointCodes() {
+  static const std::vector<std::string> codes = {"dlom_l", "dlom_r", "uc_l", "uc_r", "ans", "ss"};
+  return codes;
+}
+
+std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules) {
+  std::vector<OptionFault> faults;
+  for (const auto& [code, point] : rules.points) {
+    if (std::ranges::find(RulePointCodes(), code) == RulePointCodes().end()) {
+      faults.push_back({"points." + code, fmt::format("no rule asks for '{}'; known: {}", code,
+                                                      fmt::join(RulePointCodes(), ", "))});
+    }
+  }
+  return faults;
+}
+
+RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> landmarks,
+                       const Similarity& skull_from_average, const FacePrior& prior) {
+  if (!HasMultiPie(prior)) {
+    return {};
+  }
+  for (const auto& [code, p] : rules.points) {
+    landmarks[code] = {p[0], p[1], p[2]};
+  }
+  RuleBook book(std::move(landmarks), skull_from_average, prior);
+  const std::pair<const RuleUse*, void (RuleBook::*)(const RuleUse&)> all[] = {
+      {&rules.eye_height, &RuleBook::EyeHeight},
+      {&rules.eye_protrusion, &RuleBook::EyeProtrusion},
+      {&rules.mouth_width, &RuleBook::MouthWidth},
+      {&rules.pronasale, &RuleBook::Pronasale}};
+  for (const auto& [rule, apply] : all) {
+    if (rule->use) {
+      (book.*apply)(*rule);
+    }
+  }
+  return book.Take();
+}
+
+}  // namespace semblance

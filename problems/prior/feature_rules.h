@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rules of the literature for what no tissue depth reaches: eyes, mouth, nose. Each predicts a
+// point of the face from the bone, and is one weighted observation of the prior.
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "problems/config/config_errors.h"
+#include "problems/prior/face_prior.h"
+#include "surfaces/base/fields.h"
+
+namespace semblance {
+
+struct RuleUse {
+  bool use = true;
+  double sd_mm = kNaN;
+};
+template <class Visitor>
+void Fields(Visitor& visit, RuleUse& o) {
+  visit(FieldInfo{.name = "use", .doc = "false leaves the rule out"}, o.use);
+  visit(FieldInfo{.name = "sd_mm",
+                  .unit = "mm",
+                  .min = 0.01,
+                  .max = 1000,
+                  .doc = "standard deviation of what the rule predicts"},
+        o.sd_mm);
+}
+
+// Left out, for no source states their coefficients in reach: nasal width (Rynn et al. 2010), lip
+// height and the oral regressions (Stephan & Henneberg 2003, Houlton et al. 2021). Left out as
+// measured worst on skulls: Krogman's rules, mental foramina (Stephan & Murphy 2008).
+struct FeatureRules {
+  std::map<std::string, std::array<double, 3>> points;  // of bone, mm, LPS, by RulePointCodes()
+  RuleUse eye_height = {.sd_mm = 1.6};
+  RuleUse eye_protrusion = {.sd_mm = 2.9};
+  RuleUse mouth_width = {.sd_mm = 3.8};
+  RuleUse pronasale = {.use = false, .sd_mm = 3};
+};
+template <class Visitor>
+void Fields(Visitor& visit, FeatureRules& o) {
+  visit(
+      FieldInfo{.name = "points",
+                .unit = "mm",
+                .doc = "points of the bone (LPS) that only rules ask for, by name: dlom_l, dlom_r "
+                       "(deepest point of the lateral margin of the orbit), uc_l, uc_r (lateral "
+                       "border of the upper canine's crown), ans (acanthion, tip of the nasal "
+                       "spine), ss (subspinale); a rule is on when its points are there"},
+      o.points);
+  visit(FieldInfo{.name = "eye_height",
+                  .doc = "the middle of the lids lies 44.1 % of the orbit's height (mso to mio) "
+                         "below its upper margin (Guyomarc'h et al. 2012; standard error of 1.6 mm "
+                         "on 58 CT: Humphrey et al. 2026)"},
+        o.eye_height);
+  visit(FieldInfo{.name = "eye_protrusion",
+                  .doc = "the lids' margins lie 16.2 mm in front of dlom, the mean exophthalmos "
+                         "(standard error of 2.9 mm on 58 CT: Humphrey et al. 2026)"},
+        o.eye_protrusion);
+  visit(FieldInfo{.name = "mouth_width",
+                  .doc = "the canines' width, uc_l to uc_r, is 75.8 % of the mouth's (Stephan & "
+                         "Henneberg 2003, 93 adults; on 9 cadavers 2.4 mm too small: Stephan & "
+                         "Murphy 2008; with a deviation of 3 mm for rules of this kind, 3.8 mm)"},
+        o.mouth_width);
+  visit(
+      FieldInfo{.name = "pronasale",
+                .doc = "the nose's tip lies 0.83 (rhi to ss) - 3.5 mm in front of the line from n "
+                       "to pr and 0.9 (n to ans) - 2 mm down it (Rynn et al. 2010, 79 CT and 60 "
+                       "cephalograms; on 86 Czechs off by at most 2.2 mm in the mean: Zednikova "
+                       "Mala 2013, who give no deviation in their abstract: 3 mm is a guess). "
+                       "Off, for on three heads it was 3 to 6 mm too far in front"},
+      o.pronasale);
+}
+
+// What rules may be given in `points`.
+const std::vector<std::string>& RulePointCodes();
+
+// An unknown name under `points`, as "points.NAME".
+std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules);
+
+// A rule at work. One that predicts two coordinates stands twice.
+struct AppliedRule {
+  std::string rule;        // as in FeatureRules
+  std::string point;       // of the face: eye_l, ch_r, prn
+  std::string coordinate;  // height, front, side
+  std::string source;      // author, year, population
+  double sd_mm = kNaN;
+  double residual_mm = kNaN;  // from the face to what was predicted; > 0 up, in front, outwards
+};
+
+struct RuleMarks {
+  std::vector<ShapeMark> marks;
+  std::vector<AppliedRule> rules;  // one per mark
+};
+
+// The rules that are on and whose points are there. landmarks: of the skull, by site, mm.
+// skull_from_average: the pose of the skull (average_skull.h), whose axes are up, front and side.
+// None where the prior does not have the 41 landmarks of nose, eyes and mouth in the order of
+// Multi-PIE (28 to 68).
+RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> landmarks,
+                       const Similarity& skull_from_average, const FacePrior& prior);
+
+}  // namespace semblance

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/prior/feature_rules.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/face_template/template_source.h"
+#include "problems/prior/hspline_prior.h"
+#include "problems/subject/average_skull.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+
+const FacePrior& Ict() {
+  static const FacePrior prior = LoadPrior(IctPrior{.count = 1}, LoadTemplate(IctTemplate{}));
+  return prior;
+}
+
+std::map<std::string, Vec3> AverageLandmarks() {
+  std::map<std::string, Vec3> points;
+  for (const char* const site : {"n", "rhi", "pr", "mso_l", "mso_r", "mio_l", "mio_r"}) {
+    points[site] = AverageSite(site);
+  }
+  return points;
+}
+
+FeatureRules AllRules() {
+  FeatureRules rules;
+  rules.pronasale.use = true;
+  rules.points = {{"dlom_l", {47, 22, -8}}, {"dlom_r", {-47, 22, -8}}, {"uc_l", {19, 8, -72}},
+                  {"uc_r", {-19, 8, -72}},  {"ans", {0, -2, -50}},     {"ss", {0, 2, -58}}};
+  return rules;
+}
+
+std::vector<std::string> Names(const RuleMarks& marks) {
+  std::vector<std::string> names;
+  for (const AppliedRule& rule : marks.rules) {
+    names.push_back(rule.rule + " " + rule.point + " " + rule.coordinate);
+  }
+  return names;
+}
+
+TEST(FeatureRules, ARuleIsOnWhenItsPointsAreThere) {
+  EXPECT_THAT(Names(MarksOfRules({}, AverageLandmarks(), {}, Ict())),
+              ::testing::ElementsAre("eye_height eye_r height", "eye_height eye_l height"));
+  EXPECT_THAT(Names(MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict())),
+              ::testing::ElementsAre("eye_height eye_r height", "eye_height eye_l height",
+                                     "eye_protrusion eye_r front", "eye_protrusion eye_l front",
+                                     "mouth_width ch_r side", "mouth_width ch_l side",
+                                     "pronasale prn front", "pronasale prn height"));
+  FeatureRules off = AllRules();
+  off.eye_height.use = off.eye_protrusion.use = off.mouth_width.use = off.pronasale.use = false;
+  EXPECT_TRUE(MarksOfRules(off, AverageLandmarks(), {}, Ict()).marks.empty());
+}
+
+TEST(FeatureRules, ForeseeWhatTheirFormulasSay) {
+  const RuleMarks all = MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict());
+  const auto mark = [&](std::size_t k) { return all.marks.at(k).position; };
+  const double upper = AverageSite("mso_l").z(), lower = AverageSite("mio_l").z();
+  EXPECT_NEAR(mark(1).z(), upper - 0.441 * (upper - lower), 1e-9);
+  EXPECT_NEAR(mark(3).y(), 22 - 16.2, 1e-9);                 // the face looks to -y
+  EXPECT_NEAR(mark(5).x() - mark(4).x(), 38 / 0.758, 1e-9);  // corner to corner
+  // n at the origin, pr 67 mm down and 1 mm in front.
+  const Vec3 n = Vec3::Zero(), down = AverageSite("pr").normalized(),
+             front = Vec3::UnitX().cross(down);
+  const double anterior = 0.83 * (AverageSite("rhi") - Vec3(0, 2, -58)).norm() - 3.5,
+               vertical = 0.9 * Vec3(0, -2, -50).norm() - 2;
+  const Vec3 tip = mark(6) - n;
+  EXPECT_NEAR(tip.dot(down), vertical, 1e-9);
+  EXPECT_NEAR(std::abs(tip.dot(front)), anterior, 1e-9);
+  EXPECT_LT(tip.y(), 0);
+}
+
+// The marks are of the landmarks that they are called after: the mean's own eyes, corners and tip.
+TEST(FeatureRules, MarksLieOnTheirLandmarks) {
+  const RuleMarks all = MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict());
+  const TriMesh& mean = Ict().model.mean;
+  const auto at = [&](std::size_t k) {
+    return PositionOf(all.marks.at(k).at.front(), mean, mean.points);
+  };
+  EXPECT_GT(at(1).x(), 15);  // eye_l
+  EXPECT_LT(at(0).x(), -15);
+  EXPECT_NEAR(at(5).x(), 25, 2);  // ch_l
+  const double tip_y = std::ranges::min(mean.points, {}, [](const Vec3& p) { return p.y(); }).y();
+  EXPECT_NEAR(at(6).y(), tip_y, 1.5);
+}
+
+TEST(FeatureRules, AnEstimateFollowsAMark) {
+  ShapeTarget target{.start = {}, .tips = {}, .surface = nullptr, .features = {}};
+  for (const auto& [site, at] : Ict().sites) {
+    ShapeTip tip{.label = site, .at = at};
+    tip.position = PositionOf(at, Ict().model.mean, Ict().model.mean.points);
+    target.tips.push_back(tip);
+  }
+  RuleMarks rules = MarksOfRules({}, AverageLandmarks(), {}, Ict());
+  ShapeMark mark = rules.marks.at(0);
+  const Vec3 eye = PositionOf(mark.at.front(), Ict().model.mean, Ict().model.mean.points);
+  mark.position = eye + 3 * Vec3::UnitZ();
+  mark.at.resize(1);
+  ShapeFitOptions options;
+  options.field.centres = 30;
+  const ShapeEstimate before = EstimateShape(Ict().model, target, options, {});
+  target.marks = {mark};
+  const ShapeEstimate after = EstimateShape(Ict().model, target, options, {});
+  const auto height = [&](const ShapeEstimate& e) {
+    return PositionOf(mark.at.front(), Ict().model.mean, e.points).z();
+  };
+  EXPECT_GT(height(after), height(before) + 0.1);
+  EXPECT_NEAR(after.mark_residual_mm.at(0), mark.position.z() - height(after), 1e-9);
+  target.marks[0].sd_mm = 0;
+  EXPECT_THROW(EstimateShape(Ict().model, target, options, {}), InputError);
+}
+
+TEST(FeatureRules, AnUnknownPointIsAFault) {
+  FeatureRules rules;
+  rules.points["acanthion"] = {0, 0, 0};
+  ASSERT_EQ(FaultsOfRules(rules).size(), 1u);
+  EXPECT_EQ(FaultsOfRules(rules)[0].path, "points.acanthion");
+  EXPECT_THAT(FaultsOfRules(rules)[0].what, HasSubstr("dlom_l, dlom_r, uc_l, uc_r, ans, ss"));
+  EXPECT_TRUE(FaultsOfRules(AllRules()).empty());
+}
+
+}  // namespace
+}  // namespace semblance
