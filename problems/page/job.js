@@ -17,7 +17,7 @@ export class Job {
   state(state) {
     const {job, face} = state, runs = job.state === 'running';
     this.runButton.hidden = runs && job.name === 'run';
-    this.runButton.disabled = runs || state.landmarks.length === 0;
+    this.runButton.disabled = runs || face.saved || state.landmarks.length === 0;
     this.runButton.textContent = face.saved ? 'Full face is made' : 'Make the full face';
     this.runButton.classList.toggle('primary', !face.saved);
     this.show(job, face);

@@ -6,7 +6,7 @@ import {act, choose, landmarkOf, nameOf, onChoice, siteOf, store} from './store.
 
 const FORMATS = [['.yaml', 'YAML (Semblance)'], ['.mrk.json', '3D Slicer (.mrk.json)'], ['.fcsv', '3D Slicer (.fcsv)'],
                  ['.pp', 'MeshLab (.pp)'], ['.csv', 'table (.csv)'], ['.txt', 'CloudCompare (.txt)']];
-const DOUBTFUL = {from_bone_mm: 2, from_mirror_mm: 8, from_foreseen_mm: 12};
+const DOUBTFUL = {from_bone_mm: 2, from_mirror_mm: 8, from_foreseen_mm: 15};
 const MEANINGS = {from_bone_mm: 'from the bone', from_mirror_mm: 'from the mirror image of its partner',
                   from_foreseen_mm: 'from where the others foresee it'};
 

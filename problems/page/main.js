@@ -29,6 +29,7 @@ function makeTabs(bench) {
     for (const tab of byId('tabs').children) { tab.setAttribute('aria-selected', String(tab.dataset.tab === name)); }
     const panel = panels.get(name);
     byId('panel').replaceChildren(panel.element);
+    byId('panel').scrollTop = 0;
     say('');
     if (panel.show) { panel.show(); }
     if (panel.state && store.state) { panel.state(store.state, null); }

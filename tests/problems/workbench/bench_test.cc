@@ -9,10 +9,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <thread>
 
 #include "problems/pipeline/experiment_config.h"
-#include "problems/report/run_folder.h"
 #include "problems/run.h"
 #include "problems/workbench/bench_actions.h"
 #include "surfaces/base/atomic_file.h"
@@ -114,34 +114,49 @@ TEST_F(WorkbenchBench, AnotherUnitAndFrameAreSeenAtOnce) {
   EXPECT_THAT(bench.Look().subject->faults, SizeIs(2)) << "skull and skin are no head's in metres";
 }
 
-TEST_F(WorkbenchBench, TheFolderRunsToTheSameBytesEditsAndAll) {
+// What is kept of a face and blended into it changes nothing.
+void ExpectAFeatureBlendsBackToItself(Bench& bench) {
+  bench.Do("no edits", [](BenchState s) { return TakeEdits(s, {}); });
+  const std::map<VertexId, Vec3> before = bench.Full().surface.Offsets();
+  bench.KeepFeature("nose", "mine");
+  EXPECT_THROW(bench.KeepFeature("nose", "mine"), InputError);
+  EXPECT_THROW(bench.KeepFeature("ear", "other"), InputError);
+  bench.BlendFeature("mine", 0.5);
+  const std::map<VertexId, Vec3> after = bench.Full().surface.Offsets();
+  for (const auto& [vertex, offset] : after) {
+    EXPECT_LT((offset - before.at(vertex)).norm(), 1e-12);
+  }
+  EXPECT_THROW(bench.BlendFeature("theirs", 0.5), InputError);
+  bench.Undo();
+}
+
+// The page's test compares every byte of the folder.
+TEST_F(WorkbenchBench, TheFolderRunsToTheSameFaceEditsAndAll) {
   Bench bench(Options());
+  bench.Do("no skin", [](BenchState s) { return ChangeSetting(s, "subject.skin", "\"\""); });
   bench.Do("set a depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.g", "9"); });
-  EXPECT_THROW(bench.PullAt({0, -100, 0}, {.level = 1, .by_mm = {0, -3, 0}}), InputError)
-      << "the face is sculpted once it is made";
-  RunToTheEnd(bench);
-  const HSplineSurface plain = bench.Full().surface;
-  const Vec3 nose = plain.Point({0.5, 0.5});
-  bench.PullAt(nose, {.level = 1, .uv = {}, .by_mm = {0, -3, 0}, .reach = 2, .mirror = true});
-  EXPECT_FALSE(bench.Look().run_saved);
-  EXPECT_TRUE(bench.Look().face_fresh);
-  const HSplineSurface pulled = bench.Full().surface;
-  EXPECT_GT((pulled.Point({0.5, 0.5}) - nose).norm(), 1);
+  bench.Do("edited", [](BenchState s) {
+    EditScript script;
+    script.edits.push_back({2, 9, 9, std::array{0.0, 0.0, 4.0}});
+    return TakeEdits(s, script);
+  });
+  const Pull pull{.level = 1, .by_mm = {0, -3, 0}, .reach = 2, .mirror = true};
+  EXPECT_THROW(bench.PullAt({0, -100, 0}, pull), InputError) << "sculpted once it is made";
   RunToTheEnd(bench);
   EXPECT_TRUE(bench.Look().run_saved);
-  const HSplineSurface saved = ReadHSpline(bench.Folder() / "run/face.hspline.json");
-  EXPECT_EQ(saved.Offsets(), pulled.Offsets());
-
-  // As from the command line.
   const auto experiment = ReadConfig<Experiment>(bench.Folder() / "config.yaml");
-  OutputFolder again(folder_ / "again", WhenNotEmpty::kRefuse);
-  WriteRun(experiment, semblance::Run(experiment, {}), again, {});
-  for (const std::string& name : again.Written()) {
-    if (name != "timing.json") {
-      EXPECT_EQ(ReadFileBytes(again.Root() / name), ReadFileBytes(bench.Folder() / "run" / name))
-          << name;
-    }
-  }
+  const RunResult again = semblance::Run(experiment, {});
+  const HSplineSurface face = bench.Full().surface;
+  EXPECT_EQ(face.Offsets(), again.fit.surface.Offsets());
+  EXPECT_EQ(ReadHSpline(bench.Folder() / "run/face.hspline.json").Offsets(), face.Offsets());
+  EXPECT_EQ(ReadFileBytes(bench.Folder() / "run/resolved.yaml"), WriteConfig(experiment));
+
+  ExpectAFeatureBlendsBackToItself(bench);
+  const Vec3 nose = face.Point({0.5, 0.5});
+  bench.PullAt(nose, pull);
+  EXPECT_FALSE(bench.Look().run_saved);
+  EXPECT_TRUE(bench.Look().face_fresh);
+  EXPECT_GT((bench.Full().surface.Point({0.5, 0.5}) - nose).norm(), 1);
 }
 
 TEST_F(WorkbenchBench, AChangeDuringARunIsNotMixedIntoIt) {
@@ -158,13 +173,14 @@ TEST_F(WorkbenchBench, AChangeDuringARunIsNotMixedIntoIt) {
 
 TEST_F(WorkbenchBench, ACoarseFaceFollowsADepth) {
   Bench bench(Options());
-  const BenchFace before = bench.Coarse(), after = bench.CoarseWith({"tissue.set_mm.g", "14"});
+  bench.Do("set", [](BenchState s) { return ChangeSetting(s, "face.type", "\"fit\""); });
+  const BenchFace before = bench.Coarse();
+  const BenchFace after = bench.CoarseWith({"tissue.set_mm.g", "14"});
   const auto dowel = std::ranges::find(before.dowels, "g", &Dowel::site);
   ASSERT_NE(dowel, before.dowels.end());
   const Vec3 tip = dowel->base + 14 * dowel->direction;
-  EXPECT_LT(DistanceFrom(after.surface, tip), 1.5);
-  EXPECT_GT(DistanceFrom(before.surface, tip), 4);
-  EXPECT_FALSE(CanUndo(bench.Look().history)) << "only tried out";
+  EXPECT_LT(DistanceFrom(after.surface, tip), DistanceFrom(before.surface, tip) - 3);
+  EXPECT_FALSE(bench.Look().experiment.tissue.set_mm.contains("g")) << "only tried out";
 }
 
 TEST_F(WorkbenchBench, VariantsDifferAsTheirDepthsDo) {
@@ -174,20 +190,6 @@ TEST_F(WorkbenchBench, VariantsDifferAsTheirDepthsDo) {
   for (std::size_t k = 0; k < thin.dowels.size(); ++k) {
     EXPECT_GT(thick.dowels[k].depth_mm, thin.dowels[k].depth_mm) << thin.dowels[k].site;
   }
-}
-
-TEST_F(WorkbenchBench, AFeatureThatIsKeptBlendsBackToItself) {
-  Bench bench(Options());
-  RunToTheEnd(bench);
-  const auto before = bench.Full().surface.Offsets();
-  bench.KeepFeature("nose", "mine");
-  EXPECT_THROW(bench.KeepFeature("nose", "mine"), InputError);
-  EXPECT_THROW(bench.KeepFeature("ear", "other"), InputError);
-  bench.BlendFeature("mine", 0.5);
-  for (const auto& [vertex, offset] : bench.Full().surface.Offsets()) {
-    EXPECT_LT((offset - before.at(vertex)).norm(), 1e-12);
-  }
-  EXPECT_THROW(bench.BlendFeature("theirs", 0.5), InputError);
 }
 
 TEST_F(WorkbenchBench, AFolderWithOtherThingsIsRefused) {

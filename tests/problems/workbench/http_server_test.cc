@@ -12,6 +12,7 @@
 
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
@@ -37,6 +38,7 @@ std::string Ask(int port, const std::string& bytes, const char* address = "127.0
   std::string answer;
   if (::connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0) {
     ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    ::shutdown(socket, SHUT_WR);
     char buffer[65536];
     for (ssize_t n = 0; (n = ::recv(socket, buffer, sizeof buffer, 0)) > 0;) {
       answer.append(buffer, static_cast<std::size_t>(n));
@@ -46,63 +48,57 @@ std::string Ask(int port, const std::string& bytes, const char* address = "127.0
   return answer;
 }
 
-// One workbench on a coarse phantom for all tests.
+// A workbench on a coarse phantom.
 class WorkbenchServer : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = new ScratchFolder;
-    WriteFileAtomically(*folder_ / "phantom.yaml",
-                        fmt::format("base: {}/configs/phantom.yaml\nsubject: {{rings: 20}}\n",
-                                    SEMBLANCE_SOURCE_DIR));
-    BenchOptions options;
-    options.source = *folder_ / "phantom.yaml";
-    options.folder = *folder_ / "bench";
-    bench_ = new Bench(options);
-    HttpServerOptions listening;
-    listening.most_upload_bytes = 1 << 20;
-    listening.most_bytes = 4096;
-    server_ = new HttpServer(*bench_, listening);
-    serving_ = new std::jthread([](const std::stop_token& stop) { server_->Serve(stop); });
-  }
-  static void TearDownTestSuite() {
-    delete serving_;
-    delete server_;
-    delete bench_;
-    delete folder_;
+  WorkbenchServer() : bench_(Options(folder_)), server_(bench_, Listening()) {
+    serving_ = std::jthread([this](const std::stop_token& stop) { server_.Serve(stop); });
   }
 
-  static std::string Host() { return fmt::format("127.0.0.1:{}", server_->Port()); }
-  static std::string Token() {
-    const std::string url = server_->Url();
+  static BenchOptions Options(const ScratchFolder& folder) {
+    BenchOptions options;
+    options.source = folder / "phantom.yaml";
+    options.folder = folder / "bench";
+    WriteFileAtomically(options.source,
+                        fmt::format("base: {}/configs/phantom.yaml\nsubject: {{rings: 20}}\n",
+                                    SEMBLANCE_SOURCE_DIR));
+    return options;
+  }
+
+  static HttpServerOptions Listening() {
+    HttpServerOptions options;
+    options.most_upload_bytes = 1 << 20;
+    options.most_bytes = 4096;
+    return options;
+  }
+
+  std::string Host() { return fmt::format("127.0.0.1:{}", server_.Port()); }
+  std::string Token() {
+    const std::string url = server_.Url();
     return url.substr(url.size() - 65, 64);
   }
 
-  static std::string Get(const std::string& path, const std::string& headers = "") {
-    return Ask(server_->Port(), fmt::format("GET {} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{}"
-                                            "\r\n",
-                                            path, Host(), headers));
+  std::string Get(const std::string& path, const std::string& headers = "") {
+    return Ask(server_.Port(), fmt::format("GET {} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{}"
+                                           "\r\n",
+                                           path, Host(), headers));
   }
-  static std::string GetBelow(const std::string& path) { return Get("/" + Token() + "/" + path); }
+  std::string GetBelow(const std::string& path) { return Get("/" + Token() + "/" + path); }
 
-  static std::string Post(const std::string& path, const std::string& body,
-                          const std::string& origin, const std::string& more = "",
-                          const std::string& type = "application/json") {
-    return Ask(server_->Port(),
+  std::string Post(const std::string& path, const std::string& body, const std::string& origin,
+                   const std::string& more = "", const std::string& type = "application/json") {
+    return Ask(server_.Port(),
                fmt::format("POST /{}/{} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{}{}"
                            "Content-Type: {}\r\nContent-Length: {}\r\n\r\n{}",
                            Token(), path, Host(), origin, more, type, body.size(), body));
   }
-  static std::string OwnOrigin() { return fmt::format("Origin: http://{}\r\n", Host()); }
+  std::string OwnOrigin() { return fmt::format("Origin: http://{}\r\n", Host()); }
 
-  static ScratchFolder* folder_;
-  static Bench* bench_;
-  static HttpServer* server_;
-  static std::jthread* serving_;
+  ScratchFolder folder_;
+  Bench bench_;
+  HttpServer server_;
+  std::jthread serving_;
 };
-ScratchFolder* WorkbenchServer::folder_ = nullptr;
-Bench* WorkbenchServer::bench_ = nullptr;
-HttpServer* WorkbenchServer::server_ = nullptr;
-std::jthread* WorkbenchServer::serving_ = nullptr;
 
 TEST_F(WorkbenchServer, ThePageAndItsStateComeWithTheToken) {
   EXPECT_THAT(GetBelow(""), AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("<!DOCTYPE html>"),
@@ -116,11 +112,10 @@ TEST_F(WorkbenchServer, ThePageAndItsStateComeWithTheToken) {
 TEST_F(WorkbenchServer, WithoutTheWholeTokenNothingComes) {
   std::string near = Token();
   near.back() = near.back() == '0' ? '1' : '0';
-  for (const std::string& path :
-       {std::string("/"), std::string("/index.html"), std::string("/api/state"),
-        "/" + near + "/api/state", "/" + Token().substr(0, 63) + "/api/state",
-        "/" + Token() + "0/api/state", "//api/state", "/" + Token(),
-        "/x/" + Token() + "/api/state"}) {
+  for (const std::string& path : std::vector<std::string>{
+           "/", "/index.html", "/api/state", "/" + near + "/api/state",
+           "/" + Token().substr(0, 63) + "/api/state", "/" + Token() + "0/api/state", "//api/state",
+           "/" + Token(), "/x/" + Token() + "/api/state"}) {
     EXPECT_THAT(Get(path), AllOf(StartsWith("HTTP/1.1 403"), Not(HasSubstr("landmarks")))) << path;
   }
 }
@@ -132,11 +127,11 @@ TEST_F(WorkbenchServer, EachServerHasATokenOfItsOwn) {
 
 TEST_F(WorkbenchServer, AnotherHostIsRefused) {
   for (const std::string& host : {std::string("evil.example"), std::string("127.0.0.1"),
-                                  fmt::format("127.0.0.1.evil.example:{}", server_->Port()),
+                                  fmt::format("127.0.0.1.evil.example:{}", server_.Port()),
                                   std::string("127.0.0.1:1"), std::string()}) {
-    EXPECT_THAT(Ask(server_->Port(), fmt::format("GET /{}/api/state HTTP/1.1\r\nHost: {}\r\n"
-                                                 "Connection: close\r\n\r\n",
-                                                 Token(), host)),
+    EXPECT_THAT(Ask(server_.Port(), fmt::format("GET /{}/api/state HTTP/1.1\r\nHost: {}\r\n"
+                                                "Connection: close\r\n\r\n",
+                                                Token(), host)),
                 AllOf(StartsWith("HTTP/1.1 403"), HasSubstr("host")))
         << host;
   }
@@ -162,22 +157,22 @@ TEST_F(WorkbenchServer, LargeBodiesAndOnesOfUnknownSizeAreRefusedUnread) {
       "POST /{}/api/act HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{}"
       "Content-Type: application/json\r\n",
       Token(), Host(), OwnOrigin());
-  EXPECT_THAT(Ask(server_->Port(), head + "Content-Length: 99999999999999\r\n\r\n{"),
+  EXPECT_THAT(Ask(server_.Port(), head + "Content-Length: 99999999999999\r\n\r\n{"),
               StartsWith("HTTP/1.1 413"));
-  EXPECT_THAT(Ask(server_->Port(), head + "Content-Length: 5000\r\n\r\n{"),
+  EXPECT_THAT(Ask(server_.Port(), head + "Content-Length: 5000\r\n\r\n{"),
               StartsWith("HTTP/1.1 413"));
-  EXPECT_THAT(Ask(server_->Port(), head + "Content-Length: -1\r\n\r\n{"),
+  EXPECT_THAT(Ask(server_.Port(), head + "Content-Length: -1\r\n\r\n{"),
               StartsWith("HTTP/1.1 411"));
-  EXPECT_THAT(Ask(server_->Port(), head + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"),
+  EXPECT_THAT(Ask(server_.Port(), head + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"),
               StartsWith("HTTP/1.1 411"));
   EXPECT_THAT(Post("api/act", "a=1", OwnOrigin(), "", "application/x-www-form-urlencoded"),
               StartsWith("HTTP/1.1 415"));
 }
 
 TEST_F(WorkbenchServer, NoPathLeadsOutOfTheRun) {
-  WriteFileAtomically(*folder_ / "secret.txt", "secret");
-  std::filesystem::create_directories(*folder_ / "bench/run");
-  std::filesystem::create_symlink(*folder_ / "secret.txt", *folder_ / "bench/run/link");
+  WriteFileAtomically(folder_ / "secret.txt", "secret");
+  std::filesystem::create_directories(folder_ / "bench/run");
+  std::filesystem::create_symlink(folder_ / "secret.txt", folder_ / "bench/run/link");
   for (const char* path :
        {"run/../config.yaml", "run/../../secret.txt", "run/%2e%2e/%2e%2e/secret.txt",
         "run/..%2f..%2fsecret.txt", "run//etc/passwd", "run/link", "../secret.txt", "/etc/passwd",
@@ -203,14 +198,14 @@ TEST_F(WorkbenchServer, GarbageIsAnsweredInWords) {
   }
   const std::string deep(2000, '[');
   EXPECT_THAT(Post("api/act", deep, OwnOrigin()), StartsWith("HTTP/1.1 400"));
-  EXPECT_THAT(Ask(server_->Port(), "garbage\r\n\r\n"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(Ask(server_.Port(), "garbage\r\n\r\n"), StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(GetBelow("api/coarse?variant=thick"), StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(GetBelow("api/landmarks?format=.exe"), StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(GetBelow("api/state"), StartsWith("HTTP/1.1 200")) << "and it goes on";
 }
 
 TEST_F(WorkbenchServer, AnUploadKeepsItsNameToItself) {
-  const auto upload = [](const std::string& query) {
+  const auto upload = [this](const std::string& query) {
     return Post("api/upload?" + query, "not a mesh", OwnOrigin(), "", "application/octet-stream");
   };
   for (const char* name : {"..%2f..%2fa.ply", "%2fetc%2fa.ply", ".ply", "a%00.ply", ""}) {
@@ -218,13 +213,13 @@ TEST_F(WorkbenchServer, AnUploadKeepsItsNameToItself) {
   }
   EXPECT_THAT(upload("as=folder&name=a.ply"), StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(upload("as=skull&name=a.ply"), StartsWith("HTTP/1.1 400"));
-  EXPECT_FALSE(std::filesystem::exists(*folder_ / "a.ply"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.ply"));
   EXPECT_THAT(GetBelow("api/state"), Not(HasSubstr("a.ply"))) << "what was no mesh is not taken";
 }
 
 TEST_F(WorkbenchServer, ASecondWorkbenchOnTheFolderIsRefused) {
   BenchOptions options;
-  options.folder = *folder_ / "bench";
+  options.folder = folder_ / "bench";
   try {
     const Bench second(options);
     FAIL() << "two on one folder";
@@ -235,7 +230,7 @@ TEST_F(WorkbenchServer, ASecondWorkbenchOnTheFolderIsRefused) {
 
 TEST_F(WorkbenchServer, NoOtherAddressAnswers) {
   // All of 127/8 is this machine; the server listens on one of them alone.
-  EXPECT_EQ(Ask(server_->Port(), "GET / HTTP/1.1\r\n\r\n", "127.0.0.2"), "");
+  EXPECT_EQ(Ask(server_.Port(), "GET / HTTP/1.1\r\n\r\n", "127.0.0.2"), "");
 }
 
 }  // namespace
