@@ -7,6 +7,7 @@ import {act, nameOf, store} from './store.js';
 const MAIN = [['tissue.depths', 'depths from'], ['tissue.table', 'table'], ['tissue.fill_from', 'else from'],
               ['tissue.sex', 'sex'], ['tissue.build', 'build'], ['template', 'generic face'], ['face', 'way to the face'],
               ['interp', 'between the dowels']];
+const FORMATS = ['.ply', '.obj', '.stl', '.glb', '.off', '.step', '.iges', '.vtu'];
 const HIDDEN = ['subject', 'title', 'edits', 'base'];
 
 function stateLine(faces) {
@@ -42,10 +43,14 @@ export function facePanel({faces, scene}) {
   const clear = element('input', {type: 'range', min: 0.1, max: 1, step: 0.05, value: scene.shared.layers.get('face').opacity,
                                   oninput: () => { scene.shared.layers.get('face').opacity = Number(clear.value); scene.update(); }});
   search.setAttribute('aria-label', 'find an option');
+  const format = element('select', {}, ...FORMATS.map((ending) => element('option', {value: ending, textContent: ending})));
+  format.setAttribute('aria-label', 'kind of file');
+  const save = element('div', {className: 'row'}, 'The full face as a file', format, button('Save', () =>
+      element('a', {href: `api/export?format=${format.value}`, download: ''}).click()));
   const root = element('div', {}, line,
       group('Show', check('Colour what the last change did', colour), check('Keep comparing with the face of now', pin), field('solid face', clear)),
       group('Choices', main), element('details', {open: true}, element('summary', {textContent: 'Depths, mm'}), depths),
-      element('details', {}, element('summary', {textContent: 'All options'}), search, all), notes);
+      element('details', {}, element('summary', {textContent: 'All options'}), search, all), notes, save);
 
   const drawDepths = () => {
     if (document.activeElement && depths.contains(document.activeElement) && document.activeElement.type === 'range' && faces.busy) { return; }
@@ -61,6 +66,7 @@ export function facePanel({faces, scene}) {
   };
   const drawFace = () => {
     line.replaceChildren(stateLine(faces));
+    save.hidden = faces.kind !== 'full';
     notes.replaceChildren(faces.notes.length ? element('details', {}, element('summary', {textContent: `Notes (${faces.notes.length})`}),
                                                        lines(faces.notes, 'soft')) : '');
     drawDepths();

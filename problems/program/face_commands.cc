@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "problems/config/config.h"
+#include "problems/edits/edit_script.h"
 #include "problems/face_template/template_io.h"
 #include "problems/prior/hspline_prior.h"
-#include "problems/edits/edit_script.h"
 #include "problems/program/exit_code.h"
-#include "surfaces/hspline_files/face_export.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 

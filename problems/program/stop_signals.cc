@@ -57,4 +57,6 @@ std::stop_token StopOnSignals() {
   return token;
 }
 
+void EndInOwnTime() { ::alarm(0); }
+
 }  // namespace semblance

@@ -12,4 +12,8 @@ namespace semblance {
 // stays ignored where it was, as in a job in the background.
 std::stop_token StopOnSignals();
 
+// For a command that has seen the stop and ends by itself: the second of grace is taken back. A
+// second signal still ends the program at once.
+void EndInOwnTime();
+
 }  // namespace semblance

@@ -4,12 +4,19 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <stop_token>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "problems/program/exit_code.h"
+#include "problems/program/stop_signals.h"
 #include "problems/workbench/http_server.h"
 #include "surfaces/base/error.h"
 
@@ -64,7 +71,14 @@ int Workbench(const WorkbenchArguments& a) {
   if (a.open) {
     OpenBrowser(server.Url());
   }
-  server.Serve(a.stop);
+  {
+    const std::jthread serving([&server](const std::stop_token& stop) { server.Serve(stop); });
+    while (!a.stop.stop_requested()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    EndInOwnTime();  // open connections may take some seconds
+  }
+  fmt::print("ended; `semblance workbench {}` goes on\n", bench.Folder().string());
   return kDone;
 }
 

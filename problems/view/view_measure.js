@@ -88,9 +88,58 @@ const SemblanceSurface = (() => {
       const found = through(a, b, to.point, times[v], times[o]);
       if (found < length) { length = found; last = times[v] < times[o] ? v : o; }
     });
-    const way = [to.point];
-    for (let v = last; v >= 0; v = came[v]) { way.push(vertexOf(geometry, v)); }
-    return {length, way: [...way, from.point]};
+    return {length, way: wayDown(geometry, {times, came, first, trianglesAt}, from, to, last)};
+  };
+
+  // From `to` down the slope of the times to `from`, triangle by triangle; where a slope leads back, on by a corner.
+  const wayDown = (geometry, field, from, to, last) => {
+    const {times, came, first, trianglesAt} = field, way = [to.point];
+    const around = (v) => Array.from(trianglesAt.subarray(first[v], first[v + 1]));
+    let point = to.point.clone(), triangle = to.faceIndex, former = -1;
+    for (let step = 0; step < 4000 && triangle !== from.faceIndex; ++step) {
+      const corners = cornersOf(geometry, triangle);
+      const exit = corners.every((v) => isFinite(times[v])) ? exitOf(geometry, corners, times, point) : null;
+      const next = exit && around(exit.edge[0]).find((t) => t !== triangle && cornersOf(geometry, t).includes(exit.edge[1]));
+      if (next !== undefined && next !== null && next !== former) {
+        point = exit.point;
+        former = triangle;
+        triangle = next;
+        way.push(point);
+        continue;
+      }
+      const corner = exit ? exit.edge.reduce((v, o) => times[o] < times[v] ? o : v) : last;
+      const ahead = came[corner];
+      if (ahead < 0) { break; }
+      way.push(vertexOf(geometry, corner), vertexOf(geometry, ahead));
+      last = ahead;
+      former = -1;
+      const nexts = around(ahead), low = (t) => Math.min(...cornersOf(geometry, t).map((v) => times[v]));
+      triangle = nexts.reduce((t, o) => low(o) < low(t) ? o : t);
+      const middle = cornersOf(geometry, triangle).reduce((sum, v) => sum.add(vertexOf(geometry, v)), new THREE.Vector3()).divideScalar(3);
+      point = vertexOf(geometry, ahead).lerp(middle, 1e-3);
+    }
+    return [...way, from.point];
+  };
+
+  // Where the steepest way down from a point of a triangle leaves it: {point, edge}.
+  const exitOf = (geometry, corners, times, point) => {
+    const [a, b, c] = corners.map((v) => vertexOf(geometry, v)), [ta, tb, tc] = corners.map((v) => times[v]);
+    const e1 = b.clone().sub(a), e2 = c.clone().sub(a), n = e1.clone().cross(e2), size = n.lengthSq();
+    if (!(size > 0)) { return null; }
+    const down = e2.clone().cross(n).multiplyScalar(ta - tb).add(n.clone().cross(e1).multiplyScalar(ta - tc)).divideScalar(size);
+    // Shares of the corners at the point, and how they change along the way.
+    const sharesOf = (way) => {
+      const share2 = n.dot(e1.clone().cross(way)) / size, share1 = n.dot(way.clone().cross(e2)) / size;
+      return [-share1 - share2, share1, share2];
+    };
+    const at = sharesOf(point.clone().sub(a)), change = sharesOf(down);
+    at[0] += 1;
+    let nearest = Infinity, out = -1;
+    for (let k = 0; k < 3; ++k) {
+      const reach = change[k] < -1e-12 ? Math.max(0, at[k]) / -change[k] : Infinity;
+      if (reach < nearest) { nearest = reach; out = k; }
+    }
+    return out < 0 ? null : {point: point.clone().addScaledVector(down, nearest), edge: corners.filter((_, k) => k !== out)};
   };
 
   return {alongSurface, through};

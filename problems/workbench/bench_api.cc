@@ -11,6 +11,7 @@
 #include <iterator>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "problems/config/config.h"
 #include "problems/landmark_files/read_landmarks.h"
@@ -23,6 +24,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
+#include "surfaces/hspline_files/face_export.h"
 
 namespace semblance {
 namespace {
@@ -169,6 +171,15 @@ BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
       "landmarks" + (format == request.query.end() ? std::string(".yaml") : format->second);
   const LandmarkFile file = LandmarksOf(Now(bench.Look().history));
   return {200, "application/octet-stream", EncodeLandmarks(file, name), name};
+}
+
+// The face of the last run with its edits, for other programs.
+BenchReply FaceFile(Bench& bench, const BenchRequest& request) {
+  const auto format = request.query.find("format");
+  const std::string extension = format == request.query.end() ? ".ply" : format->second;
+  return {200, "application/octet-stream",
+          EncodeFace(bench.Full().surface, extension, /*chord_mm=*/std::nullopt, /*threads=*/1),
+          "face" + extension};
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -377,6 +388,7 @@ constexpr std::array kRoutes = {
     Route{"GET", "api/coarse", &CoarseReply},
     Route{"GET", "api/face", &FullReply},
     Route{"GET", "api/landmarks", &LandmarksFile},
+    Route{"GET", "api/export", &FaceFile},
     Route{"POST", "api/act", &Act},
     Route{"POST", "api/open", &Open},
     Route{"POST", "api/upload", &Upload},

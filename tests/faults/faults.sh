@@ -5,6 +5,7 @@
 # JOB=depth does so with the shorter job (run). Prints a table; ends with 1 if anything fell short.
 set -u
 shopt -s nullglob
+here=$(dirname "$(realpath "$0")")
 program=$(realpath "$1") configs=$(realpath "$2") count=${3:-100}
 RANDOM=${SEED:-1}
 kind=${JOB:-run}
@@ -194,5 +195,15 @@ for trial in study/trials/*; do
   tried=$((tried + 1))
 done
 tell "damaged trial: made again, and not merged" $tried $bad
+
+# A workbench while actions are posted: what it had said to be done is there when it is opened again.
+echo "base: $configs/phantom.yaml
+subject: {type: phantom, rings: 24}" > bench.yaml
+if command -v python3 > /dev/null; then
+  bad=$(python3 "$here/workbench_kills.py" "$program" bench.yaml $((count / 2)) "${SEED:-1}")
+  tell "workbench: kill -9; nothing that was acknowledged is lost" $((count / 2)) "$bad"
+else
+  echo "workbench: not tried, as python3 is not here"
+fi
 
 [ $short = 0 ]

@@ -26,6 +26,21 @@ FACE = "return window.semblance.faces.kind;"
 STATE = "return window.semblance.store.state;"
 
 
+# The worst relative error of distances along a plane, where they are straight, over pairs of triangles.
+PLANE = """
+const plane = new THREE.PlaneBufferGeometry(2, 2, 24, 24), count = plane.index.count / 3;
+const middle = (t) => [0, 1, 2].reduce((sum, k) => sum.add(new THREE.Vector3().fromArray(
+    plane.attributes.position.array, 3 * plane.index.array[3 * t + k])), new THREE.Vector3()).divideScalar(3);
+let worst = 0;
+for (let k = 0; k < 60; ++k) {
+  const a = (k * 487) % count, b = (k * 811 + 300) % count, exact = middle(a).distanceTo(middle(b));
+  const found = SemblanceSurface.alongSurface(plane, {faceIndex: a, point: middle(a)}, {faceIndex: b, point: middle(b)});
+  if (exact > 0.3) { worst = Math.max(worst, Math.abs(found.length - exact) / exact); }
+}
+return worst;
+"""
+
+
 def state(browser):
     return browser.run(STATE)
 
@@ -114,7 +129,7 @@ def pull_the_nose(browser):
 
 def same_from_the_command_line(program, folder):
     """Every file of the folder's run but the times, against a run of its config.yaml."""
-    again = os.path.join(folder, "..", "again")
+    again = os.path.join(os.path.dirname(folder), "again")
     subprocess.run([program, "run", os.path.join(folder, "config.yaml"), "--out", again, "--quiet"], check=True,
                    stdout=subprocess.DEVNULL)
     compared = 0
@@ -181,6 +196,7 @@ def work(program, config, folder, pictures):
         straight, along = (float(number) for number in re.findall(r"([\d.]+) mm", text))
         assert 80 < straight < along < 2 * straight, text
         picture("measure")
+        assert browser.run(PLANE) < 0.03
 
         browser.resize(400, 800)
         browser.run("window.scrollTo(0, 0)")
@@ -203,7 +219,7 @@ def main():
     if words := webdriver.missing():
         print(f"skipped: {words} is not installed")
         return SKIPPED
-    subprocess.run(["rm", "-rf", folder, os.path.join(folder, "..", "again")], check=True)
+    subprocess.run(["rm", "-rf", folder, os.path.join(os.path.dirname(folder), "again")], check=True)
     work(program, config, folder, rest[0] if rest else None)
     print("the page of the workbench does what it should")
     return 0
