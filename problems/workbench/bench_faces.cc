@@ -19,12 +19,13 @@ PriorFace PriorFaceOf(const FaceSource& way) {
   constexpr int kCentres = 30, kRounds = 5;
   PriorFace coarse;
   if (const auto* fitted = std::get_if<PriorThenFit>(&way)) {
-    coarse = {.estimate = fitted->estimate, .table_depths = fitted->table_depths};
+    coarse.use = fitted->use;
   } else if (const auto* prior = std::get_if<PriorFace>(&way)) {
     coarse = *prior;
   }
-  coarse.estimate.field.centres = std::min(coarse.estimate.field.centres, kCentres);
-  coarse.estimate.rounds = std::min(coarse.estimate.rounds, kRounds);
+  ShapeFitOptions& estimate = coarse.use.estimate;
+  estimate.field.centres = std::min(estimate.field.centres, kCentres);
+  estimate.rounds = std::min(estimate.rounds, kRounds);
   return coarse;
 }
 
