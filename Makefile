@@ -8,7 +8,7 @@ BUILD        := $(if $(filter sanitize debug quick,$(PRESET)),build-$(PRESET),bu
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build demo demo-phantom test bench faults sanitize format check headers tidy configs clean
+.PHONY: all setup configure build deb demo demo-phantom test bench faults sanitize format check headers tidy configs clean
 
 all: build
 
@@ -24,6 +24,11 @@ configure: setup
 
 build: configure
 	@cmake --build --preset $(PRESET)
+
+# Debian packages of the program and of the libraries, in build/packages.
+deb: build
+	@cd $(BUILD) && cpack > packages.log || { cat packages.log; exit 1; }
+	@ls $(BUILD)/packages/*.deb
 
 # The program alone, in the way that builds fastest from nothing: the tests would double the time.
 demo: PACKAGES = $(RUN_PACKAGES)

@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "problems/program/commands.h"
+#include "problems/command_line/commands.h"
 
 namespace semblance {
 

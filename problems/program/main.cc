@@ -14,6 +14,7 @@
 #include "problems/program/landmark_commands.h"
 #include "problems/program/phantom_commands.h"
 #include "problems/program/run_commands.h"
+#include "problems/program/shell_commands.h"
 #include "problems/program/stop_signals.h"
 #include "problems/program/study_commands.h"
 #include "problems/program/template_commands.h"
@@ -41,8 +42,9 @@ int ParseAndRun(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   app.require_subcommand(1);
   CommandLine line{.stop = StopOnSignals(), .chosen = {}};
-  for (const auto& commands : {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(),
-                               TemplateCommands(), PhantomCommands(), WorkbenchCommands()}) {
+  for (const auto& commands :
+       {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(), TemplateCommands(),
+        PhantomCommands(), WorkbenchCommands(), ShellCommands()}) {
     Declare(commands, app, line);
   }
   try {

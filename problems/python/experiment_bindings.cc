@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/output/staged_folder.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/python/arrays.h"
+#include "problems/python/bindings.h"
+#include "problems/python/option_text.h"
+#include "problems/report/run_folder.h"
+#include "problems/run.h"
+#include "problems/study/study_report.h"
+#include "problems/study/study_run.h"
+
+namespace semblance {
+namespace {
+
+namespace py = pybind11;
+namespace fs = std::filesystem;
+
+std::vector<std::string> Overrides(const py::dict& set) {
+  std::vector<std::string> overrides;
+  for (const auto& [path, value] : set) {
+    overrides.push_back(std::string(py::str(path)) + "=" + OptionText(value));
+  }
+  return overrides;
+}
+
+WhenNotEmpty Asked(bool force) {
+  return force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse;
+}
+
+py::object FromJson(const std::string& text) {
+  return py::module_::import("json").attr("loads")(text);
+}
+
+// What a run gives: its result.json, its surface, and why it cannot be used.
+py::dict RunConfig(const std::string& config, const py::dict& set,
+                   const std::optional<std::string>& out, bool force, int threads) {
+  const auto experiment = ReadConfig<Experiment>(config, Overrides(set));
+  RunContext context;
+  context.threads = threads;
+  std::optional<RunResult> result;
+  {
+    const py::gil_scoped_release release;
+    std::optional<StagedFolder> folder;
+    if (out) {
+      folder.emplace(*out, Asked(force));
+    }
+    result = Run(experiment, context);
+    if (folder) {
+      WriteRun(experiment, *result, folder->Files(), context);
+      folder->Publish();
+    }
+  }
+  py::dict answer;
+  answer["result"] = FromJson(ResultJson(experiment, *result));
+  answer["surface"] = result->fit.surface;
+  answer["faults"] = result->Faults();
+  return answer;
+}
+
+// A table of pandas, where it is installed; else the rows as dictionaries.
+py::object TableOf(const fs::path& csv) {
+  try {
+    return py::module_::import("pandas").attr("read_csv")(csv.string());
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_ImportError)) {
+      throw;
+    }
+  }
+  const py::object file = py::module_::import("builtins").attr("open")(csv.string());
+  const py::object rows = py::list(py::module_::import("csv").attr("DictReader")(file));
+  file.attr("close")();
+  return rows;
+}
+
+py::object RunStudyFile(const std::string& path, const std::string& out, int jobs) {
+  const StudyPlan plan = ReadStudy(path);
+  StudyRunOptions options;
+  options.jobs = jobs;
+  {
+    const py::gil_scoped_release release;
+    RunStudy(plan, out, options, {});
+    OutputFolder folder(out, WhenNotEmpty::kReplaceFiles);
+    WriteStudyTables(folder);
+  }
+  return TableOf(fs::path(out) / "trials.csv");
+}
+
+}  // namespace
+
+void BindExperiments(py::module_& module) {
+  module.def("run", &RunConfig, py::arg("config"), py::arg("set") = py::dict(),
+             py::arg("out") = std::nullopt, py::arg("force") = false, py::arg("threads") = 1,
+             "Runs an experiment, as `semblance run` does. set: options by path, e.g. "
+             "{'implicit.resolution': 60}. Returns {'result': result.json, 'surface': HSpline, "
+             "'faults': why it cannot be used, or []}; with `out` the files of a run are written "
+             "there too.");
+  module.def(
+      "study", &RunStudyFile, py::arg("path"), py::arg("out"), py::arg("jobs") = 1,
+      "Runs a study, or what is left of it, into the folder `out`, and returns trials.csv in "
+      "long form: a pandas.DataFrame where pandas is installed, else a list of dictionaries.");
+}
+
+}  // namespace semblance

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <optional>
+
+#include "problems/config/config.h"
+#include "problems/points/point_fit.h"
+#include "problems/python/arrays.h"
+#include "problems/python/bindings.h"
+#include "problems/python/option_text.h"
+
+namespace semblance {
+namespace {
+
+namespace py = pybind11;
+
+PointTable TableOf(const Doubles& points, const std::optional<Doubles>& uv,
+                   const std::optional<Doubles>& weights) {
+  PointTable table{.positions = Points3(points, "points"), .uv = {}, .weights = {}};
+  if (uv) {
+    table.uv = Points2(*uv, "uv");
+  }
+  if (weights) {
+    const auto numbers = Numbers(*weights, "weights");
+    table.weights.assign(numbers.begin(), numbers.end());
+  }
+  for (const std::size_t count : {table.uv.size(), table.weights.size()}) {
+    if (count != 0 && count != table.positions.size()) {
+      throw InputError("points, uv and weights must have as many rows as each other");
+    }
+  }
+  return table;
+}
+
+PointFit FitArrays(const Doubles& points, const std::optional<Doubles>& uv,
+                   const std::optional<Doubles>& weights, int threads, const py::kwargs& options) {
+  const PointTable table = TableOf(points, uv, weights);
+  const auto chosen = ReadConfigText<PointFitOptions>(OptionText(options), "fit(...)");
+  RunContext context;
+  context.threads = threads;
+  const py::gil_scoped_release release;
+  return FitPoints(table, chosen, context);
+}
+
+std::string FitDocumentation() {
+  return "An H-spline through scattered points, finer where they ask for it.\n\npoints: n x 3, mm. "
+         "uv: n x 2, or None: by `parameters`. weights: n, above 0. Options are those of a "
+         "configuration of `semblance fit`, dictionaries within each other:\n\n" +
+         OptionsReference<PointFitOptions>();
+}
+
+}  // namespace
+
+void BindFit(py::module_& module) {
+  py::class_<PointFit>(module, "PointFit", "What fit() found.")
+      .def_property_readonly("surface", [](const PointFit& f) { return f.fit.surface; })
+      .def_property_readonly(
+          "uv", [](const PointFit& f) { return ArrayOf(f.fit.uv); }, "n x 2: where each point lies")
+      .def_property_readonly(
+          "residuals_mm", [](const PointFit& f) { return ArrayOf(f.fit.residual_mm); },
+          "n: distance of the surface at the point's (u, v)")
+      .def_property_readonly("rms_mm", [](const PointFit& f) { return f.fit.point_rms_mm; })
+      .def_property_readonly("parameters", [](const PointFit& f) { return f.parameters; })
+      .def_property_readonly("usable", [](const PointFit& f) { return f.Faults().empty(); })
+      .def_property_readonly("faults", &PointFit::Faults, "why it cannot be used; else empty");
+  module.def("fit", &FitArrays, py::arg("points"), py::arg("uv") = std::nullopt,
+             py::arg("weights") = std::nullopt, py::arg("threads") = 1, FitDocumentation().c_str());
+}
+
+}  // namespace semblance

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python module against closed forms, and against what it reads back."""
+import os
+import sys
+import tempfile
+import threading
+import unittest
+
+import numpy as np
+
+import semblance
+
+SOURCE = sys.argv.pop()
+
+
+def paraboloid(side):
+    x, y = np.meshgrid(np.linspace(-20, 20, side), np.linspace(-20, 20, side))
+    return np.column_stack([x.ravel(), y.ravel(), 0.01 * (x**2 + y**2).ravel()])
+
+
+def plane_net(rows=5, columns=6):
+    net = np.zeros((rows, columns, 3))
+    net[..., 0] = 10.0 * (np.arange(columns)[None, :] - 1)
+    net[..., 1] = 10.0 * (np.arange(rows)[:, None] - 1)
+    return net
+
+
+def sphere(radius=50.0, rings=24):
+    """Vertices and triangles of a closed sphere, outward."""
+    points, triangles = [[0, 0, radius]], []
+    for i in range(1, rings):
+        for j in range(2 * rings):
+            t, p = np.pi * i / rings, np.pi * j / rings
+            points.append([radius * np.sin(t) * np.cos(p), radius * np.sin(t) * np.sin(p), radius * np.cos(t)])
+    points.append([0, 0, -radius])
+    n = 2 * rings
+    at = lambda i, j: 1 + (i - 1) * n + j % n
+    for j in range(n):
+        triangles.append([0, at(1, j), at(1, j + 1)])
+        triangles.append([len(points) - 1, at(rings - 1, j + 1), at(rings - 1, j)])
+        for i in range(1, rings - 1):
+            triangles += [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+    return np.array(points), np.array(triangles)
+
+
+class Surface(unittest.TestCase):
+    def test_a_plane_is_a_plane(self):
+        surface = semblance.HSpline(plane_net(), max_level=2)
+        uv = np.random.default_rng(1).random((50, 2))
+        points = surface.points(uv)
+        np.testing.assert_allclose(points, np.column_stack([30 * uv[:, 0], 20 * uv[:, 1], 0 * uv[:, 0]]), atol=1e-12)
+        np.testing.assert_allclose(surface.normals(uv), np.tile([0, 0, 1], (50, 1)), atol=1e-12)
+        np.testing.assert_allclose(surface.derivatives(uv, 1, 0), np.tile([30, 0, 0], (50, 1)), atol=1e-10)
+        np.testing.assert_allclose(surface.derivatives(uv, 0, 2), np.zeros((50, 3)), atol=1e-9)
+
+    def test_projection_finds_the_foot(self):
+        surface = semblance.HSpline(plane_net(), max_level=0)
+        uv, distance = surface.project([[15.0, 5.0, -7.0]])
+        np.testing.assert_allclose(uv, [[0.5, 0.25]], atol=1e-9)
+        np.testing.assert_allclose(distance, [7.0], atol=1e-9)
+
+    def test_a_changed_net_is_read_back_and_finer_detail_rides_along(self):
+        surface = semblance.HSpline(plane_net(), max_level=1)
+        fine = surface.net(1)
+        fine[4, 4, 2] += 1.0
+        surface.set_net(1, fine)
+        np.testing.assert_allclose(surface.net(1), fine, atol=1e-12)
+        coarse = surface.net(0)
+        coarse[..., 2] += 5.0
+        surface.set_net(0, coarse)
+        np.testing.assert_allclose(surface.net(1)[..., 2], fine[..., 2] + 5.0, atol=1e-9)
+
+    def test_a_file_gives_the_surface_to_the_bit(self):
+        surface = semblance.HSpline(plane_net() + 0.1, max_level=1)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "s.hspline.json")
+            surface.write(path)
+            again = semblance.HSpline.read(path)
+        self.assertTrue((again.net(0) == surface.net(0)).all())
+        self.assertEqual((again.patches, again.max_level, again.periodic_u), ((3, 2), 1, False))
+
+    def test_the_mesh_lies_on_the_surface(self):
+        surface = semblance.HSpline(plane_net(), max_level=0)
+        vertices, triangles, uv = surface.mesh(2)
+        np.testing.assert_allclose(vertices, surface.points(uv), atol=1e-12)
+        self.assertEqual(triangles.shape[0], 2 * 6 * 4)
+        self.assertLess(triangles.max(), len(vertices))
+
+    def test_wrong_arrays_are_told(self):
+        surface = semblance.HSpline(plane_net())
+        with self.assertRaisesRegex(semblance.InputError, r"uv is 4 x 3; expected an array of n x 2"):
+            surface.points(np.zeros((4, 3)))
+        with self.assertRaisesRegex(ValueError, "rows x columns x 3"):
+            semblance.HSpline(np.zeros((4, 4)))
+        with self.assertRaisesRegex(OSError, "nowhere.json"):
+            semblance.HSpline.read("nowhere.json")
+
+    def test_another_memory_layout_gives_the_same(self):
+        surface = semblance.HSpline(plane_net())
+        uv = np.random.default_rng(2).random((20, 2))
+        self.assertTrue((surface.points(np.asfortranarray(uv)) == surface.points(uv)).all())
+        self.assertTrue((surface.points(uv, threads=3) == surface.points(uv)).all())
+
+
+class Fit(unittest.TestCase):
+    def test_a_paraboloid_within_the_tolerance(self):
+        points = paraboloid(41)
+        found = semblance.fit(points, fit={"plan": {"type": "adaptive", "tolerance_mm": 0.01, "finest": 3}})
+        self.assertTrue(found.usable, found.faults)
+        self.assertLess(found.rms_mm, 0.01)
+        self.assertLess(found.residuals_mm.max(), 0.02)
+        np.testing.assert_allclose(np.linalg.norm(found.surface.points(found.uv) - points, axis=1), found.residuals_mm, atol=1e-9)
+
+    def test_given_parameters_are_kept(self):
+        points = paraboloid(21)
+        uv = (points[:, :2] + 20) / 40
+        found = semblance.fit(points, uv, patches_u=4, patches_v=4)
+        np.testing.assert_array_equal(found.uv, uv)
+
+    def test_unknown_options_are_told_with_a_suggestion(self):
+        with self.assertRaisesRegex(semblance.ConfigError, "patches_w.*did you mean 'patches_[uv]'"):
+            semblance.fit(paraboloid(9), patches_w=3)
+        with self.assertRaisesRegex(semblance.ConfigError, "patches_u"):
+            semblance.fit(paraboloid(9), patches_u="many")
+
+    def test_the_documentation_names_each_option(self):
+        for word in ("patches_u", "closure", "parameters", "tolerance_mm"):
+            self.assertIn(word, semblance.fit.__doc__)
+
+    def test_other_threads_run_meanwhile(self):
+        counted = [0]
+        stop = threading.Event()
+
+        def count():
+            while not stop.is_set():
+                counted[0] += 1
+                stop.wait(0.001)
+
+        thread = threading.Thread(target=count)
+        thread.start()
+        before = counted[0]
+        semblance.fit(paraboloid(201), fit={"plan": {"type": "adaptive", "tolerance_mm": 1e-4, "finest": 4}})
+        self.assertGreater(counted[0], before)
+        stop.set()
+        thread.join()
+
+
+class Interpolation(unittest.TestCase):
+    def test_equal_depths_give_that_depth_everywhere(self):
+        vertices, triangles = sphere()
+        bases = vertices[5::200]
+        directions = bases / np.linalg.norm(bases, axis=1)[:, None]
+        for scheme in ("kriging", "nearest", "mean", {"type": "inverse_distance", "power": 3}):
+            depth, sd = semblance.interpolate(vertices, triangles, bases, directions, np.full(len(bases), 7.5), scheme)
+            known = np.isfinite(depth)
+            self.assertGreater(known.sum(), len(vertices) // 2)
+            np.testing.assert_allclose(depth[known], 7.5, atol=1e-6)
+            self.assertEqual(sd.shape, depth.shape)
+
+    def test_faults_are_told(self):
+        vertices, triangles = sphere(rings=6)
+        with self.assertRaisesRegex(semblance.InputError, "names vertex 999"):
+            semblance.interpolate(vertices, [[0, 1, 999]], vertices[:2], vertices[:2], [1, 2])
+        with self.assertRaisesRegex(semblance.ConfigError, "krigging.*did you mean 'kriging'"):
+            semblance.interpolate(vertices, triangles, vertices[:2], vertices[:2], [1, 2], "krigging")
+
+
+class Experiments(unittest.TestCase):
+    QUICK = {"subject.rings": 24, "implicit.resolution": 16, "seeds.level": 0, "template.max_level": 1,
+             "first_fit": [], "fit.plan.schedule": [{"level": 0, "fraction": 1}]}
+
+    def test_a_run_gives_what_its_files_say(self):
+        config = os.path.join(SOURCE, "configs", "phantom.yaml")
+        with tempfile.TemporaryDirectory() as folder:
+            out = os.path.join(folder, "run")
+            run = semblance.run(config, set=self.QUICK, out=out)
+            written = semblance.HSpline.read(os.path.join(out, "face.hspline.json"))
+            with self.assertRaises(semblance.IoError):
+                semblance.run(config, set=self.QUICK, out=out)  # nothing is overwritten unasked
+        self.assertTrue((run["surface"].net(0) == written.net(0)).all())
+        self.assertGreater(run["result"]["face"]["rms_mm"], 0)
+
+    def test_a_study_gives_its_long_table(self):
+        with tempfile.TemporaryDirectory() as folder:
+            study = os.path.join(folder, "study.yaml")
+            with open(study, "w") as file:
+                file.write("base: %s\njob: depth\ngrid: {interp: [nearest, mean]}\nset: {subject.rings: 24}\n"
+                           "metric: depth_truth.along_direction.rms_mm\n" % os.path.join(SOURCE, "configs", "phantom.yaml"))
+            table = semblance.study(study, os.path.join(folder, "out"))
+        rows = table if isinstance(table, list) else table.to_dict("records")
+        self.assertEqual({row["interp"] for row in rows}, {"nearest", "mean"})
+        self.assertTrue(all(row["status"] == "done" for row in rows))
+
+
+if __name__ == "__main__":
+    unittest.main()
