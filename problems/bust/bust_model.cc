@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kColumns = 256, kRows = 192;  // of the mesh of an H-spline head
+constexpr int kColumns = 272, kRows = 204;  // of the mesh of an H-spline head
 
 std::map<std::string, Vec3> SitesOf(const TemplateFace& face) {
   std::map<std::string, Vec3> sites;

@@ -30,7 +30,7 @@ constexpr double kLidTrust = 0.05;
 constexpr double kSkullTrust = 0.1;  // of the scalp, against 1 of the face
 constexpr double kScalpReach_mm = 20;
 constexpr double kEar_mm = 45;  // round the ear
-constexpr int kRounds = 3;
+constexpr int kRounds = 2;
 
 double SmoothStep(double x) {
   const double t = std::clamp(x, 0.0, 1.0);
@@ -48,7 +48,8 @@ struct OnFace {
   std::int32_t vertex = -1;
   int triangle = -1;
   Vec3 weights = Vec3::Constant(kNaN);
-  double above_mm = 0;  // along the normal of the face
+  Vec3 beside = Vec3::Zero();  // from the face to the vertex, in the frame of both
+  Vec3 normal = Vec3::Zero();  // of the face there
   double trust = 0;
 };
 
@@ -95,8 +96,12 @@ std::vector<OnFace> FindOnFace(const TriMesh& mesh, const FaceMesh& face, double
       const double lids = (p - eye.center).norm() / eye.radius_mm;
       trust *= kLidTrust + (1 - kLidTrust) * SmoothStep((lids - kLids) / 0.5);
     }
-    found[v] = {static_cast<std::int32_t>(v), at.triangle, at.weights, normal.dot(p - at.position),
-                trust};
+    found[v] = {.vertex = static_cast<std::int32_t>(v),
+                .triangle = at.triangle,
+                .weights = at.weights,
+                .beside = p - at.position,
+                .normal = normal,
+                .trust = trust};
   });
   std::erase_if(found, [](const OnFace& f) { return f.vertex < 0 || f.trust < 1e-3; });
   return found;
@@ -111,7 +116,7 @@ class Scalp {
     const Vec3 left = at("sgl_l"), right = at("sgl_r");
     const Vec3 front = (at("mio_l") + at("mio_r")) / 2, middle = (left + right) / 2;
     const Vec3 back = (middle - front).normalized();
-    up_ = back.cross(left - right).normalized();
+    up_ = (left - right).cross(back).normalized();
     middle_ = middle;
     for (const Vec3& side : {left, right}) {
       ears_.push_back({side + 14 * back - 12 * up_, kEar_mm});
@@ -119,7 +124,7 @@ class Scalp {
   }
   // 0 to 1: how much of the scalp a point is.
   double At(const Vec3& p) const {
-    constexpr double kFirst_mm = 20, kWidth_mm = 25, kBeside_mm = 20;
+    constexpr double kFirst_mm = 25, kWidth_mm = 45, kBeside_mm = 20;
     double part = SmoothStep((up_.dot(p - middle_) - kFirst_mm) / kWidth_mm);
     for (const Sphere& ear : ears_) {
       part *= SmoothStep(((p - ear.center).norm() - ear.radius_mm) / kBeside_mm);
@@ -143,6 +148,7 @@ class BustPoser {
       over_skull_.emplace(in_.over_skull);
     }
     posed_ = placed_;
+    deformation_.emplace(placed_, DeformOptions{});
     for (int round = 0; round < kRounds; ++round) {
       context_.ThrowIfStopped();
       Follow(round);
@@ -194,10 +200,10 @@ class BustPoser {
 
   void Follow(int round) {
     if (!in_.model.rest) {
-      constexpr std::array kReach_mm = {12.0, 6.0, 4.0};
+      constexpr std::array kReach_mm = {12.0, 5.0};
       on_face_ = FindOnFace(posed_, face_, kReach_mm[round], {}, context_.threads);
       for (OnFace& f : on_face_) {
-        f.above_mm = 0;
+        f.beside.setZero();
       }
     }
     FindScalp();
@@ -238,9 +244,13 @@ class BustPoser {
     }
   }
 
+  // What lay beside the face turns with it.
   Vec3 TargetOf(const OnFace& f) const {
+    const Vec3 normal = face_.Normal(f.triangle, f.weights);
+    const auto turn =
+        Eigen::Quaterniond::FromTwoVectors(subject_from_model_.rotation * f.normal, normal);
     return face_.Point(f.triangle, f.weights) +
-           subject_from_model_.scale * f.above_mm * face_.Normal(f.triangle, f.weights);
+           subject_from_model_.scale * (turn * (subject_from_model_.rotation * f.beside));
   }
 
   void Solve() {
@@ -255,7 +265,7 @@ class BustPoser {
         targets.push_back(target);
       }
     }
-    posed_.points = Deform(placed_, targets, {});
+    posed_.points = deformation_->Follow(targets);
   }
 
   // Lets go of what turns a triangle over, a little further round each time.
@@ -335,6 +345,7 @@ class BustPoser {
   const BustInput& in_;
   const RunContext& context_;
   const FaceMesh face_;
+  std::optional<SoftDeformation> deformation_;  // of placed_
   std::optional<MeshQuery> over_skull_;
   std::vector<bool> released_;
   std::vector<OnFace> on_face_;

@@ -8,32 +8,37 @@
 
 namespace semblance {
 
-std::vector<Vec3> Deform(const TriMesh& mesh, std::span<const SoftTarget> targets,
-                         const DeformOptions& options) {
-  const auto n = static_cast<Eigen::Index>(mesh.points.size());
-  if (targets.empty()) {
-    return mesh.points;
-  }
+SoftDeformation::SoftDeformation(const TriMesh& mesh, const DeformOptions& options)
+    : points_(mesh.points) {
   const MeshLaplacian laplacian = BuildLaplacian(mesh);
-  const Eigen::VectorXd& area = laplacian.area_mm2;
-  Eigen::VectorXd diagonal = area * std::pow(options.detail_mm / options.fade_mm, 4);
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(n, 3);
-  for (const SoftTarget& target : targets) {
-    const double weight = target.weight * area[target.vertex];
-    diagonal[target.vertex] += weight;
-    right.row(target.vertex) += weight * (target.position - mesh.points[target.vertex]).transpose();
-  }
+  area_mm2_ = laplacian.area_mm2;
   const double stiffness = std::pow(options.detail_mm, 4);
   const Eigen::SparseMatrix<double>& k = laplacian.stiffness;
-  const Eigen::SparseMatrix<double> per_area = area.cwiseInverse().asDiagonal() * k;
-  Eigen::SparseMatrix<double> matrix = k * per_area;
-  matrix *= stiffness;
-  matrix += k * (stiffness / (options.calm_mm * options.calm_mm));
+  const Eigen::SparseMatrix<double> per_area = area_mm2_.cwiseInverse().asDiagonal() * k;
+  bending_ = k * per_area;
+  bending_ *= stiffness;
+  bending_ += k * (stiffness / (options.calm_mm * options.calm_mm));
+  bending_.diagonal() += area_mm2_ * (stiffness / std::pow(options.fade_mm, 4));
+}
+
+std::vector<Vec3> SoftDeformation::Follow(std::span<const SoftTarget> targets) const {
+  if (targets.empty()) {
+    return points_;
+  }
+  const auto n = static_cast<Eigen::Index>(points_.size());
+  Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(n);
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(n, 3);
+  for (const SoftTarget& target : targets) {
+    const double weight = target.weight * area_mm2_[target.vertex];
+    diagonal[target.vertex] += weight;
+    right.row(target.vertex) += weight * (target.position - points_[target.vertex]).transpose();
+  }
+  Eigen::SparseMatrix<double> matrix = bending_;
   matrix.diagonal() += diagonal;
-  const Eigen::MatrixXd displacement = MeshSolver(mesh.points, matrix).Solve(right);
+  const Eigen::MatrixXd displacement = MeshSolver(points_, matrix).Solve(right);
   std::vector<Vec3> points;
   for (Eigen::Index v = 0; v < n; ++v) {
-    points.push_back(mesh.points[v] + displacement.row(v).transpose());
+    points.push_back(points_[v] + displacement.row(v).transpose());
   }
   return points;
 }

@@ -2,6 +2,7 @@
 // A mesh that follows some of its points, and bends little between them.
 #pragma once
 
+#include <Eigen/SparseCore>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,18 +23,28 @@ struct DeformOptions {
   double detail_mm = 2;
   // Away from targets the displacement bends over shorter distances than this, and levels out over
   // longer ones.
-  double calm_mm = 60;
-  // Over longer distances than this it fades.
-  double fade_mm = 250;
+  double calm_mm = 35;
+  // Farther than about fade^2 / calm from all targets it is gone.
+  double fade_mm = 50;
 };
 
-// The points of `mesh` plus the displacement d that minimises, with l = detail_mm,
-//   integral of w |d - d_target|^2 + l^4 (|laplacian d|^2 + |gradient d|^2 / calm^2 + |d|^2 /
-//   fade^4)
-// in the cotangent discretisation (Botsch and Sorkine 2008, the linear bi-Laplacian). One sparse
-// Cholesky factorisation. A vertex may have several targets. Without a target nothing moves.
-std::vector<Vec3> Deform(const TriMesh& mesh, std::span<const SoftTarget> targets,
-                         const DeformOptions& options);
+// Keeps the equations of a mesh for several sets of targets.
+class SoftDeformation {
+ public:
+  SoftDeformation(const TriMesh& mesh, const DeformOptions& options);
+
+  // The points of the mesh plus the displacement d that minimises, with l = detail_mm,
+  //   integral of w |d - d_target|^2
+  //     + l^4 (|laplacian d|^2 + |gradient d|^2 / calm^2 + |d|^2 / fade^4)
+  // in the cotangent discretisation (Botsch and Sorkine 2008, the linear bi-Laplacian); one sparse
+  // Cholesky factorisation. A vertex may have several targets. Without a target nothing moves.
+  std::vector<Vec3> Follow(std::span<const SoftTarget> targets) const;
+
+ private:
+  std::vector<Vec3> points_;
+  Eigen::VectorXd area_mm2_;             // of each vertex
+  Eigen::SparseMatrix<double> bending_;  // all but the targets
+};
 
 // Triangles that were turned over: whose normal, from `before` to `after`, turned by more than 90
 // degrees beyond the rotation that the whole made. Both meshes have the same triangles.

@@ -93,6 +93,36 @@ std::vector<Sphere> Eyeballs(const HeadDomain& domain) {
   return eyes;
 }
 
+// Half as many as the ring below where they would be crowded, so that no slivers meet at the crown.
+int ColumnsAt(const WholeHead& head, int row, int below, int rows) {
+  constexpr int kFewest = 8, kProbes = 32;
+  const double v = static_cast<double>(row) / rows;
+  double round = 0, up = 0;
+  for (int i = 0; i < kProbes; ++i) {
+    const Vec3 p = head.surface.Point({double(i) / kProbes, v});
+    round += (head.surface.Point({double(i + 1) / kProbes, v}) - p).norm();
+    up += (head.surface.Point({double(i) / kProbes, v - 1.0 / rows}) - p).norm() / kProbes;
+  }
+  return row > rows / 2 && below % 2 == 0 && below > kFewest && round / below < 0.5 * up ? below / 2
+                                                                                         : below;
+}
+
+// Between rings of as many points, or of half as many in the upper one.
+void JoinRings(int lower, int n, int upper, int m, TriMesh& mesh) {
+  for (int i = 0; i < m; ++i) {
+    const int next = (i + 1) % m;
+    if (n == m) {
+      mesh.triangles.push_back({lower + i, lower + next, upper + next});
+      mesh.triangles.push_back({lower + i, upper + next, upper + i});
+      continue;
+    }
+    const int a = lower + 2 * i, middle = a + 1, b = lower + (2 * i + 2) % n;
+    mesh.triangles.push_back({a, middle, upper + i});
+    mesh.triangles.push_back({middle, upper + next, upper + i});
+    mesh.triangles.push_back({middle, b, upper + next});
+  }
+}
+
 }  // namespace
 
 WholeHeadFit FitWholeHead(const TriMesh& mesh, const std::string& name, const RunContext& context) {
@@ -152,27 +182,25 @@ WholeHead WholeHeadFromJson(std::string_view text, const std::string& name) try 
 
 TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows) {
   TriMesh mesh;
+  std::vector<int> first, count;  // of each ring
   for (int j = 0; j < rows; ++j) {
-    for (int i = 0; i < columns; ++i) {
-      mesh.points.push_back(head.surface.Point({double(i) / columns, double(j) / rows}));
+    first.push_back(static_cast<int>(mesh.points.size()));
+    count.push_back(ColumnsAt(head, j, j == 0 ? columns : count.back(), rows));
+    for (int i = 0; i < count.back(); ++i) {
+      mesh.points.push_back(head.surface.Point({double(i) / count.back(), double(j) / rows}));
     }
   }
   Vec3 crown = Vec3::Zero();
   for (int i = 0; i < columns; ++i) {
     crown += head.surface.Point({double(i) / columns, 1}) / columns;
   }
+  const auto top = static_cast<std::int32_t>(mesh.points.size());
   mesh.points.push_back(crown);
-  const int top = columns * rows;
-  for (int j = 0; j < rows; ++j) {
-    for (int i = 0; i < columns; ++i) {
-      const int next = (i + 1) % columns, a = j * columns + i, b = j * columns + next;
-      if (j + 1 == rows) {
-        mesh.triangles.push_back({a, b, top});
-        continue;
-      }
-      mesh.triangles.push_back({a, b, b + columns});
-      mesh.triangles.push_back({a, b + columns, a + columns});
-    }
+  for (int j = 0; j + 1 < rows; ++j) {
+    JoinRings(first[j], count[j], first[j + 1], count[j + 1], mesh);
+  }
+  for (int i = 0; i < count.back(); ++i) {
+    mesh.triangles.push_back({first.back() + i, first.back() + (i + 1) % count.back(), top});
   }
   return mesh;
 }

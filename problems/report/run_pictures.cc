@@ -18,8 +18,13 @@ constexpr int kWidth = 560, kHeight = 640;
 Box3 Region(const RunResult& result) {
   Box3 box = Bounds(result.face.mesh);
   box.extend(Bounds(result.shell));
-  if (result.bust) {
-    box.extend(Bounds(result.bust->skin));
+  if (result.bust) {  // its ears, not its shoulders
+    const double chin_mm = box.min().z();
+    for (const Vec3& point : result.bust->skin.points) {
+      if (point.z() >= chin_mm) {
+        box.extend(point);
+      }
+    }
   }
   for (const Dowel& dowel : result.subject.dowels_on_bone) {
     box.extend(dowel.Tip());
@@ -199,8 +204,10 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   WriteViews({{SkinObject(result.face.mesh)}}, result, {"H-spline face", {}, std::nullopt},
              Lighting::kStudio, folder, "pictures/face.png", threads);
   if (result.bust) {
-    WriteViews(HeadScene(result), result, {"", {}, std::nullopt}, Lighting::kStudio, folder,
-               "pictures/bust.png", threads);
+    folder.Write(
+        "pictures/bust.png",
+        EncodePng(RenderViews(HeadScene(result), Bounds(result.bust->skin), kViews,
+                              {"", {}, std::nullopt}, Options(Lighting::kStudio), threads)));
   }
   WriteOrigin(result, folder, threads);
   Scene over = SkullScene(result);

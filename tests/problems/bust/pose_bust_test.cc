@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/bust/pose_bust.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fitting/problem/placement.h"
+#include "problems/bust/bust_files.h"
+#include "problems/bust/head_domain.h"
+#include "problems/bust/ict_head.h"
+#include "problems/bust/soft_deformation.h"
+#include "problems/bust/whole_head.h"
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+// The head that the program carries, with few triangles.
+BustModel SmallBust() {
+  const WholeHead head = WholeHeadFromJson(IctHead(), "the ICT head");
+  BustModel model{.name = "small",
+                  .mesh = WholeHeadMesh(head, 112, 84),
+                  .eyeballs = head.eyeballs,
+                  .rest = LoadTemplate(IctTemplate{}),
+                  .sites = {},
+                  .obj = std::nullopt};
+  for (const auto& [code, uv] : model.rest->site_uv) {
+    model.sites[code] = model.rest->surface.Point(uv);
+  }
+  return model;
+}
+
+Similarity Elsewhere() {
+  const Mat3 turn = Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  return {1.07, turn, {20, -40, 900}};
+}
+
+// Another person: a longer chin on one side, a fuller cheek.
+HSplineSurface AnotherFace(const HSplineSurface& face) {
+  ControlNet net = face.Net(0);
+  for (Vec3& p : net.vertices) {
+    const auto bell = [&](const Vec3& centre, double width) {
+      return std::exp(-0.5 * (p - centre).squaredNorm() / (width * width));
+    };
+    p += bell({0, -90, -80}, 35) * Vec3(3, -5, -9) + bell({50, -40, -20}, 30) * Vec3(6, -4, 0) +
+         bell({-40, -60, 90}, 40) * Vec3(0, -4, 5);
+  }
+  HSplineSurface other = face;
+  other.SetNet(0, net);
+  return other;
+}
+
+Bust Pose(const BustModel& model, const HSplineSurface& face, const TriMesh& over_skull = {},
+          int threads = 2) {
+  RunContext context;
+  context.threads = threads;
+  return PoseBust({model, face, LoadTemplate(IctTemplate{}).site_uv, over_skull}, context);
+}
+
+double LargestGap(const TriMesh& mesh, const std::vector<Vec3>& expected) {
+  double gap = 0;
+  for (std::size_t v = 0; v < expected.size(); ++v) {
+    gap = std::max(gap, (mesh.points[v] - expected[v]).norm());
+  }
+  return gap;
+}
+
+TEST(PoseBust, StaysWhereItsFaceIsTheSubjects) {
+  const BustModel model = SmallBust();
+  const Bust bust = Pose(model, model.rest->surface);
+  EXPECT_LT(LargestGap(bust.skin, model.mesh.points), 1e-6);
+  EXPECT_EQ(bust.turned_over, 0);
+  EXPECT_EQ(bust.eyes.size(), 8u);
+}
+
+TEST(PoseBust, FollowsASimilarityOfTheFaceAndOfWhatIsOverTheSkull) {
+  const BustModel model = SmallBust();
+  const Similarity moved = Elsewhere();
+  const TriMesh expected = Transformed(model.mesh, moved);
+  const Bust bust = Pose(model, Transformed(model.rest->surface, moved), expected);
+  EXPECT_LT(LargestGap(bust.skin, expected.points), 1e-5);
+  EXPECT_GT(bust.on_skull, 100);
+}
+
+TEST(PoseBust, MeetsTheFaceWithoutATornSeam) {
+  const BustModel model = SmallBust();
+  const Bust bust = Pose(model, AnotherFace(model.rest->surface));
+  EXPECT_EQ(bust.turned_over, 0);
+  EXPECT_LT(bust.face_rms_mm, 0.3);
+  // By how much neighbours move apart, for each mm between them.
+  double strain = 0;
+  for (const Triangle& t : model.mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = t[k], b = t[(k + 1) % 3];
+      const Vec3 before = model.mesh.points[b] - model.mesh.points[a];
+      const Vec3 after = bust.skin.points[b] - bust.skin.points[a];
+      if (before.norm() > 0.5) {
+        strain = std::max(strain, (after - before).norm() / before.norm());
+      }
+    }
+  }
+  EXPECT_LT(strain, 0.6);
+}
+
+TEST(PoseBust, TheScalpMeetsWhatIsOverTheSkull) {
+  const BustModel model = SmallBust();
+  TriMesh larger = model.mesh;
+  for (Vec3& p : larger.points) {
+    p += 6 * std::clamp((p.z() - 40) / 60, 0.0, 1.0) * Vec3(p.x(), p.y(), p.z()).normalized();
+  }
+  const Bust bust = Pose(model, model.rest->surface, larger);
+  const MeshQuery query(larger);
+  const Vec3 back(0, 80, 100);
+  for (std::size_t v = 0; v < bust.skin.points.size(); ++v) {
+    if ((model.mesh.points[v] - back).norm() < 40) {
+      EXPECT_LT(query.Closest(bust.skin.points[v]).distance_mm, 0.5);
+    }
+  }
+  EXPECT_EQ(bust.turned_over, 0);
+}
+
+TEST(PoseBust, GivesTheSameBytesWithOneAndFourThreads) {
+  const BustModel model = SmallBust();
+  const HSplineSurface face = AnotherFace(model.rest->surface);
+  const auto one = BustToFiles(Pose(model, face, {}, 1), model);
+  const auto four = BustToFiles(Pose(model, face, {}, 4), model);
+  ASSERT_EQ(one.size(), four.size());
+  for (std::size_t k = 0; k < one.size(); ++k) {
+    EXPECT_EQ(one[k].name, four[k].name);
+    EXPECT_TRUE(one[k].bytes == four[k].bytes) << one[k].name;
+  }
+}
+
+TEST(PoseBust, AMeshWithLandmarksFollowsTheFaceToo) {
+  BustModel model = SmallBust();
+  const HSplineSurface face = Transformed(AnotherFace(model.rest->surface), Elsewhere());
+  const std::vector<Sphere> eyes = model.eyeballs;
+  model.rest.reset();
+  model.eyeballs.clear();
+  const Bust bust = Pose(model, face);
+  EXPECT_EQ(bust.turned_over, 0);
+  EXPECT_LT(bust.face_rms_mm, 0.6);
+  EXPECT_TRUE(bust.eyes.empty());
+  const MeshQuery query(bust.skin);
+  for (const auto& [code, uv] : LoadTemplate(IctTemplate{}).site_uv) {
+    EXPECT_LT(query.Closest(face.Point(uv)).distance_mm, 1.5) << code;
+  }
+}
+
+TEST(PoseBust, SaysWhereSitesAreMissing) {
+  BustModel model = SmallBust();
+  model.rest.reset();
+  model.sites = {{"g", {0, 0, 0}}};
+  EXPECT_THAT([&] { Pose(model, LoadTemplate(IctTemplate{}).surface); },
+              ThrowsMessage<InputError>(HasSubstr("shares 1 sites with the face")));
+}
+
+// ------------------------------------------------------------------------------------------------
+// Files
+// ------------------------------------------------------------------------------------------------
+
+std::uint32_t Word(const std::string& bytes, std::size_t at) {
+  std::uint32_t word = 0;
+  for (int k = 3; k >= 0; --k) {
+    word = word << 8 | static_cast<unsigned char>(bytes[at + k]);
+  }
+  return word;
+}
+
+TEST(BustFiles, ReadBackTheSame) {
+  const BustModel model = SmallBust();
+  const Bust bust = Pose(model, model.rest->surface);
+  const auto files = BustToFiles(bust, model);
+  ASSERT_EQ(files.size(), 3u);
+  const testing::ScratchFolder folder;
+  for (const NamedBytes& file : files) {
+    std::ofstream(folder / file.name, std::ios::binary) << file.bytes;
+  }
+  const TriMesh read = ReadMesh(folder / "bust.obj");
+  for (std::size_t v = 0; v < bust.skin.points.size(); ++v) {
+    ASSERT_EQ(read.points[v].cast<float>(), bust.skin.points[v].cast<float>());
+  }
+  EXPECT_TRUE(std::ranges::equal(bust.skin.triangles,
+                                 std::span(read.triangles).first(bust.skin.triangles.size())));
+  const std::string& glb = files[0].bytes;
+  ASSERT_EQ(glb.substr(0, 4), "glTF");
+  ASSERT_EQ(Word(glb, 8), glb.size());
+  const std::uint32_t length = Word(glb, 12);
+  const auto json = nlohmann::json::parse(glb.substr(20, length));
+  EXPECT_EQ(json["meshes"][0]["primitives"].size(), 5u);
+  const std::size_t begin = 20 + length + 8;
+  const auto at = [&](std::size_t k) { return std::bit_cast<float>(Word(glb, begin + 4 * k)); };
+  for (std::size_t v = 0; v < bust.skin.points.size(); ++v) {
+    const Vec3 p = bust.skin.points[v] / 1000;
+    ASSERT_EQ(Eigen::Vector3f(at(3 * v), at(3 * v + 1), at(3 * v + 2)),
+              Vec3(p.x(), p.z(), -p.y()).cast<float>());
+  }
+}
+
+TEST(BustFiles, AnObjKeepsItsLinesMaterialsAndTextures) {
+  const testing::ScratchFolder folder;
+  std::ofstream(folder / "head.mtl") << "newmtl face\nKd 0.5 0.25 1\nmap_Kd maps/skin.png\n";
+  std::filesystem::create_directories(folder / "maps");
+  std::ofstream(folder / "maps/skin.png") << "png";
+  std::ofstream(folder / "head.obj")
+      << "mtllib head.mtl\no head\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
+         "vn 0 0 1\nusemtl face\nf 1/1/1 2/2/1 3/3/1 4/1/1\n";
+  BustModel model{.name = "quad",
+                  .mesh = ReadMesh(folder / "head.obj"),
+                  .eyeballs = {},
+                  .rest = std::nullopt,
+                  .sites = {},
+                  .obj = ReadObjText(folder / "head.obj")};
+  Bust bust{.skin = model.mesh, .eyes = {}, .subject_from_model = {}};
+  bust.skin.points[2] = {2, 3, 0.5};
+  const auto files = BustToFiles(bust, model);
+  ASSERT_EQ(files.size(), 4u);
+  EXPECT_EQ(files[1].bytes,
+            "mtllib bust.mtl\no head\nv 0 0 0\nv 1 0 0\nv 2 3 0.5\nv 0 1 0\nvt 0 0\nvt 1 0\n"
+            "vt 1 1\nusemtl face\nf 1/1 2/2 3/3 4/1\n");
+  EXPECT_EQ(files[2].bytes, "newmtl face\nKd 0.5 0.25 1\nmap_Kd skin.png\n");
+  EXPECT_EQ(files[3].name, "skin.png");
+  EXPECT_THAT(files[0].bytes, HasSubstr("baseColorTexture"));
+  std::ofstream(folder / "head.mtl") << "newmtl face\nmap_Kd ../../secret.png\n";
+  EXPECT_THAT([&] { ReadObjText(folder / "head.obj"); },
+              ThrowsMessage<InputError>(HasSubstr("not below its own folder")));
+}
+
+// ------------------------------------------------------------------------------------------------
+// Busts that cannot be used
+// ------------------------------------------------------------------------------------------------
+
+class BadBust : public ::testing::Test {
+ protected:
+  // As mesh and landmarks in the folder.
+  MeshBust Written(const TriMesh& mesh, double mirror = 1) const {
+    const MeshBust bust{folder_ / "bust.ply", folder_ / "sites.csv"};
+    std::ofstream(bust.mesh, std::ios::binary) << EncodeMesh(mesh, ".ply");
+    std::ofstream csv(bust.landmarks);
+    csv << "site,x,y,z\n";
+    for (const auto& [code, p] : SmallBust().sites) {
+      csv << code << ',' << mirror * p.x() << ',' << p.y() << ',' << p.z() << '\n';
+    }
+    return bust;
+  }
+  std::string Complaint(const MeshBust& bust) const {
+    try {
+      LoadBust(bust, IctTemplate{}, {});
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "none";
+  }
+  const testing::ScratchFolder folder_;
+};
+
+TEST_F(BadBust, IsRefusedInOneLine) {
+  const TriMesh head = SmallBust().mesh;
+  EXPECT_EQ(Complaint(Written(head)), "none");
+  EXPECT_THAT(Complaint(Written(head, -1)), HasSubstr("left and right have changed places"));
+  TriMesh two = head;
+  const auto n = static_cast<std::int32_t>(head.points.size());
+  for (const Vec3& p : head.points) {
+    two.points.push_back(p + Vec3(300, 0, 0));
+  }
+  for (const Triangle& t : head.triangles) {
+    two.triangles.push_back({t[0] + n, t[1] + n, t[2] + n});
+  }
+  EXPECT_THAT(Complaint(Written(two)), HasSubstr("two pieces of a head's size"));
+  TriMesh pieces = head;
+  pieces.points.insert(pieces.points.end(), {{0, 0, 0}, {9, 0, 0}, {0, 9, 0}});
+  pieces.triangles.push_back({n, n + 1, n + 2});
+  EXPECT_THAT(Complaint(Written(pieces)), HasSubstr("a bust is one piece, and this mesh has 2"));
+}
+
+// ------------------------------------------------------------------------------------------------
+// The deformation and the whole head
+// ------------------------------------------------------------------------------------------------
+
+TEST(SoftDeformation, ATriangleTurnedOverIsFound) {
+  const TriMesh before{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2}, {1, 3, 2}}};
+  TriMesh after = before;
+  after.points[3] = {-0.5, -0.5, 0};
+  EXPECT_THAT(TurnedOver(before, after, Mat3::Identity()), ElementsAre(1));
+}
+
+TEST(WholeHead, RoundTripsThroughItsFile) {
+  const WholeHead head = WholeHeadFromJson(IctHead(), "the ICT head");
+  EXPECT_EQ(WholeHeadToJson(head), std::string(IctHead()));
+  EXPECT_EQ(head.eyeballs.size(), 2u);
+  EXPECT_THAT([] { WholeHeadFromJson("{}", "bust.json"); },
+              ThrowsMessage<IoError>(HasSubstr("bust.json: ")));
+}
+
+TEST(WholeHead, ItsMeshIsOnePieceOpenAtTheNeckAlone) {
+  const TriMesh mesh = WholeHeadMesh(WholeHeadFromJson(IctHead(), "the ICT head"), 96, 72);
+  const EdgeReport edges = CheckEdges(mesh);
+  EXPECT_EQ(edges.boundary, 96);
+  EXPECT_EQ(edges.non_manifold, 0);
+  EXPECT_EQ(edges.inconsistent, 0);
+  EXPECT_EQ(ConnectedComponents(mesh).count, 1);
+}
+
+// In the domain every triangle keeps its side; a hole becomes a pocket.
+TEST(HeadDomain, FoldsNowhere) {
+  const TriMesh whole = WholeHeadMesh(WholeHeadFromJson(IctHead(), "the ICT head"), 64, 48);
+  std::vector<bool> keep;
+  for (const Triangle& t : whole.triangles) {
+    keep.push_back((TriangleCentroid(whole, t) - Vec3(0, -90, 80)).norm() > 20);
+  }
+  const HeadDomain domain = LayOutHead(Submesh(whole, keep), "head");
+  EXPECT_EQ(domain.rims.size(), 1u);
+  int folded = 0;
+  for (const Triangle& t : domain.mesh.triangles) {
+    if (std::ranges::find(t, domain.crown) != t.end()) {
+      continue;
+    }
+    Vec2 a = domain.uv[t[1]] - domain.uv[t[0]], b = domain.uv[t[2]] - domain.uv[t[0]];
+    a.x() -= std::round(a.x());
+    b.x() -= std::round(b.x());
+    folded += a.x() * b.y() - a.y() * b.x() <= 0;
+  }
+  EXPECT_EQ(folded, 0);
+  const TriMesh closed{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+                       {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}};
+  EXPECT_THAT([&] { LayOutHead(closed, "ball.ply"); },
+              ThrowsMessage<InputError>(HasSubstr("ball.ply: the head has no border")));
+}
+
+}  // namespace
+}  // namespace semblance
