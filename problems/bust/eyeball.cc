@@ -34,9 +34,9 @@ class EyeShell {
       for (int k = 0; k < kRound; ++k) {
         const int a = s * kRound + k, b = s * kRound + (k + 1) % kRound;
         if (from > 0 || s > 0) {
-          mesh.triangles.push_back({a, a + kRound, b});
+          mesh.triangles.push_back({a, b, a + kRound});
         }
-        mesh.triangles.push_back({b, a + kRound, b + kRound});
+        mesh.triangles.push_back({b, b + kRound, a + kRound});
       }
     }
     return mesh;

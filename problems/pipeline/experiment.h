@@ -135,7 +135,7 @@ void Fields(Visitor& visit, Alternative& o) {
         o.name);
   visit(FieldInfo{.name = "set",
                   .doc = "what is otherwise, as --set takes it: [\"tissue.build=obese\"], or "
-                         "[\"tissue.sds=1\"]; files by whole paths, or from the current folder"},
+                         "[\"tissue.sds=1\"]; files from the configuration's folder"},
         o.set);
 }
 

@@ -30,6 +30,7 @@
 #include "problems/program/exit_code.h"
 #include "problems/program/failure.h"
 #include "problems/program/progress.h"
+#include "problems/report/alternatives.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
 #include "problems/study/depth_study.h"
@@ -96,7 +97,12 @@ int RunCommand(const Arguments& arguments) {
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   StagedFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
   const RunContext context = MakeContext(arguments);
-  const RunResult result = Run(experiment, context);
+  const std::vector<NamedExperiment> named = AlternativesOf(experiment, config.parent_path());
+  StageCache cache(16);
+  const RunResult result = Run(experiment, context, &cache);
+  std::vector<std::string> faults = result.Faults();
+  std::ranges::copy(RunAlternatives(experiment, named, result, cache, folder.Files(), context),
+                    std::back_inserter(faults));
   WriteRun(experiment, result, folder.Files(), context);
   folder.Publish();
   for (const std::string& note : result.subject.notes) {
@@ -108,7 +114,7 @@ int RunCommand(const Arguments& arguments) {
     PrintFaceError("H-spline face", result.truth->face);
   }
   fmt::print("report: {}\n", (folder.Root() / "report.html").string());
-  return TellFaults(result.Faults());
+  return TellFaults(faults);
 }
 
 int DepthCommand(const Arguments& arguments) {
@@ -193,6 +199,10 @@ void CheckExperiment(const std::string& file, const Experiment& experiment,
     fmt::print("{}: warning: {}\n", file, warning);
   }
   subjects.Look(file, experiment);
+  for (const NamedExperiment& alternative :
+       AlternativesOf(experiment, std::filesystem::path(file).parent_path())) {
+    CheckExperiment(file, alternative.experiment, subjects);
+  }
 }
 
 // The keys at the top tell what a file is for: an experiment, where no other fits better.

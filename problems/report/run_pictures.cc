@@ -36,19 +36,6 @@ RenderOptions Options(Lighting lighting) {
   return {.width = kWidth, .height = kHeight, .lighting = lighting};
 }
 
-// The head with open eyes, where there is one; else the face.
-Scene HeadScene(const RunResult& result) {
-  if (!result.bust) {
-    return {{SkinObject(result.face.mesh)}};
-  }
-  Scene scene{{SkinObject(result.bust->skin)}};
-  for (const EyePart& part : result.bust->eyes) {
-    const auto& c = part.colour;
-    scene.objects.push_back(EyeObject(part.mesh, {c[0], c[1], c[2]}));
-  }
-  return scene;
-}
-
 void WriteViews(const Scene& scene, const RunResult& result, const Sheet& sheet, Lighting lighting,
                 OutputFolder& folder, const char* name, int threads) {
   folder.Write(name, EncodePng(RenderViews(scene, Region(result), kViews, sheet, Options(lighting),
@@ -164,6 +151,18 @@ void WriteOrigin(const RunResult& result, OutputFolder& folder, int threads) {
 }
 
 }  // namespace
+
+Scene HeadScene(const RunResult& result) {
+  if (!result.bust) {
+    return {{SkinObject(result.face.mesh)}};
+  }
+  Scene scene{{SkinObject(result.bust->skin)}};
+  for (const EyePart& part : result.bust->eyes) {
+    const auto& c = part.colour;
+    scene.objects.push_back(EyeObject(part.mesh, {c[0], c[1], c[2]}));
+  }
+  return scene;
+}
 
 ColourMap DepthColours() { return SequentialMap(0, 25); }
 ColourMap ErrorColours() { return DivergingMap(8); }

@@ -6,6 +6,7 @@
 
 #include "problems/output/files.h"
 #include "problems/pictures/colour_map.h"
+#include "problems/pictures/render.h"
 #include "problems/run.h"
 
 namespace semblance {
@@ -19,9 +20,12 @@ ColourMap SigmaColours();  // 0 to 6 mm
 std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
                                   const RunContext& context);
 
+// The head with open eyes, where there is one; else the face.
+Scene HeadScene(const RunResult& result);
+
 // pictures/overview.png and, from front, three quarters and side: skull_dowels, depth, implicit,
-// face, face_over_skull, where it is known sigma, and, where the true skin is known, truth and
-// error (on the true skin).
+// face, face_over_skull, where they are there bust and sigma, and, where the true skin is known,
+// truth and error (on the true skin).
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context);
 
 }  // namespace semblance

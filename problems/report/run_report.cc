@@ -261,6 +261,49 @@ ReportSection PictureSection(const OutputFolder& folder) {
   return section;
 }
 
+std::string Words(const Json& list, const char* between) {
+  std::string words;
+  for (const Json& word : list) {
+    words += (words.empty() ? "" : between) + word.get<std::string>();
+  }
+  return words;
+}
+
+// Where the run has alternatives (alternatives.h).
+ReportSection AlternativesSection(const Json& answers, const OutputFolder& folder) {
+  ReportSection section{.heading = "Alternatives side by side"};
+  section.paragraphs = {
+      "The same skull with other options. All pictures have one camera; the maps show how far each "
+      "face lies outside (+) or inside (-) this run's own."};
+  for (const auto& [file, alt] :
+       {std::pair("front", "heads of the alternatives, from the front"),
+        std::pair("three_quarter", "heads of the alternatives, from between front and side"),
+        std::pair("side", "heads of the alternatives, from the side"),
+        std::pair("difference", "difference of the alternatives from this run's own face")}) {
+    section.images.push_back(ReportImageFromFile(
+        folder.Root() / "pictures" / fmt::format("alternatives_{}.png", file), "", alt));
+  }
+  ReportTable table{"What differs, and by how much",
+                    {"alternative", "otherwise", "dowels", "sites left out", "mean outside (mm)",
+                     "RMS difference (mm)", "least (mm)", "most (mm)", "mean error (mm)",
+                     "p95 error (mm)", "≤ 2.5 mm (%)"},
+                    {}};
+  for (const Json& answer : answers) {
+    const Json none = {
+        {"mean_mm", nullptr}, {"rms_mm", nullptr}, {"least_mm", nullptr}, {"most_mm", nullptr}};
+    const Json unknown = {{"mean_abs_mm", nullptr}, {"p95_mm", nullptr}, {"within_2_5mm", nullptr}};
+    const Json& d = answer.at("difference").is_null() ? none : answer.at("difference");
+    const Json& face = answer.at("face").is_null() ? unknown : answer.at("face");
+    table.rows.push_back({Number(answer.at("name")), Words(answer.at("set"), "; "),
+                          Number(answer.at("dowels")), Words(answer.at("left_out"), ", "),
+                          Number(d.at("mean_mm")), Number(d.at("rms_mm")), Number(d.at("least_mm")),
+                          Number(d.at("most_mm")), Number(face.at("mean_abs_mm")),
+                          Number(face.at("p95_mm")), Percent(face.at("within_2_5mm"))});
+  }
+  section.tables = {table};
+  return section;
+}
+
 // Folders of older versions do not say.
 bool IsPartlyInvented(const Json& result) {
   return result.contains("bone") && result.at("bone").at("mirrored_cm2").get<double>() +
@@ -350,6 +393,11 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   std::vector<ReportSection> sections;
   if (!result.at("face").is_null()) {
     sections.push_back(ErrorSection(result, folder));
+  }
+  const std::filesystem::path alternatives = folder.Root() / "alternatives.json";
+  if (std::filesystem::exists(alternatives)) {
+    sections.push_back(
+        AlternativesSection(ParseJson(ReadFileBytes(alternatives), alternatives.string()), folder));
   }
   sections.push_back(PictureSection(folder));
   if (IsPartlyInvented(result)) {

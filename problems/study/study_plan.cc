@@ -195,6 +195,12 @@ StudyTrial MakeTrial(const SubjectTree& subject, const StudyRow& row,
   }
   trial.experiment = ReadConfigTree<Experiment>(tree, errors);
   faults.Add(errors);
+  if (!trial.experiment.alternatives.empty()) {
+    faults.Add(fmt::format(
+        "{}: alternatives: they are for a run; a study varies by its axes. Write `alternatives: "
+        "[]` in what it sets",
+        subject.name));
+  }
   return trial;
 }
 

@@ -88,7 +88,15 @@ TEST(PoseBust, StaysWhereItsFaceIsTheSubjects) {
   const Bust bust = Pose(model, model.rest->surface);
   EXPECT_LT(LargestGap(bust.skin, model.mesh.points), 1e-6);
   EXPECT_EQ(bust.turned_over, 0);
-  EXPECT_EQ(bust.eyes.size(), 8u);
+  ASSERT_EQ(bust.eyes.size(), 8u);
+  for (std::size_t k = 0; k < bust.eyes.size(); ++k) {
+    const TriMesh& part = bust.eyes[k].mesh;
+    for (const Triangle& t : part.triangles) {  // counter-clockwise from outside
+      EXPECT_GT(
+          TriangleAreaVector(part, t).dot(TriangleCentroid(part, t) - model.eyeballs[k / 4].center),
+          0);
+    }
+  }
 }
 
 TEST(PoseBust, FollowsASimilarityOfTheFaceAndOfWhatIsOverTheSkull) {

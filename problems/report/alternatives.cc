@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/report/alternatives.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "problems/pictures/pictures.h"
+#include "problems/pipeline/experiment_config.h"
+#include "problems/report/run_folder.h"
+#include "problems/report/run_pictures.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+constexpr int kWidth = 420, kHeight = 520;  // pixels of a picture
+
+bool IsName(const std::string& name) {
+  return !name.empty() && name.size() <= 60 && std::ranges::all_of(name, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '+';
+  });
+}
+
+// Settings are read as if they stood in a file of that folder.
+void StartPathsAt(const fs::path& folder, ConfigNode& node) {
+  if (node.place.source && !node.place.source->has_lines) {
+    auto source = std::make_shared<ConfigSource>(*node.place.source);
+    source->folder = folder;
+    node.place.source = std::move(source);
+  }
+  for (ConfigNode::Entry& entry : node.entries) {
+    StartPathsAt(folder, entry.value);
+  }
+  for (ConfigNode& item : node.items) {
+    StartPathsAt(folder, item);
+  }
+}
+
+Experiment Read(const std::string& text, const Alternative& alternative, const fs::path& folder) {
+  ConfigErrors errors;
+  ConfigNode tree = LoadConfigTextTree(text, "alternative " + alternative.name, alternative.set,
+                                       ConfigTreeOf(Experiment{}), errors);
+  StartPathsAt(fs::absolute(folder), tree);
+  auto experiment = ReadConfigTree<Experiment>(tree, errors);
+  errors.ThrowIfAny();
+  return experiment;
+}
+
+// What of a result the comparison needs; the rest is let go.
+struct Answer {
+  std::string name;
+  Scene scene;
+  TriMesh face;
+  std::vector<Vec3> normals;
+  std::set<std::string> sites;  // with a dowel
+  Json json;
+};
+
+std::set<std::string> SitesOf(const RunResult& result) {
+  std::set<std::string> sites;
+  for (const Dowel& dowel : result.subject.dowels_on_bone) {
+    sites.insert(dowel.site);
+  }
+  return sites;
+}
+
+Answer AnswerOf(const std::string& name, const std::vector<std::string>& set,
+                const RunResult& result) {
+  Answer answer{.name = name,
+                .scene = HeadScene(result),
+                .face = result.face.mesh,
+                .normals = result.face.normals,
+                .sites = SitesOf(result),
+                .json = {{"name", name}, {"set", set}, {"usable", result.usable()}}};
+  answer.json["dowels"] = answer.sites.size();
+  answer.json["face"] = nullptr;
+  if (result.truth) {
+    const DistanceSummary& s = result.truth->face.truth_to_face;
+    answer.json["face"] = {{"mean_abs_mm", s.mean_abs_mm},
+                           {"rms_mm", s.rms_mm},
+                           {"p95_mm", s.p95_mm},
+                           {"within_2_5mm", s.within_2_5mm}};
+  }
+  answer.json["notes"] = result.subject.notes;
+  return answer;
+}
+
+// How far each vertex lies outside the run's own face; none where the two have no common (u,v).
+std::vector<double> Outside(const Answer& answer, const Answer& own) {
+  std::vector<double> outside;
+  if (answer.face.triangles == own.face.triangles) {
+    for (std::size_t v = 0; v < own.face.points.size(); ++v) {
+      outside.push_back(own.normals[v].dot(answer.face.points[v] - own.face.points[v]));
+    }
+  }
+  return outside;
+}
+
+Json DifferenceJson(const std::vector<double>& outside, const TriMesh& mesh) {
+  if (outside.empty()) {
+    return nullptr;
+  }
+  const std::vector<double> areas = VertexAreas(mesh);
+  double sum = 0, squares = 0, area = 0;
+  for (std::size_t v = 0; v < outside.size(); ++v) {
+    sum += areas[v] * outside[v];
+    squares += areas[v] * outside[v] * outside[v];
+    area += areas[v];
+  }
+  return {{"mean_mm", sum / area},
+          {"rms_mm", std::sqrt(squares / area)},
+          {"least_mm", *std::ranges::min_element(outside)},
+          {"most_mm", *std::ranges::max_element(outside)}};
+}
+
+void Compare(std::vector<Answer>& answers) {
+  const Answer& own = answers.front();
+  for (Answer& answer : answers) {
+    Json left_out = Json::array();
+    for (const std::string& site : own.sites) {
+      if (!answer.sites.contains(site)) {
+        left_out.push_back(site);
+      }
+    }
+    answer.json["left_out"] = left_out;
+    answer.json["difference"] = DifferenceJson(Outside(answer, own), own.face);
+  }
+}
+
+class ComparedPictures {
+ public:
+  ComparedPictures(const std::vector<Answer>& answers, OutputFolder& folder, int threads)
+      : answers_(answers), folder_(folder), threads_(threads) {
+    for (const Answer& answer : answers) {
+      sheet_.captions.push_back(answer.name);
+      faces_.extend(Bounds(answer.face));
+      for (const SceneObject& object : answer.scene.objects) {
+        heads_.extend(Bounds(object.mesh));
+      }
+    }
+  }
+
+  void WriteHeads(View view) {
+    std::vector<Image> pictures;
+    for (const Answer& answer : answers_) {
+      pictures.push_back(Picture(answer.scene, view, heads_, Lighting::kStudio));
+    }
+    Write(std::string(EnumNames(View{})[static_cast<int>(view)]), pictures, sheet_);
+  }
+
+  void WriteDifferences() {
+    const Legend legend{ErrorColours(), "outside (+) or inside (-) this run's own face"};
+    Sheet sheet = sheet_;
+    sheet.legend = legend;
+    std::vector<Image> pictures;
+    for (const Answer& answer : answers_) {
+      std::vector<double> outside = Outside(answer, answers_.front());
+      outside.resize(answer.face.points.size(), kNaN);
+      pictures.push_back(Picture({{MappedObject(answer.face, outside, legend.map)}}, View::kFront,
+                                 faces_, Lighting::kEven));
+    }
+    Write("difference", pictures, sheet);
+  }
+
+ private:
+  Image Picture(const Scene& scene, View view, const Box3& region, Lighting lighting) const {
+    const double aspect = static_cast<double>(kWidth) / kHeight;
+    return Render(scene, CameraFor(view, region, aspect),
+                  {.width = kWidth, .height = kHeight, .lighting = lighting}, threads_);
+  }
+  void Write(const std::string& name, const std::vector<Image>& pictures, const Sheet& sheet) {
+    folder_.Write(fmt::format("pictures/alternatives_{}.png", name),
+                  EncodePng(ContactSheet(pictures, sheet)));
+  }
+
+  const std::vector<Answer>& answers_;
+  OutputFolder& folder_;
+  int threads_;
+  Sheet sheet_{.title = "", .captions = {}, .legend = std::nullopt};
+  Box3 heads_, faces_;
+};
+
+}  // namespace
+
+std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const fs::path& folder) {
+  Experiment own = experiment;
+  own.alternatives.clear();
+  const std::string text = WriteConfig(own);
+  std::vector<NamedExperiment> result;
+  std::set<std::string> names;
+  for (const Alternative& alternative : experiment.alternatives) {
+    if (!IsName(alternative.name) || !names.insert(alternative.name).second) {
+      throw InputError(fmt::format(
+          "alternatives: '{}' is no name, or stands twice; letters, digits, '_', '-' and '+' make "
+          "one",
+          alternative.name));
+    }
+    result.push_back({alternative.name, Read(text, alternative, folder)});
+    result.back().experiment.title += " (" + alternative.name + ")";
+    if (!result.back().experiment.alternatives.empty()) {
+      throw InputError(fmt::format("alternatives: '{}' sets alternatives of its own; it has none",
+                                   alternative.name));
+    }
+  }
+  return result;
+}
+
+std::vector<std::string> RunAlternatives(const Experiment& experiment,
+                                         const std::vector<NamedExperiment>& named,
+                                         const RunResult& own, StageCache& cache,
+                                         OutputFolder& folder, const RunContext& context) {
+  std::vector<std::string> faults;
+  if (named.empty()) {
+    return faults;
+  }
+  std::vector<Answer> answers = {AnswerOf("this run", {}, own)};
+  for (std::size_t k = 0; k < named.size(); ++k) {
+    const RunResult result = Run(named[k].experiment, context, &cache);
+    OutputFolder below(folder.Root() / "alternatives" / named[k].name, WhenNotEmpty::kReplaceFiles);
+    WriteRun(named[k].experiment, result, below, context);
+    for (const std::string& fault : result.Faults()) {
+      faults.push_back(fmt::format("alternative '{}': {}", named[k].name, fault));
+    }
+    answers.push_back(AnswerOf(named[k].name, experiment.alternatives[k].set, result));
+  }
+  Compare(answers);
+  Json json = Json::array();
+  for (const Answer& answer : answers) {
+    json.push_back(answer.json);
+  }
+  folder.Write("alternatives.json", json.dump(2) + "\n");
+  ComparedPictures pictures(answers, folder, context.threads);
+  for (const View view : {View::kFront, View::kThreeQuarter, View::kSide}) {
+    pictures.WriteHeads(view);
+  }
+  pictures.WriteDifferences();
+  return faults;
+}
+
+}  // namespace semblance
