@@ -69,7 +69,7 @@ TEST(Alternatives, StandBelowTheRunAndSayWhatIsLeftOut) {
   const testing::ScratchFolder scratch;
   OutputFolder folder(scratch / "out", WhenNotEmpty::kRefuse);
   StageCache cache(16);
-  const RunResult own = Run(experiment, {}, &cache);
+  const RunResult own = semblance::Run(experiment, {}, &cache);
   EXPECT_THAT(
       RunAlternatives(experiment, AlternativesOf(experiment, kConfigs), own, cache, folder, {}),
       ElementsAre());

@@ -87,6 +87,19 @@ TEST(FillDepths, TakesTheDeviationWhereTheTableHasOne) {
   EXPECT_EQ(s.dowels[1].sd_mm, 6);
 }
 
+TEST(FillDepths, AddsDeviationsWhereTheTableStatesThem) {
+  Subject s({"g", "go_l"});
+  TissueOptions options = FromTable("t_table_2023", Sex::kMale, Build::kNormal);
+  options.sds = -1;
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels), IsEmpty());
+  EXPECT_THAT(s.Depths(), ElementsAre(4.5, 6.5));
+  options = FromTable("rhine_caucasoid", Sex::kFemale, Build::kObese);
+  options.sds = 1;
+  EXPECT_THAT(FillDepths(options, s.file, s.dowels),
+              ElementsAre(HasSubstr("states no standard deviation for g, go_l")));
+  EXPECT_THAT(s.Depths()[1], 17.5);
+}
+
 TEST(FillDepths, SaysThatASuspectCellIsUsed) {
   Subject s({"n", "g"});
   EXPECT_THAT(
