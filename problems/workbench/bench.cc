@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
@@ -150,7 +151,9 @@ void Bench::FindFormerRun() {
   }
   const std::string edits = EditsText(state);
   if (ReadFileBytes(key) == Sha256OfText(present_key_ + edits)) {
-    face_.emplace(RunFace{ReadHSpline(face), {}, {}, present_key_, edits});
+    Case head = CoarseCase(*subject_, experiment_, state);
+    face_.emplace(RunFace{ReadHSpline(face), std::move(head.dowels_on_bone), std::move(head.notes),
+                          present_key_, edits});
     face_revision_ = revision_;
   }
 }

@@ -51,11 +51,16 @@ SubjectData ThinnedOut(const BenchSubject& subject, const BenchState& state) {
 
 }  // namespace
 
+Case CoarseCase(const BenchSubject& subject, const Experiment& experiment,
+                const BenchState& state) {
+  return MakeCase(ThinnedOut(subject, state), experiment);
+}
+
 BenchFace CoarseFace(const BenchSubject& subject, const Experiment& given, const BenchState& state,
                      StageCache& cache, const RunContext& context) {
   Experiment experiment = given;
   experiment.face = CoarseWay(given);
-  Case head = MakeCase(ThinnedOut(subject, state), experiment);
+  Case head = CoarseCase(subject, experiment, state);
   const auto generic = cache.Get<TemplateFace>(StageKey("template", experiment.face_template), [&] {
     return LoadTemplate(experiment.face_template);
   });

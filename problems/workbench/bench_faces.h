@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/pipeline/experiment.h"
+#include "problems/pipeline/case.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/workbench/bench_subject.h"
 #include "surfaces/hspline/hspline_surface.h"
@@ -17,6 +17,10 @@ struct BenchFace {
   std::vector<Dowel> dowels;
   std::vector<std::string> notes;
 };
+
+// The head as a run takes it, but on the thinned-out skull: dowels with their depths, and notes.
+// Throws as MakeCase.
+Case CoarseCase(const BenchSubject& subject, const Experiment& experiment, const BenchState& state);
 
 // The face without the implicit surface and without a fit: the prior's most likely face given the
 // dowels' tips alone, where the experiment's way to the face asks a prior; else the generic face

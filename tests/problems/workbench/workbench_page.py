@@ -183,6 +183,7 @@ def work(program, config, folder, pictures):
         browser.wait("return window.semblance && window.semblance.faces.kind === 'full'")
         assert state(browser)["edited_vertices"] == vertices
         assert state(browser)["face"]["saved"]
+        assert browser.run("return document.querySelectorAll('.depth').length") > 20
 
         browser.click("[data-tab=compare]")
         browser.wait("return document.querySelectorAll('#view canvas:not(.view3d-compass)').length === 4")
