@@ -11,6 +11,7 @@ export class Faces {
     this.words = '';         // why there is none
     this.notes = [];
     this.dowels = [];
+    this.settled = null;     // the geometry of the last state; what is only tried out is none
     this.former = null;      // the geometry that changes are told from
     this.pinned = false;     // it stays the one that was pinned
     this.coloured = false;
@@ -34,19 +35,19 @@ export class Faces {
 
   // A depth that is being dragged: seen, not yet kept.
   async tryOut(path, value) {
-    await this.load(() => get('coarse', {path, value: JSON.stringify(value)}), 'coarse');
+    await this.load(() => get('coarse', {path, value: JSON.stringify(value)}), 'coarse', true);
   }
 
   // Only the latest answer counts; while one is under way, the latest question waits.
-  async load(ask, kind) {
-    this.next = {ask, kind};
+  async load(ask, kind, trial = false) {
+    this.next = {ask, kind, trial};
     if (this.busy) { return; }
     this.busy = true;
     while (this.next) {
-      const {ask: now, kind: what} = this.next;
+      const {ask: now, kind: what, trial: tried} = this.next;
       this.next = null;
       try {
-        this.take(await now(), what);
+        this.take(await now(), what, tried);
       } catch (error) {
         this.clear(error.message);
       }
@@ -54,9 +55,8 @@ export class Faces {
     this.busy = false;
   }
 
-  take(face, kind) {
-    const before = this.scene.faceGeometry();
-    if (before && !this.pinned) { this.former = before.clone(); }
+  take(face, kind, trial) {
+    if (!this.pinned) { this.former = this.settled; }
     this.kind = kind;
     this.words = '';
     this.notes = face.notes;
@@ -65,6 +65,7 @@ export class Faces {
     this.finest = face.finest_level;
     this.blob = face.mesh;
     this.scene.put('face', face.mesh);
+    if (!trial) { this.settled = this.scene.faceGeometry().clone(); }
     this.scene.putDowels(this.dowels);
     this.recolour();
     this.tell();

@@ -167,6 +167,9 @@ def work(program, config, folder, pictures):
         browser.wait("return window.semblance.store.state.landmarks.some((l) => l.site === 'go_r')")
         moved = change_depth(browser, "n", 12)
         assert moved > 2, f"the face moved by {moved} mm"
+        browser.run("document.querySelector('#panel .check input').click()")
+        assert browser.run("return window.semblance.faces.change.most") > 2
+        browser.run("document.querySelector('#panel .check input').click()")
         picture("face")
         make_full_face(browser)
         picture("full")
