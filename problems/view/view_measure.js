@@ -174,7 +174,8 @@ class SemblanceMeasure {
   }
 
   click(stage, event) {
-    const hit = stage.hit(event, this.tool === 'depth' ? ['skull', 'depth'] : undefined);
+    const surfaces = [...stage.layers.values()].filter(({layer}) => layer.mesh).map(({layer}) => layer.id);
+    const hit = stage.hit(event, this.tool === 'depth' ? ['skull', 'depth'] : surfaces);
     if (!hit || !hit.object.geometry || !hit.object.geometry.index || hit.faceIndex === undefined) {
       this.say(this.tool === 'depth' ? 'Depth is asked of bone: show the skull and click on it.' : 'There is no surface there.');
       return;
