@@ -204,6 +204,34 @@ bool MeetAnew(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& t
   return any;
 }
 
+// With depths of a table a person's build is not known, and the tips carry it into sigma. Around
+// sites without a dowel, as where no bone was scanned, no tip does: the site's own deviation does.
+void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
+                         const TableDepthOptions& table, std::vector<double>& sigma_mm) {
+  constexpr double kUsualDepth_mm = 10;  // of a site whose deviation goes by its depth
+  std::map<std::string, Vec3> places;
+  for (const auto& [site, at] : prior.sites) {
+    places[site] = PositionOf(at, prior.model.mean, prior.model.mean.points);
+  }
+  std::map<std::string, double> missing_mm;
+  for (const auto& [site, place] : places) {
+    if (std::ranges::find(dowels, site, &Dowel::site) == dowels.end()) {
+      Dowel none;
+      none.site = site;
+      none.depth_mm = kUsualDepth_mm;
+      missing_mm[site] = table.shared * PublishedSd_mm(none);
+    }
+  }
+  for (std::size_t v = 0; v < sigma_mm.size() && !missing_mm.empty(); ++v) {
+    const auto nearest = std::ranges::min_element(places, {}, [&](const auto& place) {
+      return (place.second - prior.model.mean.points[v]).squaredNorm();
+    });
+    if (const auto missing = missing_mm.find(nearest->first); missing != missing_mm.end()) {
+      sigma_mm[v] = std::hypot(sigma_mm[v], missing->second);
+    }
+  }
+}
+
 // None of a subject whose pose is not known.
 RuleMarks RulesOf(const FaceInput& in, const FacePrior& prior) {
   return in.subject.basis.sites ? MarksOfRules(in.experiment.rules, in.subject.points,
@@ -233,6 +261,9 @@ MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceIn
   }
   for (std::size_t k = 0; k < rules.rules.size(); ++k) {
     rules.rules[k].residual_mm = shape.mark_residual_mm[k];
+  }
+  if (table != nullptr) {
+    WidenWhereNoDowelIs(prior.face, dowels, *table, shape.sigma_mm);
   }
   placed.face_from_template =
       Composed(shape.subject_from_model, prior.on_template.mean_from_template);
