@@ -119,7 +119,8 @@ FaceRegion InFrontOfNetwork(const TriMesh& mesh, std::span<const Dowel> dowels,
   const MeshQuery query(network_mesh);
   const BorderRule border(network_mesh);
   const std::vector<Sphere> excluded = ExcludedSpheres(WithDowels(points, dowels), options.exclude);
-  const std::map<std::string, Vec3> bases = WithDowels({}, dowels);
+  std::map<std::string, Vec3> bases = WithDowels({}, dowels);
+  std::erase_if(bases, [](const auto& base) { return !IsStandardSite(base.first); });
   FaceRegion region{std::vector<bool>(mesh.points.size(), false),
                     std::vector<int>(mesh.points.size(), -1)};
   for (std::size_t v = 0; v < mesh.points.size(); ++v) {
@@ -131,7 +132,7 @@ FaceRegion InFrontOfNetwork(const TriMesh& mesh, std::span<const Dowel> dowels,
                                     [&](const Sphere& s) { return s.Contains(p); });
     if (inside && !barred) {
       region.scored[v] = true;
-      region.part[v] = NearestPart(p, bases);
+      region.part[v] = bases.empty() ? -1 : NearestPart(p, bases);
     }
   }
   return region;
