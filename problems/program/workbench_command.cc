@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/program/workbench_command.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -53,9 +54,21 @@ BenchOptions BenchOptionsOf(const WorkbenchArguments& a) {
   return options;
 }
 
-void OpenBrowser(const std::string& url) {
+// By a file that nobody else can read: others of this machine see the words of a command.
+void OpenBrowser(const fs::path& folder, const std::string& url) {
+  const std::string file = (folder / ".semblance-workbench" / "open.html").string();
+  const std::string page =
+      fmt::format("<!DOCTYPE html><meta http-equiv=\"refresh\" content=\"0; url={}\">\n", url);
+  ::unlink(file.c_str());
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  const bool written = descriptor >= 0 && ::write(descriptor, page.data(), page.size()) ==
+                                              static_cast<ssize_t>(page.size());
+  ::close(descriptor);
+  if (!written) {
+    throw IoError(fmt::format("{}: cannot be written; open the address by hand", file));
+  }
   if (::fork() == 0) {
-    ::execlp("xdg-open", "xdg-open", url.c_str(), nullptr);
+    ::execlp("xdg-open", "xdg-open", file.c_str(), nullptr);
     ::_exit(127);
   }
 }
@@ -69,7 +82,7 @@ int Workbench(const WorkbenchArguments& a) {
              bench.Folder().string(), server.Url());
   std::fflush(stdout);
   if (a.open) {
-    OpenBrowser(server.Url());
+    OpenBrowser(bench.Folder(), server.Url());
   }
   {
     const std::jthread serving([&server](const std::stop_token& stop) { server.Serve(stop); });
