@@ -51,7 +51,7 @@ function textControl(path, value, send) {
     return element('input', {type: 'text', value, spellcheck: false, onchange: (event) => send(event.target.value)});
   }
   const known = choices.map(({path: file, title}) => [file, title]);
-  if (!known.some(([file]) => file === value)) { known.unshift([value, value ? value : 'none']); }
+  if (!known.some(([file]) => file === value)) { known.unshift([value, value ? value.split('/').pop() : 'none']); }
   else if (path.endsWith('fill_from')) { known.unshift(['', 'none']); }
   return select(known, value, send);
 }
