@@ -236,6 +236,13 @@ Recentred Recentre(const FacePrior& prior, const PriorOnTemplate& on_template,
   }
   const std::map<std::string, Vec3> sites = SitesOnMean(prior, places, options.site_prior);
   const FacePrior moved = WithSites(prior, sites);
+  Recentred result{.face = face};
+  result.face.site_uv = SiteUv(face, on_template, sites);
+  result.sites_moved_mm = MedianMove(prior, moved);
+  result.mean_moved_mm = result.mean_moved_most_mm = 0;
+  if (!options.move_mean) {
+    return result;
+  }
   std::vector<std::vector<double>> misfits;
   for (const KnownHead& head : heads) {
     misfits.push_back(Misfit(moved, head, options, context));
@@ -243,10 +250,7 @@ Recentred Recentre(const FacePrior& prior, const PriorOnTemplate& on_template,
   const TriMesh& mean = prior.model.mean;
   const Sums sums = OfBothSides(misfits, Partners(mean, context));
   const std::vector<double> shift_mm = Shifts(mean, sums, options, context);
-  Recentred result{.face = face};
   result.face.surface = Shifted(face, prior, on_template, shift_mm);
-  result.face.site_uv = SiteUv(face, on_template, sites);
-  result.sites_moved_mm = MedianMove(prior, moved);
   double squares = 0, seen = 0, most = 0;
   for (std::size_t v = 0; v < shift_mm.size(); ++v) {
     squares += sums.count[v] > 0 ? shift_mm[v] * shift_mm[v] : 0;

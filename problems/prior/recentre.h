@@ -21,6 +21,7 @@ struct KnownHead {
 };
 
 struct RecentreOptions {
+  bool move_mean = false;  // else the sites alone
   double tip_mm = 3;       // a dowel with its tip farther from the skin says nothing of its site
   double site_prior = 2;   // how many points the present place of a site counts as
   double mean_prior = 2;   // how many points the present mean counts as

@@ -216,6 +216,9 @@ void DeclareRecentre(CLI::App& command, CommandLine& line) {
       ->check(Finite())
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
+  command.add_flag("--mean", a.options.move_mean,
+                   "move the mean as well: the face written then holds what the skins of these "
+                   "heads are off, so it is theirs too");
   command
       .add_option("--mean_prior", a.options.mean_prior,
                   "how many points the present mean counts as")
@@ -233,9 +236,10 @@ void DeclareRecentre(CLI::App& command, CommandLine& line) {
 constexpr std::array kCommands = {
     ProgramCommand{"template", "make a generic H-spline face of a head mesh with landmarks",
                    &DeclareTemplate},
-    ProgramCommand{"recentre",
-                   "set a generic face right, sites and mean, by heads whose skin is known",
-                   &DeclareRecentre},
+    ProgramCommand{
+        "recentre",
+        "set the sites of a generic face right, and its mean, by heads whose skin is known",
+        &DeclareRecentre},
 };
 
 }  // namespace

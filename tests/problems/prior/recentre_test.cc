@@ -51,8 +51,8 @@ struct Heads {
 TEST(Recentre, SitesGoToTheTipsAndTheMeanToTheSkin) {
   const Heads heads;
   const std::vector<KnownHead> known(3, {.dowels = heads.dowels, .skin = heads.skin});
-  const Recentred result =
-      Recentre(heads.prior, heads.on_template, heads.face, known, {}, {.threads = 2});
+  const Recentred result = Recentre(heads.prior, heads.on_template, heads.face, known,
+                                    {.move_mean = true}, {.threads = 2});
   // Three heads, of which each counts twice, against two: three quarters of the way.
   const double way = (result.face.surface.Point(result.face.site_uv.at("g")) -
                       heads.face.surface.Point(heads.face.site_uv.at("g")))
@@ -74,6 +74,7 @@ TEST(Recentre, ATipWithoutSkinSaysNothingOfItsSite) {
   const Recentred result =
       Recentre(heads.prior, heads.on_template, heads.face, known, {}, {.threads = 2});
   EXPECT_NEAR((result.face.site_uv.at("g") - heads.face.site_uv.at("g")).norm(), 0, 1e-12);
+  EXPECT_EQ(result.face.surface.Offsets(), heads.face.surface.Offsets());  // nobody asked for it
 }
 
 }  // namespace
