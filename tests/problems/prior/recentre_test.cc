@@ -50,17 +50,20 @@ struct Heads {
 
 TEST(Recentre, SitesGoToTheTipsAndTheMeanToTheSkin) {
   const Heads heads;
-  const std::vector<KnownHead> known(3, {.dowels = heads.dowels, .skin = heads.skin});
+  const std::vector<KnownHead> known = {{.dowels = heads.dowels, .skin = heads.skin}};
   const Recentred result = Recentre(heads.prior, heads.on_template, heads.face, known,
                                     {.move_mean = true}, {.threads = 2});
-  // Three heads, of which each counts twice, against two: three quarters of the way.
+  // A head of two sides against two points: half of the way.
   const double way = (result.face.surface.Point(result.face.site_uv.at("g")) -
                       heads.face.surface.Point(heads.face.site_uv.at("g")))
                          .z();
-  EXPECT_NEAR(way, 4.5, 0.7);
+  EXPECT_NEAR(way, 3, 0.8);
+  // Of the mean less than that, for the estimate's smooth rest follows the dowels around.
   const Vec2 uv(0.5, 0.8);
-  const Vec3 before = heads.face.surface.Point(uv), after = result.face.surface.Point(uv);
-  EXPECT_NEAR((after - before).dot(heads.face.surface.Normal(uv)), 0.75 * kMovedMm, 0.6);
+  const double moved = (result.face.surface.Point(uv) - heads.face.surface.Point(uv))
+                           .dot(heads.face.surface.Normal(uv));
+  EXPECT_GT(moved, 0.1);
+  EXPECT_LT(moved, 0.5 * kMovedMm);
   EXPECT_NEAR(result.face.site_uv.at("n").x(), 0.5, 1e-12);
 }
 
