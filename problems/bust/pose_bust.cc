@@ -18,6 +18,7 @@
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/outer_surface.h"
 
 namespace semblance {
 namespace {
@@ -122,6 +123,9 @@ class Scalp {
       ears_.push_back({side + 14 * back - 12 * up_, kEar_mm});
     }
   }
+  bool InEar(const Vec3& p) const {
+    return std::ranges::any_of(ears_, [&](const Sphere& ear) { return ear.Contains(p); });
+  }
   // 0 to 1: how much of the scalp a point is.
   double At(const Vec3& p) const {
     constexpr double kFirst_mm = 25, kWidth_mm = 45, kBeside_mm = 20;
@@ -185,6 +189,18 @@ class BustPoser {
     placed_ = Transformed(in_.model.mesh, subject_from_model_);
     if (!in_.model.rest) {
       BendToSites(from, to);
+      FindOuter();
+    }
+  }
+
+  // Walls of nostrils and ears are not the face's.
+  void FindOuter() {
+    outer_.assign(placed_.points.size(), true);
+    const std::vector<bool> seen = SeenFromOutside(placed_, context_.threads);
+    for (std::size_t t = 0; t < seen.size(); ++t) {
+      for (const std::int32_t v : placed_.triangles[t]) {
+        outer_[v] = outer_[v] && seen[t];
+      }
     }
   }
 
@@ -200,8 +216,12 @@ class BustPoser {
 
   void Follow(int round) {
     if (!in_.model.rest) {
-      constexpr std::array kReach_mm = {12.0, 5.0};
+      constexpr std::array kReach_mm = {8.0, 4.0};
       on_face_ = FindOnFace(posed_, face_, kReach_mm[round], {}, context_.threads);
+      const Scalp head(in_.face, in_.site_uv);
+      std::erase_if(on_face_, [&](const OnFace& f) {
+        return !outer_[f.vertex] || head.InEar(posed_.points[f.vertex]);
+      });
       for (OnFace& f : on_face_) {
         f.beside.setZero();
       }
@@ -347,6 +367,7 @@ class BustPoser {
   const FaceMesh face_;
   std::optional<SoftDeformation> deformation_;  // of placed_
   std::optional<MeshQuery> over_skull_;
+  std::vector<bool> outer_;  // of a model without a rest
   std::vector<bool> released_;
   std::vector<OnFace> on_face_;
   std::vector<SoftTarget> scalp_;
