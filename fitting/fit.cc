@@ -181,6 +181,31 @@ class Fitter {
     }});
   }
 
+  void Follow(const AutoPlan& plan) {
+    NestedFitResult fit = FitNested(result_.surface, driver_.target(), plan, context_);
+    result_.surface = std::move(fit.surface);
+    result_.automatic = std::move(fit.report);
+    for (const NestedRound& round : result_.automatic->rounds) {
+      driver_.Solve({.solve = [&](std::span<const Term>) { return SummaryOf(round); }});
+    }
+  }
+
+  // Only the surface as it ended is there to be measured.
+  LevelSummary SummaryOf(const NestedRound& round) const {
+    const bool last = &round == &result_.automatic->rounds.back();
+    return {
+        .level = round.finest,
+        .fraction = 1,
+        .terms = {},
+        .rms_after_mm = last ? PointRms(result_.surface, driver_.target(), context_.threads) : kNaN,
+        .iterations = round.steps,
+        .free_vertices = round.vertices,
+        .auto_weight = round.weight,
+        .solver = "conjugate gradients",
+        .termination = "convergence",
+        .usable = true};
+  }
+
   void SeePoints(SpaceSolve& all) const {
     if (driver_.MovesPoints()) {
       all.SeePoints();

@@ -49,7 +49,7 @@ const std::map<std::string, Layers> kRooms = {
      {{"least_squares", "problem"},
       {"shape_model", "space"},
       {"terms"},
-      {"solve"},
+      {"nested", "solve"},
       {"relaxation", "uncertainty"},
       {"plan"},
       {kHall}}},

@@ -36,12 +36,16 @@ class FaultFinder {
   FaultFinder(const FitOptions& options, int max_level)
       : options_(options),
         max_level_(max_level),
-        adaptive_(std::holds_alternative<AdaptivePlan>(options.plan)) {}
+        adaptive_(std::holds_alternative<AdaptivePlan>(options.plan)),
+        auto_(std::holds_alternative<AutoPlan>(options.plan)) {}
 
   std::vector<FitFault> Take() {
     std::visit([&](const auto& plan) { Plan(plan); }, options_.plan);
     if (adaptive_) {
       NeedPoints("the adaptive plan has no term 'points' with a weight; add one", "terms");
+    }
+    if (auto_) {
+      TermsOfAutoPlan();
     }
     AutoWeights();
     FindRelaxation();
@@ -87,6 +91,32 @@ class FaultFinder {
     Fraction("plan.fraction", plan.fraction);
   }
   void Plan(const AdaptivePlan& plan) { Level("plan.finest", plan.finest); }
+  void Plan(const AutoPlan&) {}  // the surface takes the levels that it needs
+
+  // What the auto plan chooses by itself is not to be asked for.
+  void TermsOfAutoPlan() {
+    for (int k = 0; k < std::ssize(options_.terms); ++k) {
+      const auto* const points = std::get_if<PointTerm>(&options_.terms[k]);
+      const auto* const smooth = std::get_if<SmoothnessTerm>(&options_.terms[k]);
+      const bool known = points != nullptr ? points->loss == RobustLoss::kNone
+                                           : smooth != nullptr && smooth->weight.automatic &&
+                                                 smooth->of == SmoothnessOf::kDisplacement;
+      if (!known) {
+        Add(fmt::format("terms[{}]", k),
+            "the auto plan weighs 'points' without a loss (it finds outliers by itself) and "
+            "'smoothness' of the displacement with weight: auto; leave 'terms' out, or take plan: "
+            "adaptive");
+      }
+    }
+    if (options_.solver != Solver::kFastest) {
+      Add("solver", "the auto plan solves by conjugate gradients; write solver: fastest");
+    }
+    if (!std::holds_alternative<NoRelaxation>(options_.relaxation)) {
+      Add("relaxation",
+          "the auto plan leaves the points' (u,v) where they are; write relaxation: "
+          "none, or take plan: adaptive");
+    }
+  }
 
   // The first of the terms `points` with a weight; without any there is a fault.
   const PointTerm* NeedPoints(std::string what, std::string path) {
@@ -150,7 +180,7 @@ class FaultFinder {
 
   const FitOptions& options_;
   int max_level_;
-  bool adaptive_;
+  bool adaptive_, auto_;
   std::vector<FitFault> faults_;
 };
 
@@ -173,6 +203,9 @@ void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
     Fail(fmt::format("{}: {}", fault.path, fault.what));
   }
   CheckFeatures(features, start.shape());
+  if (std::holds_alternative<AutoPlan>(options.plan) && !features.empty()) {
+    Fail("the auto plan knows no features; take plan: adaptive");
+  }
 }
 
 }  // namespace semblance

@@ -92,7 +92,8 @@ FitDriver::FitDriver(const HSplineSurface& rest, const FitTarget& target, const 
       terms_(std::move(terms)),
       context_(context),
       result_(result),
-      rms_mm_(std::holds_alternative<AdaptivePlan>(options.plan)  // which measures by itself
+      rms_mm_(std::holds_alternative<AdaptivePlan>(options.plan) ||
+                      std::holds_alternative<AutoPlan>(options.plan)  // which measure by themselves
                   ? kNaN
                   : PointRms(result.surface, target, context.threads)),
       moves_(MovesOf(options.relaxation)) {

@@ -2,8 +2,10 @@
 // What a fit gives back.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "fitting/nested/nested_fit.h"
 #include "fitting/relaxation/relaxation.h"
 #include "fitting/solve/level_fit.h"
 #include "surfaces/hspline/hspline_surface.h"
@@ -20,7 +22,8 @@ struct FitResult {
   double point_rms_mm = kNaN;            // of all points, weighted, after features were restored
   double dowel_rms_mm = kNaN;            // of the points that were not seeded (seeding.h), weighted
   int restored_features = -1;            // offsets that were given back, or never changed
-  bool usable = false;                   // every step's solution could be used
+  std::optional<AutoReport> automatic = {};  // of the auto plan: what it assumed
+  bool usable = false;                       // every step's solution could be used
 };
 
 }  // namespace semblance

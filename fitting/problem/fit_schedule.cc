@@ -22,7 +22,7 @@ std::vector<ScheduleStep> StepsOf(const SchedulePlan& plan) {
 FitAim AimOf(const SchedulePlan& plan) {
   return std::visit(
       []<class Plan>(const Plan& p) {
-        if constexpr (std::is_same_v<Plan, AdaptivePlan>) {
+        if constexpr (std::is_same_v<Plan, AdaptivePlan> || std::is_same_v<Plan, AutoPlan>) {
           return FitAim::kSurface;
         } else {
           return p.aim;

@@ -164,6 +164,30 @@ void Fields(Visitor& visit, AdaptivePlan& o) {
         o.min_points);
 }
 
+enum class OutlierRule { kDrop, kKeep };
+constexpr auto EnumNames(OutlierRule) { return std::to_array<std::string_view>({"drop", "keep"}); }
+
+// How fine, how smooth and which points to believe: all from the points (fitting/nested/). Its
+// terms are `points` and `smoothness` with `weight: auto`.
+struct AutoPlan {
+  static constexpr std::string_view kName = "auto";
+  int finest = 7;
+  OutlierRule outliers = OutlierRule::kDrop;
+};
+template <class Visitor>
+void Fields(Visitor& visit, AutoPlan& o) {
+  visit(FieldInfo{.name = "finest",
+                  .min = 0,
+                  .max = 8,
+                  .doc = "finest level that may be overlaid, however dense the points are"},
+        o.finest);
+  visit(
+      FieldInfo{.name = "outliers",
+                .doc = "drop: points that agree with none of their neighbours have no weight, and "
+                       "are listed; keep: every point is believed"},
+      o.outliers);
+}
+
 // How every plan goes to the minimum of its terms.
 enum class Solver {
   kCeres,   // ceres::Problems, whose parameter blocks are the control vertices
@@ -171,13 +195,13 @@ enum class Solver {
 };
 constexpr auto EnumNames(Solver) { return std::to_array<std::string_view>({"ceres", "fastest"}); }
 
-using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan, AdaptivePlan>;
+using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan, AdaptivePlan, AutoPlan>;
 
 // The steps of one pass of a plan that goes level by level; none of the adaptive plan.
 std::vector<ScheduleStep> StepsOf(const SchedulePlan& plan);
 // What the levels of a plan aim at; the adaptive plan solves for the surface.
 FitAim AimOf(const SchedulePlan& plan);
-// The finest level that a plan names.
+// The finest level that a plan names; 0 of the auto plan, which takes the levels that it needs.
 int FinestLevelOf(const SchedulePlan& plan);
 
 }  // namespace semblance

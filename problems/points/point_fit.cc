@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -11,10 +12,10 @@
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
 #include "problems/metrics/quantile.h"
-#include "problems/output/manifest.h"
+#include "problems/points/fit_report.h"
+#include "problems/points/residual_files.h"
 #include "problems/report/fit_json.h"
 #include "problems/report/timing_json.h"
-#include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
@@ -55,13 +56,13 @@ Json VerticesJson(const HSplineSurface& surface) {
   return json;
 }
 
-Json ResultJsonOf(const PointFitOptions& options, const std::filesystem::path& points,
+Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
                   const PointFit& result) {
   const std::vector<WeightedValue> residual = SortedValues(result.fit.residual_mm);
   Json json = {{"title", options.title},
                {"version", SEMBLANCE_VERSION},
-               {"points_file", points.filename().string()},
-               {"points_sha256", Sha256OfFile(points)},
+               {"points_file", source.name},
+               {"points_sha256", source.sha256},
                {"points", result.fit.residual_mm.size()},
                {"parameters", result.parameters},
                {"rms_mm", result.fit.point_rms_mm},
@@ -71,21 +72,62 @@ Json ResultJsonOf(const PointFitOptions& options, const std::filesystem::path& p
                {"control_vertices", VerticesJson(result.fit.surface)},
                {"usable", result.Faults().empty()},
                {"faults", result.Faults()}};
+  if (result.fit.automatic) {
+    json["automatic"] = AutoJson(*result.fit.automatic);
+  }
   json.update(StepsToJson(result.fit));
   return json;
 }
 
-std::string ResidualsCsv(const FitResult& fit) {
-  CsvWriter csv({"point", "u", "v", "residual_mm"});
-  for (std::size_t k = 0; k < fit.uv.size(); ++k) {
-    csv.Row(k, fit.uv[k].x(), fit.uv[k].y(), fit.residual_mm[k]);
+// Of the points' box.
+double DiagonalOf(std::span<const Vec3> positions) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : positions) {
+    box.extend(p);
   }
-  return csv.Text();
+  return box.diagonal().norm();
 }
 
-std::string SurfacePly(const HSplineSurface& surface, double chord_mm, int threads) {
-  Tessellation tessellation = TessellateToChord(surface, chord_mm, threads);
+// Before the fit: what could only be refused after it.
+void CheckChord(const AutoOr<double>& chord_mm, std::span<const Vec3> positions) {
+  constexpr double kFinest = 1e-7;
+  const double least = kFinest * DiagonalOf(positions);
+  if (!chord_mm.automatic && chord_mm.value < least) {
+    throw InputError(fmt::format(
+        "chord_mm: {} is too fine for points that extend over {:.3g} mm: surface.ply would have "
+        "too many triangles; give at least {:.2g}, or auto",
+        chord_mm.value, DiagonalOf(positions), least));
+  }
+}
+
+Tessellation TessellateAsFineAsCanBe(const HSplineSurface& surface, double chord_mm, int threads) {
+  constexpr int kTries = 12;
+  for (int k = 0; k < kTries; ++k, chord_mm *= 2) {
+    try {
+      return TessellateToChord(surface, chord_mm, threads);
+    } catch (const InputError&) {
+      continue;  // too many triangles
+    }
+  }
+  return TessellateToChord(surface, chord_mm, threads);
+}
+
+double ExtentOf(const HSplineSurface& surface) { return DiagonalOf(surface.Net(0).vertices); }
+
+std::string SurfacePly(const HSplineSurface& surface, const AutoOr<double>& chord_mm, int threads) {
+  constexpr double kChords = 5000;
+  Tessellation tessellation =
+      chord_mm.automatic ? TessellateAsFineAsCanBe(surface, ExtentOf(surface) / kChords, threads)
+                         : TessellateToChord(surface, chord_mm, threads);
   return EncodeMesh(tessellation.mesh, ".ply", {std::move(tessellation.normals), {}, {}});
+}
+
+void WriteResiduals(ResidualFile kind, const FitResult& fit, OutputFolder& folder) {
+  if (kind == ResidualFile::kCsv) {
+    folder.Write("residuals.csv", ResidualsCsv(fit));
+  } else if (kind == ResidualFile::kPly) {
+    folder.Write("residuals.ply", ResidualsPly(fit));
+  }
 }
 
 }  // namespace
@@ -101,6 +143,7 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
 PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
                    const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
+  CheckChord(options.chord_mm, table.positions);
   StepClock step(context);
   const Parametrisation parameters = step(
       "parameters", [&] { return Parametrise(table.positions, options.parameters, table.uv); });
@@ -118,7 +161,7 @@ PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
   return result;
 }
 
-void WritePointFit(const PointFitOptions& options, const std::filesystem::path& points,
+void WritePointFit(const PointFitOptions& options, const PointSource& source,
                    const PointFit& result, OutputFolder& folder, const RunContext& context) {
   context.Report("write");
   // First what can still be refused.
@@ -126,11 +169,11 @@ void WritePointFit(const PointFitOptions& options, const std::filesystem::path& 
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
   folder.Write("surface.ply", mesh);
-  folder.Write("residuals.csv", ResidualsCsv(result.fit));
+  WriteResiduals(options.residuals, result.fit, folder);
   folder.Write("timing.json", TimingJson(result.times));
   folder.Write(
       "result.json",
-      ResultJsonOf(options, points, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+      ResultJsonOf(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
           "\n");
 }
 

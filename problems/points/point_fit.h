@@ -2,8 +2,9 @@
 // An H-spline fitted to any scattered points: `semblance fit`.
 #pragma once
 
-#include <filesystem>
+#include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fitting/fit.h"
@@ -13,8 +14,15 @@
 #include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
 #include "problems/points/point_table.h"
+#include "surfaces/base/auto_or.h"
 
 namespace semblance {
+
+// What is written of each point.
+enum class ResidualFile { kCsv, kPly, kNone };
+constexpr auto EnumNames(ResidualFile) {
+  return std::to_array<std::string_view>({"csv", "ply", "none"});
+}
 
 struct PointFitOptions {
   std::string title = "untitled";
@@ -23,10 +31,11 @@ struct PointFitOptions {
   Closure closure = Closure::kOpen;
   Parameters parameters;
   FitOptions fit = {
-      .plan = AdaptivePlan{},
+      .plan = AutoPlan{},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
-  double chord_mm = 0.05;
+  AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);
+  ResidualFile residuals = ResidualFile::kCsv;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PointFitOptions& o) {
@@ -41,12 +50,18 @@ void Fields(Visitor& visit, PointFitOptions& o) {
   visit(FieldInfo{.name = "closure", .doc = "periodic_u for surfaces that go round"}, o.closure);
   visit(FieldInfo{.name = "parameters", .doc = "where the points' (u,v) come from"}, o.parameters);
   visit(FieldInfo{.name = "fit", .doc = "the fit; its finest level is the surface's"}, o.fit);
-  visit(FieldInfo{.name = "chord_mm",
-                  .unit = "mm",
-                  .min = 1e-9,
-                  .max = 1e3,
-                  .doc = "how far a triangle of surface.ply may be from the surface"},
-        o.chord_mm);
+  visit(
+      FieldInfo{.name = "chord_mm",
+                .unit = "mm",
+                .min = 1e-9,
+                .max = 1e3,
+                .doc = "how far a triangle of surface.ply may be from the surface; auto: 1/5000 "
+                       "of the points' extent, or more where that would be millions of triangles"},
+      o.chord_mm);
+  visit(FieldInfo{.name = "residuals",
+                  .doc = "what is written of each point: csv: residuals.csv; ply: residuals.ply, "
+                         "binary, faster and smaller; none: nothing"},
+        o.residuals);
 }
 
 // What the fit's plan, terms and solver cannot do together. Told with the other faults when a
@@ -62,15 +77,19 @@ struct PointFit {
   std::vector<std::string> Faults() const { return FaultsIn(fit); }
 };
 
-// Throws InputError as Parametrise, StartSurface and Fit do, and for a closure that does not suit
-// the parameters (a cylinder is periodic, a plane is not).
+// Throws InputError as Parametrise, StartSurface and Fit do, for a closure that does not suit the
+// parameters (a cylinder is periodic, a plane is not), and for a chord so fine against the points'
+// extent that no surface could be written with it.
 PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
                    const RunContext& context);
 
-// Writes resolved.yaml, result.json, residuals.csv (in the order of the table),
+// Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
 // surface.hspline.json, surface.ply and timing.json; the same bytes for the same input, timing.json
-// apart.
-void WritePointFit(const PointFitOptions& options, const std::filesystem::path& points,
+// apart. source: what the points came from.
+struct PointSource {
+  std::string name, sha256;
+};
+void WritePointFit(const PointFitOptions& options, const PointSource& source,
                    const PointFit& result, OutputFolder& folder, const RunContext& context);
 
 }  // namespace semblance

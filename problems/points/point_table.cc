@@ -9,7 +9,6 @@
 #include <optional>
 #include <string>
 
-#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 
 namespace semblance {
@@ -82,10 +81,6 @@ class PointReader {
 
 PointTable ParsePointTable(std::string_view text, std::string_view name) {
   return PointReader(text, name).Read();
-}
-
-PointTable ReadPointTable(const std::filesystem::path& file) {
-  return ParsePointTable(ReadFileBytes(file), file.string());
 }
 
 }  // namespace semblance

@@ -2,7 +2,6 @@
 // Scattered points in a CSV file.
 #pragma once
 
-#include <filesystem>
 #include <string_view>
 #include <vector>
 
@@ -22,6 +21,5 @@ struct PointTable {
 // entries, an empty line before the end, what is not a finite number, a weight that is not
 // positive, or no point at all.
 PointTable ParsePointTable(std::string_view text, std::string_view name);
-PointTable ReadPointTable(const std::filesystem::path& file);
 
 }  // namespace semblance

@@ -25,6 +25,8 @@
 #include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/pipeline/stage_key.h"
+#include "problems/points/fit_report.h"
+#include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
 #include "problems/program/evaluate.h"
 #include "problems/program/exit_code.h"
@@ -129,20 +131,32 @@ int DepthCommand(const Arguments& arguments) {
   return TellFaults(result.Faults());
 }
 
+PointFitOptions FitOptionsOf(const Arguments& arguments) {
+  return arguments.files.size() > 1
+             ? ReadConfig<PointFitOptions>(arguments.files[1], arguments.overrides)
+             : ReadConfigText<PointFitOptions>("{}", "the options of the command",
+                                               arguments.overrides);
+}
+
 int FitCommand(const Arguments& arguments) {
-  const std::filesystem::path points = arguments.files.at(0), config = arguments.files.at(1);
-  const auto options = ReadConfig<PointFitOptions>(config, arguments.overrides);
-  const PointTable table = ReadPointTable(points);
-  StagedFolder folder = MakeFolder(arguments, fmt::format("out/{}", points.stem().string()));
+  const std::filesystem::path path = arguments.files.at(0);
+  const PointFitOptions options = FitOptionsOf(arguments);
+  const PointFile file = ReadPointFile(path);
+  const std::string name = path == "-" ? "standard input" : path.filename().string();
+  StagedFolder folder = MakeFolder(
+      arguments, fmt::format("out/{}", path == "-" ? "points" : name.substr(0, name.find('.', 1))));
   const RunContext context = MakeContext(arguments);
-  const PointFit result = FitPoints(table, options, context);
-  WritePointFit(options, points, result, folder.Files(), context);
+  const PointFit result = FitPoints(file.points, options, context);
+  WritePointFit(options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
   folder.Publish();
   fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
-             table.positions.size(), result.parameters,
+             file.points.positions.size(), result.parameters,
              result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
              result.fit.point_rms_mm,
              *std::max_element(result.fit.residual_mm.begin(), result.fit.residual_mm.end()));
+  if (result.fit.automatic) {
+    fmt::print("{}", AutoText(*result.fit.automatic));
+  }
   fmt::print("folder: {}\n", folder.Root().string());
   return TellFaults(result.Faults());
 }
@@ -389,9 +403,11 @@ void DeclareFit(CLI::App& command, CommandLine& line) {
   command
       .add_option(
           "POINTS CONFIG", a.files,
-          "CSV file with the columns x,y,z and, if known, u,v, weight; YAML file of the fit")
+          "points: .csv with the columns x,y,z and, if known, u,v, weight; .xyz .npy .ply .obj; "
+          "each also .gz; - for a CSV on standard input. YAML file of the fit; without it all "
+          "follows from the points")
       ->required()
-      ->expected(2);
+      ->expected(1, 2);
 }
 
 void DeclareImportCt(CLI::App& command, CommandLine& line) {

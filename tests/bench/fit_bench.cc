@@ -10,7 +10,7 @@
 #include "tests/bench/fit_parts.h"
 
 // One BLAS thread for every case; OpenBLAS looks at the variable only when it is loaded.
-// fit_bench [head] [peers] [heldout] [relax] [linear]: parts; none: all of them.
+// fit_bench [head] [untuned] [peers] [heldout] [relax] [linear]: parts; none: all of them.
 int main(int argc, char** argv) {
   if (std::getenv("OPENBLAS_NUM_THREADS") == nullptr) {
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
@@ -22,6 +22,9 @@ int main(int argc, char** argv) {
   };
   if (wanted("head")) {
     semblance::bench::RunHead();
+  }
+  if (wanted("untuned")) {
+    semblance::bench::RunUntuned();
   }
   if (wanted("peers")) {
     semblance::bench::RunPeers();

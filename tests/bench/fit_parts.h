@@ -10,7 +10,11 @@ namespace semblance::bench {
 // figures of peers that are not in Debian.
 void RunHead();
 
-// The same at 1e5 points against FITPACK and ITK, where their Debian packages are there.
+// Ten sets that are hard in different ways (point_sets.h), with nothing chosen, against MBA and
+// FITPACK at their best on the truth.
+void RunUntuned();
+
+// The head at 1e5 points against FITPACK and ITK, where their Debian packages are there.
 void RunPeers();
 
 // Points held out of a terrain and of a deep-drawn part with gaps, with `weight: auto`, against MBA

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/config/config.h"
+#include "problems/points/point_files.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -75,20 +76,53 @@ TEST_F(PointFitCommand, FrankesFunctionAndTheHeadComeOut) {
   EXPECT_GT(ReadMesh(folder_ / "head/surface.ply").triangles.size(), 1000u);
 }
 
-// With more vertices than the points determine, cross-validation leaves them their noise, 1e-3 each
-// way. A coarser level than the configuration's, which takes a minute.
+// Neither a configuration nor (u,v): what is left of the points is their noise, 1e-3 each way.
 TEST_F(PointFitCommand, AHeightFieldKeepsItsNoise) {
   Write("franke.csv", Csv(Scattered(FrankePoint, 5000, 1e-3, 1), /*with_uv=*/false));
-  const auto outcome = Call(fmt::format(
-      "fit franke.csv {}/height_field.yaml --set \"fit.plan.schedule=[{{level: 3, fraction: 1}}]\" "
-      "--out out --quiet",
-      kConfigs));
+  const auto outcome =
+      Call(fmt::format("fit franke.csv {}/height_field.yaml --out out --quiet", kConfigs));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "out/result.json"));
-  EXPECT_EQ(json["control_vertices"]["by_level"].size(), 4u);
-  const double noise = std::sqrt(3) * 1e-3;
-  EXPECT_GT(json["rms_mm"], 0.8 * noise);
-  EXPECT_LT(json["rms_mm"], 1.05 * noise);
+  EXPECT_GT(json["rms_mm"], 0.8e-3);
+  EXPECT_LT(json["rms_mm"], 1.3e-3);
+}
+
+TEST_F(PointFitCommand, TheTableOfTheReadmeIsFittedWithoutAConfiguration) {
+  const auto outcome =
+      Call(fmt::format("fit {}/points.csv --set residuals=ply --out out --quiet", kConfigs));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("outliers left out"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/residuals.ply"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/residuals.csv"));
+  const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "out/result.json"));
+  EXPECT_NEAR(json["automatic"]["noise_mm"], 2e-3, 2e-4);
+  EXPECT_NEAR(json["automatic"]["outlier_count"], 20, 2);
+}
+
+TEST_F(PointFitCommand, PointsOfEachKindOfFileAreTheSame) {
+  const FitTarget target = Scattered(FrankePoint, 300, 0, 1);
+  std::string xyz, obj, ply = "ply\nformat ascii 1.0\nelement vertex 300\n";
+  for (const char* name : {"x", "y", "z", "u", "v"}) {
+    ply += fmt::format("property double {}\n", name);
+  }
+  ply += "end_header\n";
+  for (const FitPoint& p : target.points) {
+    const std::string place =
+        fmt::format("{} {} {}", p.position.x(), p.position.y(), p.position.z());
+    xyz += place + "\n";
+    obj += "v " + place + "\n";
+    ply += fmt::format("{} {} {}\n", place, p.uv.x(), p.uv.y());
+  }
+  Write("p.csv", Csv(target, /*with_uv=*/true));
+  Write("p.xyz", "# a scan\n" + xyz);
+  Write("p.obj", obj + "f 1 2 3\n");
+  Write("p.ply", ply);
+  const PointFile csv = ReadPointFile(folder_ / "p.csv");
+  for (const char* name : {"p.xyz", "p.obj", "p.ply"}) {
+    EXPECT_EQ(ReadPointFile(folder_ / name).points.positions, csv.points.positions) << name;
+  }
+  EXPECT_EQ(ReadPointFile(folder_ / "p.ply").points.uv, csv.points.uv);
+  EXPECT_THROW(ReadPointFile(folder_ / "p.doc"), IoError);
 }
 
 TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
@@ -107,6 +141,7 @@ TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   refused("bad.csv plain.yaml", "bad.csv:2: column 'z': 'zero'");
   refused("none.csv plain.yaml", "none.csv");
   refused("line.csv plain.yaml", "lie on a line");
+  refused("good.csv --set chord_mm=1e-9", "chord_mm: 1e-09 is too fine");
   refused("good.csv cylinder.yaml", "closure: periodic_u");
   refused("good.csv plain.yaml --set parameters=given", "columns u and v");
   refused("good.csv plain.yaml --set fit.terms[1].weight=some", "expected a number");
@@ -150,8 +185,11 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   const auto read = [](const std::string& text) {
     return testing::WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
   };
+  EXPECT_THAT(read("fit: {plan: adaptive, terms: [symmetry]}\n"),
+              HasSubstr("fit.terms: the adaptive plan has no term 'points'"));
   EXPECT_THAT(read("fit: {terms: [symmetry]}\n"),
-              HasSubstr("x.yaml:1:14: fit.terms: the adaptive plan has no term 'points'"));
+              HasSubstr("the auto plan weighs 'points' without a loss"));
+  EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
 }
 

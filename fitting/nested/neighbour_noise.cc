@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/nested/neighbour_noise.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace semblance {
+namespace {
+
+// Points that are nearest to one among those that follow or precede it along the curve.
+class Neighbourhood {
+ public:
+  Neighbourhood(const NestedPoints& points, std::span<const std::uint32_t> indices)
+      : points_(points), indices_(indices) {}
+
+  // The point itself first.
+  std::vector<std::uint32_t> Of(std::size_t n, std::size_t count) const {
+    const std::size_t window = 3 * count, begin = n > window ? n - window : 0,
+                      end = std::min(n + window + 1, indices_.size());
+    std::vector<std::pair<double, std::uint32_t>> near;
+    for (std::size_t k = begin; k < end; ++k) {
+      const double dx = points_.x[indices_[k]] - points_.x[indices_[n]],
+                   dy = points_.y[indices_[k]] - points_.y[indices_[n]];
+      near.emplace_back(dx * dx + dy * dy, indices_[k]);
+    }
+    const std::size_t taken = std::min(count + 1, near.size());
+    std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(taken), near.end());
+    std::vector<std::uint32_t> found;
+    for (std::size_t k = 0; k < taken; ++k) {
+      found.push_back(near[k].second);
+    }
+    return found;
+  }
+
+ private:
+  const NestedPoints& points_;
+  std::span<const std::uint32_t> indices_;
+};
+
+// What is left of the values per degree of freedom and channel.
+double LeftOver(const NestedPoints& points, const std::vector<std::uint32_t>& near, int terms) {
+  const auto count = static_cast<Eigen::Index>(near.size());
+  Eigen::MatrixXd rows(count, terms), values(count, points.channels);
+  double scale = 1e-300;
+  for (const std::uint32_t k : near) {
+    scale = std::max({scale, std::abs(points.x[k] - points.x[near[0]]),
+                      std::abs(points.y[k] - points.y[near[0]])});
+  }
+  for (Eigen::Index r = 0; r < count; ++r) {
+    const std::uint32_t k = near[r];
+    const double x = (points.x[k] - points.x[near[0]]) / scale,
+                 y = (points.y[k] - points.y[near[0]]) / scale;
+    const std::array<double, 6> row = {1, x, y, x * x, x * y, y * y};
+    rows.row(r) = Eigen::Map<const Eigen::RowVectorXd>(row.data(), terms);
+    for (int c = 0; c < points.channels; ++c) {
+      values(r, c) = points.value[c][k];
+    }
+  }
+  const Eigen::MatrixXd left = values - rows * rows.colPivHouseholderQr().solve(values);
+  return left.squaredNorm() / static_cast<double>((count - terms) * points.channels);
+}
+
+}  // namespace
+
+double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
+                      NeighbourModel model) {
+  constexpr std::size_t kSamples = 1000;
+  const std::size_t count = model == NeighbourModel::kPlaneOf8 ? 8 : 20;
+  const int terms = model == NeighbourModel::kPlaneOf8 ? 3 : 6;
+  if (indices.size() < 2 * count) {
+    return kNaN;
+  }
+  const Neighbourhood neighbourhood(points, indices);
+  std::vector<double> squares;
+  for (std::size_t n = 0; n < indices.size();
+       n += std::max<std::size_t>(indices.size() / kSamples, 1)) {
+    squares.push_back(LeftOver(points, neighbourhood.Of(n, count), terms));
+  }
+  const auto middle = squares.begin() + std::ssize(squares) / 2;
+  std::nth_element(squares.begin(), middle, squares.end());
+  // The median of a chi-squared variable over its mean (Wilson & Hilferty 1931).
+  const double freedom = static_cast<double>(count + 1 - terms) * points.channels;
+  return std::sqrt(*middle / std::pow(1 - 2 / (9 * freedom), 3));
+}
+
+double NeighbourCorrelation(const NestedPoints& points, std::span<const std::uint32_t> indices,
+                            std::span<const NestedSolve::Residual> residuals) {
+  double together = 0, squares = 0;
+  for (std::size_t n = 0; n + 1 < indices.size(); ++n) {
+    for (int c = 0; c < points.channels; ++c) {
+      together += residuals[n].along[c] * residuals[n + 1].along[c];
+    }
+    squares += (residuals[n].Square() + residuals[n + 1].Square()) / 2;
+  }
+  return squares > 0 ? together / squares : 0;
+}
+
+}  // namespace semblance

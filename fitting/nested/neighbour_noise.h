@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Noise from the points alone, and what is left of it between neighbours.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "fitting/nested/nested_solve.h"
+
+namespace semblance {
+
+enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
+
+// Standard deviation of a point along one axis: a plane or quadratic through each of some
+// thousand points and its neighbours in (u,v), by least squares, and the median of what that leaves
+// per degree of freedom. Detail that neighbours do not share is in it, the more of it the wider the
+// neighbourhood. NaN for too few points.
+double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
+                      NeighbourModel model);
+
+// Sum of e_a . e_b over that of |e|^2, b being next to a along the curve: 0 for errors that do not
+// know of each other.
+double NeighbourCorrelation(const NestedPoints& points, std::span<const std::uint32_t> indices,
+                            std::span<const NestedSolve::Residual> residuals);
+
+}  // namespace semblance

@@ -1,0 +1,405 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/nested/nested_fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include "fitting/nested/neighbour_noise.h"
+#include "fitting/nested/outlier_search.h"
+#include "fitting/nested/unresolved_detail.h"
+#include "fitting/nested/weight_search.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using Residual = NestedSolve::Residual;
+using Indices = std::vector<std::uint32_t>;
+
+constexpr int kMostRounds = 24;
+constexpr int kMostPatches = 8192;  // along one side (HSplineShape)
+constexpr std::size_t kFewestLooked = 100000, kPointsPerVertex = 24;
+constexpr double kAsGood = 1.001;      // of the mean square held out
+constexpr double kFewNew = 0.005;      // of the vertices: not worth a round
+constexpr double kDense = 1.25;        // points for a patch of the next level
+constexpr double kCheapDense = 0.3;    // the same where all patches together are few
+constexpr std::size_t kCheap = 50000;  // points
+
+[[noreturn]] void Fail(const std::string& what) { throw InputError("fit: plan auto: " + what); }
+
+// One in ten, by its place along the curve.
+bool IsHeld(std::uint32_t k) {
+  const std::uint64_t bits = (k + 1) * 0xD1B54A32D192ED03u;
+  return (bits ^ bits >> 31) % 10 == 0;
+}
+
+// The finest level on which a patch with points has more than one of them on the mean.
+int FinestByDensity(const NestedPoints& points, const GridLayout& level0, int finest) {
+  constexpr double kPointsPerPatch = 1.3;
+  constexpr std::size_t kMostPatchesPerPoint = 4;
+  GridLayout layout = level0;
+  for (int level = 1; level <= finest; ++level) {
+    layout = layout.Finer();
+    std::size_t occupied = 0, last = layout.Patches();
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const NestedPlace place = PlaceOn(layout.grid, level, points.x[k], points.y[k]);
+      const std::size_t patch = layout.Patch(place.i, place.j);
+      occupied += patch != last ? 1 : 0;
+      last = patch;
+    }
+    if (static_cast<double>(points.size()) < kPointsPerPatch * static_cast<double>(occupied) ||
+        layout.Patches() > kMostPatchesPerPoint * points.size()) {
+      return level - 1;
+    }
+  }
+  return finest;
+}
+
+// A cloud of a shape with levels is sorted along a Z-curve.
+HSplineShape WithLevels(HSplineShape shape) {
+  shape.max_level = 1;
+  return shape;
+}
+
+struct Snapshot {
+  NestedSpace space;
+  NestedValues solution;
+  double weight = kNaN;
+  double held_square = kNaN;
+  int round = -1;
+};
+
+class NestedFitter {
+ public:
+  NestedFitter(const HSplineSurface& start, const FitTarget& target, const AutoPlan& plan,
+               const RunContext& context)
+      : start_(start),
+        plan_(plan),
+        context_(context),
+        cloud_(WithLevels(start.shape()), target),
+        points_(DisplacementsFrom(start, cloud_, context.threads)),
+        solve_(points_, MeanLengths(start)),
+        space_(start.shape()),
+        cap_(plan.finest),
+        outlier_(points_.size(), 0) {
+    while ((std::max(start.shape().patches_u, start.shape().patches_v) << cap_) > kMostPatches) {
+      --cap_;
+    }
+    finest_ = FinestByDensity(points_, space_[0].layout, cap_);
+  }
+
+  NestedFitResult Run() {
+    Look();
+    BeforeAnyFit();
+    for (int round = 0; round < kMostRounds; ++round) {
+      context_.ThrowIfStopped();
+      context_.Report("fit",
+                      fmt::format("{} vertices to level {}", space_.Vertices(), space_.finest()));
+      FitRound();
+      if (!Refine()) {
+        break;
+      }
+    }
+    return Finish();
+  }
+
+ private:
+  // Some of the points, as many as the vertices need.
+  void Look() {
+    const std::size_t enough =
+        std::max(kFewestLooked, kPointsPerVertex * static_cast<std::size_t>(space_.Vertices()));
+    const std::size_t every = std::max<std::size_t>(points_.size() / enough, 1);
+    looked_.clear();
+    for (std::size_t k = 0; k < points_.size(); k += every) {
+      looked_.push_back(static_cast<std::uint32_t>(k));
+    }
+  }
+
+  template <class Wanted>
+  Indices Those(const Wanted& wanted) const {
+    Indices indices;
+    std::copy_if(looked_.begin(), looked_.end(), std::back_inserter(indices), wanted);
+    return indices;
+  }
+
+  std::vector<Residual> ResidualsOf(const Indices& indices) const {
+    const NestedValues displacements = solve_.Displacements();
+    std::vector<Residual> residuals;
+    residuals.reserve(indices.size());
+    for (const std::uint32_t k : indices) {
+      residuals.push_back(solve_.ResidualAt(displacements, k));
+    }
+    return residuals;
+  }
+
+  // The displacements themselves tell the grossest outliers, which would bend the first surface.
+  void BeforeAnyFit() {
+    if (plan_.outliers == OutlierRule::kKeep) {
+      return;
+    }
+    std::vector<Residual> residuals(looked_.size());
+    for (std::size_t n = 0; n < looked_.size(); ++n) {
+      for (int c = 0; c < points_.channels; ++c) {
+        residuals[n].along[c] = points_.value[c][looked_[n]];
+      }
+    }
+    FindOutliers(points_, looked_, residuals, 0, outlier_);
+  }
+
+  void FitRound() {
+    Look();
+    const Indices fitted = Those([&](std::uint32_t k) { return !IsHeld(k) && outlier_[k] == 0; });
+    solve_.Begin(space_, fitted);
+    NestedWeightSearch search(points_, fitted, solve_, least_gain_);
+    if (std::isnan(weight_)) {
+      search.Scan();
+      search.Climb(4, search.Finish().weight);
+    } else {
+      search.ClimbAnew(4, weight_);
+    }
+    const NestedWeight chosen = search.Finish();
+    least_gain_ = search.least_gain();
+    if (std::isnan(chosen.weight)) {
+      Fail("no smoothness has a usable solve; more points than a plane needs are wanted");
+    }
+    weight_ = chosen.weight;
+    Judge(chosen, search.steps());
+  }
+
+  // By the points held out.
+  void Judge(const NestedWeight& chosen, int steps) {
+    residuals_ = ResidualsOf(looked_);
+    std::vector<double> squares;
+    for (std::size_t n = 0; n < looked_.size(); ++n) {
+      if (IsHeld(looked_[n]) && outlier_[looked_[n]] == 0) {
+        squares.push_back(residuals_[n].Square());
+      }
+    }
+    const double held = squares.empty() ? kNaN
+                                        : std::accumulate(squares.begin(), squares.end(), 0.0) /
+                                              std::ssize(squares) / points_.channels;
+    if (plan_.outliers == OutlierRule::kDrop) {
+      outliers_ = FindOutliers(points_, looked_, residuals_, HeldSd(std::move(squares)), outlier_);
+    }
+    report_.rounds.push_back({.finest = space_.finest(),
+                              .vertices = space_.Vertices(),
+                              .weight = chosen.weight,
+                              .degrees_of_freedom = chosen.degrees_of_freedom,
+                              .rms_mm = std::sqrt(chosen.mean_square),
+                              .held_out_rms_mm = std::sqrt(held),
+                              .steps = steps,
+                              .outliers = outliers_});
+    if (!best_ || held * kAsGood < best_->held_square) {
+      best_ = Snapshot{.space = space_,
+                       .solution = solve_.solution(),
+                       .weight = weight_,
+                       .held_square = held,
+                       .round = static_cast<int>(report_.rounds.size()) - 1};
+    }
+  }
+
+  // Along one axis, by the median.
+  double HeldSd(std::vector<double> squares) const {
+    constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
+    if (squares.empty()) {
+      return 0;
+    }
+    const auto middle = squares.begin() + std::ssize(squares) / 2;
+    std::nth_element(squares.begin(), middle, squares.end());
+    return kSdOfMedian[points_.channels] * std::sqrt(*middle);
+  }
+
+  bool Refine() {
+    Indices fitted;
+    std::vector<Residual> residuals;
+    for (std::size_t n = 0; n < looked_.size(); ++n) {
+      if (!IsHeld(looked_[n]) && outlier_[looked_[n]] == 0) {
+        fitted.push_back(looked_[n]);
+        residuals.push_back(residuals_[n]);
+      }
+    }
+    const int vertices = space_.Vertices();
+    const UnresolvedDetail detail =
+        FindUnresolvedDetail(points_, space_[0].layout, finest_, fitted, residuals);
+    const int added = OverlayDetail(detail, space_);
+    return added > kFewNew * vertices || Densify();
+  }
+
+  // Where most patches show detail, what is finer than the points can tell apart still helps
+  // between them.
+  bool Densify() {
+    const bool last_helped = best_->round == std::ssize(report_.rounds) - 1;
+    const int level = FinestOfMost();
+    const bool cheap = points_.size() < kCheap;
+    if ((densified_ && !last_helped) || level < space_.finest() - 1 ||
+        level >= std::min(cap_, cheap ? finest_ + 1 : finest_)) {
+      return false;
+    }
+    densified_ = true;
+    const double least = cheap ? kCheapDense : kDense;
+    return OverlayDense(points_, level, least, space_) > 0;
+  }
+
+  // The finest level that most of the domain has.
+  int FinestOfMost() const {
+    int level = space_.finest();
+    for (; level > 0; --level) {
+      const std::vector<char>& there = space_[level].there;
+      if (2 * std::count(there.begin(), there.end(), 1) >= std::ssize(there)) {
+        break;
+      }
+    }
+    return level;
+  }
+
+  // All points, with the smoothness in finer steps.
+  NestedFitResult Finish() {
+    Snapshot best = std::move(*best_);
+    space_ = std::move(best.space);
+    looked_.resize(points_.size());
+    std::iota(looked_.begin(), looked_.end(), 0u);
+    solve_.SetSolution(std::move(best.solution));
+    report_.chosen_round = best.round;
+    report_.held_out_rms_mm = std::sqrt(best.held_square);
+    weight_ = best.weight;
+    solve_.Begin(space_, {});
+    DropOutliers(report_.held_out_rms_mm);
+    NestedWeight chosen = FitAll();
+    if (DropOutliers(std::sqrt(chosen.score))) {
+      chosen = FitAll();
+    }
+    Report(chosen);
+    return {Surface(), std::move(report_)};
+  }
+
+  // Whether others than before are outliers.
+  bool DropOutliers(double least_sd_mm) {
+    if (plan_.outliers == OutlierRule::kKeep) {
+      return false;
+    }
+    const std::vector<char> before = outlier_;
+    FindOutliers(points_, looked_, ResidualsOf(looked_), least_sd_mm, outlier_);
+    return before != outlier_;
+  }
+
+  NestedWeight FitAll() {
+    const Indices fitted = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
+    solve_.Begin(space_, fitted);
+    NestedWeightSearch search(points_, fitted, solve_, least_gain_);
+    search.Climb(2, weight_);
+    const NestedWeight chosen = search.Finish();
+    weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
+    return chosen;
+  }
+
+  void Report(const NestedWeight& chosen) {
+    report_.limited_by_density = finest_ < cap_ && FinestOfMost() >= finest_;
+    const Indices kept = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
+    const double left = 1 - chosen.degrees_of_freedom / static_cast<double>(kept.size());
+    report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, 0.02));
+    report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
+    report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
+    report_.neighbour_correlation = NeighbourCorrelation(points_, kept, ResidualsOf(kept));
+    for (std::uint32_t k = 0; k < points_.size(); ++k) {
+      if (outlier_[k] != 0) {
+        report_.outliers.push_back(points_.given[k]);
+      }
+    }
+    std::sort(report_.outliers.begin(), report_.outliers.end());
+  }
+
+  Vec3 InSpace(const GridValues& values, int i, int j) const {
+    Vec3 sum = Vec3::Zero();
+    for (int c = 0; c < points_.channels; ++c) {
+      sum += values.Row(c, j)[i] * points_.axes.col(c);
+    }
+    return sum;
+  }
+
+  // Level by level: an offset is measured from the next coarser surface, in its frame.
+  HSplineSurface Surface() const {
+    const NestedValues displacements = solve_.Displacements();
+    HSplineShape shape = start_.shape();
+    shape.max_level = space_.finest();
+    ControlNet net = start_.Net(0);
+    for (int j = 0; j < net.rows; ++j) {
+      for (int i = 0; i < net.columns; ++i) {
+        net.At(i, j) += InSpace(displacements[0], i, j);
+      }
+    }
+    HSplineSurface surface(shape, net);
+    ControlNet rest = start_.Net(0);
+    for (int level = 1; level <= space_.finest(); ++level) {
+      rest = Refine(shape, rest, level - 1);
+      surface.SetOffsets(OffsetsOf(level, rest, displacements[level], surface));
+    }
+    return surface;
+  }
+
+  static ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level) {
+    return semblance::Refine(shape, net, level);
+  }
+
+  std::map<VertexId, std::optional<Vec3>> OffsetsOf(int level, const ControlNet& rest,
+                                                    const GridValues& displacements,
+                                                    const HSplineSurface& surface) const {
+    std::map<VertexId, std::optional<Vec3>> offsets;
+    const NestedLevel& nested = space_[level];
+    for (int i = 0; i < rest.columns; ++i) {
+      for (int j = 0; j < rest.rows; ++j) {
+        if (nested.active[nested.layout.At(i, j)] == 0 || space_.IsCovered(level, i, j)) {
+          continue;
+        }
+        const VertexId vertex{level, i, j};
+        const SurfaceFrame frame = surface.LevelFrame(level - 1, surface.ParameterOf(vertex));
+        const Vec3 way = rest.At(i, j) + InSpace(displacements, i, j) - frame.point;
+        offsets.emplace_hint(offsets.end(), vertex, Vec3(frame.axes.transpose() * way));
+      }
+    }
+    return offsets;
+  }
+
+  const HSplineSurface& start_;
+  const AutoPlan& plan_;
+  const RunContext& context_;
+  PointCloud cloud_;
+  NestedPoints points_;
+  NestedSolve solve_;
+  NestedSpace space_;
+  int cap_;  // level
+  std::vector<char> outlier_;
+  int finest_ = 0, outliers_ = 0;
+  Indices looked_;
+  std::vector<Residual> residuals_;  // of `looked_`
+  double weight_ = kNaN, least_gain_ = 0;
+  bool densified_ = false;
+  std::optional<Snapshot> best_;
+  AutoReport report_;
+};
+
+}  // namespace
+
+NestedFitResult FitNested(const HSplineSurface& start, const FitTarget& target,
+                          const AutoPlan& plan, const RunContext& context) {
+  if (!start.Offsets().empty()) {
+    Fail("the start has detail of finer levels; start from one without, or take plan adaptive");
+  }
+  if (target.points.size() < 16) {
+    Fail(
+        fmt::format("{} points are too few to leave some out; give at least 16, or take another "
+                    "plan",
+                    target.points.size()));
+  }
+  const Vec2 lengths_mm = MeanLengths(start);
+  if (!(lengths_mm.allFinite() && lengths_mm.minCoeff() > 0)) {
+    Fail("the points have no extent along u or v; give other (u,v)");
+  }
+  return NestedFitter(start, target, plan, context).Run();
+}
+
+}  // namespace semblance

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The levels of a nested fit: which vertices take part, and on which level each place is finest.
+#pragma once
+
+#include <vector>
+
+#include "fitting/nested/grid_values.h"
+#include "surfaces/hspline/hspline_surface.h"
+
+namespace semblance {
+
+struct NestedLevel {
+  GridLayout layout;
+  std::vector<char> active;  // of each vertex, by GridLayout::At; of level 0 all
+  std::vector<char> there;   // of each patch: its parent is split
+  std::vector<char> split;   // of each patch: finer vertices reach into it
+  bool leaves = false;       // some patch is there and not split
+};
+
+// Coarse vertices stay unknowns where finer ones cover them: the many ways to write a surface do no
+// harm to conjugate gradients, and the coarse ones carry what the fine ones have in common.
+class NestedSpace {
+ public:
+  explicit NestedSpace(const HSplineShape& level0);
+
+  int finest() const { return static_cast<int>(levels_.size()) - 1; }
+  const NestedLevel& operator[](int level) const { return levels_[level]; }
+  bool IsLeaf(int level, std::size_t patch) const {
+    return levels_[level].there[patch] != 0 && levels_[level].split[patch] == 0;
+  }
+  // The level whose patch holds the point, in patches of level 0, and is no more split.
+  int LeafLevel(double x, double y) const;
+  // Vertices that are active and not sums of active ones of the next level.
+  int Vertices() const;
+  bool IsCovered(int level, int i, int j) const;
+
+  // Makes the vertices of the next level on the knots of a patch active, and those beyond a border.
+  // Returns how many were not. Link before anything else is asked.
+  int Overlay(int level, int i, int j);
+  void Link();
+
+ private:
+  void AddLevel();
+  bool IsReached(int level, int i, int j) const;
+
+  std::vector<NestedLevel> levels_;
+};
+
+}  // namespace semblance

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where residuals hang together, so that finer vertices would follow them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fitting/nested/nested_solve.h"
+
+namespace semblance {
+
+// Of residuals e under the functions N of a level: sum |sum_i N_i e_i|^2 / sum N_i^2 |e_i|^2 - 1
+// over some of the functions. Errors that do not know of each other give 0 on the mean, whatever
+// their size and however it changes from place to place; a function whose coefficient is as large
+// as its own standard error gives 1, where taking it is worth just what it costs; and a single
+// gross error gives 0 too, for it agrees with nobody.
+struct UnresolvedDetail {
+  // By level, from 1: per patch of the level before, whether it should be overlaid for what the
+  // functions of this level see.
+  std::vector<std::vector<char>> seen;
+  int Finest() const { return static_cast<int>(seen.size()) - 1; }
+};
+
+// finest: of the levels that are looked at. indices and residuals: of the points that were fitted.
+UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const GridLayout& level0,
+                                      int finest, std::span<const std::uint32_t> indices,
+                                      std::span<const NestedSolve::Residual> residuals);
+
+// Overlays each patch of the space over which a finer level sees detail, one level a time. Returns
+// the number of vertices that became active.
+int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space);
+
+// Overlays each patch of a level that is there and has at least so many points for each of
+// the patches that it would be split into.
+int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
+                 NestedSpace& space);
+
+}  // namespace semblance

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/nested/weight_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace semblance {
+namespace {
+
+// Times the weight at which points and energy balance: no more than a plane is left.
+constexpr double kSmoothest = 100;
+
+}  // namespace
+
+double NestedWeightSearch::MeanSquare() const {
+  const NestedValues displacements = solve_.Displacements();
+  double sum = 0, weights = 0;
+  for (const std::uint32_t k : fitted_) {
+    sum += points_.weight[k] * solve_.ResidualAt(displacements, k).Square();
+    weights += points_.weight[k];
+  }
+  return sum / weights / points_.channels;
+}
+
+NestedWeight NestedWeightSearch::Try(double weight) {
+  const auto [at, added] = tried_.try_emplace(weight);
+  if (!added) {
+    return at->second;
+  }
+  solve_.SetWeight(weight);
+  steps_ += solve_.Solve(least_gain_);
+  const double mean_square = MeanSquare(), trace = solve_.Trace(),
+               left = 1 - trace / static_cast<double>(fitted_.size());
+  constexpr double kGain = 0.01, kLeast = 0.02;
+  least_gain_ = kGain * mean_square * solve_.WeightSum() / static_cast<double>(fitted_.size()) *
+                std::max(trace, 1.0);
+  at->second = {.weight = weight,
+                .score = left > kLeast ? mean_square / (left * left) : kNaN,
+                .degrees_of_freedom = trace,
+                .mean_square = mean_square};
+  if (at->second.score < best_.score || std::isnan(best_.score)) {
+    best_ = at->second;
+    best_solution_ = solve_.solution();
+  }
+  return at->second;
+}
+
+void NestedWeightSearch::Scan() {
+  constexpr double kTurned = 1.05;
+  constexpr int kDecades = 16;
+  const double even = solve_.EvenWeight();
+  int turned = 0;
+  for (int decade = 2; decade > 2 - kDecades && turned < 1; --decade) {
+    const NestedWeight next = Try(even * std::pow(10.0, decade));
+    turned += next.score <= kTurned * best_.score ? 0 : 1;
+  }
+}
+
+void NestedWeightSearch::Climb(double factor, double from) {
+  constexpr int kMost = 24;
+  const double smoothest = kSmoothest * solve_.EvenWeight();
+  Try(std::min(from, smoothest));
+  for (int k = 0; k < kMost; ++k) {
+    const double at = std::isnan(best_.weight) ? from : best_.weight;
+    if (at * factor <= smoothest) {
+      Try(at * factor);
+    }
+    if (best_.weight == at) {
+      Try(at / factor);
+    }
+    if (best_.weight == at) {
+      return;
+    }
+  }
+}
+
+void NestedWeightSearch::ClimbAnew(double factor, double from) {
+  constexpr double kRough = 1e-3;
+  const double even = solve_.EvenWeight();
+  Climb(factor, from);
+  const double before = best_.weight;
+  Try(kRough * even);
+  if (best_.weight != before) {
+    Climb(factor, best_.weight);
+  }
+}
+
+NestedWeight NestedWeightSearch::Finish() {
+  if (!std::isnan(best_.weight)) {
+    solve_.SetSolution(best_solution_);
+    solve_.SetWeight(best_.weight);
+  }
+  return best_;
+}
+
+}  // namespace semblance

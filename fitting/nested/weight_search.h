@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The thin-plate weight of a nested fit by generalised cross-validation.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+
+#include "fitting/nested/nested_solve.h"
+
+namespace semblance {
+
+struct NestedWeight {
+  double weight = kNaN;
+  double score = kNaN;               // of generalised cross-validation, mm^2 along one axis
+  double degrees_of_freedom = kNaN;  // trace of the influence matrix
+  double mean_square = kNaN;         // of the residuals along one axis
+};
+
+// Craven & Wahba (1979), the trace by one probe. Each solve begins where the one before ended and
+// goes on until what is left to gain is a hundredth of what chance does to the solution.
+class NestedWeightSearch {
+ public:
+  // fitted: the points that the solve has begun with. least_gain: of the first solve (Solve).
+  NestedWeightSearch(const NestedPoints& points, std::span<const std::uint32_t> fitted,
+                     NestedSolve& solve, double least_gain)
+      : points_(points), fitted_(fitted), solve_(solve), least_gain_(least_gain) {}
+
+  // From smooth to rough by decades until the score has turned.
+  void Scan();
+  // Uphill and downhill from a weight, by a factor, until neither is better.
+  void Climb(double factor, double from);
+  // The same on finer vertices than those that the weight was found for: a rough one is tried too,
+  // for detail that the coarser ones could not follow looked like noise to them.
+  void ClimbAnew(double factor, double from);
+
+  // Brings the solve to the best weight.
+  NestedWeight Finish();
+  int steps() const { return steps_; }
+  double least_gain() const { return least_gain_; }  // for the next search
+
+ private:
+  NestedWeight Try(double weight);
+  double MeanSquare() const;
+
+  const NestedPoints& points_;
+  std::span<const std::uint32_t> fitted_;
+  NestedSolve& solve_;
+  std::map<double, NestedWeight> tried_;
+  NestedWeight best_;
+  NestedValues best_solution_;
+  double least_gain_;
+  int steps_ = 0;
+};
+
+}  // namespace semblance

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/points/fit_report.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kHangTogether = 0.1;  // correlation of neighbours' residuals
+constexpr double kSmaller = 0.85;      // of the noise that the neighbours show
+
+Json RoundJson(const NestedRound& round) {
+  return {{"finest", round.finest}, {"vertices", round.vertices},
+          {"weight", round.weight}, {"degrees_of_freedom", round.degrees_of_freedom},
+          {"rms_mm", round.rms_mm}, {"held_out_rms_mm", round.held_out_rms_mm},
+          {"steps", round.steps},   {"outliers", round.outliers}};
+}
+
+bool LeavesDetail(const AutoReport& r) {
+  return r.neighbour_correlation > kHangTogether || r.neighbour_noise_mm < kSmaller * r.noise_mm;
+}
+
+std::string Verdict(const AutoReport& r) {
+  if (r.limited_by_density) {
+    return "detail goes down to the points' spacing: denser points would show more";
+  }
+  return LeavesDetail(r) ? "residuals still hang together: part of what counts as noise is detail"
+                         : "residuals look like noise: these points show no more detail";
+}
+
+}  // namespace
+
+nlohmann::ordered_json AutoJson(const AutoReport& r) {
+  Json json = {{"noise_mm", r.noise_mm},
+               {"neighbour_noise_mm", r.neighbour_noise_mm},
+               {"closer_noise_mm", r.closer_noise_mm},
+               {"held_out_rms_mm", r.held_out_rms_mm},
+               {"neighbour_correlation", r.neighbour_correlation},
+               {"limited_by_density", r.limited_by_density},
+               {"verdict", Verdict(r)},
+               {"chosen_round", r.chosen_round},
+               {"outlier_count", r.outliers.size()},
+               {"outliers", r.outliers},
+               {"rounds", Json::array()}};
+  for (const NestedRound& round : r.rounds) {
+    json["rounds"].push_back(RoundJson(round));
+  }
+  return json;
+}
+
+std::string AutoText(const AutoReport& r) {
+  std::string text =
+      fmt::format("noise {:.3g} mm a coordinate (between neighbours {:.3g}); held out {:.3g}\n",
+                  r.noise_mm, r.neighbour_noise_mm, r.held_out_rms_mm);
+  if (!r.outliers.empty()) {
+    text += fmt::format("{} outliers left out; residuals and result.json list them\n",
+                        r.outliers.size());
+  }
+  return text + Verdict(r) + "\n";
+}
+
+}  // namespace semblance

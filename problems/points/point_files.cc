@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/points/point_files.h"
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <string_view>
+
+#include "problems/output/manifest.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/npy.h"
+#include "surfaces/mesh_files/ply_header.h"
+#include "surfaces/mesh_files/read_ply.h"
+#include "surfaces/mesh_files/text_lines.h"
+
+namespace semblance {
+namespace {
+
+struct ArchiveCloser {
+  void operator()(archive* a) const { archive_read_free(a); }
+};
+
+std::string Unzipped(const std::string& bytes, const std::string& name) {
+  const std::unique_ptr<archive, ArchiveCloser> a(archive_read_new());
+  archive_read_support_filter_gzip(a.get());
+  archive_read_support_format_raw(a.get());
+  archive_entry* entry = nullptr;
+  std::string text;
+  std::array<char, 1 << 16> block;
+  la_ssize_t got = archive_read_open_memory(a.get(), bytes.data(), bytes.size());
+  got = got == ARCHIVE_OK ? archive_read_next_header(a.get(), &entry) : got;
+  while (got >= 0 && (got = archive_read_data(a.get(), block.data(), block.size())) > 0) {
+    text.append(block.data(), static_cast<std::size_t>(got));
+  }
+  if (got < 0) {
+    throw IoError(fmt::format("{}: it cannot be unpacked ({}); give a file made by gzip", name,
+                              archive_error_string(a.get())));
+  }
+  return text;
+}
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+PointTable NonEmpty(PointTable table, const std::string& name) {
+  if (table.positions.empty()) {
+    throw InputError(fmt::format("{}: there is no point; give at least one", name));
+  }
+  return table;
+}
+
+Vec3 NextPosition(TextLines& lines) {
+  Vec3 p;
+  for (int c = 0; c < 3; ++c) {
+    p[c] = lines.NextDouble();
+  }
+  if (!p.allFinite()) {
+    lines.Fail("a coordinate is not finite; give numbers");
+  }
+  return p;
+}
+
+PointTable ParseXyz(std::string_view text, const std::string& name) {
+  TextLines lines(text, name, {.comment = '#'});
+  PointTable table;
+  while (lines.NextLine()) {
+    table.positions.push_back(NextPosition(lines));
+  }
+  return table;
+}
+
+PointTable ParseObj(std::string_view text, const std::string& name) {
+  TextLines lines(text, name, {.comment = '#'});
+  PointTable table;
+  while (lines.NextLine()) {
+    if (lines.NextWord() == "v") {
+      table.positions.push_back(NextPosition(lines));
+    }
+  }
+  return table;
+}
+
+PointTable ParseNpyPoints(std::string_view bytes, const std::string& name) {
+  const NpyArray array = ParseNpy(bytes, name);
+  const std::size_t columns = array.shape.size() == 2 ? array.shape[1] : 0;
+  if (columns != 3 && columns != 5) {
+    throw InputError(
+        fmt::format("{}: the array is neither n x 3 (x, y, z) nor n x 5 (x, y, z, u, v)", name));
+  }
+  PointTable table;
+  for (std::size_t k = 0; k < array.values.size(); k += columns) {
+    const double* const row = array.values.data() + k;
+    table.positions.emplace_back(row[0], row[1], row[2]);
+    if (columns == 5) {
+      table.uv.emplace_back(row[3], row[4]);
+    }
+  }
+  return table;
+}
+
+bool HasProperties(const PlyHeader& header, std::initializer_list<std::string_view> names) {
+  return std::all_of(names.begin(), names.end(), [&](std::string_view name) {
+    return std::any_of(header.elements.begin(), header.elements.end(), [&](const PlyElement& e) {
+      return e.name == "vertex" && std::any_of(e.properties.begin(), e.properties.end(),
+                                               [&](const auto& p) { return p.name == name; });
+    });
+  });
+}
+
+PointTable ParsePlyPoints(std::string_view bytes, const std::string& name) {
+  const PlyHeader header = ReadPlyHeader(bytes, name);
+  const auto scalar = [&](const char* of) { return PlyVertexScalar(bytes, of, name); };
+  const std::vector<double> x = scalar("x"), y = scalar("y"), z = scalar("z");
+  PointTable table;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    table.positions.emplace_back(x[k], y[k], z[k]);
+    if (!table.positions.back().allFinite()) {
+      throw InputError(fmt::format("{}: vertex {} is not finite; leave it out", name, k));
+    }
+  }
+  const bool uv = HasProperties(header, {"u", "v"}), st = HasProperties(header, {"s", "t"});
+  if (uv || st) {
+    const std::vector<double> u = scalar(uv ? "u" : "s"), v = scalar(uv ? "v" : "t");
+    for (std::size_t k = 0; k < u.size(); ++k) {
+      table.uv.emplace_back(u[k], v[k]);
+    }
+  }
+  return table;
+}
+
+PointTable Parse(const std::string& bytes, const std::filesystem::path& path) {
+  const std::string name = path.string(), ending = Lower(path.extension().string());
+  if (ending == ".csv" || ending == ".txt" || name == "-") {
+    return ParsePointTable(bytes, name == "-" ? "standard input" : name);
+  }
+  if (ending == ".xyz") {
+    return NonEmpty(ParseXyz(bytes, name), name);
+  }
+  if (ending == ".npy") {
+    return NonEmpty(ParseNpyPoints(bytes, name), name);
+  }
+  if (ending == ".ply") {
+    return NonEmpty(ParsePlyPoints(bytes, name), name);
+  }
+  if (ending == ".obj") {
+    return NonEmpty(ParseObj(bytes, name), name);
+  }
+  throw IoError(
+      fmt::format("{}: files of points end in .csv, .txt, .xyz, .npy, .ply or .obj, or in "
+                  "one of these and .gz; or give - for a CSV on standard input",
+                  name));
+}
+
+}  // namespace
+
+PointFile ReadPointFile(const std::filesystem::path& path) {
+  const bool piped = path == "-", zipped = Lower(path.extension().string()) == ".gz";
+  std::string bytes =
+      piped ? std::string(std::istreambuf_iterator<char>(std::cin), {}) : ReadFileBytes(path);
+  PointFile file{.points = {}, .sha256 = Sha256OfText(bytes)};
+  if (zipped) {
+    bytes = Unzipped(bytes, path.string());
+  }
+  file.points = Parse(bytes, zipped ? path.parent_path() / path.stem() : path);
+  return file;
+}
+
+}  // namespace semblance

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Scattered points in files of several kinds.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "problems/points/point_table.h"
+
+namespace semblance {
+
+struct PointFile {
+  PointTable points;
+  std::string sha256;  // of the bytes as they were read, lower-case hexadecimal
+};
+
+// By the ending, in any case: .csv and .txt (ParsePointTable); .xyz (three or more numbers a line,
+// the first three are x, y, z; # begins a comment); .npy (n x 3: x, y, z; n x 5: u and v too); .ply
+// (the vertices' x, y, z, and u, v or s, t if they have them); .obj (the lines `v`). Each may be
+// compressed: .csv.gz. "-" stands for a CSV on standard input. Throws IoError for a file that
+// cannot be read, another ending, or what ParsePointTable refuses; InputError for anything in the
+// file that is not of its kind.
+PointFile ReadPointFile(const std::filesystem::path& path);
+
+}  // namespace semblance

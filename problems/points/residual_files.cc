@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/points/residual_files.h"
+
+#include <fmt/compile.h>
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <cstring>
+#include <iterator>
+#include <vector>
+
+namespace semblance {
+namespace {
+
+// Per point; none of a fit that looks for none.
+std::vector<char> OutliersOf(const FitResult& fit) {
+  std::vector<char> outlier;
+  if (fit.automatic) {
+    outlier.assign(fit.uv.size(), 0);
+    for (const std::uint32_t k : fit.automatic->outliers) {
+      outlier[k] = 1;
+    }
+  }
+  return outlier;
+}
+
+void AppendFloat(double value, std::string& bytes) {
+  const auto number = static_cast<float>(value);
+  char raw[sizeof number];
+  std::memcpy(raw, &number, sizeof number);
+  bytes.append(raw, sizeof number);
+}
+
+}  // namespace
+
+std::string ResidualsCsv(const FitResult& fit) {
+  const std::vector<char> outlier = OutliersOf(fit);
+  std::string csv = outlier.empty() ? "point,u,v,residual_mm\n" : "point,u,v,residual_mm,outlier\n";
+  csv.reserve(fit.uv.size() * 64);
+  const auto out = std::back_inserter(csv);
+  for (std::size_t k = 0; k < fit.uv.size(); ++k) {
+    fmt::format_to(out, FMT_COMPILE("{},{},{},{}"), k, fit.uv[k].x(), fit.uv[k].y(),
+                   fit.residual_mm[k]);
+    csv += outlier.empty() ? "\n" : outlier[k] != 0 ? ",1\n" : ",0\n";
+  }
+  return csv;
+}
+
+std::string ResidualsPly(const FitResult& fit) {
+  const std::vector<char> outlier = OutliersOf(fit);
+  std::string bytes = fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float "
+      "y\nproperty float z\nproperty float residual_mm\nproperty float outlier\nend_header\n",
+      fit.uv.size());
+  bytes.reserve(bytes.size() + fit.uv.size() * 20);
+  for (std::size_t k = 0; k < fit.uv.size(); ++k) {
+    AppendFloat(fit.uv[k].x(), bytes);
+    AppendFloat(fit.uv[k].y(), bytes);
+    AppendFloat(0, bytes);
+    AppendFloat(fit.residual_mm[k], bytes);
+    AppendFloat(outlier.empty() ? 0 : outlier[k], bytes);
+  }
+  return bytes;
+}
+
+}  // namespace semblance

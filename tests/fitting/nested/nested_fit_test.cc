@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The fit that asks for no tolerance, on surfaces that are known.
+#include "fitting/nested/nested_fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fitting/problem/start_surface.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
+#include "tests/testing/scattered_data.h"
+
+namespace semblance {
+namespace {
+
+using testing::ErrorAgainst;
+using testing::FrankePoint;
+using testing::HeadPoint;
+using testing::Scattered;
+
+NestedFitResult FitAuto(const FitTarget& target, Closure closure = Closure::kOpen,
+                        const AutoPlan& plan = {}) {
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    positions.push_back(p.position);
+    uv.push_back(p.uv);
+  }
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0, .closure = closure};
+  return FitNested(StartSurface(shape, positions, uv), target, plan, {});
+}
+
+// A height field: noise in z alone.
+template <class Surface>
+FitTarget Heights(const Surface& surface, int count, double noise) {
+  FitTarget target = Scattered(surface, count, noise, 5);
+  for (FitPoint& p : target.points) {
+    p.position.head<2>() = surface(p.uv).template head<2>();
+  }
+  return target;
+}
+
+// Least squares on 16 x 16 patches, with which FITPACK is best here, errs by about
+// noise * sqrt(361 / 20000) = 1.3e-4; MBA at its best by 3.4e-4.
+TEST(NestedFit, FrankesFunctionIsFoundBelowItsNoise) {
+  const NestedFitResult fit = FitAuto(Heights(FrankePoint, 20000, 1e-3));
+  EXPECT_LT(ErrorAgainst(FrankePoint, fit.surface, 100).rms, 1.7e-4);
+  EXPECT_NEAR(fit.report.noise_mm, 1e-3, 3e-5);
+  EXPECT_NEAR(fit.report.neighbour_noise_mm, 1e-3, 1e-4);
+  EXPECT_LT(std::abs(fit.report.neighbour_correlation), 0.08);
+  EXPECT_THAT(fit.report.outliers, ::testing::IsEmpty());
+  EXPECT_FALSE(fit.report.limited_by_density);
+}
+
+TEST(NestedFit, AClosedSurfaceInSpaceIsFoundAndCloses) {
+  const NestedFitResult fit = FitAuto(Scattered(HeadPoint, 20000, 1e-4, 3), Closure::kPeriodicU);
+  EXPECT_LT(ErrorAgainst(HeadPoint, fit.surface, 100).rms, 1.5e-4);
+  const Vec3 left = fit.surface.Point({1 - 1e-12, 0.4}), right = fit.surface.Point({0, 0.4});
+  EXPECT_LT((left - right).norm(), 1e-9);
+}
+
+// On the coarse levels the waves look like noise, and are smoothed away; on the finer ones the
+// smoothness that was chosen there must not hold.
+TEST(NestedFit, WavesThatCoarseLevelsTakeForNoiseAreFound) {
+  const auto waves = [](const Vec2& q) {
+    return Vec3(q.x(), q.y(), 0.06 * std::sin(2 * std::numbers::pi * 20 * (q.x() + 0.1 * q.y())));
+  };
+  const NestedFitResult fit = FitAuto(Heights(waves, 20000, 5e-3));
+  EXPECT_LT(ErrorAgainst(waves, fit.surface, 150).rms, 5e-3);
+  EXPECT_NEAR(fit.report.noise_mm, 5e-3, 5e-4);
+}
+
+// One point in twenty, all on one side.
+TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
+  FitTarget target = Heights(FrankePoint, 10000, 1e-3);
+  Random random(9);
+  std::vector<std::uint32_t> gross;
+  for (std::uint32_t k = 0; k < target.points.size(); ++k) {
+    if (random.Uniform() < 0.05) {
+      target.points[k].position.z() += random.Uniform(0.02, 2);
+      gross.push_back(k);
+    }
+  }
+  const NestedFitResult fit = FitAuto(target);
+  EXPECT_LT(ErrorAgainst(FrankePoint, fit.surface, 100).rms, 1e-3);
+  const auto& found = fit.report.outliers;
+  std::vector<std::uint32_t> missed, wrong;
+  std::set_difference(gross.begin(), gross.end(), found.begin(), found.end(),
+                      std::back_inserter(missed));
+  std::set_difference(found.begin(), found.end(), gross.begin(), gross.end(),
+                      std::back_inserter(wrong));
+  EXPECT_LE(missed.size(), gross.size() / 50);
+  EXPECT_LE(wrong.size(), 20u);
+  const NestedFitResult kept =
+      FitAuto(target, Closure::kOpen, {.finest = 2, .outliers = OutlierRule::kKeep});
+  EXPECT_THAT(kept.report.outliers, ::testing::IsEmpty());
+  EXPECT_GT(ErrorAgainst(FrankePoint, kept.surface, 100).rms, 1e-2);
+}
+
+TEST(NestedFit, TheOrderOfThePointsHasNoEffect) {
+  FitTarget target = Heights(FrankePoint, 3000, 1e-3);
+  const NestedFitResult first = FitAuto(target);
+  std::reverse(target.points.begin(), target.points.end());
+  // The start is a sum over the points, and so differs in its last digits.
+  EXPECT_LT(ErrorAgainst([&](const Vec2& uv) { return first.surface.Point(uv); },
+                         FitAuto(target).surface, 50)
+                .largest,
+            1e-9);
+}
+
+TEST(NestedFit, APlaneIsReproduced) {
+  const auto plane = [](const Vec2& q) { return Vec3(3 * q.x(), 2 * q.y() - q.x(), 0.5 * q.y()); };
+  const NestedFitResult fit = FitAuto(Scattered(plane, 500, 0, 2));
+  EXPECT_LT(ErrorAgainst(plane, fit.surface, 40).largest, 1e-10);
+}
+
+TEST(NestedFit, WhatCannotBeFittedIsSaid) {
+  const FitTarget few = Scattered(FrankePoint, 10, 0, 1);
+  EXPECT_THROW(FitAuto(few), InputError);
+  HSplineSurface detailed = testing::PlainStart({.patches_u = 8, .patches_v = 8, .max_level = 1});
+  detailed.SetOffset({1, 5, 5}, Vec3(0, 0, 1));
+  EXPECT_THROW(FitNested(detailed, Scattered(FrankePoint, 100, 0, 1), {}, {}), InputError);
+}
+
+}  // namespace
+}  // namespace semblance
