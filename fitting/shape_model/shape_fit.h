@@ -22,7 +22,7 @@ struct ShapeFitOptions {
   double mode_sd = 1;                 // of a coefficient
   SmoothFieldOptions field;           // what the modes cannot express
   int surface_points = 300;           // drawn to the implicit face; 0: the dowels alone
-  double surface_worth = 20;          // how many independent points those count as
+  double surface_worth = 80;          // how many independent points those count as
   double surface_sd_mm = 2.5;         // of the surface along its normal, where it states none
   double surface_loss_width = 0.8;    // Huber, in standard deviations
   double surface_reach_mm = 15;       // farther off a point is not drawn

@@ -35,7 +35,7 @@ void Fields(Visitor& visit, RuleUse& o) {
 struct FeatureRules {
   std::map<std::string, std::array<double, 3>> points;  // of bone, mm, LPS, by RulePointCodes()
   RuleUse eye_height = {.sd_mm = 1.6};
-  RuleUse eye_protrusion = {.sd_mm = 2.9};
+  RuleUse eye_protrusion = {.use = false, .sd_mm = 2.9};
   RuleUse mouth_width = {.sd_mm = 3.8};
   RuleUse pronasale = {.use = false, .sd_mm = 3};
 };
@@ -56,7 +56,8 @@ void Fields(Visitor& visit, FeatureRules& o) {
         o.eye_height);
   visit(FieldInfo{.name = "eye_protrusion",
                   .doc = "the lids' margins lie 16.2 mm in front of dlom, the mean exophthalmos "
-                         "(standard error of 2.9 mm on 58 CT: Humphrey et al. 2026)"},
+                         "(standard error of 2.9 mm on 58 CT: Humphrey et al. 2026). Off, for with it each "
+                         "of three heads was worse"},
         o.eye_protrusion);
   visit(FieldInfo{.name = "mouth_width",
                   .doc = "the canines' width, uc_l to uc_r, is 75.8 % of the mouth's (Stephan & "

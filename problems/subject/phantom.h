@@ -26,7 +26,7 @@ void Fields(Visitor& visit, PhantomOptions& o) {
   visit(
       FieldInfo{
           .name = "rings",
-          .min = 8,
+          .min = 16,
           .max = 1000,
           .doc = "bands of triangles from crown to throat; the mesh has about 3 rings^2 triangles"},
       o.rings);
