@@ -51,8 +51,9 @@ struct Heads {
 TEST(Recentre, SitesGoToTheTipsAndTheMeanToTheSkin) {
   const Heads heads;
   const std::vector<KnownHead> known = {{.dowels = heads.dowels, .skin = heads.skin}};
-  const Recentred result = Recentre(heads.prior, heads.on_template, heads.face, known,
-                                    {.move_mean = true}, {.threads = 2});
+  const Recentred result =
+      Recentre(heads.prior, heads.on_template, heads.face, known, {.move_mean = true},
+               {.on_event = {}, .stop_token = {}, .threads = 2});
   // A head of two sides against two points: half of the way.
   const double way = (result.face.surface.Point(result.face.site_uv.at("g")) -
                       heads.face.surface.Point(heads.face.site_uv.at("g")))
@@ -74,8 +75,8 @@ TEST(Recentre, ATipWithoutSkinSaysNothingOfItsSite) {
     keep.push_back((heads.skin.points[t[0]] - heads.glabella).norm() > 15);
   }
   const std::vector<KnownHead> known = {{heads.dowels, Submesh(heads.skin, keep)}};
-  const Recentred result =
-      Recentre(heads.prior, heads.on_template, heads.face, known, {}, {.threads = 2});
+  const Recentred result = Recentre(heads.prior, heads.on_template, heads.face, known, {},
+                                    {.on_event = {}, .stop_token = {}, .threads = 2});
   EXPECT_NEAR((result.face.site_uv.at("g") - heads.face.site_uv.at("g")).norm(), 0, 1e-12);
   EXPECT_EQ(result.face.surface.Offsets(), heads.face.surface.Offsets());  // nobody asked for it
 }
