@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
 #include <optional>
 #include <string>
 #include <vector>
@@ -93,7 +95,7 @@ py::object RunStudyFile(const std::string& path, const std::string& out, int job
 
 void BindExperiments(py::module_& module) {
   module.def("run", &RunConfig, py::arg("config"), py::arg("set") = py::dict(),
-             py::arg("out") = std::nullopt, py::arg("force") = false, py::arg("threads") = 1,
+             py::arg("out") = py::none(), py::arg("force") = false, py::arg("threads") = 1,
              "Runs an experiment, as `semblance run` does. set: options by path, e.g. "
              "{'implicit.resolution': 60}. Returns {'result': result.json, 'surface': HSpline, "
              "'faults': why it cannot be used, or []}; with `out` the files of a run are written "

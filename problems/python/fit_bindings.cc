@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
 #include <optional>
 
 #include "problems/config/config.h"
@@ -61,8 +63,8 @@ void BindFit(py::module_& module) {
       .def_property_readonly("parameters", [](const PointFit& f) { return f.parameters; })
       .def_property_readonly("usable", [](const PointFit& f) { return f.Faults().empty(); })
       .def_property_readonly("faults", &PointFit::Faults, "why it cannot be used; else empty");
-  module.def("fit", &FitArrays, py::arg("points"), py::arg("uv") = std::nullopt,
-             py::arg("weights") = std::nullopt, py::arg("threads") = 1, FitDocumentation().c_str());
+  module.def("fit", &FitArrays, py::arg("points"), py::arg("uv") = py::none(),
+             py::arg("weights") = py::none(), py::arg("threads") = 1, FitDocumentation().c_str());
 }
 
 }  // namespace semblance
