@@ -382,6 +382,16 @@ class NestedFitter {
   AutoReport report_;
 };
 
+void CheckWeights(const FitTarget& target) {
+  double sum = 0;
+  for (const FitPoint& point : target.points) {
+    sum += point.weight;
+  }
+  if (!std::isfinite(sum)) {
+    Fail("the points' weights add up to no finite number; divide them all by the largest");
+  }
+}
+
 }  // namespace
 
 NestedFitResult FitNested(const HSplineSurface& start, const FitTarget& target,
@@ -395,6 +405,7 @@ NestedFitResult FitNested(const HSplineSurface& start, const FitTarget& target,
                     "plan",
                     target.points.size()));
   }
+  CheckWeights(target);
   const Vec2 lengths_mm = MeanLengths(start);
   if (!(lengths_mm.allFinite() && lengths_mm.minCoeff() > 0)) {
     Fail("the points have no extent along u or v; give other (u,v)");

@@ -285,7 +285,10 @@ TEST_F(Trust, AResultThatIsNoNumberIsNotUsableAndSaysWhy) {
     csv += fmt::format("{},{},{},1e308\n", k % 10, k / 10, (k * k) % 7);
   }
   Write("points.csv", csv);
-  Write("fit.yaml", "parameters: plane\npatches_u: 4\npatches_v: 4\n");
+  Write("fit.yaml",
+        "parameters: plane\npatches_u: 4\npatches_v: 4\n"
+        "fit: {terms: [points], plan: {type: adaptive, tolerance_mm: 0.1}}\n");
+  ExpectRefused("fit points.csv --out auto --quiet", "weights add up to no finite number");
   const Outcome outcome = Call("fit points.csv fit.yaml --out out --quiet");
   EXPECT_EQ(outcome.code, 1) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("the result is not usable: the points' distances"));
