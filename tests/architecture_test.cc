@@ -324,14 +324,13 @@ TEST(Architecture, TheReadmeShowsTheConsumersProgram) {
 }
 
 TEST(Architecture, OnlyTheAgreedEntriesStandAtTheTop) {
-  const std::set<std::string> allowed = {"CMakeLists.txt", "fitting", "surfaces", "interp",
-                                         "problems", "tests", "configs", "README.md", "LICENSE",
-                                         "NOTICE", "Makefile", "CMakePresets.json", ".clang-format",
-                                         ".clang-tidy", ".gitignore", ".ci", "docs",
-                                         "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md",
-                                         // not part of the project, and ignored by git
-                                         ".git", "build", "build-debug", "build-sanitize",
-                                         "build-quick", "build-tidy", "out", ".cache"};
+  const std::set<std::string> allowed = {
+      "CMakeLists.txt", "fitting", "surfaces", "interp", "problems", "tests", "configs",
+      "README.md", "LICENSE", "NOTICE", "Makefile", "CMakePresets.json", ".clang-format",
+      ".clang-tidy", ".gitignore", ".ci", "docs", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md",
+      // not part of the project, and ignored by git
+      ".git", "build", "build-debug", "build-sanitize", "build-quick", "build-tidy", "out",
+      ".cache"};
   for (const auto& entry : fs::directory_iterator(SEMBLANCE_SOURCE_DIR)) {
     EXPECT_TRUE(allowed.contains(entry.path().filename().string())) << entry.path();
   }

@@ -54,11 +54,13 @@ void Fields(Visitor& visit, FeatureRules& o) {
                          "below its upper margin (Guyomarc'h et al. 2012; standard error of 1.6 mm "
                          "on 58 CT: Humphrey et al. 2026)"},
         o.eye_height);
-  visit(FieldInfo{.name = "eye_protrusion",
-                  .doc = "the lids' margins lie 16.2 mm in front of dlom, the mean exophthalmos "
-                         "(standard error of 2.9 mm on 58 CT: Humphrey et al. 2026). Off, for with it each "
-                         "of three heads was worse"},
-        o.eye_protrusion);
+  visit(
+      FieldInfo{
+          .name = "eye_protrusion",
+          .doc = "the lids' margins lie 16.2 mm in front of dlom, the mean exophthalmos "
+                 "(standard error of 2.9 mm on 58 CT: Humphrey et al. 2026). Off, for with it each "
+                 "of three heads was worse"},
+      o.eye_protrusion);
   visit(FieldInfo{.name = "mouth_width",
                   .doc = "the canines' width, uc_l to uc_r, is 75.8 % of the mouth's (Stephan & "
                          "Henneberg 2003, 93 adults; on 9 cadavers 2.4 mm too small: Stephan & "
