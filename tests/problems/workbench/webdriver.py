@@ -23,6 +23,10 @@ def free_port():
         return probe.getsockname()[1]
 
 
+class CannotStart(RuntimeError):
+    """The browser is installed, and does not run here: no shared memory, say, or no processes of its own."""
+
+
 class Browser:
     """Headless Chromium with a window of width x height pixels."""
 
@@ -31,6 +35,14 @@ class Browser:
         self.driver = subprocess.Popen(["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL,
                                        stderr=subprocess.DEVNULL)
         self.base = f"http://127.0.0.1:{port}"
+        try:
+            self._begin(width, height)
+        except RuntimeError as error:
+            self.driver.kill()
+            self.driver.wait()
+            raise CannotStart(str(error).splitlines()[0]) from None
+
+    def _begin(self, width, height):
         self._await_driver()
         options = {"args": ["--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
                             "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--force-device-scale-factor=1"]}

@@ -144,9 +144,8 @@ def same_from_the_command_line(program, folder):
     assert compared > 10, compared
 
 
-def work(program, config, folder, pictures):
+def work(browser, program, config, folder, pictures):
     bench = Workbench(program, [config, "--out", folder])
-    browser = webdriver.Browser(1440, 900)
 
     def picture(name):
         if pictures:
@@ -224,7 +223,12 @@ def main():
         print(f"skipped: {words} is not installed")
         return SKIPPED
     subprocess.run(["rm", "-rf", folder, os.path.join(os.path.dirname(folder), "again")], check=True)
-    work(program, config, folder, rest[0] if rest else None)
+    try:
+        browser = webdriver.Browser(1440, 900)
+    except webdriver.CannotStart as error:
+        print(f"skipped: Chromium does not start here: {error}")
+        return SKIPPED
+    work(browser, program, config, folder, rest[0] if rest else None)
     print("the page of the workbench does what it should")
     return 0
 
