@@ -4,8 +4,8 @@
 #include <dlfcn.h>
 
 #include <Eigen/CholmodSupport>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <cmath>
 
 namespace semblance {
 
@@ -48,16 +48,7 @@ Eigen::VectorXd SparseFactor::Pivots() const {
   return pivots;
 }
 
-Eigen::VectorXd Pivots(const SparseMatrix& lower, double shift, double enough) {
-  const SparseFactor factor(lower, shift);
-  if (factor.usable() && factor.Pivots().minCoeff() > enough) {
-    return factor.Pivots();
-  }
-  Eigen::SimplicialLDLT<SparseMatrix> signed_factor;
-  signed_factor.setShift(shift);
-  signed_factor.compute(lower);
-  return signed_factor.vectorD();
-}
+double SparseFactor::LogDeterminant() const { return Pivots().array().log().sum(); }
 
 namespace {
 
@@ -69,15 +60,30 @@ SparseMatrix Scaled(const SparseMatrix& lower) {
   return scale.asDiagonal() * lower * scale.asDiagonal();
 }
 
+// From log det(A + more) - log det(A + less): each eigenvalue well below `less` adds the log of their
+// ratio, each well above `more` nothing, whatever the order of the pivots.
+double CountBelow(double less, double log_less, double more, double log_more) {
+  return (log_more - log_less) / std::log(more / less);
+}
+
 }  // namespace
 
-// Pivots of the scaled normal equations that stand out of a shift, which keeps the others from
-// being zero. A pivot just above the threshold leaves shift / threshold in the next one, so the
-// threshold is above the root of the shift.
+// The shifts are far above rounding, which is of some 1e-15. Points that tell all apart leave no
+// small pivot, and cost one factor.
 int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
-  constexpr double kIndependent = 1e-6;
-  const Eigen::VectorXd pivots = Pivots(Scaled(lower), 1e-13, kIndependent);
-  return static_cast<int>(std::min<Eigen::Index>((pivots.array() > kIndependent).count(), rows));
+  constexpr double kLess = 1e-11, kMore = 1e-10, kPlain = 1e-6;
+  const SparseMatrix scaled = Scaled(lower);
+  const SparseFactor less(scaled, kLess);
+  if (!less.usable()) {
+    return -1;
+  }
+  int rank = static_cast<int>(scaled.rows());
+  if (!(less.Pivots().minCoeff() > kPlain)) {
+    const SparseFactor more(scaled, kMore);
+    rank -= static_cast<int>(std::lround(
+        CountBelow(kLess, less.LogDeterminant(), kMore, more.LogDeterminant())));
+  }
+  return static_cast<int>(std::min<std::size_t>(rank, rows));
 }
 
 void UseOneBlasThread() {

@@ -18,17 +18,16 @@ class SparseFactor {
   bool usable() const;  // false: not positive definite
   Eigen::MatrixXd Solve(const Eigen::MatrixXd& right) const;
   Eigen::VectorXd Pivots() const;  // squares of the factor's diagonal, in its own order
+  double LogDeterminant() const;
 
  private:
   struct Cholmod;
   std::unique_ptr<Cholmod> cholmod_;
 };
 
-// The pivots of lower + shift; unless all exceed `enough`, by a slower factorisation that rounding
-// cannot stop, then with signs.
-Eigen::VectorXd Pivots(const SparseMatrix& lower, double shift, double enough);
-
-// Estimated rank of the matrix whose normal matrix `lower` is; it has so many rows.
+// Estimated rank of the matrix whose normal matrix `lower` is; it has so many rows. With its columns
+// scaled to length 1, those directions count whose squares exceed some 1e-10. -1 if rounding leaves
+// no factor, as with a number that is not finite.
 int NumericalRank(const SparseMatrix& lower, std::size_t rows);
 
 // OpenBLAS, where the sparse Cholesky uses it, sums in an order that depends on its number of

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/least_squares/sparse_factor.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "surfaces/base/random.h"
+
+namespace semblance {
+namespace {
+
+// Rows of four numbers each, beside each other in the columns, as of points on a curve.
+Eigen::MatrixXd Rows(int rows, int columns, std::uint64_t random_seed) {
+  Random random(random_seed);
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(rows, columns);
+  for (int k = 0; k < rows; ++k) {
+    const int first = std::min(static_cast<int>(random.Uniform(0, columns - 3)), columns - 4);
+    for (int i = 0; i < 4; ++i) {
+      a(k, first + i) = random.Uniform(0.1, 1);
+    }
+  }
+  return a;
+}
+
+SparseMatrix LowerOf(const Eigen::MatrixXd& a) {
+  const Eigen::MatrixXd normal = a.transpose() * a;
+  return Eigen::MatrixXd(normal.triangularView<Eigen::Lower>()).sparseView();
+}
+
+// Few rows, many, some twice, and columns of no row; each of its own size.
+TEST(NumericalRank, IsThatOfTheSingularValues) {
+  for (std::uint64_t k = 0; k < 60; ++k) {
+    const int columns = 10 + static_cast<int>(k), rows = 3 + 2 * static_cast<int>(k % 37);
+    Eigen::MatrixXd a = Rows(rows, columns, k);
+    a.bottomRows(rows / 3) = 2 * a.topRows(rows / 3);
+    a.col(columns / 2).setZero();
+    a.array().colwise() *= Eigen::ArrayXd::LinSpaced(rows, -3, 3).exp();
+    const int expected =
+        static_cast<int>(Eigen::JacobiSVD<Eigen::MatrixXd>(
+                             a * a.colwise().norm().cwiseMax(1e-300).cwiseInverse().asDiagonal())
+                             .setThreshold(1e-5)
+                             .rank());
+    EXPECT_EQ(NumericalRank(LowerOf(a), rows), expected) << k;
+  }
+}
+
+TEST(NumericalRank, OfNothingIsZero) { EXPECT_EQ(NumericalRank(SparseMatrix(7, 7), 5), 0); }
+
+}  // namespace
+}  // namespace semblance
