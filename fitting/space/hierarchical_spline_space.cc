@@ -228,7 +228,8 @@ void HierarchicalSplineSpace::Measure(std::vector<double> factors, int threads,
   std::vector<int> stale;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     const QuadtreeNode& node = nodes_[k];
-    if (node.children < 0 && (!node.measured || !factors_.empty() || squares != nullptr)) {
+    const bool fresh = node.measured && node.has_moments;  // without factors, that is
+    if (node.children < 0 && (!fresh || !factors_.empty() || squares != nullptr)) {
       stale.push_back(static_cast<int>(k));
     }
   }
