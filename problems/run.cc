@@ -47,17 +47,26 @@ std::optional<FaceUncertainty> EstimateUncertainty(const Experiment& experiment,
   return result;
 }
 
+std::shared_ptr<const OuterSkin> OuterSkinOf(const Experiment& experiment, const TriMesh& skin,
+                                             StageCache& cache) {
+  const double probe_mm = experiment.region.probe_mm;
+  return cache.Get<OuterSkin>(
+      StageKey("outer skin", experiment.subject) + fmt::format("\n{}", probe_mm),
+      [&] { return FindOuterSkin(skin, probe_mm); });
+}
+
 std::optional<TruthComparison> Measure(const Experiment& experiment, const SkullStage& skull,
                                        const TriMesh& face,
                                        const std::optional<FaceUncertainty>& uncertainty,
-                                       std::span<const Sphere> masks, const RunContext& context) {
+                                       std::span<const Sphere> masks, StageCache& cache,
+                                       const RunContext& context) {
   const Case& subject = skull.depth_stage->subject;
   if (!subject.skin) {
     return std::nullopt;
   }
   const TriMesh& skin = *subject.skin;
   TruthComparison truth;
-  truth.skin = FindScoredSkin(subject, experiment.region);
+  truth.skin = FindScoredSkin(subject, *OuterSkinOf(experiment, skin, cache), experiment.region);
   truth.face = CompareFaces(skin, truth.skin.region, face, context);
   truth.details = MeasureDetails(skin, truth.skin, subject.basis, face, context);
   truth.implicit = CompareFaces(skin, truth.skin.region, skull.implicit.mesh, context);
@@ -154,7 +163,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
     // A prior knows of nose, mouth and eyes, and so does its sigma.
     const std::vector<Sphere> masks =
         made.prior ? std::vector<Sphere>() : TemplateMasks(made.placed.face);
-    return Measure(experiment, *skull, face.mesh, uncertainty, masks, context);
+    return Measure(experiment, *skull, face.mesh, uncertainty, masks, shared, context);
   });
   std::vector<FeatureDistortion> features =
       MeasureFeatures(made.placed.face, made.fitted.fit.surface);

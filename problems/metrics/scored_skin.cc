@@ -68,7 +68,13 @@ void MeasureAreas(const TriMesh& skin, ScoredSkin& scored) {
 ScoredSkin FindScoredSkin(const TriMesh& skin, const SkullSites& sites,
                           std::span<const Dowel> dowels, const DowelNetwork& network,
                           const FaceRegionOptions& options) {
-  const OuterSkin felt = FindOuterSkin(skin, options.probe_mm);
+  return FindScoredSkin(skin, FindOuterSkin(skin, options.probe_mm), sites, dowels, network,
+                        options);
+}
+
+ScoredSkin FindScoredSkin(const TriMesh& skin, const OuterSkin& felt, const SkullSites& sites,
+                          std::span<const Dowel> dowels, const DowelNetwork& network,
+                          const FaceRegionOptions& options) {
   const std::vector<Sphere> excluded = ExcludedSpheres(sites.points, options.exclude);
   const std::vector<Vec3> normals = VertexNormals(skin);
   ScoredSkin scored{.region = Extent(skin, sites, dowels, network, options),

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "problems/metrics/face_region.h"
+#include "problems/metrics/outer_skin.h"
 #include "surfaces/mesh/cut_planes.h"
 
 namespace semblance {
@@ -41,6 +42,10 @@ struct ScoredSkin {
 // The part of the face is that of the nearest of all 32 sites. extent `network`: in front of the
 // dowels' network instead. Throws InputError as InFrontOfNetwork and FindOuterSkin.
 ScoredSkin FindScoredSkin(const TriMesh& skin, const SkullSites& sites,
+                          std::span<const Dowel> dowels, const DowelNetwork& network,
+                          const FaceRegionOptions& options);
+// felt: FindOuterSkin(skin, options.probe_mm), which takes longer than all the rest.
+ScoredSkin FindScoredSkin(const TriMesh& skin, const OuterSkin& felt, const SkullSites& sites,
                           std::span<const Dowel> dowels, const DowelNetwork& network,
                           const FaceRegionOptions& options);
 

@@ -200,7 +200,12 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
 }
 
 ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options) {
-  return FindScoredSkin(*subject.skin, *subject.basis.sites, subject.dowels_on_bone,
+  return FindScoredSkin(subject, FindOuterSkin(*subject.skin, options.probe_mm), options);
+}
+
+ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& felt,
+                          const FaceRegionOptions& options) {
+  return FindScoredSkin(*subject.skin, felt, *subject.basis.sites, subject.dowels_on_bone,
                         subject.network, options);
 }
 

@@ -53,5 +53,7 @@ Case MakeCase(const SubjectData& subject, const Experiment& experiment);
 
 // Of the subject's skin, which must be there.
 ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options);
+ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& felt,
+                          const FaceRegionOptions& options);
 
 }  // namespace semblance
