@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
+#include "fitting/solve/auto_weight.h"
 #include "fitting/solve/space_solve.h"
 #include "surfaces/hspline_files/feature.h"
 
@@ -61,6 +63,50 @@ std::vector<Term> TermsOf(const FitOptions& options) {
     terms.emplace_back(PriorTerm{.weight = weight, .held_only = true});
   }
   return terms;
+}
+
+// Those that were not left out, with their anchors.
+FitTarget Without(std::span<const std::uint32_t> outliers, FitTarget target) {
+  std::vector<FitPoint> kept;
+  auto next = outliers.begin();
+  for (std::uint32_t k = 0; k < target.points.size(); ++k) {
+    if (next != outliers.end() && *next == k) {
+      ++next;
+    } else {
+      kept.push_back(std::move(target.points[k]));
+    }
+  }
+  target.points = std::move(kept);
+  return target;
+}
+
+double PointWeight(std::span<const Term> terms) {
+  double sum = 0;
+  for (const Term& term : terms) {
+    sum += std::holds_alternative<PointTerm>(term) ? WeightOf(term) : 0;
+  }
+  return sum;
+}
+
+bool HasSmoothness(std::span<const Term> terms) {
+  return std::any_of(terms.begin(), terms.end(),
+                     [](const Term& t) { return std::holds_alternative<SmoothnessTerm>(t); });
+}
+
+// With the weight that the plan has chosen, for points of weight 1 and a length of 1 mm, unless a
+// number is given.
+std::vector<Term> WithSmoothness(std::span<const Term> terms, double weight) {
+  std::vector<Term> all(terms.begin(), terms.end());
+  const int automatic = AutoTerm(all);
+  SmoothnessTerm smooth =
+      automatic < 0 ? SmoothnessTerm{.length_mm = 1} : std::get<SmoothnessTerm>(all[automatic]);
+  smooth.weight = weight * PointWeight(all) / std::pow(smooth.length_mm, 4);
+  if (automatic >= 0) {
+    all[automatic] = smooth;
+  } else if (!HasSmoothness(all)) {
+    all.emplace_back(smooth);
+  }
+  return all;
 }
 
 // A fit by any plan.
@@ -182,12 +228,37 @@ class Fitter {
   }
 
   void Follow(const AutoPlan& plan) {
+    const ControlNet start = result_.surface.Net(0);
     NestedFitResult fit = FitNested(result_.surface, driver_.target(), plan, context_);
     result_.surface = std::move(fit.surface);
     result_.automatic = std::move(fit.report);
     for (const NestedRound& round : result_.automatic->rounds) {
       driver_.Solve({.solve = [&](std::span<const Term>) { return SummaryOf(round); }});
     }
+    if (options_.solver == Solver::kCeres) {
+      driver_.Solve({.solve = [&](std::span<const Term> terms) {
+        return SettleByCeres(terms, HSplineSurface(result_.surface.shape(), start));
+      }});
+    }
+  }
+
+  // The minimum of all terms in the space that the auto plan has found, with its smoothness and
+  // without its outliers.
+  LevelSummary SettleByCeres(std::span<const Term> terms, const HSplineSurface& rest) {
+    context_.Report("fit", "all terms");
+    const FitTarget kept = Without(result_.automatic->outliers, driver_.target());
+    const std::vector<Term> weighed = WithSmoothness(terms, result_.automatic->weight);
+    SpaceSolve all({.start = result_.surface,
+                    .rest = rest,
+                    .target = kept,
+                    .terms = weighed,
+                    .solver = Solver::kCeres,
+                    .threads = context_.threads,
+                    .settled = true});
+    LevelSummary summary = all.Settle();
+    result_.surface = all.Surface();
+    summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
+    return summary;
   }
 
   // Only the surface as it ended is there to be measured.

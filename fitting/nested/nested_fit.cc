@@ -298,6 +298,7 @@ class NestedFitter {
   }
 
   void Report(const NestedWeight& chosen) {
+    report_.weight = weight_;
     report_.limited_by_density = finest_ < cap_ && FinestOfMost() >= finest_;
     const Indices kept = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
     const double left = 1 - chosen.degrees_of_freedom / static_cast<double>(kept.size());

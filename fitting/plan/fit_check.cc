@@ -46,8 +46,9 @@ class FaultFinder {
     }
     if (auto_) {
       TermsOfAutoPlan();
+    } else {
+      AutoWeights();
     }
-    AutoWeights();
     FindRelaxation();
     return std::move(faults_);
   }
@@ -93,29 +94,37 @@ class FaultFinder {
   void Plan(const AdaptivePlan& plan) { Level("plan.finest", plan.finest); }
   void Plan(const AutoPlan&) {}  // the surface takes the levels that it needs
 
-  // What the auto plan chooses by itself is not to be asked for.
+  // What the auto plan chooses by itself is not to be asked for. Ceres takes other terms too, in
+  // the space that the plan has found.
   void TermsOfAutoPlan() {
+    const bool ceres = options_.solver == Solver::kCeres;
+    int automatic = 0;
     for (int k = 0; k < std::ssize(options_.terms); ++k) {
-      const auto* const points = std::get_if<PointTerm>(&options_.terms[k]);
-      const auto* const smooth = std::get_if<SmoothnessTerm>(&options_.terms[k]);
-      const bool known = points != nullptr ? points->loss == RobustLoss::kNone
-                                           : smooth != nullptr && smooth->weight.automatic &&
-                                                 smooth->of == SmoothnessOf::kDisplacement;
-      if (!known) {
+      const Term& term = options_.terms[k];
+      const bool weighed = AutoTerm(std::span(&term, 1)) >= 0;
+      const bool known = (ceres && !weighed) || IsOfAutoPlan(term);
+      automatic += weighed ? 1 : 0;
+      if (!known || automatic > 1) {
         Add(fmt::format("terms[{}]", k),
-            "the auto plan weighs 'points' without a loss (it finds outliers by itself) and "
+            "the auto plan weighs 'points' without a loss (it finds outliers by itself) and one "
             "'smoothness' of the displacement with weight: auto; leave 'terms' out, or take plan: "
-            "adaptive");
+            "adaptive; other terms, with numbers as weights, need solver: ceres");
       }
     }
-    if (options_.solver != Solver::kFastest) {
-      Add("solver", "the auto plan solves by conjugate gradients; write solver: fastest");
-    }
+    NeedPoints("the auto plan has no term 'points' with a weight; add one", "terms");
     if (!std::holds_alternative<NoRelaxation>(options_.relaxation)) {
       Add("relaxation",
           "the auto plan leaves the points' (u,v) where they are; write relaxation: "
           "none, or take plan: adaptive");
     }
+  }
+
+  static bool IsOfAutoPlan(const Term& term) {
+    const auto* const points = std::get_if<PointTerm>(&term);
+    const auto* const smooth = std::get_if<SmoothnessTerm>(&term);
+    return points != nullptr ? points->loss == RobustLoss::kNone
+                             : smooth != nullptr && smooth->weight.automatic &&
+                                   smooth->of == SmoothnessOf::kDisplacement;
   }
 
   // The first of the terms `points` with a weight; without any there is a fault.

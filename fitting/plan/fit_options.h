@@ -23,7 +23,8 @@ void Fields(Visitor& visit, FitOptions& o) {
   visit(FieldInfo{.name = "plan",
                   .doc = "listed: the steps of a schedule once; coarse_to_fine: level by level; "
                          "until: a schedule again and again while that helps; adaptive: all levels "
-                         "at once, finer vertices only where they are needed"},
+                         "at once, finer vertices only where they are needed; auto: levels, "
+                         "smoothness and outliers from the points"},
         o.plan);
   visit(FieldInfo{.name = "terms", .min = 1, .doc = "what each solve weighs"}, o.terms);
   visit(FieldInfo{.name = "features",

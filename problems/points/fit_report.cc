@@ -40,6 +40,7 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"neighbour_noise_mm", r.neighbour_noise_mm},
                {"closer_noise_mm", r.closer_noise_mm},
                {"held_out_rms_mm", r.held_out_rms_mm},
+               {"weight", r.weight},
                {"neighbour_correlation", r.neighbour_correlation},
                {"limited_by_density", r.limited_by_density},
                {"verdict", Verdict(r)},

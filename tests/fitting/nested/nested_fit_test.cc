@@ -8,16 +8,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fitting/fit.h"
 #include "fitting/problem/start_surface.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/scratch_file.h"
 
 namespace semblance {
 namespace {
 
 using testing::ErrorAgainst;
 using testing::FrankePoint;
+using ::testing::HasSubstr;
 using testing::HeadPoint;
 using testing::Scattered;
 
@@ -115,6 +118,73 @@ TEST(NestedFit, APlaneIsReproduced) {
   const auto plane = [](const Vec2& q) { return Vec3(3 * q.x(), 2 * q.y() - q.x(), 0.5 * q.y()); };
   const NestedFitResult fit = FitAuto(Scattered(plane, 500, 0, 2));
   EXPECT_LT(ErrorAgainst(plane, fit.surface, 40).largest, 1e-10);
+}
+
+HSplineSurface PlaneUnder(const FitTarget& target) {
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    positions.push_back(p.position);
+    uv.push_back(p.uv);
+  }
+  return StartSurface({.patches_u = 8, .patches_v = 8, .max_level = 0}, positions, uv);
+}
+
+FitResult FitBy(Solver solver, std::vector<Term> terms, const FitTarget& target) {
+  return Fit(PlaneUnder(target), target, {},
+             {.plan = AutoPlan{}, .terms = std::move(terms), .solver = solver}, {});
+}
+
+std::string Refusal(Solver solver, const Term& term) {
+  return testing::WordsOf<InputError>([&] {
+    FitBy(solver, {PointTerm{}, term}, Heights(FrankePoint, 100, 0));
+  });
+}
+
+// Conjugate gradients and Ceres, of the same space, smoothness and points; outliers among them.
+TEST(NestedFit, CeresFindsTheSameSurface) {
+  FitTarget target = Heights(FrankePoint, 3000, 1e-3);
+  for (std::size_t k = 0; k < target.points.size(); k += 100) {
+    target.points[k].position.z() += 3;
+  }
+  const FitResult fastest = FitBy(Solver::kFastest, {PointTerm{}}, target);
+  const Term smoothness = SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 0.1};
+  for (const std::vector<Term>& terms :
+       {std::vector<Term>{PointTerm{}}, std::vector<Term>{PointTerm{.weight = 7}, smoothness}}) {
+    const FitResult ceres = FitBy(Solver::kCeres, terms, target);
+    EXPECT_EQ(ceres.automatic->outliers.size(), 30u);
+    EXPECT_EQ(ceres.levels.back().solver, "ceres");
+    EXPECT_LT(
+        ErrorAgainst([&](const Vec2& uv) { return fastest.surface.Point(uv); }, ceres.surface, 60)
+            .rms,
+        1e-4);
+    double before = 0, after = 0;
+    for (const TermCosts& term : ceres.levels.back().terms) {
+      before += term.before;
+      after += term.after;
+    }
+    EXPECT_LE(after, before);
+    EXPECT_LT(before, 1.001 * after) << "the plan stops where noise is larger than what is left";
+    EXPECT_TRUE(ceres.usable);
+  }
+}
+
+// A membrane as stiff as that lets the surface rise by hardly anything over its start.
+TEST(NestedFit, WithCeresOtherTermsTakePart) {
+  const FitTarget target = Heights(FrankePoint, 3000, 1e-3);
+  const HSplineSurface start = PlaneUnder(target);
+  const FitResult fit =
+      FitBy(Solver::kCeres, {PointTerm{}, MembraneTerm{.weight = 1e4, .length_mm = 1}}, target);
+  const auto from_start = [&](const HSplineSurface& surface) {
+    const Vec3 mean = surface.Point({0.5, 0.5}) - start.Point({0.5, 0.5});
+    return ErrorAgainst([&](const Vec2& uv) -> Vec3 { return start.Point(uv) + mean; }, surface, 40)
+        .rms;
+  };
+  EXPECT_GT(from_start(FitBy(Solver::kFastest, {PointTerm{}}, target).surface), 0.1);
+  EXPECT_LT(from_start(fit.surface), 1e-3);
+  EXPECT_THAT(Refusal(Solver::kFastest, MembraneTerm{}), HasSubstr("need solver: ceres"));
+  EXPECT_THAT(Refusal(Solver::kCeres, MembraneTerm{.weight = AutoOr<double>::Auto()}),
+              HasSubstr("one 'smoothness'"));
 }
 
 TEST(NestedFit, WhatCannotBeFittedIsSaid) {
