@@ -48,7 +48,8 @@ void Fields(Visitor& visit, FitOptions& o) {
                        "are the control vertices, in tiles of 3 x 3 where the terms treat x, y and "
                        "z alike; fastest: one direct factorisation of the same least squares where "
                        "the terms treat x, y and z alike, else as ceres; the same surface to "
-                       "rounding"},
+                       "rounding. The auto plan goes by conjugate gradients; with ceres a last "
+                       "problem over the vertices that it found brings all terms to their minimum"},
       o.solver);
 }
 
