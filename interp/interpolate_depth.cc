@@ -9,9 +9,17 @@ namespace {
 template <class Scheme>
 bool GoesAlong(const Scheme& scheme) {
   if constexpr (requires { scheme.distance == DowelDistance::kGeodesic; }) {
-    return scheme.distance == DowelDistance::kGeodesic;
+    if (scheme.distance == DowelDistance::kGeodesic) {
+      return true;
+    }
   }
-  return std::is_same_v<Scheme, Harmonic> || std::is_same_v<Scheme, Biharmonic>;
+  if constexpr (requires { scheme.mean == DepthMean::kCovariates; }) {
+    if (scheme.mean == DepthMean::kCovariates) {
+      return true;
+    }
+  }
+  return std::is_same_v<Scheme, SurfaceMatern> || std::is_same_v<Scheme, Harmonic> ||
+         std::is_same_v<Scheme, Biharmonic>;
 }
 
 }  // namespace
@@ -24,6 +32,17 @@ DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
 
 bool NeedsSurface(const DepthScheme& scheme) {
   return std::visit([](const auto& options) { return GoesAlong(options); }, scheme);
+}
+
+bool NeedsExpected(const DepthScheme& scheme) {
+  return std::visit(
+      [](const auto& options) {
+        if constexpr (requires { options.mean == DepthMean::kTable; }) {
+          return options.mean == DepthMean::kTable;
+        }
+        return false;
+      },
+      scheme);
 }
 
 bool NeedsNetwork(const DepthScheme& scheme) {

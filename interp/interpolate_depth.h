@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "interp/kriging/kriging.h"
+#include "interp/kriging/surface_matern.h"
 #include "interp/schemes/barycentric.h"
 #include "interp/schemes/biharmonic.h"
 #include "interp/schemes/depth_map.h"
@@ -20,9 +21,9 @@
 
 namespace semblance {
 
-using DepthScheme =
-    std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis, MovingLeastSquares,
-                 Kriging, Harmonic, Biharmonic, NaturalNeighbour, NetworkSpline, DepthMap>;
+using DepthScheme = std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis,
+                                 MovingLeastSquares, Kriging, SurfaceMatern, Harmonic, Biharmonic,
+                                 NaturalNeighbour, NetworkSpline, DepthMap>;
 
 // One entry per vertex. Where the status is kAssigned the depth is finite and within the range of
 // the dowels' depths (without a scheme's `clamp`: above 0; depth_map's are the map's); elsewhere it
@@ -34,6 +35,9 @@ DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
 
 // Does the scheme work along the skull's surface, so that points alone do not do?
 bool NeedsSurface(const DepthScheme& scheme);
+
+// Does the scheme vary around DepthInput::expected?
+bool NeedsExpected(const DepthScheme& scheme);
 
 // Does the scheme work on the dowel network, so that one without an area will not do?
 bool NeedsNetwork(const DepthScheme& scheme);

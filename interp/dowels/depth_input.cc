@@ -75,6 +75,9 @@ void CheckDepthInput(const DepthInput& input) {
   for (const Dowel& dowel : input.dowels) {
     CheckDowel(dowel);
   }
+  for (const Dowel& dowel : input.expected) {
+    CheckDowel(dowel);
+  }
   CheckNetwork(input);
   CheckSkull(input);
 }

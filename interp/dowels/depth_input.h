@@ -20,11 +20,14 @@ struct DepthInput {
   std::span<const Vec3> normals;  // unit, out of the bone, one per vertex; zero where there is none
   std::span<const Dowel> dowels;
   const DowelNetwork& network;  // may have no area where the scheme needs none
+  // What is to be expected before any measurement, e.g. a population's mean depths at its sites: as
+  // dowels on this skull, also where no depth was measured. None where nothing is known.
+  std::span<const Dowel> expected = {};
 };
 
-// Throws InputError if there is no dowel, if one has no finite base, no unit direction or no depth
-// above 0, if the normals are not one per vertex, if an area names a dowel that is not there, or if
-// a vertex is not finite.
+// Throws InputError if there is no dowel, if one (also an expected one) has no finite base, no unit
+// direction or no depth above 0, if the normals are not one per vertex, if an area names a dowel
+// that is not there, or if a vertex is not finite.
 void CheckDepthInput(const DepthInput& input);
 
 // One entry per vertex: no depth, outside.

@@ -53,15 +53,15 @@ DepthField Interpolated(const DepthScheme& scheme, const DepthInput& input, cons
 
 // At one vertex a left-out dowel, for schemes in space.
 DepthField FieldAtBases(const DepthScheme& scheme, const OutsideRule& rule, const Shown& shown,
-                        std::span<const Dowel> dowels, const std::vector<std::size_t>& fold,
+                        const DepthInput& all, const std::vector<std::size_t>& fold,
                         const RunContext& run) {
   TriMesh points;
   std::vector<Vec3> normals;
   for (const std::size_t i : fold) {
-    points.points.push_back(dowels[i].base);
-    normals.push_back(dowels[i].direction);
+    points.points.push_back(all.dowels[i].base);
+    normals.push_back(all.dowels[i].direction);
   }
-  const DepthInput input{points, normals, shown.dowels, shown.network};
+  const DepthInput input{points, normals, shown.dowels, shown.network, all.expected};
   return ApplyOutsideRule(rule, input, Interpolated(scheme, input, run), run);
 }
 
@@ -85,8 +85,8 @@ std::vector<std::size_t> NearestCorners(const DepthInput& input) {
 DepthField FieldAtCorners(const DepthScheme& scheme, const OutsideRule& rule, const Shown& shown,
                           const DepthInput& all, const std::vector<std::size_t>& fold,
                           const std::vector<std::size_t>& corners, const RunContext& run) {
-  const DepthField field =
-      Interpolated(scheme, {all.skull, all.normals, shown.dowels, shown.network}, run);
+  const DepthField field = Interpolated(
+      scheme, {all.skull, all.normals, shown.dowels, shown.network, all.expected}, run);
   TriMesh points;
   std::vector<Vec3> normals;
   DepthField at = EmptyDepthField(fold.size());
@@ -121,7 +121,7 @@ std::vector<LeftOut> LeaveOut(const DepthScheme& scheme, const OutsideRule& rule
   const Shown shown = Without(input, fold);
   const DepthField field = NeedsSurface(scheme)
                                ? FieldAtCorners(scheme, rule, shown, input, fold, corners, run)
-                               : FieldAtBases(scheme, rule, shown, input.dowels, fold, run);
+                               : FieldAtBases(scheme, rule, shown, input, fold, run);
   std::vector<LeftOut> left_out;
   for (std::size_t k = 0; k < fold.size(); ++k) {
     left_out.push_back(Compared(input.dowels[fold[k]], field, k));

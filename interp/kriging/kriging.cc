@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "interp/kriging/kriging_likelihood.h"
 #include "interp/kriging/kriging_process.h"
@@ -59,9 +58,11 @@ void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samp
 }
 
 KrigingScene SceneOf(const Kriging& options, const DepthInput& input,
-                     const std::vector<DepthSample>& samples, const RunContext& run) {
+                     const std::vector<DepthSample>& samples, const MeanRegressors& mean,
+                     const RunContext& run) {
   const auto n = static_cast<Eigen::Index>(samples.size());
-  KrigingScene scene{{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd(n)}, {}, {}};
+  KrigingScene scene{
+      {Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd()}, {}, {}};
   for (const DepthSample& sample : samples) {
     const auto i = static_cast<Eigen::Index>(scene.bases.size());
     const double nugget_mm = options.nugget_share * sample.sd_mm;
@@ -69,6 +70,7 @@ KrigingScene SceneOf(const Kriging& options, const DepthInput& input,
     scene.data.nugget_mm2[i] = std::isfinite(nugget_mm) ? nugget_mm * nugget_mm : 0;
     scene.bases.push_back(sample.base);
   }
+  scene.data.regressors = mean.At(scene.bases, run).transpose();
   if (options.distance == DowelDistance::kGeodesic) {
     FindGeodesics(input, samples, run, scene);
   } else {
@@ -79,40 +81,27 @@ KrigingScene SceneOf(const Kriging& options, const DepthInput& input,
   return scene;
 }
 
-// `count` samples, each the furthest from those before it, beginning with the first.
-std::vector<Eigen::Index> FarApart(const KrigingScene& scene, Eigen::Index count) {
-  const Eigen::Index n = scene.data.depth_mm.size();
-  std::vector<Eigen::Index> chosen;
-  Eigen::VectorXd distance = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::infinity());
-  for (Eigen::Index next = 0; static_cast<Eigen::Index>(chosen.size()) < std::min(n, count);) {
-    chosen.push_back(next);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      distance[i] = std::min(distance[i], (scene.bases[i] - scene.bases[next]).norm());
-    }
-    distance.maxCoeff(&next);
-  }
-  return chosen;
-}
-
 KrigingHyper HyperFor(const Kriging& options, const KrigingScene& scene, const RunContext& run) {
   if (scene.data.depth_mm.size() <= kFitSamples) {
     return FitHyper(options, scene.data, run);
   }
-  const std::vector<Eigen::Index> some = FarApart(scene, kFitSamples);
-  return FitHyper(
-      options,
-      {scene.data.distance_mm(some, some), scene.data.depth_mm(some), scene.data.nugget_mm2(some)},
-      run);
+  const std::vector<Eigen::Index> some = FarApart(scene.bases, kFitSamples);
+  return FitHyper(options,
+                  {scene.data.distance_mm(some, some), scene.data.depth_mm(some),
+                   scene.data.nugget_mm2(some), scene.data.regressors(some, Eigen::all)},
+                  run);
 }
 
 }  // namespace
 
 KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run) {
   CheckDepthInput(input);
-  const KrigingScene scene = SceneOf(options, input, DepthSamples(input.dowels), run);
+  const MeanRegressors mean(options.mean, Kriging::kName, input, run);
+  const KrigingScene scene = SceneOf(options, input, DepthSamples(input.dowels), mean, run);
   const KrigingHyper hyper = HyperFor(options, scene, run);
+  const KrigingProcess process(options.covariance, scene.data, hyper);
   return {hyper.length_mm, hyper.signal_mm,
-          KrigingProcess(options.covariance, scene.data, hyper).mean_mm()};
+          (scene.data.regressors * process.coefficients()).mean()};
 }
 
 DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
@@ -120,7 +109,8 @@ DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
   CheckDepthInput(input);
   Kriging straight = options;
   straight.distance = DowelDistance::kEuclidean;
-  const KrigingScene scene = SceneOf(straight, input, DepthSamples(input.dowels), run);
+  const MeanRegressors mean(options.mean, Kriging::kName, input, run);
+  const KrigingScene scene = SceneOf(straight, input, DepthSamples(input.dowels), mean, run);
   const auto count = static_cast<Eigen::Index>(points.size());
   Eigen::MatrixXd to_dowels_mm(scene.data.depth_mm.size(), count), between_mm(count, count);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -130,7 +120,7 @@ DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
     }
   }
   return KrigingProcess(straight.covariance, scene.data, HyperFor(straight, scene, run))
-      .Posterior(to_dowels_mm, between_mm);
+      .Posterior(to_dowels_mm, between_mm, mean.At(points, run));
 }
 
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
@@ -139,7 +129,9 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
   run.ThrowIfStopped();
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const DepthLimits limits(samples, options.clamp);
-  const KrigingScene scene = SceneOf(options, input, samples, run);
+  const MeanRegressors mean(options.mean, Kriging::kName, input, run);
+  const KrigingScene scene = SceneOf(options, input, samples, mean, run);
+  const Eigen::MatrixXd regressors = mean.AtVertices(run);
   KrigingProcess process(options.covariance, scene.data, HyperFor(options, scene, run));
   if (options.state_sd) {
     process.PrepareSd();
@@ -149,7 +141,8 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
     if (!std::isfinite(distance_mm.minCoeff())) {
       return DepthValue{};  // no dowel is reached along the bone
     }
-    const DepthValue value = process.ValueAt(distance_mm);
+    const DepthValue value =
+        process.ValueAt(distance_mm, regressors.col(static_cast<Eigen::Index>(i)));
     return DepthValue{limits(value.mm), value.sd_mm};
   });
 }

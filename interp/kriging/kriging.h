@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Ordinary kriging: tissue depth as a Gaussian process in space, with a standard deviation.
+// Kriging: tissue depth as a Gaussian process in space, with a standard deviation; ordinary where
+// its mean is constant, else universal.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,6 +11,7 @@
 
 #include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_samples.h"
+#include "interp/kriging/depth_mean.h"
 #include "interp/on_surface/surface_distance.h"
 
 namespace semblance {
@@ -24,6 +26,7 @@ struct Kriging {
   static constexpr std::string_view kName = "kriging";
   Covariance covariance = Covariance::kMatern32;       // smoother ones oscillate between far dowels
   DowelDistance distance = DowelDistance::kEuclidean;  // or along the bone
+  DepthMean mean = DepthMean::kConstant;               // what the depths vary around
   std::optional<double> length_mm = std::nullopt;      // none: by maximum likelihood
   double length_prior_mm = 60;                         // median; dowels alone do not fix a length
   double length_prior_spread = 0.5;                    // sd of the logarithm
@@ -41,6 +44,7 @@ void Fields(Visitor& visit, Kriging& o) {
                          "oscillates between dowels that are far apart)"},
         o.covariance);
   DistanceField(visit, o.distance);
+  MeanField(visit, o.mean);
   visit(FieldInfo{.name = "length_mm",
                   .unit = "mm",
                   .min = 1,
@@ -86,7 +90,7 @@ void Fields(Visitor& visit, Kriging& o) {
 struct KrigingModel {
   double length_mm = kNaN;
   double signal_mm = kNaN;
-  double mean_mm = kNaN;  // the process's mean, by generalised least squares
+  double mean_mm = kNaN;  // the process's mean, by generalised least squares: that of the dowels
 };
 
 // The maximum of the restricted likelihood times the prior (kriging_likelihood.h). Of more than 200
@@ -104,12 +108,13 @@ struct DepthPosterior {
 DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
                                 std::span<const Vec3> points, const RunContext& run);
 
-// Far from all dowels the depth is the process's mean. sd_mm is that of the process at the vertex,
-// given the dowels, the model and the uncertain mean; it does not hold the nugget of a further
-// measurement there, nor the uncertainty of length and signal. kNotFacing as AssignWhereFacing;
-// kOutside where no dowel is reached along the bone. There the smoother covariances are not always
-// definite; then the field smooths, and may miss certain dowels. It keeps 8 bytes per vertex and
-// dowel. Throws InputError as CheckDepthInput, or if the skull has no triangle to go along.
+// Far from all dowels the depth is the process's mean there. sd_mm is that of the process at the
+// vertex, given the dowels, the model and the uncertain mean; it does not hold the nugget of a
+// further measurement there, nor the uncertainty of length and signal. kNotFacing as
+// AssignWhereFacing; kOutside where no dowel is reached along the bone. There the smoother
+// covariances are not always definite; then the field smooths, and may miss certain dowels. It
+// keeps 8 bytes per vertex and dowel. Throws InputError as CheckDepthInput, or if the skull has no
+// triangle to go along.
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
 
 }  // namespace semblance

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/kriging/kriging_process.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 namespace semblance {
-namespace {
-
-constexpr double kFirstJitter = 1e-10;  // of the variance, on the diagonal
-
-}  // namespace
 
 CorrelationValue CorrelationAt(Covariance covariance, double distance_mm, double length_mm) {
   if (!std::isfinite(distance_mm)) {
@@ -39,19 +35,12 @@ KrigingProcess::KrigingProcess(Covariance covariance, const KrigingData& data,
     : covariance_(covariance),
       hyper_(hyper),
       variance_mm2_(hyper.signal_mm * hyper.signal_mm),
-      nugget_mm2_(data.nugget_mm2) {
-  Factor(data);
-  const Eigen::Index n = data.depth_mm.size();
-  inverse_ones_ = factor_.solve(Eigen::VectorXd::Ones(n));
-  ones_ = inverse_ones_.sum();
-  mean_mm_ = inverse_ones_.dot(data.depth_mm) / ones_;
-  const Eigen::VectorXd residual = data.depth_mm.array() - mean_mm_;
-  inverse_residual_ = factor_.solve(residual);
-  misfit_ = residual.dot(inverse_residual_);
+      regression_(Regression(data)) {
+  by_log_signal_.diagonal().array() += 2 * regression_.added();
   FindWeights(data);
 }
 
-void KrigingProcess::Factor(const KrigingData& data) {
+GaussianRegression KrigingProcess::Regression(const KrigingData& data) {
   const Eigen::Index n = data.depth_mm.size();
   Eigen::MatrixXd matrix(n, n);
   by_log_length_.resize(n, n);
@@ -63,13 +52,9 @@ void KrigingProcess::Factor(const KrigingData& data) {
       by_log_length_(j, k) = by_log_length_(k, j) = variance_mm2_ * c.by_log_length;
     }
   }
-  matrix.diagonal() += nugget_mm2_;
-  for (double jitter = kFirstJitter; jitter < 100; jitter *= 10) {
-    factor_.compute(matrix + jitter * variance_mm2_ * Eigen::MatrixXd::Identity(n, n));
-    if (factor_.info() == Eigen::Success) {
-      return;
-    }
-  }
+  by_log_signal_ = 2 * matrix;
+  matrix.diagonal() += data.nugget_mm2;
+  return {matrix, variance_mm2_, data.depth_mm, data.regressors};
 }
 
 // With ways that are not quite symmetric, and a diagonal that had to grow, the field misses the
@@ -77,18 +62,19 @@ void KrigingProcess::Factor(const KrigingData& data) {
 // of the ways themselves would be exact and wild: they need not be definite.
 void KrigingProcess::FindWeights(const KrigingData& data) {
   constexpr int kRounds = 20;
-  weights_ = inverse_residual_;
+  weights_ = regression_.weights();
   if (data.distance_mm == data.distance_mm.transpose()) {
     return;
   }
   Eigen::MatrixXd with = CovarianceAt(data.distance_mm);
-  with.diagonal() += nugget_mm2_;
+  with.diagonal() += data.nugget_mm2;
+  const Eigen::VectorXd residual = data.depth_mm - data.regressors * coefficients();
   const auto miss = [&](const Eigen::VectorXd& weights) -> Eigen::VectorXd {
-    return (data.depth_mm.array() - mean_mm_).matrix() - with * weights;
+    return residual - with * weights;
   };
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::VectorXd off = miss(weights_);
-    const Eigen::VectorXd nearer = weights_ + factor_.solve(off);
+    const Eigen::VectorXd nearer = weights_ + regression_.Solve(off);
     if (!(miss(nearer).norm() < off.norm())) {
       return;
     }
@@ -96,25 +82,13 @@ void KrigingProcess::FindWeights(const KrigingData& data) {
   }
 }
 
-double KrigingProcess::Deviance() const {
-  return 2 * factor_.matrixLLT().diagonal().array().log().sum() + std::log(ones_) + misfit_;
-}
-
 Vec2 KrigingProcess::DevianceGradient() const {
-  const Eigen::Index n = weights_.size();
-  const Eigen::MatrixXd inverse = factor_.solve(Eigen::MatrixXd::Identity(n, n));
-  const auto along = [&](const Eigen::MatrixXd& change) {  // of V
-    return inverse.cwiseProduct(change).sum() - inverse_ones_.dot(change * inverse_ones_) / ones_ -
-           inverse_residual_.dot(change * inverse_residual_);
-  };
-  Eigen::MatrixXd by_log_signal = 2 * factor_.reconstructedMatrix();
-  by_log_signal.diagonal() -= 2 * nugget_mm2_;
-  return {along(by_log_length_), along(by_log_signal)};
+  return {regression_.DevianceAlong(by_log_length_), regression_.DevianceAlong(by_log_signal_)};
 }
 
 void KrigingProcess::PrepareSd() {
-  const Eigen::Index n = weights_.size();
-  inverse_root_ = factor_.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
+  regression_.PrepareVariance();
+  with_sd_ = true;
 }
 
 Eigen::MatrixXd KrigingProcess::CovarianceAt(const Eigen::MatrixXd& distance_mm) const {
@@ -123,26 +97,23 @@ Eigen::MatrixXd KrigingProcess::CovarianceAt(const Eigen::MatrixXd& distance_mm)
   });
 }
 
-DepthValue KrigingProcess::ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm) const {
+DepthValue KrigingProcess::ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm,
+                                   const Eigen::VectorXd& regressors) const {
   const Eigen::VectorXd with = CovarianceAt(distance_mm);
-  return {mean_mm_ + with.dot(weights_), inverse_root_.size() > 0 ? Sd(with) : kNaN};
+  const double depth_mm = regressors.dot(coefficients()) + with.dot(weights_);
+  if (!with_sd_) {
+    return {depth_mm, kNaN};
+  }
+  const double variance = regression_.Variance(with, regressors, variance_mm2_);
+  return {depth_mm, std::sqrt(std::max(variance, 0.0))};
 }
 
 DepthPosterior KrigingProcess::Posterior(const Eigen::MatrixXd& to_dowels_mm,
-                                         const Eigen::MatrixXd& between_mm) const {
+                                         const Eigen::MatrixXd& between_mm,
+                                         const Eigen::MatrixXd& regressors) const {
   const Eigen::MatrixXd with = CovarianceAt(to_dowels_mm);
-  const Eigen::MatrixXd known = factor_.matrixL().solve(with);
-  const Eigen::VectorXd of_mean = 1 - (with.transpose() * inverse_ones_).array();
-  return {
-      (with.transpose() * weights_).array() + mean_mm_,
-      CovarianceAt(between_mm) - known.transpose() * known + of_mean * of_mean.transpose() / ones_};
-}
-
-double KrigingProcess::Sd(const Eigen::VectorXd& with) const {
-  const double of_mean = 1 - inverse_ones_.dot(with);
-  const double variance =
-      variance_mm2_ - (inverse_root_ * with).squaredNorm() + of_mean * of_mean / ones_;
-  return std::sqrt(std::max(variance, 0.0));
+  return {regressors.transpose() * coefficients() + with.transpose() * weights_,
+          regression_.Covariance(with, regressors, CovarianceAt(between_mm))};
 }
 
 }  // namespace semblance

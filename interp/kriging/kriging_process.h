@@ -2,9 +2,9 @@
 // The Gaussian process behind kriging, once its length and signal are known.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "interp/kriging/gaussian_regression.h"
 #include "interp/kriging/kriging.h"
 
 namespace semblance {
@@ -16,6 +16,7 @@ struct KrigingData {
   Eigen::MatrixXd distance_mm;
   Eigen::VectorXd depth_mm;    // n
   Eigen::VectorXd nugget_mm2;  // n: variance of each depth; 0: certain
+  Eigen::MatrixXd regressors;  // n x q: what the mean is linear in; a column of 1 for a constant
 };
 
 struct KrigingHyper {
@@ -33,44 +34,39 @@ struct CorrelationValue {
 CorrelationValue CorrelationAt(Covariance covariance, double distance_mm, double length_mm);
 
 // The dowels' covariance V = signal^2 K + nugget, factored, and the mean that belongs to it. Where
-// K is singular by rounding, or not positive definite (of distances along a surface), the diagonal
-// grows until it is.
+// K is not positive definite (of distances along a surface), the diagonal grows until it is.
 class KrigingProcess {
  public:
   KrigingProcess(Covariance covariance, const KrigingData& data, const KrigingHyper& hyper);
 
-  double mean_mm() const { return mean_mm_; }  // by generalised least squares
+  // Of the regressors, by generalised least squares; of a constant mean that mean, mm.
+  const Eigen::VectorXd& coefficients() const { return regression_.coefficients(); }
 
-  // log |V| + log 1'V^-1 1 + r'V^-1 r, r the depths less the mean: minus twice the restricted log
-  // likelihood, but for a constant (Harville 1974).
-  double Deviance() const;
+  double Deviance() const { return regression_.Deviance(); }
   // Its derivatives by the logarithms of the length and of the signal.
   Vec2 DevianceGradient() const;
 
   // Before the first ValueAt with an sd; costs the cube of n.
   void PrepareSd();
-  // distance_mm: n, from each dowel to the point.
-  DepthValue ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm) const;
-  // Of m points together. to_dowels_mm: n x m; between_mm: m x m, symmetric.
-  DepthPosterior Posterior(const Eigen::MatrixXd& to_dowels_mm,
-                           const Eigen::MatrixXd& between_mm) const;
+  // distance_mm: n, from each dowel to the point; regressors: q, at the point.
+  DepthValue ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm,
+                     const Eigen::VectorXd& regressors) const;
+  // Of m points together. to_dowels_mm: n x m; between_mm: m x m, symmetric; regressors: q x m.
+  DepthPosterior Posterior(const Eigen::MatrixXd& to_dowels_mm, const Eigen::MatrixXd& between_mm,
+                           const Eigen::MatrixXd& regressors) const;
 
  private:
-  void Factor(const KrigingData& data);
+  GaussianRegression Regression(const KrigingData& data);
   void FindWeights(const KrigingData& data);
   Eigen::MatrixXd CovarianceAt(const Eigen::MatrixXd& distance_mm) const;
-  double Sd(const Eigen::VectorXd& with) const;
 
   Covariance covariance_;
   KrigingHyper hyper_;
   double variance_mm2_;
-  Eigen::MatrixXd by_log_length_;  // of V
-  Eigen::VectorXd nugget_mm2_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd inverse_ones_, inverse_residual_;
-  Eigen::VectorXd weights_;       // of the dowels' covariances with a point
-  Eigen::MatrixXd inverse_root_;  // empty without PrepareSd
-  double ones_ = 0, mean_mm_ = 0, misfit_ = 0;
+  Eigen::MatrixXd by_log_length_, by_log_signal_;  // of V
+  GaussianRegression regression_;
+  Eigen::VectorXd weights_;  // of the dowels' covariances with a point
+  bool with_sd_ = false;
 };
 
 }  // namespace semblance

@@ -185,6 +185,107 @@ class Elimination {
   std::vector<MeshSolver::Front> fronts_;
 };
 
+// Blocks of the inverse over each front's own unknowns and its border, from the last front to the
+// first. Let L be the factor's own part, B that below it, Z the inverse; on the border Z is known
+// from the front that owns the first of the border. With Y = B L^-1, Z between border and own is
+// -Z Y, and that of the own is (L L')^-1 + Y' Z Y.
+class BlockInverse {
+ public:
+  BlockInverse(const std::vector<MeshSolver::Front>& fronts, const std::vector<int>& order,
+               Eigen::SparseMatrix<double>& entries)
+      : fronts_(fronts),
+        order_(order),
+        entries_(entries),
+        rank_(order.size()),
+        owner_(order.size(), -1),
+        open_children_(fronts.size(), 0),
+        blocks_(fronts.size()) {
+    for (std::size_t f = 0; f < fronts.size(); ++f) {
+      for (int k = fronts[f].begin; k < fronts[f].end; ++k) {
+        rank_[order[k]] = k;
+        owner_[k] = static_cast<int>(f);
+      }
+    }
+    for (const MeshSolver::Front& front : fronts) {
+      if (front.end > front.begin && !front.border.empty()) {
+        ++open_children_[owner_[front.border.front()]];
+      }
+    }
+    for (std::size_t f = fronts.size(); f-- > 0;) {
+      if (fronts[f].end > fronts[f].begin) {
+        Invert(f);
+      }
+    }
+  }
+
+ private:
+  void Invert(std::size_t f) {
+    const MeshSolver::Front& front = fronts_[f];
+    const Eigen::Index own = front.end - front.begin;
+    const auto border = static_cast<Eigen::Index>(front.border.size());
+    Eigen::MatrixXd& block = blocks_[f];
+    block.resize(own + border, own + border);
+    const Eigen::MatrixXd root =
+        front.own.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(own, own));
+    block.topLeftCorner(own, own).noalias() = root.transpose() * root;
+    if (border > 0) {
+      const Eigen::MatrixXd known = OnBorder(front), y = front.below * root;
+      const Eigen::MatrixXd across = known * y;
+      block.bottomLeftCorner(border, own) = -across;
+      block.topRightCorner(own, border) = -across.transpose();
+      block.topLeftCorner(own, own).noalias() += y.transpose() * across;
+      block.bottomRightCorner(border, border) = known;
+    }
+    Write(front, block);
+    if (open_children_[f] == 0) {
+      block.resize(0, 0);
+    }
+  }
+
+  // Of the owner's block, which is given up with its last child.
+  Eigen::MatrixXd OnBorder(const MeshSolver::Front& front) {
+    const int owner = owner_[front.border.front()];
+    std::vector<int> local;
+    for (const int rank : front.border) {
+      local.push_back(LocalIndex(fronts_[owner], rank));
+    }
+    Eigen::MatrixXd known = blocks_[owner](local, local);
+    if (--open_children_[owner] == 0) {
+      blocks_[owner].resize(0, 0);
+    }
+    return known;
+  }
+
+  static int LocalIndex(const MeshSolver::Front& front, int rank) {
+    return rank < front.end ? rank - front.begin
+                            : front.end - front.begin +
+                                  static_cast<int>(std::ranges::lower_bound(front.border, rank) -
+                                                   front.border.begin());
+  }
+
+  void Write(const MeshSolver::Front& front, const Eigen::MatrixXd& block) {
+    for (int k = front.begin; k < front.end; ++k) {
+      for (Eigen::SparseMatrix<double>::InnerIterator it(entries_, order_[k]); it; ++it) {
+        const int rank = rank_[it.row()];
+        if (rank >= front.begin) {
+          it.valueRef() = block(LocalIndex(front, rank), k - front.begin);
+        }
+        if (rank >= front.end) {
+          entries_.coeffRef(order_[k], it.row()) = it.value();
+        }
+      }
+    }
+  }
+
+  const std::vector<MeshSolver::Front>& fronts_;
+  const std::vector<int>& order_;
+  Eigen::SparseMatrix<double>& entries_;
+  std::vector<int> rank_;           // of each unknown in the order
+  std::vector<int> owner_;          // the front of each rank
+  std::vector<int> open_children_;  // of each front: those that still need its block
+  std::vector<Eigen::MatrixXd> blocks_;
+};
+
 }  // namespace
 
 MeshSolver::MeshSolver(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& matrix) {
@@ -220,6 +321,12 @@ Eigen::MatrixXd MeshSolver::Solve(const Eigen::MatrixXd& right) const {
   Eigen::MatrixXd solution(right.rows(), right.cols());
   solution(order_, Eigen::all) = x;
   return solution;
+}
+
+Eigen::SparseMatrix<double> MeshSolver::SelectedInverse(Eigen::SparseMatrix<double> entries) const {
+  entries.makeCompressed();
+  const BlockInverse fill(fronts_, order_, entries);
+  return entries;
 }
 
 }  // namespace semblance

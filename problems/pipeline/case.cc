@@ -131,6 +131,28 @@ std::vector<std::string> CheckLandmarks(const SubjectData& data, const MeshQuery
   return found.notes;
 }
 
+// What tells the depths that are to be expected, where the scheme asks for them.
+std::optional<TissueOptions> ExpectedTissue(const Experiment& experiment) {
+  if (!NeedsExpected(experiment.interp)) {
+    return std::nullopt;
+  }
+  TissueOptions table = experiment.tissue;
+  table.depths = DepthSource::kTable;
+  table.set_mm.clear();
+  return table;
+}
+
+// The table's mean depths at all dowels that it has one for, measured or not.
+std::vector<Dowel> ExpectedDowels(const Experiment& experiment, const LandmarkFile& landmarks,
+                                  std::vector<Dowel> dowels) {
+  const std::optional<TissueOptions> table = ExpectedTissue(experiment);
+  if (!table) {
+    return {};
+  }
+  FillDepths(*table, landmarks, dowels);
+  return dowels;
+}
+
 void CheckFilesNamed(const Experiment& experiment) {
   if (experiment.network.empty()) {
     throw InputError(
@@ -165,12 +187,14 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
       .skin = data.skin,
       .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks),
       .open_dowels = {},
+      .expected_on_bone = {},
       .network = {},
       .points = {},
       .basis = {},
       .notes = data.notes,
       .inputs = data.inputs};
   Append(subject.notes, remarks);
+  subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
   Append(subject.notes, FillDepths(WithSiteDepths(experiment, data.landmarks), data.landmarks,
                                    subject.dowels_on_bone));
   for (const Landmark& landmark : data.landmarks.landmarks) {
@@ -188,9 +212,7 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
   NoteDroppedAreas(subject);
   Append(subject.notes, JoinNetwork(plan, subject.dowels_on_bone, subject.network));
   subject.inputs.push_back(experiment.network);
-  for (const std::filesystem::path& table : TablesOf(experiment.tissue)) {
-    subject.inputs.push_back(table);
-  }
+  Append(subject.inputs, TablesOf(ExpectedTissue(experiment).value_or(experiment.tissue)));
   if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
     subject.inputs.push_back(map->file);
     subject.inputs.push_back(map->mesh);

@@ -30,12 +30,13 @@ struct Case {
   TriMesh skull;
   std::vector<BoneOrigin> origin;  // one per triangle of the skull; none: all observed
   std::optional<TriMesh> skin;
-  std::vector<Dowel> dowels_on_bone;   // with depths
-  std::vector<Dowel> open_dowels;      // `depth: auto`: NaN until depth is interpolated
-  DowelNetwork network;                // of those dowels
-  std::map<std::string, Vec3> points;  // all landmarks as given, with depth or without, mm
-  ScoreBasis basis;                    // the landmarks as given, for what is scored
-  std::vector<std::string> notes;      // what a reader of the result should know, a line each
+  std::vector<Dowel> dowels_on_bone;    // with depths
+  std::vector<Dowel> open_dowels;       // `depth: auto`: NaN until depth is interpolated
+  std::vector<Dowel> expected_on_bone;  // a table's mean depths, where the scheme asks for them
+  DowelNetwork network;                 // of those dowels
+  std::map<std::string, Vec3> points;   // all landmarks as given, with depth or without, mm
+  ScoreBasis basis;                     // the landmarks as given, for what is scored
+  std::vector<std::string> notes;       // what a reader of the result should know, a line each
   std::vector<std::filesystem::path> inputs;  // for the manifest
 };
 

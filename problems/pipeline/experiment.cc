@@ -77,6 +77,26 @@ FaceSource WayToFace(const Experiment& experiment) {
   return fits ? FaceSource(PriorThenFit{}) : FaceSource(FittedTemplate{});
 }
 
+namespace {
+
+// A mean that is the table's tells nothing of the table's own depths.
+void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  if (!NeedsExpected(experiment.interp)) {
+    return;
+  }
+  if (experiment.tissue.depths == DepthSource::kTable) {
+    faults.push_back({"interp.mean",
+                      "the depths are the table's own (tissue.depths: table), of which its mean "
+                      "tells nothing more; measure depths, or take `mean: constant`"});
+  } else if (experiment.tissue.table.empty()) {
+    faults.push_back({"interp.mean",
+                      "`table` takes the mean depths of tissue.table, and none is named; name one, "
+                      "e.g. configs/tables/t_table_2023.yaml, or take `mean: constant`"});
+  }
+}
+
+}  // namespace
+
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   const TemplateLevels levels = LevelsOf(experiment.face_template);
   LevelCheck check(levels);
@@ -93,6 +113,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
     faults.push_back({"sites." + fault.path, fault.what});
   }
+  CheckExpected(experiment, faults);
   const FaceSource face = WayToFace(experiment);
   const bool asks = AsksPrior(face);
   if (asks && std::holds_alternative<IctPrior>(experiment.prior) &&

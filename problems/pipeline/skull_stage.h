@@ -15,10 +15,13 @@ struct DepthStage {
   Case subject;
   TriMesh shell;              // the outer shell of the skull, temples and gaps bridged: what emits
   std::vector<Vec3> normals;  // of the shell's vertices
-  std::vector<Dowel> dowels_on_shell;  // the same dowels as they stand on the shell
-  DepthField depth;                    // of the shell's vertices, after the outside rule
+  std::vector<Dowel> dowels_on_shell;    // the same dowels as they stand on the shell
+  std::vector<Dowel> expected_on_shell;  // likewise
+  DepthField depth;                      // of the shell's vertices, after the outside rule
 
-  DepthInput Input() const { return {shell, normals, dowels_on_shell, subject.network}; }
+  DepthInput Input() const {
+    return {shell, normals, dowels_on_shell, subject.network, expected_on_shell};
+  }
 };
 
 // Loads the case, fills the skull, interpolates depth: each taken from `cache` if it was made from

@@ -150,7 +150,8 @@ PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
                      const HSplineSurface& surface, const FitTarget& target,
                      FaceUncertainty& result, const RunContext& context) {
   const std::vector<Dowel> dowels = WithSd(stage.dowels_on_shell, experiment);
-  const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network};
+  const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network,
+                         stage.expected_on_shell};
   const std::vector<DepthBehind> depths = DepthsBehind(target, stage, dowels, context);
   Eigen::MatrixXd covariance = DepthErrors(experiment, input, depths, result, context);
   PointErrors errors;

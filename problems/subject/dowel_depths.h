@@ -25,7 +25,7 @@ constexpr auto EnumNames(DepthSource) {
 
 struct TissueOptions {
   DepthSource depths = DepthSource::kTable;  // measured: those in the landmark file
-  std::filesystem::path table;               // tissue table; for depths: table
+  std::filesystem::path table;               // tissue table; for depths or a mean of it
   std::filesystem::path fill_from;           // another table, for the sites that `table` lacks
   Sex sex = Sex::kMale;                      // of the subject; a pooled table does not ask
   Build build = Build::kNormal;              // of the subject; never interpolated between builds
@@ -38,7 +38,10 @@ void Fields(Visitor& visit, TissueOptions& o) {
   visit(FieldInfo{.name = "depths",
                   .doc = "table: those of a population; measured: those in the landmark file"},
         o.depths);
-  visit(FieldInfo{.name = "table", .doc = "file of the tissue table; for depths: table"}, o.table);
+  visit(FieldInfo{.name = "table",
+                  .doc = "file of the tissue table; for depths: table, and for a scheme with mean: "
+                         "table"},
+        o.table);
   visit(FieldInfo{.name = "fill_from",
                   .doc = "another table, of the same sex and build, for the sites that `table` "
                          "lacks; a site that both lack has no dowel"},

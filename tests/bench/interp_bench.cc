@@ -140,8 +140,11 @@ void MeasureGrowth(const std::vector<DepthScheme>& schemes, const Scene& large) 
     const std::string name = NameOf(scheme);
     PrintGrowth(name, "vertices", LeastSeconds(scheme, medium), LeastSeconds(scheme, large),
                 NeedsSurface(scheme) ? 1.4 : 1.2);
-    PrintGrowth(name, "dowels", LeastSeconds(scheme, few), LeastSeconds(scheme, many),
-                std::holds_alternative<Kriging>(scheme) ? 3 : 2);
+    PrintGrowth(
+        name, "dowels", LeastSeconds(scheme, few), LeastSeconds(scheme, many),
+        std::holds_alternative<Kriging>(scheme) || std::holds_alternative<SurfaceMatern>(scheme)
+            ? 3
+            : 2);
   }
 }
 

@@ -46,6 +46,9 @@ std::vector<DepthScheme> Schemes() {
   schemes.emplace_back(Kriging{.covariance = Covariance::kSquaredExponential});
   schemes.emplace_back(Kriging{.covariance = Covariance::kMatern12, .state_sd = false});
   schemes.emplace_back(Kriging{.distance = along});
+  schemes.emplace_back(Kriging{.mean = DepthMean::kCovariates, .state_sd = false});
+  schemes.emplace_back(SurfaceMatern{.alpha = 1, .edge_mm = 12, .state_sd = false});
+  schemes.emplace_back(SurfaceMatern{.alpha = 3, .fit_nugget = true, .state_sd = false});
   schemes.emplace_back(NaturalNeighbour{.weights = NeighbourWeights::kLaplace});
   return schemes;
 }
@@ -138,6 +141,11 @@ std::optional<double> MissAtDowels_mm(const DepthScheme& scheme) {
         const std::string_view name = o.kName;
         if (name == "mean" || name == "moving_least_squares" || name == "harmonic") {
           return std::nullopt;
+        }
+        if constexpr (requires { o.fit_nugget; }) {
+          if (o.fit_nugget) {
+            return std::nullopt;
+          }
         }
         return 1e-6;
       },

@@ -115,7 +115,8 @@ TEST(Kriging, WithoutStateSdGivesTheSameDepthsAndNone) {
 
 KrigingData DataOf(const DowelScene& scene) {
   const auto n = static_cast<Eigen::Index>(scene.dowels.size());
-  KrigingData data{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd::Zero(n)};
+  KrigingData data{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd::Zero(n),
+                   Eigen::MatrixXd::Ones(n, 1)};
   for (Eigen::Index j = 0; j < n; ++j) {
     const Dowel& dowel = scene.dowels[j];
     data.depth_mm[j] = dowel.depth_mm;

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/kriging/depth_mean.h"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "interp/kriging/kriging.h"
+#include "interp/on_surface/bone_relief.h"
+#include "interp/on_surface/coarse_surface.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kReliefEdge_mm = 3;
+constexpr std::array kReliefScales_mm = {10.0, 40.0};
+
+// t at points: depths that are expected there.
+Eigen::MatrixXd ExpectedAt(std::span<const Vec3> points, std::span<const Dowel> expected,
+                           const RunContext& run) {
+  const TriMesh at{{points.begin(), points.end()}, {}};
+  const std::vector<Vec3> normals(points.size(), Vec3::Zero());
+  const DowelNetwork none;
+  const Kriging ordinary{.state_sd = false, .max_angle_deg = 180};
+  const DepthField field = InterpolateDepth(ordinary, {at, normals, expected, none}, run);
+  return Eigen::Map<const Eigen::RowVectorXd>(field.depth_mm.data(), std::ssize(field.depth_mm));
+}
+
+}  // namespace
+
+struct MeanRegressors::Relief {
+  Relief(const TriMesh& skull, const RunContext& run)
+      : surface(skull, kReliefEdge_mm, run),
+        query(skull),
+        of_vertices(BoneRelief(surface.mesh(), kReliefScales_mm)) {}
+
+  // 1 and the relief at p, which is near a vertex of the skull.
+  Eigen::VectorXd At(const Vec3& p, int skull_vertex) const {
+    const CornerWeights at = surface.Locate(p, skull_vertex);
+    Eigen::VectorXd regressors = Eigen::VectorXd::Zero(1 + of_vertices.rows());
+    regressors[0] = 1;
+    for (int c = 0; c < 3; ++c) {
+      regressors.tail(of_vertices.rows()) += at.weights[c] * of_vertices.col(at.corners[c]);
+    }
+    return regressors;
+  }
+
+  CoarseSurface surface;
+  MeshQuery query;
+  Eigen::MatrixXd of_vertices;  // of the coarse surface
+};
+
+MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const DepthInput& input,
+                               const RunContext& run)
+    : mean_(mean), input_(input) {
+  if (mean == DepthMean::kTable && input.expected.empty()) {
+    throw InputError(fmt::format(
+        "{}: `mean: table` needs the mean depths of a table beside the dowels' own, and there are "
+        "none; name tissue.table and measured depths, or choose `mean: constant`",
+        scheme));
+  }
+  if (mean == DepthMean::kCovariates) {
+    CheckSurface(scheme, input.skull);
+    constexpr std::size_t kRegressors = 1 + kReliefScales_mm.size();
+    if (DepthSamples(input.dowels).size() < kRegressors) {
+      throw InputError(
+          fmt::format("{}: `mean: covariates` finds {} factors, which {} dowels do not tell; place "
+                      "more, or choose `mean: constant`",
+                      scheme, kRegressors, input.dowels.size()));
+    }
+    relief_ = std::make_unique<Relief>(input.skull, run);
+  }
+}
+
+MeanRegressors::~MeanRegressors() = default;
+
+Eigen::MatrixXd MeanRegressors::At(std::span<const Vec3> points, const RunContext& run) const {
+  const auto count = static_cast<Eigen::Index>(points.size());
+  if (mean_ == DepthMean::kConstant) {
+    return Eigen::MatrixXd::Ones(1, count);
+  }
+  if (mean_ == DepthMean::kTable) {
+    return ExpectedAt(points, input_.expected, run);
+  }
+  Eigen::MatrixXd regressors(1 + relief_->of_vertices.rows(), count);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const MeshPoint on = relief_->query.Closest(points[k]);
+    regressors.col(static_cast<Eigen::Index>(k)) =
+        relief_->At(on.position, NearestCorner(input_.skull, on));
+  }
+  return regressors;
+}
+
+Eigen::MatrixXd MeanRegressors::AtVertices(const RunContext& run) const {
+  if (mean_ != DepthMean::kCovariates) {
+    return At(input_.skull.points, run);
+  }
+  Eigen::MatrixXd regressors(1 + relief_->of_vertices.rows(), std::ssize(input_.skull.points));
+  ForEachVertex(input_, run, [&](std::size_t i) {
+    regressors.col(static_cast<Eigen::Index>(i)) =
+        relief_->At(input_.skull.points[i], static_cast<int>(i));
+  });
+  return regressors;
+}
+
+}  // namespace semblance

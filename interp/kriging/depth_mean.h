@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a Gaussian process of depths varies around.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "interp/dowels/depth_input.h"
+
+namespace semblance {
+
+enum class DepthMean { kConstant, kTable, kCovariates };
+constexpr auto EnumNames(DepthMean) {
+  return std::to_array<std::string_view>({"constant", "table", "covariates"});
+}
+
+template <class Visitor>
+void MeanField(Visitor& visit, DepthMean& mean) {
+  visit(FieldInfo{.name = "mean",
+                  .doc = "what the depths vary around: constant, one depth, found with them; "
+                         "table, the mean depths of tissue.table on this skull, times one factor "
+                         "that is found with them (a fat face is fat everywhere), for depths that "
+                         "are not the table's own; covariates, a constant and how hollow the bone "
+                         "is over 10 mm and over 40 mm, each times a factor"},
+        mean);
+}
+
+// The regressors of the mean at any point; the process finds their coefficients.
+//   constant    1
+//   table       t(x): ordinary kriging of the expected depths, by straight distances. Its
+//               coefficient is the subject's factor. One regressor, as with a constant: few dowels
+//               do.
+//   covariates  1 and the bone's relief (BoneRelief) over two scales, from vertices 3 mm apart
+class MeanRegressors {
+ public:
+  // Throws InputError, naming the scheme, if there is nothing expected but the mean asks for it,
+  // if the skull has no triangle but the mean asks for its relief, or if there are fewer dowels
+  // than regressors.
+  MeanRegressors(DepthMean mean, std::string_view scheme, const DepthInput& input,
+                 const RunContext& run);
+  ~MeanRegressors();
+  MeanRegressors(const MeanRegressors&) = delete;
+  MeanRegressors& operator=(const MeanRegressors&) = delete;
+
+  // q x m: of m points, on the skull where they are nearest to it.
+  Eigen::MatrixXd At(std::span<const Vec3> points, const RunContext& run) const;
+  // q x vertices of the skull: the same there, faster.
+  Eigen::MatrixXd AtVertices(const RunContext& run) const;
+
+ private:
+  struct Relief;
+  DepthMean mean_;
+  const DepthInput& input_;
+  std::unique_ptr<Relief> relief_;
+};
+
+}  // namespace semblance

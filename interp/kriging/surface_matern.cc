@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/kriging/surface_matern.h"
+
+#include <Eigen/SparseCore>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "interp/kriging/gaussian_regression.h"
+#include "interp/kriging/kriging_likelihood.h"
+#include "interp/kriging/surface_matern_likelihood.h"
+#include "interp/on_surface/coarse_surface.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr Eigen::Index kFitSamples = 60;  // enough for three numbers; the modes grow with them
+
+// The surface that the process lives on, and the dowels there.
+struct SurfaceScene {
+  CoarseSurface surface;
+  MaternDomain domain;
+  std::vector<Vec3> bases;
+  std::vector<CornerWeights> at;  // of each dowel
+  SurfaceMaternData data;
+};
+
+// Of each dowel, on the side of the bone that its base is closest to.
+std::vector<CornerWeights> LocateSamples(const TriMesh& skull, const CoarseSurface& surface,
+                                         const std::vector<Vec3>& bases) {
+  const MeshQuery query(skull);
+  std::vector<CornerWeights> located;
+  for (const Vec3& base : bases) {
+    const MeshPoint on = query.Closest(base);
+    located.push_back(surface.Locate(on.position, NearestCorner(skull, on)));
+  }
+  return located;
+}
+
+SurfaceScene SceneOf(const SurfaceMatern& options, const DepthInput& input,
+                     const std::vector<DepthSample>& samples, const MeanRegressors& mean,
+                     const RunContext& run) {
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  SurfaceScene scene{CoarseSurface(input.skull, options.edge_mm, run), {}, {}, {}, {}};
+  scene.domain = {scene.surface.mesh().points, BuildLaplacian(scene.surface.mesh())};
+  scene.data = {Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd()};
+  for (const DepthSample& sample : samples) {
+    const auto i = static_cast<Eigen::Index>(scene.bases.size());
+    const double nugget_mm = options.nugget_share * sample.sd_mm;
+    scene.data.depth_mm[i] = sample.depth_mm;
+    scene.data.nugget_mm2[i] = std::isfinite(nugget_mm) ? nugget_mm * nugget_mm : 0;
+    scene.bases.push_back(sample.base);
+  }
+  scene.data.regressors = mean.At(scene.bases, run).transpose();
+  scene.at = LocateSamples(input.skull, scene.surface, scene.bases);
+  return scene;
+}
+
+// One column per dowel of `some`.
+Eigen::MatrixXd WeightsOf(const SurfaceScene& scene, const std::vector<Eigen::Index>& some) {
+  Eigen::MatrixXd weights =
+      Eigen::MatrixXd::Zero(std::ssize(scene.domain.points), std::ssize(some));
+  for (std::size_t k = 0; k < some.size(); ++k) {
+    const CornerWeights& at = scene.at[static_cast<std::size_t>(some[k])];
+    for (int c = 0; c < 3; ++c) {
+      weights(at.corners[c], static_cast<Eigen::Index>(k)) += at.weights[c];
+    }
+  }
+  return weights;
+}
+
+SurfaceMaternHyper HyperFor(const SurfaceMatern& options, const SurfaceScene& scene,
+                            const RunContext& run) {
+  if (options.length_mm && options.signal_mm && !options.fit_nugget) {
+    return {*options.length_mm, *options.signal_mm, 0};
+  }
+  const std::vector<Eigen::Index> some = FarApart(scene.bases, kFitSamples);
+  const ReducedMatern correlations(scene.domain, WeightsOf(scene, some), SearchPoles(options), run);
+  return FitHyper(options,
+                  {scene.data.depth_mm(some), scene.data.nugget_mm2(some),
+                   scene.data.regressors(some, Eigen::all)},
+                  correlations, run);
+}
+
+// The process, once its length, signal and nugget are known.
+class SurfaceProcess {
+ public:
+  SurfaceProcess(const SurfaceMatern& options, const SurfaceScene& scene,
+                 const SurfaceMaternHyper& hyper, const RunContext& run)
+      : with_sd_(options.state_sd),
+        signal_mm_(hyper.signal_mm),
+        regression_(Regression(options, scene, hyper, run)) {
+    if (with_sd_) {
+      regression_.PrepareVariance();
+    }
+  }
+
+  const Eigen::VectorXd& coefficients() const { return regression_.coefficients(); }
+
+  DepthValue ValueAt(const CornerWeights& at, const Eigen::VectorXd& regressors) const {
+    const Eigen::VectorXd with = CovariancesAt(at);
+    const double depth_mm =
+        regressors.dot(regression_.coefficients()) + with.dot(regression_.weights());
+    if (!with_sd_) {
+      return {depth_mm, kNaN};
+    }
+    const double variance = regression_.Variance(with, regressors, signal_mm_ * signal_mm_);
+    return {depth_mm, std::sqrt(std::max(variance, 0.0))};
+  }
+
+ private:
+  // Fills with_dowels_ and local_, too.
+  GaussianRegression Regression(const SurfaceMatern& options, const SurfaceScene& scene,
+                                const SurfaceMaternHyper& hyper, const RunContext& run) {
+    const MaternField field(scene.domain, options.alpha,
+                            MaternKappa(options.alpha, hyper.length_mm));
+    const auto n = static_cast<Eigen::Index>(scene.at.size());
+    std::vector<Eigen::Index> all;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      all.push_back(k);
+    }
+    local_ = field.LocalCovariances();
+    run.ThrowIfStopped();
+    with_dowels_ = field.Covariances(WeightsOf(scene, all), run).transpose();
+    for (Eigen::Index k = 0; k < n; ++k) {
+      with_dowels_.row(k) *= signal_mm_ / std::sqrt(VarianceAt(scene.at[k]));
+    }
+    Eigen::MatrixXd covariance(n, n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      covariance.col(k) = CovariancesAt(scene.at[k]);
+    }
+    covariance = (covariance + covariance.transpose()).eval() / 2;
+    covariance.diagonal() +=
+        (scene.data.nugget_mm2.array() + hyper.nugget_mm * hyper.nugget_mm).matrix();
+    return {covariance, signal_mm_ * signal_mm_, scene.data.depth_mm, scene.data.regressors};
+  }
+
+  // Of the field before it is divided by its deviation.
+  double VarianceAt(const CornerWeights& at) const {
+    double variance = 0;
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) {
+        const double weight = at.weights[a] * at.weights[b];
+        variance += weight > 0 ? weight * local_.coeff(at.corners[a], at.corners[b]) : 0;
+      }
+    }
+    return variance;
+  }
+
+  // With each dowel.
+  Eigen::VectorXd CovariancesAt(const CornerWeights& at) const {
+    Eigen::VectorXd with = at.weights[0] * with_dowels_.col(at.corners[0]);
+    with += at.weights[1] * with_dowels_.col(at.corners[1]);
+    with += at.weights[2] * with_dowels_.col(at.corners[2]);
+    return with * (signal_mm_ / std::sqrt(VarianceAt(at)));
+  }
+
+  bool with_sd_;
+  double signal_mm_;
+  Eigen::SparseMatrix<double> local_;  // covariances along edges, before the division
+  Eigen::MatrixXd with_dowels_;        // n x m: half divided, by the dowels' deviations
+  GaussianRegression regression_;
+};
+
+}  // namespace
+
+SurfaceMaternModel FitSurfaceMatern(const SurfaceMatern& options, const DepthInput& input,
+                                    const RunContext& run) {
+  CheckDepthInput(input);
+  CheckSurface(SurfaceMatern::kName, input.skull);
+  const MeanRegressors mean(options.mean, SurfaceMatern::kName, input, run);
+  const SurfaceScene scene = SceneOf(options, input, DepthSamples(input.dowels), mean, run);
+  const SurfaceMaternHyper hyper = HyperFor(options, scene, run);
+  const SurfaceProcess process(options, scene, hyper, run);
+  return {hyper.length_mm, hyper.signal_mm, hyper.nugget_mm,
+          (scene.data.regressors * process.coefficients()).mean()};
+}
+
+DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  run.ThrowIfStopped();
+  CheckSurface(SurfaceMatern::kName, input.skull);
+  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
+  const DepthLimits limits(samples, options.clamp);
+  const MeanRegressors mean(options.mean, SurfaceMatern::kName, input, run);
+  const SurfaceScene scene = SceneOf(options, input, samples, mean, run);
+  const Eigen::MatrixXd regressors = mean.AtVertices(run);
+  const SurfaceProcess process(options, scene, HyperFor(options, scene, run), run);
+  return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
+    const CornerWeights at = scene.surface.Locate(input.skull.points[i], static_cast<int>(i));
+    const DepthValue value = process.ValueAt(at, regressors.col(static_cast<Eigen::Index>(i)));
+    return DepthValue{limits(value.mm), value.sd_mm};
+  });
+}
+
+}  // namespace semblance
