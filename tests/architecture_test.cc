@@ -59,10 +59,11 @@ const std::map<std::string, Layers> kRooms = {
       {"landmark_files", "preparation"},
       {"face_template"},
       {"bust", "metrics", "prior"},
-      {"pipeline", "propose"},
+      {"pipeline", "plots", "propose"},
       {kHall},
       {"report"},
       {"command_line", "points", "study", "workbench"},
+      {"study_report"},
       {"program", "python"}}},
 };
 

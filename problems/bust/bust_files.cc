@@ -13,7 +13,7 @@
 #include <optional>
 #include <utility>
 
-#include "problems/pictures/srgb.h"
+#include "surfaces/base/srgb.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 

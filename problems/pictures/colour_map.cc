@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/pictures/srgb.h"
 #include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/srgb.h"
 
 namespace semblance {
 namespace {

@@ -31,6 +31,11 @@ Colour HexColour(std::uint32_t rrggbb) {
   return {((rrggbb >> 16) & 255) / 255.0, ((rrggbb >> 8) & 255) / 255.0, (rrggbb & 255) / 255.0};
 }
 
+std::string HexText(const Colour& colour) {
+  const auto byte = [](double x) { return std::lround(255 * std::clamp(x, 0.0, 1.0)); };
+  return fmt::format("#{:02x}{:02x}{:02x}", byte(colour.r), byte(colour.g), byte(colour.b));
+}
+
 Image MakeImage(int width, int height, const Colour& colour) {
   if (width < 1 || height < 1) {
     throw InputError(

@@ -28,6 +28,9 @@ void Fields(Visitor& visit, Colour& o) {
 // 0xrrggbb.
 Colour HexColour(std::uint32_t rrggbb);
 
+// "#rrggbb".
+std::string HexText(const Colour& colour);
+
 struct Image {
   int width = 0;                  // pixels
   int height = 0;                 // pixels

@@ -9,9 +9,9 @@
 
 #include "problems/pictures/lighting.h"
 #include "problems/pictures/raster.h"
-#include "problems/pictures/srgb.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/srgb.h"
 
 namespace semblance {
 namespace {

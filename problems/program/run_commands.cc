@@ -37,7 +37,7 @@
 #include "problems/report/run_report.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/study_plan.h"
-#include "problems/study/study_report.h"
+#include "problems/study_report/study_report.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"

@@ -12,9 +12,10 @@
 #include <vector>
 
 #include "problems/program/exit_code.h"
-#include "problems/study/study_report.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_submit.h"
+#include "problems/study_report/study_ranking.h"
+#include "problems/study_report/study_report.h"
 
 namespace semblance {
 namespace {
@@ -71,6 +72,7 @@ int PrintStudyState(const StudyResults& results, const fs::path& root) {
                  fmt::join(row.values, " | "), row.reason.empty() ? "" : ": ", row.reason);
     }
   }
+  fmt::print("{}", RankingText(results));
   fmt::print("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
              results.trials.size(), results.Count("unusable"), results.Count("failed"),
              results.Count("missing"));

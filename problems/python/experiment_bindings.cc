@@ -12,8 +12,8 @@
 #include "problems/python/option_text.h"
 #include "problems/report/run_folder.h"
 #include "problems/run.h"
-#include "problems/study/study_report.h"
 #include "problems/study/study_run.h"
+#include "problems/study_report/study_report.h"
 
 namespace semblance {
 namespace {

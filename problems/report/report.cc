@@ -7,9 +7,12 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
-#include "problems/output/files.h"
+#include "problems/plots/escape_html.h"
 #include "problems/report/report_assets.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/base64.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -41,8 +44,18 @@ std::string SizeAttributes(const std::string& bytes) {
     return value;
   };
   const std::uint32_t width = number(16), height = number(20);
-  return fmt::format(" width=\"{}\" height=\"{}\"{}", width, height,
-                     width > 1.8 * height ? " class=\"wide\"" : "");
+  return fmt::format(" width=\"{}\" height=\"{}\"", width, height);
+}
+
+// An SVG is part of the page: its titles show where the pointer rests, and its colours follow those
+// of the page.
+std::string PictureHtml(const ReportImage& image) {
+  if (MimeType(image) == "image/png") {
+    return fmt::format("<img alt=\"{}\"{} src=\"data:image/png;base64,{}\">", EscapeHtml(image.alt),
+                       SizeAttributes(image.bytes), Base64(image.bytes));
+  }
+  return fmt::format("<svg class=\"plot\" role=\"img\" aria-label=\"{}\"{}", EscapeHtml(image.alt),
+                     image.bytes.substr(image.bytes.find("<svg") + 4));
 }
 
 std::string ImageHtml(const ReportImage& image) {
@@ -50,9 +63,7 @@ std::string ImageHtml(const ReportImage& image) {
     throw InputError(fmt::format(
         "report image '{}': it has no alt text; say in a few words what it shows", image.caption));
   }
-  std::string html = fmt::format(
-      "<figure><div class=\"scroll\"><img alt=\"{}\"{} src=\"data:{};base64,{}\"></div>",
-      EscapeHtml(image.alt), SizeAttributes(image.bytes), MimeType(image), Base64(image.bytes));
+  std::string html = "<figure>" + PictureHtml(image);
   if (!image.caption.empty()) {
     html += fmt::format("<figcaption>{}</figcaption>", EscapeHtml(image.caption));
   }
@@ -67,7 +78,8 @@ bool IsNumeric(const std::string& cell) {
   }
   const bool starts_with_digit =
       i < cell.size() && std::isdigit(static_cast<unsigned char>(cell[i]));
-  return (starts_with_digit && cell.size() <= 24) || cell == "NaN" || cell == "inf";
+  const bool is_list = cell.find(", ") != cell.npos;  // words that begin with a number
+  return (starts_with_digit && !is_list && cell.size() <= 24) || cell == "NaN" || cell == "inf";
 }
 
 // Columns whose cells, where there are any, are all numbers.
@@ -93,27 +105,45 @@ void CheckTable(const ReportTable& table) {
   }
 }
 
-std::string RowHtml(const std::vector<std::string>& cells, const std::vector<bool>& numeric,
-                    std::string_view tag) {
+std::string HeadHtml(const ReportTable& table, const std::vector<bool>& numeric) {
   std::string html = "<tr>";
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    html += fmt::format("<{0}{1}{2}>{3}</{0}>", tag, tag == "th" ? " scope=\"col\"" : "",
-                        numeric[c] ? " class=\"n\"" : "",
-                        cells[c].empty() ? "\u2013" : EscapeHtml(cells[c]));
+  for (std::size_t c = 0; c < table.header.size(); ++c) {
+    html += fmt::format("<th scope=\"col\"{}>{}</th>", numeric[c] ? " class=\"n\"" : "",
+                        EscapeHtml(table.header[c]));
+  }
+  return html + "</tr>\n";
+}
+
+// Each cell knows its column's head, which a narrow screen shows beside it.
+std::string RowHtml(const ReportTable& table, std::size_t r, const std::vector<bool>& numeric) {
+  const std::string id = r < table.ids.size() ? table.ids[r] : "",
+                    link = r < table.links.size() ? table.links[r] : "";
+  std::string html = id.empty() ? "<tr>" : fmt::format("<tr id=\"{}\">", EscapeHtml(id));
+  for (std::size_t c = 0; c < table.header.size(); ++c) {
+    const std::string& cell = table.rows[r][c];
+    std::string text = cell.empty() ? "\u2013" : EscapeHtml(cell);
+    if (c == 0 && !link.empty()) {
+      text = fmt::format("<a href=\"{}\">{}</a>", EscapeHtml(link), text);
+    }
+    html += fmt::format("<td{} data-head=\"{}\">{}</td>", numeric[c] ? " class=\"n\"" : "",
+                        EscapeHtml(table.header[c]), text);
   }
   return html + "</tr>\n";
 }
 
 std::string TableHtml(const ReportTable& table) {
+  constexpr std::size_t kFitsAPhone = 3;  // columns
   CheckTable(table);
   const std::vector<bool> numeric = NumericColumns(table);
-  std::string html = "<div class=\"scroll\" tabindex=\"0\"><table>\n";
+  std::string html = fmt::format("<div class=\"scroll\" tabindex=\"0\"><table{}{}>\n",
+                                 table.header.size() > kFitsAPhone ? " class=\"cards\"" : "",
+                                 table.filter ? " data-filter" : "");
   if (!table.caption.empty()) {
     html += fmt::format("<caption>{}</caption>\n", EscapeHtml(table.caption));
   }
-  html += "<thead>" + RowHtml(table.header, numeric, "th") + "</thead>\n<tbody>\n";
-  for (const auto& row : table.rows) {
-    html += RowHtml(row, numeric, "td");
+  html += "<thead>" + HeadHtml(table, numeric) + "</thead>\n<tbody>\n";
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    html += RowHtml(table, r, numeric);
   }
   return html + "</tbody></table></div>\n";
 }
@@ -138,15 +168,59 @@ std::string TilesHtml(const std::vector<ReportTile>& tiles) {
   return html + "</dl>\n";
 }
 
-std::string NavigationHtml(const std::vector<ReportSection>& sections) {
-  if (sections.size() < 2) {
+std::string NotesHtml(const std::vector<std::string>& notes) {
+  if (notes.empty()) {
     return {};
   }
-  std::string html = "<nav aria-label=\"Sections\">";
-  for (std::size_t i = 0; i < sections.size(); ++i) {
-    html += fmt::format("<a href=\"#s{}\">{}</a> ", i + 1, EscapeHtml(sections[i].heading));
+  std::string html = "<section class=\"notes\">\n<h2 id=\"notes\">Notes</h2>\n";
+  for (const std::string& note : notes) {
+    html += fmt::format("<p>{}</p>\n", EscapeHtml(note));
   }
-  return html + "</nav>\n";
+  return html + "</section>\n";
+}
+
+std::string ScoreHtml(const Report& report) {
+  if (report.tiles.empty() && report.score_images.empty()) {
+    return {};
+  }
+  std::string html =
+      fmt::format("<section>\n<h2 id=\"score\">{}</h2>\n", EscapeHtml(report.score_heading));
+  html += TilesHtml(report.tiles);
+  for (const ReportImage& image : report.score_images) {
+    html += ImageHtml(image);
+  }
+  return html + "</section>\n";
+}
+
+// The headings of a page and where they are, in order.
+std::vector<std::pair<std::string, std::string>> Headings(const Report& report) {
+  std::vector<std::pair<std::string, std::string>> headings;
+  if (!report.notes.empty()) {
+    headings.emplace_back("notes", "Notes");
+  }
+  if (!report.scenes.empty()) {
+    headings.emplace_back("view", "In three dimensions");
+  }
+  if (!report.tiles.empty() || !report.score_images.empty()) {
+    headings.emplace_back("score", report.score_heading);
+  }
+  for (std::size_t k = 0; k < report.sections.size(); ++k) {
+    headings.emplace_back(fmt::format("s{}", k + 1), report.sections[k].heading);
+  }
+  return headings;
+}
+
+std::string NavigationHtml(const Report& report) {
+  const auto headings = Headings(report);
+  if (headings.size() < 2) {
+    return {};
+  }
+  std::string html =
+      "<nav aria-label=\"Contents\"><details open><summary>Contents</summary>\n<ul>\n";
+  for (const auto& [id, heading] : headings) {
+    html += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", id, EscapeHtml(heading));
+  }
+  return html + "</ul></details></nav>\n";
 }
 
 // A policy that lets the page reach nothing outside itself.
@@ -156,33 +230,43 @@ constexpr std::string_view kPolicy =
 
 std::string Script(std::string_view text) { return fmt::format("<script>\n{}</script>\n", text); }
 
-// The 3-D view, with all that it is made of. In JSON "<" can stand in strings only, where it may be
-// written as \u003c, so that no "</script>" ends the block early.
-std::string ViewHtml(const std::string& scenes, const std::string& note) {
-  if (scenes.empty() || ThreeScript().empty()) {
-    return {};
-  }
-  std::string safe;
-  for (const char c : scenes) {
+// In JSON "<" can stand in strings only, where it may be written as \\u003c, so that no "</script>"
+// ends the block early.
+std::string JsonScript(const std::string& id, const std::string& json) {
+  std::string html = fmt::format("<script type=\"application/json\" id=\"{}\">", id);
+  for (const char c : json) {
     if (c == '<') {
-      safe += "\\u003c";
+      html += "\\u003c";
     } else {
-      safe += c;
+      html += c;
     }
   }
-  std::string html =
-      "<section>\n<h2 id=\"s0\">In three dimensions</h2>\n<p>Drag to turn, shift and drag to move, "
-      "wheel to zoom; point at a surface or a dowel to read its value.</p>\n"
-      "<div id=\"view3d\"></div>\n<script type=\"application/json\" id=\"view3d-scenes\">";
-  html += safe + "</script>\n";
+  return html + "</script>\n";
+}
+
+// The 3-D view, with all that it is made of.
+std::string ViewHtml(const std::string& scenes, const std::string& note) {
+  if (scenes.empty()) {
+    return {};
+  }
+  std::string html = "<section>\n<h2 id=\"view\">In three dimensions</h2>\n";
+  if (ThreeScript().empty()) {
+    return html +
+           "<p class=\"no-view\">There is no 3-D view here: the program that wrote this page was "
+           "built without three.js (Debian: libjs-three). Built with it, semblance report makes "
+           "this page anew.</p>\n</section>\n";
+  }
+  html +=
+      "<div id=\"view3d\"><noscript><p class=\"no-view\">The 3-D view needs JavaScript, which is "
+      "off in this browser. The pictures do without.</p></noscript></div>\n";
+  html += JsonScript("view3d-scenes", scenes);
   html += note.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeHtml(note));
   html += "</section>\n";
   return html + Script(ThreeScript()) + Script(ReportViewScript());
 }
 
-std::string SectionHtml(const ReportSection& section, std::size_t number) {
-  std::string html =
-      fmt::format("<section>\n<h2 id=\"s{}\">{}</h2>\n", number, EscapeHtml(section.heading));
+std::string SectionBody(const ReportSection& section) {
+  std::string html;
   for (const std::string& paragraph : section.paragraphs) {
     html += fmt::format("<p>{}</p>\n", EscapeHtml(paragraph));
   }
@@ -195,7 +279,16 @@ std::string SectionHtml(const ReportSection& section, std::size_t number) {
   if (!section.preformatted.empty()) {
     html += fmt::format("<pre tabindex=\"0\">{}</pre>\n", EscapeHtml(section.preformatted));
   }
-  return html + "</section>\n";
+  return html;
+}
+
+std::string SectionHtml(const ReportSection& section, std::size_t number) {
+  const std::string heading =
+      fmt::format("<h2 id=\"s{}\">{}</h2>", number, EscapeHtml(section.heading));
+  return section.folded
+             ? fmt::format("<details class=\"fold\"><summary>{}</summary>\n{}</details>\n", heading,
+                           SectionBody(section))
+             : fmt::format("<section>\n{}\n{}</section>\n", heading, SectionBody(section));
 }
 
 }  // namespace
@@ -214,16 +307,18 @@ std::string ReportHtml(const Report& report) {
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
-      "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<header>\n<h1>{}</h1>\n",
+      "<title>{}</title>\n<style>{}</style>\n</head>\n<body "
+      "class=\"report\">\n<header>\n<h1>{}</h1>\n",
       kPolicy, EscapeHtml(report.title), ReportStyle(), EscapeHtml(report.title));
   if (!report.subtitle.empty()) {
     html += fmt::format("<p class=\"subtitle\">{}</p>\n", EscapeHtml(report.subtitle));
   }
-  html += NavigationHtml(report.sections) + "</header>\n<main>\n" + TilesHtml(report.tiles);
+  html += "</header>\n" + NavigationHtml(report) + "<main>\n" + NotesHtml(report.notes) +
+          ViewHtml(report.scenes, report.scenes_note);
   for (const ReportImage& image : report.main_images) {
     html += ImageHtml(image);
   }
-  html += ViewHtml(report.scenes, report.scenes_note);
+  html += ScoreHtml(report);
   for (std::size_t i = 0; i < report.sections.size(); ++i) {
     html += SectionHtml(report.sections[i], i + 1);
   }
@@ -231,62 +326,7 @@ std::string ReportHtml(const Report& report) {
   if (!report.footer.empty()) {
     html += fmt::format("<footer>{}</footer>\n", EscapeHtml(report.footer));
   }
-  return html + Script(ReportTableScript()) + "</body>\n</html>\n";
-}
-
-std::string EscapeHtml(std::string_view text) {
-  std::string html;
-  for (const char c : text) {
-    const auto code = static_cast<unsigned char>(c);
-    switch (c) {
-      case '&':
-        html += "&amp;";
-        break;
-      case '<':
-        html += "&lt;";
-        break;
-      case '>':
-        html += "&gt;";
-        break;
-      case '"':
-        html += "&quot;";
-        break;
-      case '\'':
-        html += "&#39;";
-        break;
-      case '\t':
-      case '\n':
-        html += c;
-        break;
-      case '\r':
-        break;
-      default:
-        if (code < 0x20 || code == 0x7F) {
-          html += "\uFFFD";
-        } else {
-          html += c;
-        }
-    }
-  }
-  return html;
-}
-
-std::string Base64(std::string_view bytes) {
-  constexpr std::string_view kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      group = (group << 8) | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0);
-    }
-    for (std::size_t k = 0; k < 4; ++k) {
-      text += k <= count ? kDigits[(group >> (18 - 6 * k)) & 63] : '=';
-    }
-  }
-  return text;
+  return html + Script(ReportPageScript()) + "</body>\n</html>\n";
 }
 
 }  // namespace semblance

@@ -23,6 +23,10 @@ struct ReportTable {
   std::vector<std::string> header;             // with units, e.g. "depth (mm)"
   std::vector<std::vector<std::string>> rows;  // as many cells each as the header; a column of
                                                // numbers is aligned right; empty: a dash
+  // Per row, or none: its id in the page, and where its first cell leads ("#id" or a file beside
+  // the page); an empty one: no id, no link.
+  std::vector<std::string> ids = {}, links = {};
+  bool filter = false;  // a field above it that hides the rows without the words typed there
 };
 
 // A table's number: three decimals, none from 100,000 on; nothing where it is not finite.
@@ -40,16 +44,22 @@ struct ReportSection {
   std::vector<ReportImage> images = {};
   std::vector<ReportTable> tables = {};
   std::string preformatted = {};  // e.g. the configuration; may be empty
+  bool folded = false;            // shown by its heading alone until it is opened
 };
 
+// The page shows its parts in this order.
 struct Report {
   std::string title;
   std::string subtitle;
-  std::vector<ReportTile> tiles;         // the key numbers, on the first screen
-  std::vector<ReportImage> main_images;  // the first picture people see, usually one
+  std::vector<std::string> notes = {};   // what a reader must know before looking
   std::string scenes = {};               // CollectScenes (scene_json.h) for the 3-D view; empty:
-                                         // none. Left out where the program lacks three.js
+                                         // none. Words in its place where the program lacks
+                                         // three.js, or the browser WebGL
   std::string scenes_note = {};          // below it; may be empty
+  std::vector<ReportImage> main_images;  // the first picture people see, usually one
+  std::string score_heading = "In figures";
+  std::vector<ReportTile> tiles;               // the key numbers
+  std::vector<ReportImage> score_images = {};  // what they were taken of
   std::vector<ReportSection> sections;
   std::string footer;  // e.g. the version; no time, so that the same run gives the same bytes
 };
@@ -58,14 +68,9 @@ struct Report {
 ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,
                                 std::string alt);
 
-// HTML5 with the pictures inside; the same report gives the same bytes. Throws InputError for an
-// image that is neither PNG nor SVG or has no alt text, and for a table row that is not as long as
-// the header.
+// HTML5 with the pictures inside, an SVG as part of the page; the same report gives the same bytes.
+// Throws InputError for an image that is neither PNG nor SVG or has no alt text, and for a table
+// row that is not as long as the header.
 std::string ReportHtml(const Report& report);
-
-// & < > " ' as entities; control characters that HTML forbids as a replacement character.
-std::string EscapeHtml(std::string_view text);
-
-std::string Base64(std::string_view bytes);  // RFC 4648, with padding
 
 }  // namespace semblance

@@ -7,7 +7,7 @@
 namespace semblance {
 
 std::string_view ReportStyle();        // report.css
-std::string_view ReportTableScript();  // report_tables.js
+std::string_view ReportPageScript();   // report_page.js
 std::string_view ReportViewScript();   // report_view.js and the files it is made of
 std::string_view ReportPartsScript();  // those files alone, for other pages
 std::string_view ThreeScript();        // three.js; empty if the program was built without it

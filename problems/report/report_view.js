@@ -3,6 +3,14 @@
 'use strict';
 (() => {
   const root = document.getElementById('view3d');
+  if (!SemblanceGuides.canShow()) {
+    const words = document.createElement('p');
+    words.className = 'no-view';
+    words.textContent = 'There is no 3-D view here: WebGL is off in this browser, or this machine has none. '
+        + 'The pictures on this page show the same from fixed sides.';
+    root.replaceChildren(words);
+    return;
+  }
   const {scenes, blobs} = JSON.parse(document.getElementById('view3d-scenes').textContent);
   const element = (tag, properties, ...children) => {
     const made = Object.assign(document.createElement(tag), properties);
@@ -14,11 +22,11 @@
   const headed = scenes.every((scene) => scene.layers.some((layer) => layer.id === 'bust'));
   const SHOWN = headed ? ['skull', 'dowels', 'bust'] : ['skull', 'dowels', 'face'];
   const OPACITY = {face: 0.6, implicit: 0.6, skin: 0.5};
-  const shared = {layers: new Map(), mapped: false, range_mm: 8, exaggeration: 1, camera: null};
+  const shared = {layers: new Map(), mapped: false, range_mm: 8, exaggeration: 1, difference: false, camera: null};
   const labels = new Map();
   for (const layer of scenes.flatMap((scene) => scene.layers)) {
     labels.set(layer.id, layer);
-    shared.layers.set(layer.id, {shown: SHOWN.includes(layer.id), opacity: OPACITY[layer.id] || 1});
+    shared.layers.set(layer.id, {shown: layer.shown || SHOWN.includes(layer.id), opacity: OPACITY[layer.id] || 1});
   }
 
   const stages = [];
@@ -36,6 +44,23 @@
   const updateAll = () => {
     for (const stage of stages) { stage.update(); }
     drawLegends();
+  };
+
+  // How far each face lies outside the other view's; the faces are then shown, and not the heads over them.
+  const showDifference = () => {
+    const faces = stages.map((stage) => stage.layers && stage.layers.get('face'));
+    if (!shared.difference || faces.length < 2 || !faces.every(Boolean)) { return; }
+    const reach_mm = 20, geometries = faces.map(({object}) => object.geometry);
+    faces.forEach(({object}, n) => {
+      object.userData.difference = SemblanceGeometry.outsideOf(geometries[n], geometries[1 - n], reach_mm);
+    });
+    for (const [id, shown] of [['bust', false], ['face', true]]) {
+      const state = shared.layers.get(id), box = document.querySelector(`input[data-layer="${id}"]`);
+      if (state) { state.shown = shown; }
+      if (box) { box.checked = shown; }
+    }
+    shared.layers.get('face').opacity = 1;
+    updateAll();
   };
 
   // Canvases: two where there is something to compare.
@@ -56,6 +81,7 @@
       const scene = scenes[Number(choice.value)];
       facts.textContent = scene.facts.join(' \u00b7 ');
       stage.show(scene, blobs);
+      showDifference();
     };
     choice.addEventListener('change', show);
     return {stage, canvas, show};
@@ -103,36 +129,50 @@
   const compass = element('canvas', {className: 'view3d-compass', width: 224, height: 224});
   const legends = element('div', {className: 'view3d-legends'});
 
-  const drawCompass = () => SemblanceGuides.drawCompass(compass, shared.camera.camera);
+  const drawCompass = () => SemblanceGuides.drawCompass(compass, shared.camera.camera, scenes[0].axes);
   const legendOf = (map) => SemblanceGuides.legendOf(map, shared.range_mm);
 
   // A legend for each map that is on show.
   const drawLegends = () => {
     const used = new Set();
     for (const [id, layer] of labels) {
+      if (shared.difference && layer.map === 'error') { continue; }
       if (layer.map && shared.layers.get(id).shown && (layer.always_mapped || shared.mapped)) { used.add(layer.map); }
     }
-    legends.replaceChildren(...[...used].map((name) => legendOf(scenes[0].maps[name])));
+    const maps = [...used].map((name) => scenes[0].maps[name]);
+    if (shared.difference) { maps.push({...scenes[0].maps.error, title: 'outside (+) or inside (\u2212) of the other view\'s face'}); }
+    legends.replaceChildren(...maps.map(legendOf));
   };
 
+  const canDiffer = scenes.length > 1 && scenes.every((scene) => scene.maps.error && scene.layers.some((layer) => layer.id === 'face'));
+  const hasDowels = [...labels.values()].some((layer) => layer.dowels);
   const hasError = [...labels.values()].some((layer) => layer.map === 'error');
-  const faceViews = [['Front', 0, 0], ['Three-quarter', 35, 8], ['Left side', 90, 0], ['Right side', -90, 0],
+  const faceViews = scenes[0].axes ? [['Oblique', 35, 35], ['Front', 0, 0], ['Left', 90, 0], ['Right', -90, 0], ['Back', 180, 0],
+                                      ['Top', 0, 89]] : [['Front', 0, 0], ['Three-quarter', 35, 8], ['Left side', 90, 0], ['Right side', -90, 0],
                      ['Back', 180, 0], ['Top', 0, 89]];
   panel.append(
       group('Look from', element('div', {className: 'view3d-buttons'}, ...faceViews.map(([name, turn, rise]) =>
           button(name, `look from ${name.toLowerCase()}`, () => shared.camera.look(turn, rise))))),
       group('Show', ...[...labels].map(([id, layer]) => layerRow(id, layer))),
-      group('Colours',
-            ...(hasError ? [
-              select('faces by', [['skin', 'plain'], ['error', 'signed error']], 'skin', (value) => {
+      ...(hasError || hasDowels ? [group('Colours',
+            ...(hasError || canDiffer ? [
+              select('faces by', [['skin', 'plain'], ...(hasError ? [['error', 'signed error']] : []),
+                                  ...(canDiffer ? [['difference', 'difference of A and B']] : [])], 'skin', (value) => {
                 shared.mapped = value === 'error';
+                shared.difference = value === 'difference';
+                showDifference();
               }),
               select('error up to', [[2, '\u00b1 2 mm'], [4, '\u00b1 4 mm'], [8, '\u00b1 8 mm'], [16, '\u00b1 16 mm']], 8,
                      (value) => { shared.range_mm = Number(value); })] : []),
-            select('dowel residuals', [[1, 'true length'], [5, '5 times'], [10, '10 times']], 1,
-                   (value) => { shared.exaggeration = Number(value); })),
+            ...(hasDowels ? [
+              select('face off markers', [[1, 'true length'], [5, '5 times'], [10, '10 times']], 1,
+                     (value) => { shared.exaggeration = Number(value); })] : []))] : []),
       legends, compass, button('Save picture', 'as PNG', savePicture));
-  root.append(frames, panel);
+  const touch = matchMedia('(pointer: coarse)').matches;
+  const hint = element('p', {className: 'view3d-hint', textContent: touch
+      ? 'One finger sideways turns, two fingers turn, shift and zoom; up and down scrolls the page. Touch a surface to read its value.'
+      : 'Drag to turn, shift and drag to move; after a click, or with Ctrl, the wheel zooms. Point at a surface or a marker to read its value.'});
+  root.replaceChildren(element('div', {}, frames, hint), panel);
 
   try {
     const made = [makeFrame('A', 0)];
@@ -144,18 +184,19 @@
       box.union(geometry.boundingBox);
     }
     shared.camera = new SemblanceCamera(box, drawSoon);
+    if (scenes[0].axes) { shared.camera.reach = 2.6; }  // a surface fills its box, a head does not
     for (const {stage, canvas, show} of made) {
       stages.push(stage);
       show();
-      shared.camera.attach(canvas);
+      shared.camera.attach(canvas, {wheel: 'asked'});
     }
     const measure = new SemblanceMeasure(stages, drawSoon, box);
     panel.insertBefore(group('Measure', ...measure.controls(root)), legends);
     drawLegends();
-    shared.camera.look(35, 8);
+    shared.camera.look(35, scenes[0].axes ? 35 : 8);
     new ResizeObserver(drawSoon).observe(frames);
   } catch (error) {
-    root.replaceChildren(element('p', {
-      textContent: `No 3-D view: this browser has no WebGL (${error.message}). The pictures below show the same.`}));
+    root.replaceChildren(element('p', {className: 'no-view',
+      textContent: `The 3-D view could not start (${error.message}). The pictures on this page show the same from fixed sides.`}));
   }
 })();

@@ -59,7 +59,7 @@ void WriteOverview(const RunResult& result, OutputFolder& folder, int threads) {
                                  Front({{SkinObject(result.implicit.dense)}}, result, threads),
                                  Front({{SkinObject(result.face.mesh)}}, result, threads)};
   Sheet sheet{.title = "",
-              .captions = {"skull and dowels", "implicit face", "H-spline face"},
+              .captions = {"skull and depth markers", "first face (implicit)", "recovered face"},
               .legend = std::nullopt};
   if (result.bust) {
     pictures.push_back(Front(HeadScene(result), result, threads));
@@ -104,14 +104,14 @@ void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
   WriteViews({{SkinObject(skin)}}, result, {"True skin", {}, std::nullopt}, Lighting::kStudio,
              folder, "pictures/truth.png", threads);
   WriteScoredSkin(result, folder, threads);
-  const Legend legend{ErrorColours(), "H-spline face outside (+) or inside (-) the true skin"};
+  const Legend legend{ErrorColours(), "recovered face outside (+) or inside (-) the true skin"};
   WriteViews({{MappedObject(skin, result.truth->face.signed_mm, legend.map)}}, result,
              {"Signed error on the true skin", {}, legend}, Lighting::kEven, folder,
              "pictures/error.png", threads);
   const Legend implicit_legend{ErrorColours(),
-                               "implicit face outside (+) or inside (-) the true skin"};
+                               "first face outside (+) or inside (-) the true skin"};
   WriteViews({{MappedObject(skin, result.truth->implicit.signed_mm, implicit_legend.map)}}, result,
-             {"Signed error of the implicit face", {}, implicit_legend}, Lighting::kEven, folder,
+             {"Signed error of the first face", {}, implicit_legend}, Lighting::kEven, folder,
              "pictures/error_implicit.png", threads);
 }
 
@@ -198,9 +198,10 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   WriteViews({{MappedObject(result.shell, result.depth.depth_mm, depth.map)}}, result,
              {"Interpolated tissue depth", {}, depth}, Lighting::kEven, folder,
              "pictures/depth.png", threads);
-  WriteViews({{SkinObject(result.implicit.dense)}}, result, {"Implicit face", {}, std::nullopt},
+  WriteViews({{SkinObject(result.implicit.dense)}}, result,
+             {"First face, straight from the depths (implicit surface)", {}, std::nullopt},
              Lighting::kStudio, folder, "pictures/implicit.png", threads);
-  WriteViews({{SkinObject(result.face.mesh)}}, result, {"H-spline face", {}, std::nullopt},
+  WriteViews({{SkinObject(result.face.mesh)}}, result, {"Recovered face", {}, std::nullopt},
              Lighting::kStudio, folder, "pictures/face.png", threads);
   if (result.bust) {
     folder.Write(
@@ -211,7 +212,7 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   WriteOrigin(result, folder, threads);
   Scene over = SkullScene(result);
   over.objects.push_back(SkinObject(result.face.mesh, 0.55));
-  WriteViews(over, result, {"H-spline face over skull and dowels", {}, std::nullopt},
+  WriteViews(over, result, {"Recovered face over skull and depth markers", {}, std::nullopt},
              Lighting::kStudio, folder, "pictures/face_over_skull.png", threads);
   if (result.uncertainty && !result.uncertainty->sigma_mm.empty()) {
     const Legend sigma{SigmaColours(), "standard deviation along the normal"};

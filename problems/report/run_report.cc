@@ -7,9 +7,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "problems/plots/svg_plot.h"
+#include "problems/report/plain_names.h"
 #include "problems/report/report.h"
 #include "problems/report/scene_json.h"
-#include "problems/report/svg_plot.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
@@ -42,15 +43,15 @@ std::vector<ReportTile> Tiles(const Json& result) {
   const Json& fit = result.at("fit");
   std::vector<ReportTile> tiles;
   if (!face.is_null()) {
-    tiles = {
-        {"mean error", Number(face.at("mean_abs_mm")), "mm", "H-spline face against the true skin"},
-        {"RMS error", Number(face.at("rms_mm")), "mm", ""},
-        {"median", Number(face.at("median_mm")), "mm", ""},
-        {"95th percentile", Number(face.at("p95_mm")), "mm", ""},
-        {"within 2.5 mm", Percent(face.at("within_2_5mm")), "%", "of the scored area"}};
+    tiles = {{"mean error", Number(face.at("mean_abs_mm")), "mm",
+              "recovered face against the true skin"},
+             {"RMS error", Number(face.at("rms_mm")), "mm", ""},
+             {"median", Number(face.at("median_mm")), "mm", ""},
+             {"95th percentile", Number(face.at("p95_mm")), "mm", ""},
+             {"within 2.5 mm", Percent(face.at("within_2_5mm")), "%", "of the scored area"}};
   }
-  tiles.push_back(
-      {"dowel RMS", Number(fit.at("dowel_rms_mm")), "mm", "dowel tips to the fitted face"});
+  tiles.push_back({"depth markers", Number(fit.at("dowel_rms_mm")), "mm",
+                   "RMS from the markers' tips to the face"});
   if (HasSigma(result)) {
     tiles.push_back({"may be off", Number(result.at("uncertainty").at("sigma_median_mm")), "mm",
                      "median standard deviation of the face along its normal"});
@@ -79,7 +80,7 @@ ReportTable MetricsTable(const std::string& caption, const Json& metrics) {
   table.rows.push_back(MetricsRow("all, skin to face", metrics));
   table.rows.push_back(MetricsRow("all, face to skin", metrics.at("reverse")));
   for (const auto& [name, summary] : metrics.at("regions").items()) {
-    table.rows.push_back(MetricsRow(name, summary));
+    table.rows.push_back(MetricsRow(WordsOfKey(name), summary));
   }
   return table;
 }
@@ -114,10 +115,11 @@ std::string OutOf(const Json& level, const char* part, const char* all) {
 
 // How the points' (u,v) moved; empty without relaxation, or for runs of older versions.
 ReportTable RelaxationTable(const Json& fit) {
-  ReportTable table{"How dowels and seeds moved over the face: mean penalties after each step",
-                    {"step", "distance before (mm²)", "distance (mm²)", "bunching (mm²)",
-                     "distortion (mm²)", "crease (mm²)", "largest move (mm)", "folds prevented"},
-                    {}};
+  ReportTable table{
+      "How markers and extra points moved over the face: mean penalties after each step",
+      {"step", "distance before (mm²)", "distance (mm²)", "bunching (mm²)", "distortion (mm²)",
+       "crease (mm²)", "largest move (mm)", "folds prevented"},
+      {}};
   int step = 0;
   for (const Json& moves : fit.value("relaxations", Json::array())) {
     const Json& after = moves.at("after");
@@ -136,8 +138,9 @@ ReportTable FeaturesTable(const Json& fit) {
       {}};
   const Json parts = fit.value("feature_distortion", Json::object());
   for (const auto& [part, d] : parts.items()) {
-    table.rows.push_back({part, Number(d.at("area_cm2"), 1), Percent(d.at("rms_strain")),
-                          Percent(d.at("max_strain")), Percent(d.at("rms_area"))});
+    table.rows.push_back({WordsOfKey(part), Number(d.at("area_cm2"), 1),
+                          Percent(d.at("rms_strain")), Percent(d.at("max_strain")),
+                          Percent(d.at("rms_area"))});
   }
   return table;
 }
@@ -169,12 +172,14 @@ ReportTable LevelsTable(const Json& fit) {
 // Some columns of dowels.csv, rounded for reading.
 ReportTable DowelsTable(const std::filesystem::path& file) {
   ReportTable table{
-      "Dowels", {"site", "depth (mm)", "SD (mm)", "u", "v", "fit residual (mm)", "role"}, {}};
+      "Depth markers (dowels): the tissue depth at each landmark, and how far the face is from it",
+      {"landmark", "depth (mm)", "SD (mm)", "u", "v", "distance left (mm)", "role"},
+      {}};
   const std::string text = ReadFileBytes(file);
   CsvReader csv(text, file.string());
   const std::size_t site = csv.ColumnOf("site");
   while (csv.NextRow()) {
-    std::vector<std::string> row = {std::string(csv.Cell(site))};
+    std::vector<std::string> row = {WordsOfSite(csv.Cell(site))};
     for (const char* column : {"depth_mm", "sd_mm", "u", "v", "fit_residual_mm"}) {
       const double value = csv.NumberOrNan(csv.ColumnOf(column));
       row.push_back(std::isnan(value) ? "" : fmt::format("{:.2f}", value));
@@ -190,28 +195,17 @@ ReportTable CountsTable(const std::string& caption, const Json& values) {
   ReportTable table{caption, {"what", "value"}, {}};
   for (const auto& [name, value] : values.items()) {
     if (!value.is_structured()) {
-      table.rows.push_back({name, Number(value, 3)});
+      table.rows.push_back({WordsOfKey(name), Number(value, 3)});
     }
   }
   return table;
-}
-
-// Folders of older versions have none.
-void AddScored(const Json& face, const OutputFolder& folder, ReportSection& section) {
-  if (face.contains("scored_skin")) {
-    section.images.push_back(ReportImageFromFile(
-        folder.Root() / "pictures/scored.png",
-        "Green: scored. Yellow: masked by the configuration. Red: inner walls and folds. Blue: "
-        "where the scan ended.",
-        "the scored part of the true skin from three sides"));
-  }
 }
 
 void AddProtocols(const Json& face, ReportSection& section) {
   if (!face.contains("protocols")) {
     return;
   }
-  ReportTable table = MetricsTable("H-spline face, as other papers score theirs", face);
+  ReportTable table = MetricsTable("Recovered face, as other papers score theirs", face);
   table.rows = {
       MetricsRow("in the scan's frame", face.at("protocols").at("ct_frame")),
       MetricsRow("after the best rigid fit (Lee 2012, Miranda 2018)",
@@ -221,39 +215,38 @@ void AddProtocols(const Json& face, ReportSection& section) {
 }
 
 ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
-  ReportSection section{.heading = "Against the true skin"};
+  ReportSection section{.heading = "Against the true skin", .folded = true};
   section.paragraphs = {
       "Scored is the outer skin of the face, without the zones that the configuration excludes "
       "(see "
       "resolved.yaml, region, and the picture of the scored skin). Distances are to the closest "
       "point, weighted by area; nothing was aligned to the true skin but where a table says so."};
-  section.images = {
-      ReportImageFromFile(folder.Root() / "pictures/error.png", "",
-                          "signed error of the H-spline face on the true skin from three sides"),
-      ReportImageFromFile(folder.Root() / "pictures/error_implicit.png", "",
-                          "signed error of the implicit face on the true skin"),
-      ReportImageFromFile(folder.Root() / "pictures/truth.png", "",
-                          "the true skin from three sides")};
-  AddScored(result.at("face"), folder, section);
+  section.images = {ReportImageFromFile(folder.Root() / "pictures/error_implicit.png", "",
+                                        "signed error of the first face on the true skin"),
+                    ReportImageFromFile(folder.Root() / "pictures/truth.png", "",
+                                        "the true skin from three sides")};
   section.images.push_back(
-      {QuantilePlotSvg({{"H-spline face", Numbers(result.at("face").at("quantiles_mm"))},
-                        {"implicit face", Numbers(result.at("implicit_face").at("quantiles_mm"))}},
+      {QuantilePlotSvg({{"recovered face", Numbers(result.at("face").at("quantiles_mm"))},
+                        {"first face (implicit surface)",
+                         Numbers(result.at("implicit_face").at("quantiles_mm"))}},
                        "distance from the true skin (mm)"),
        "Share of the scored skin within each distance, up to 95 %.",
        "cumulative distribution of the errors of both faces"});
-  section.tables = {MetricsTable("H-spline face", result.at("face")),
-                    MetricsTable("Implicit face", result.at("implicit_face"))};
+  section.tables = {MetricsTable("Recovered face", result.at("face")),
+                    MetricsTable("First face, straight from the depths (implicit surface)",
+                                 result.at("implicit_face"))};
   AddProtocols(result.at("face"), section);
   return section;
 }
 
 ReportSection PictureSection(const OutputFolder& folder) {
-  ReportSection section{.heading = "From skull to face"};
+  ReportSection section{.heading = "From skull to face, in pictures", .folded = true};
   for (const auto& [file, alt] :
-       {std::pair("skull_dowels", "skull with dowels"),
+       {std::pair("skull_dowels", "skull with depth markers"),
         std::pair("depth", "interpolated tissue depth on the skull's shell"),
-        std::pair("implicit", "implicit face"), std::pair("face", "H-spline face"),
-        std::pair("face_over_skull", "H-spline face, translucent, over skull and dowels")}) {
+        std::pair("implicit", "first face, straight from the depths"),
+        std::pair("face", "recovered face"),
+        std::pair("face_over_skull", "recovered face, translucent, over skull and markers")}) {
     section.images.push_back(
         ReportImageFromFile(folder.Root() / "pictures" / (std::string(file) + ".png"), "",
                             fmt::format("{} from three sides", alt)));
@@ -271,7 +264,7 @@ std::string Words(const Json& list, const char* between) {
 
 // Where the run has alternatives (alternatives.h).
 ReportSection AlternativesSection(const Json& answers, const OutputFolder& folder) {
-  ReportSection section{.heading = "Alternatives side by side"};
+  ReportSection section{.heading = "Alternatives side by side", .folded = true};
   section.paragraphs = {
       "The same skull with other options. All pictures have one camera; the maps show how far each "
       "face lies outside (+) or inside (-) this run's own."};
@@ -284,9 +277,9 @@ ReportSection AlternativesSection(const Json& answers, const OutputFolder& folde
         folder.Root() / "pictures" / fmt::format("alternatives_{}.png", file), "", alt));
   }
   ReportTable table{"What differs, and by how much",
-                    {"alternative", "otherwise", "dowels", "sites left out", "mean outside (mm)",
-                     "RMS difference (mm)", "least (mm)", "most (mm)", "mean error (mm)",
-                     "p95 error (mm)", "≤ 2.5 mm (%)"},
+                    {"alternative", "otherwise", "depth markers", "sites left out",
+                     "mean outside (mm)", "RMS difference (mm)", "least (mm)", "most (mm)",
+                     "mean error (mm)", "p95 error (mm)", "≤ 2.5 mm (%)"},
                     {}};
   for (const Json& answer : answers) {
     const Json none = {
@@ -323,16 +316,18 @@ ReportSection BoneSection(const Json& bone, const OutputFolder& folder) {
       .images = {ReportImageFromFile(folder.Root() / "pictures/origin.png", "",
                                      "observed, mirrored and inferred bone from three sides"),
                  ReportImageFromFile(folder.Root() / "pictures/origin_face.png", "",
-                                     "the face by the bone under it, from three sides")}};
+                                     "the face by the bone under it, from three sides")},
+      .folded = true};
 }
 
 ReportSection UncertaintySection(const Json& result, const OutputFolder& folder) {
   const Json& uncertainty = result.at("uncertainty");
-  ReportSection section{.heading = "How far the face may be off"};
+  ReportSection section{.heading = "How far the face may be off", .folded = true};
   section.paragraphs = {fmt::format(
-      "Standard deviation of the face along its normal, from that of the dowels' depths, of the "
+      "Standard deviation of the face along its normal, from that of the markers' depths, of the "
       "depths between them, and of what the fit's smoothness holds back: {} mm in the median and "
-      "{} mm at the 95th percentile of the area that dowels and seeds hold. It knows nothing of a "
+      "{} mm at the 95th percentile of the area that markers and extra points hold. It knows "
+      "nothing of a "
       "wrong skull, wrong landmarks or a table of other people.",
       Number(uncertainty.at("sigma_median_mm")), Number(uncertainty.at("sigma_p95_mm")))};
   if (!uncertainty.at("coverage_90").is_null()) {
@@ -343,15 +338,16 @@ ReportSection UncertaintySection(const Json& result, const OutputFolder& folder)
   }
   section.images = {
       ReportImageFromFile(folder.Root() / "pictures/sigma.png", "",
-                          "standard deviation of the H-spline face from three sides")};
+                          "standard deviation of the recovered face from three sides")};
   return section;
 }
 
 ReportSection RulesSection(const Json& rules) {
   ReportSection section{
       .heading = "Rules for what bone does not carry",
-      .paragraphs = {"Each is one observation among the dowels. What is left over goes from the "
-                     "face to what the rule foresaw."}};
+      .paragraphs = {"Each is one observation among the depth markers. What is left over goes from "
+                     "the face to what the rule foresaw."},
+      .folded = true};
   for (const Json& rule : rules) {
     section.paragraphs.push_back(
         fmt::format("{} ({}, {}): {} mm left, standard deviation {} mm. {}.",
@@ -362,31 +358,35 @@ ReportSection RulesSection(const Json& rules) {
   return section;
 }
 
-ReportSection NotesSection(const Json& result) {
-  ReportSection section{.heading = "Notes"};
+// What went wrong, then what is to be known.
+std::vector<std::string> Notes(const Json& result) {
+  std::vector<std::string> notes;
+  for (const Json& fault : result.value("faults", Json::array())) {
+    notes.push_back("The result is not usable: " + fault.get<std::string>());
+  }
   for (const Json& note : result.at("notes")) {
-    section.paragraphs.push_back(note.get<std::string>());
+    notes.push_back(note.get<std::string>());
   }
-  if (section.paragraphs.empty()) {
-    section.paragraphs = {"Nothing to note."};
-  }
-  return section;
+  return notes;
 }
 
 ReportSection FitSection(const Json& fit, const OutputFolder& folder) {
   return {.heading = "The fit",
           .images = {ConvergencePlot(fit)},
           .tables = Filled({LevelsTable(fit), RelaxationTable(fit), FeaturesTable(fit),
-                            CountsTable("Counts of the fit", fit),
-                            DowelsTable(folder.Root() / "dowels.csv")})};
+                            CountsTable("Counts of the fit", fit)}),
+          .folded = true};
 }
 
 ReportSection ProvenanceSection(const std::filesystem::path& file) {
   return {
-      .heading = "Provenance",
+      .heading = "What it was made of",
       .paragraphs = {"What went in, by content, and what it was made with. manifest.json beside "
-                     "this page has the hash of every output too."},
-      .preformatted = ReadFileBytes(file)};
+                     "this page has the hash of every output too. This folder holds no copy of "
+                     "the inputs; where they lie beside resolved.yaml, semblance run "
+                     "resolved.yaml makes it all again."},
+      .preformatted = ReadFileBytes(file),
+      .folded = true};
 }
 
 std::vector<ReportSection> Sections(const Json& result, const OutputFolder& folder) {
@@ -403,19 +403,24 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   if (IsPartlyInvented(result)) {
     sections.push_back(BoneSection(result.at("bone"), folder));
   }
+  sections.push_back({.heading = "Depth at the landmarks",
+                      .tables = {DowelsTable(folder.Root() / "dowels.csv")},
+                      .folded = true});
   sections.push_back(FitSection(result.at("fit"), folder));
   if (HasSigma(result)) {
     sections.push_back(UncertaintySection(result, folder));
   }
-  sections.push_back({.heading = "Depth and implicit surface",
-                      .tables = {CountsTable("Depth field", result.at("depth")),
-                                 CountsTable("Implicit surface", result.at("implicit"))}});
+  sections.push_back({.heading = "Depth and first face",
+                      .tables = {CountsTable("Tissue depth over the bone", result.at("depth")),
+                                 CountsTable("First face: the implicit surface of these depths",
+                                             result.at("implicit"))},
+                      .folded = true});
   if (result.contains("rules") && !result.at("rules").empty()) {
     sections.push_back(RulesSection(result.at("rules")));
   }
-  sections.push_back(NotesSection(result));
-  sections.push_back(
-      {.heading = "Configuration", .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml")});
+  sections.push_back({.heading = "All options",
+                      .preformatted = ReadFileBytes(folder.Root() / "resolved.yaml"),
+                      .folded = true});
   const std::filesystem::path provenance = folder.Root() / "provenance.json";
   if (std::filesystem::exists(provenance)) {
     sections.push_back(ProvenanceSection(provenance));
@@ -423,15 +428,39 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   return sections;
 }
 
+// Folders of older versions have no picture of it.
+std::vector<ReportImage> ScoreImages(const Json& face, const OutputFolder& folder) {
+  if (face.is_null()) {
+    return {};
+  }
+  std::vector<ReportImage> images;
+  if (face.contains("scored_skin")) {
+    images.push_back(ReportImageFromFile(
+        folder.Root() / "pictures/scored.png",
+        "The score is of the green skin. Yellow: masked by the configuration. Red: inner walls and "
+        "folds. Blue: where the scan ended.",
+        "the scored part of the true skin from three sides"));
+  }
+  images.push_back(
+      ReportImageFromFile(folder.Root() / "pictures/error.png",
+                          "Where the recovered face lies outside (red) or inside (blue) of the "
+                          "true skin.",
+                          "signed error of the recovered face on the true skin from three sides"));
+  return images;
+}
+
 Report BuildReport(const Json& result, const OutputFolder& folder) {
   Report report;
   report.title = result.at("title").get<std::string>();
   report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
                     ". An approximation, not an identification.";
+  report.notes = Notes(result);
   report.tiles = Tiles(result);
+  report.score_heading = result.at("face").is_null() ? "In figures" : "Score";
+  report.score_images = ScoreImages(result.at("face"), folder);
   report.main_images = {ReportImageFromFile(
       folder.Root() / "pictures/overview.png", "",
-      fmt::format("skull and dowels, implicit face, H-spline face{}, from the front",
+      fmt::format("skull and depth markers, first face, recovered face{}, from the front",
                   result.at("face").is_null() ? "" : " and true skin"))};
   const std::filesystem::path scene = folder.Root() / "scene.json";
   if (std::filesystem::exists(scene)) {  // runs of older versions have none

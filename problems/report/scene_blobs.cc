@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/report/scene_blobs.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "problems/output/manifest.h"
-#include "problems/report/report.h"
+#include "surfaces/base/base64.h"
+#include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
@@ -54,6 +57,17 @@ std::string Indices(std::span<const Tuple> tuples, std::size_t points) {
   return Base64(bytes);
 }
 
+// The unsigned numbers of `width` bytes each.
+std::vector<std::uint32_t> Numbers(const std::string& base64, std::size_t width) {
+  const std::string bytes = FromBase64(base64);
+  std::vector<std::uint32_t> numbers(bytes.size() / width, 0);
+  for (std::size_t k = 0; k < numbers.size() * width; ++k) {
+    numbers[k / width] |= static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[k]))
+                          << (8 * (k % width));
+  }
+  return numbers;
+}
+
 }  // namespace
 
 std::string SceneBlobs::Add(const Json& blob) {
@@ -83,6 +97,28 @@ std::string SceneBlobs::AddValues(std::span<const double> values_mm) {
                                                                  : static_cast<long>(kNone)));
   }
   return Add({{"values", Base64(bytes)}});
+}
+
+TriMesh MeshOfBlob(const Json& blob) {
+  const auto numbers = Numbers(blob.at("points").get<std::string>(), 2);
+  const double step = blob.at("step").get<double>();
+  TriMesh mesh;
+  mesh.points.assign(numbers.size() / 3, Vec3::Zero());
+  for (std::size_t k = 0; k < 3 * mesh.points.size(); ++k) {
+    const auto axis = static_cast<int>(k % 3);
+    mesh.points[k / 3][axis] = blob.at("low").at(k % 3).get<double>() + step * numbers[k];
+  }
+  const bool narrow = mesh.points.size() <= 65536;
+  const auto corners = Numbers(blob.at("triangles").get<std::string>(), narrow ? 2 : 4);
+  mesh.triangles.resize(corners.size() / 3);
+  for (std::size_t k = 0; k < 3 * mesh.triangles.size(); ++k) {
+    if (corners[k] >= mesh.points.size()) {
+      throw InputError(
+          fmt::format("a triangle names point {} of {}", corners[k], mesh.points.size()));
+    }
+    mesh.triangles[k / 3][k % 3] = static_cast<std::int32_t>(corners[k]);
+  }
+  return mesh;
 }
 
 }  // namespace semblance

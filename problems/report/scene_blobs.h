@@ -33,4 +33,8 @@ class SceneBlobs {
   nlohmann::ordered_json blobs_ = nlohmann::ordered_json::object();
 };
 
+// What AddMesh has made of a mesh, as a mesh again; a coordinate is off by half a step at most.
+// Throws InputError, or what the JSON library throws, for a blob that is no mesh.
+TriMesh MeshOfBlob(const nlohmann::ordered_json& blob);
+
 }  // namespace semblance

@@ -10,6 +10,7 @@
 #include <map>
 #include <utility>
 
+#include "problems/report/plain_names.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/scene_blobs.h"
 #include "problems/view/view_mesh.h"
@@ -24,21 +25,16 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kHeadTriangles = 50000;  // of a mesh with ears and lids
 
-std::string Hex(const Colour& c) {
-  const auto byte = [](double x) { return std::lround(255 * std::clamp(x, 0.0, 1.0)); };
-  return fmt::format("#{:02x}{:02x}{:02x}", byte(c.r), byte(c.g), byte(c.b));
-}
-
 Json MapJson(const ColourMap& map, const char* title) {
   constexpr int kSteps = 32;  // close enough for straight lines between them
   Json json = {{"title", title},
                {"low_mm", map.low_mm},
                {"high_mm", map.high_mm},
-               {"no_data", Hex(kNoDataColour)},
+               {"no_data", HexText(kNoDataColour)},
                {"colours", Json::array()}};
   for (int k = 0; k <= kSteps; ++k) {
     json["colours"].push_back(
-        Hex(ColourAt(map, map.low_mm + (map.high_mm - map.low_mm) * k / kSteps)));
+        HexText(ColourAt(map, map.low_mm + (map.high_mm - map.low_mm) * k / kSteps)));
   }
   return json;
 }
@@ -80,8 +76,8 @@ class SceneWriter {
     Mesh("skull", "Skull", view_.skull, "#e8dcc4");
     Dowels();
     Depth();
-    Face("implicit", "Implicit face", view_.implicit, "#d9b38c");
-    Face("face", "H-spline face", view_.face, "#d8a58a");
+    Face("implicit", "First face (implicit)", view_.implicit, "#d9b38c");
+    Face("face", "Recovered face", view_.face, "#d8a58a");
     Head();
     if (result_.uncertainty && !result_.uncertainty->sigma_mm.empty()) {
       Mesh("sigma", "Uncertainty of face", view_.face, "#8f8f8f");
@@ -123,7 +119,7 @@ class SceneWriter {
     for (const EyePart& part : result_.bust->eyes) {
       const auto& c = part.colour;
       layers_.back()["parts"].push_back(
-          {{"colour", Hex({c[0], c[1], c[2]})}, {"mesh", blobs_.AddMesh(part.mesh)}});
+          {{"colour", HexText({c[0], c[1], c[2]})}, {"mesh", blobs_.AddMesh(part.mesh)}});
     }
   }
 
@@ -165,6 +161,7 @@ class SceneWriter {
         continue;
       }
       Json json = {{"site", dowel.site},
+                   {"name", WordsOfSite(dowel.site)},
                    {"base", Numbers(dowel.base)},
                    {"tip", Numbers(dowel.Tip())},
                    {"depth_mm", dowel.depth_mm}};
@@ -177,7 +174,7 @@ class SceneWriter {
       dowels.push_back(json);
     }
     layers_.push_back(
-        {{"id", "dowels"}, {"label", "Dowels"}, {"colour", "#b3261e"}, {"dowels", dowels}});
+        {{"id", "dowels"}, {"label", "Depth markers"}, {"colour", "#b3261e"}, {"dowels", dowels}});
   }
 
   void Net(int level) {
@@ -216,7 +213,7 @@ class SceneWriter {
       facts.push_back(fmt::format("RMS {:.2f} mm", s.rms_mm));
       facts.push_back(fmt::format("within 2.5 mm {:.0f} %", 100 * s.within_2_5mm));
     }
-    facts.push_back(fmt::format("dowel RMS {:.2f} mm", result_.fit.dowel_rms_mm));
+    facts.push_back(fmt::format("depth markers: RMS {:.2f} mm", result_.fit.dowel_rms_mm));
     return facts;
   }
 

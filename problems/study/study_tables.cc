@@ -61,6 +61,18 @@ void ReadCurves(const Json& result, TrialRow& row) {
   }
 }
 
+// NaN where the file is not there or says nothing of it.
+double WallSeconds(const fs::path& file) {
+  std::error_code ignored;
+  if (!fs::exists(file, ignored)) {
+    return kNaN;
+  }
+  const Json json = Json::parse(ReadFileBytes(file), nullptr, /*allow_exceptions=*/false);
+  return json.is_object() && json.contains("total_wall_s") && json["total_wall_s"].is_number()
+             ? json["total_wall_s"].get<double>()
+             : kNaN;
+}
+
 void ReadTrial(const fs::path& folder, TrialRow& row) {
   row.status = "missing";
   const std::optional<Json> json = ReadTrialFile(folder, row.id);
@@ -69,6 +81,7 @@ void ReadTrial(const fs::path& folder, TrialRow& row) {
   }
   row.status = json->value("status", "failed");
   row.reason = json->value("reason", "");
+  row.wall_s = WallSeconds(TrialFolder(folder, row.id) / "timing.json");
   if (json->contains("result") && (*json)["result"].is_object()) {
     Flatten((*json)["result"], "", row.metrics);
     ReadCurves((*json)["result"], row);

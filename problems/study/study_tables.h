@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "problems/metrics/statistics.h"
+#include "surfaces/base/geometry.h"
 
 namespace semblance {
 
@@ -22,6 +23,9 @@ struct TrialRow {
   // Of stated standard deviations (interp/calibration.h): against the true depth, against dowels
   // that were left out.
   std::vector<double> depth_coverage = {}, left_out_coverage = {};
+  // Of its timing.json: work that another trial did for it is not in it. NaN: not told. It is in no
+  // table that is the same in every run.
+  double wall_s = kNaN;
 };
 
 struct StudyResults {

@@ -10,6 +10,7 @@ class SemblanceCamera {
     this.camera.up.set(0, 0, 1);
     this.centre = box.getCenter(new THREE.Vector3());
     this.extent = box.getSize(new THREE.Vector3()).length();
+    this.reach = 1.75;  // times the extent: how far away it stands at first
     this.onChange = onChange;
     this.look(0, 0);
   }
@@ -17,7 +18,7 @@ class SemblanceCamera {
   // Degrees: turn 0 looks at the face from the front, 90 at the subject's left side; rise 90 looks from above.
   look(turn, rise) {
     this.target = this.centre.clone();
-    this.distance = 1.75 * this.extent;
+    this.distance = this.reach * this.extent;
     this.turn = turn;
     this.rise = rise;
     this.update();
@@ -48,7 +49,7 @@ class SemblanceCamera {
     const from = new THREE.Vector3(
         Math.sin(turn) * Math.cos(rise), -Math.cos(turn) * Math.cos(rise), Math.sin(rise));
     this.camera.position.copy(this.target).addScaledVector(from, this.distance);
-    this.camera.near = Math.max(1, this.distance - 2 * this.extent);
+    this.camera.near = Math.max(this.extent / 500, this.distance - 2 * this.extent);
     this.camera.far = this.distance + 2 * this.extent;
     this.camera.lookAt(this.target);
     this.camera.updateMatrixWorld();
@@ -56,8 +57,12 @@ class SemblanceCamera {
   }
 
   // Drag turns; with the right button, shift or two fingers it shifts; wheel and pinch zoom; arrow keys turn.
-  attach(canvas) {
+  // wheel: 'always' zooms; 'asked' leaves the wheel to the page until the canvas is clicked, and again once the pointer
+  // has left it; with Ctrl held, and on a full screen, it zooms too.
+  attach(canvas, {wheel = 'always'} = {}) {
     const fingers = new Map();
+    let asked = wheel === 'always';
+    canvas.addEventListener('pointerleave', () => { asked = wheel === 'always'; });
     const spread = () => {
       const [a, b] = [...fingers.values()];
       return Math.hypot(a.x - b.x, a.y - b.y);
@@ -65,6 +70,7 @@ class SemblanceCamera {
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
     canvas.addEventListener('pointerdown', (event) => {
       canvas.setPointerCapture(event.pointerId);
+      asked = true;
       fingers.set(event.pointerId, {x: event.clientX, y: event.clientY});
     });
     const release = (event) => fingers.delete(event.pointerId);
@@ -86,6 +92,7 @@ class SemblanceCamera {
       }
     });
     canvas.addEventListener('wheel', (event) => {
+      if (!asked && !event.ctrlKey && !event.metaKey && !document.fullscreenElement) { return; }
       event.preventDefault();
       this.zoom(Math.exp(Math.max(-0.3, Math.min(0.3, event.deltaY / 500))));
     }, {passive: false});

@@ -52,6 +52,34 @@ const SemblanceGeometry = (() => {
     return new THREE.BufferAttribute(colours, 3);
   };
 
+  // How far each vertex of a surface lies outside (+) or inside (-) another: from the other's nearest vertex along its
+  // normal, in mm; NaN beyond `reach`. Good to a fraction of the triangles' size.
+  const outsideOf = (geometry, other, reach) => {
+    const from = geometry.attributes.position.array, to = other.attributes.position.array, normals = other.attributes.normal.array;
+    const cell = reach / 2, cells = new Map();
+    const key = (x, y, z) => `${x},${y},${z}`, at = (value) => Math.floor(value / cell);
+    for (let v = 0; v < to.length / 3; ++v) {
+      const name = key(at(to[3 * v]), at(to[3 * v + 1]), at(to[3 * v + 2]));
+      if (!cells.has(name)) { cells.set(name, []); }
+      cells.get(name).push(v);
+    }
+    return Float32Array.from({length: from.length / 3}, (_, v) => {
+      const p = [from[3 * v], from[3 * v + 1], from[3 * v + 2]], c = p.map(at);
+      let nearest = reach * reach, best = -1;
+      for (let x = c[0] - 2; x <= c[0] + 2; ++x) {
+        for (let y = c[1] - 2; y <= c[1] + 2; ++y) {
+          for (let z = c[2] - 2; z <= c[2] + 2; ++z) {
+            for (const w of cells.get(key(x, y, z)) || []) {
+              const d = (p[0] - to[3 * w]) ** 2 + (p[1] - to[3 * w + 1]) ** 2 + (p[2] - to[3 * w + 2]) ** 2;
+              if (d < nearest) { nearest = d; best = w; }
+            }
+          }
+        }
+      }
+      return best < 0 ? NaN : p.reduce((sum, x, k) => sum + (x - to[3 * best + k]) * normals[3 * best + k], 0);
+    });
+  };
+
   const vector = (numbers) => new THREE.Vector3().fromArray(numbers);
 
   const cylinder = (from, to, radius, material) => {
@@ -70,5 +98,5 @@ const SemblanceGeometry = (() => {
     return mesh;
   };
 
-  return {geometryOf, valuesOf, domainOf, coloursOf, vector, cylinder, ball};
+  return {geometryOf, valuesOf, domainOf, coloursOf, outsideOf, vector, cylinder, ball};
 })();

@@ -8,22 +8,24 @@ const SemblanceGuides = (() => {
     return made;
   };
 
-  // compass: a square canvas.
-  const drawCompass = (compass, camera) => {
+  // compass: a square canvas, drawn in its own colour of text.
+  // names: of +x, -x, +y, -y, +z and -z.
+  const HEAD = ['left', 'right', 'back', 'front', 'up', 'down'];
+  const drawCompass = (compass, camera, names = HEAD) => {
     const pen = compass.getContext('2d'), middle = compass.width / 2;
     const turn = camera.quaternion.clone().inverse();
     pen.clearRect(0, 0, compass.width, compass.height);
     pen.font = '20px system-ui, sans-serif';
     pen.textAlign = 'center';
     pen.textBaseline = 'middle';
-    const axes = [['left', 1, 0, 0], ['right', -1, 0, 0], ['front', 0, -1, 0], ['back', 0, 1, 0],
-                  ['up', 0, 0, 1], ['down', 0, 0, -1]]
-        .map(([name, ...to]) => ({name, at: new THREE.Vector3(...to).applyQuaternion(turn)}))
+    const ink = getComputedStyle(compass).color;
+    const axes = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+        .map((to, k) => ({name: names[k], at: new THREE.Vector3(...to).applyQuaternion(turn)}))
         .sort((a, b) => a.at.z - b.at.z);
     for (const {name, at} of axes) {
       const x = middle + 62 * at.x, y = middle - 62 * at.y;
       pen.globalAlpha = at.z > -0.3 ? 1 : 0.3;
-      pen.strokeStyle = pen.fillStyle = '#3b444d';
+      pen.strokeStyle = pen.fillStyle = ink;
       pen.beginPath();
       pen.moveTo(middle, middle);
       pen.lineTo(x, y);
@@ -39,13 +41,23 @@ const SemblanceGuides = (() => {
     bar.style.background = `linear-gradient(to right, ${map.colours.join(',')})`;
     const ticks = element('div', {className: 'view3d-ticks'});
     for (let k = 0; k <= 4; ++k) {
-      const value = low + (high - low) * k / 4, sign = low < 0 && value > 0 ? '+' : '';
-      ticks.append(element('span', {textContent: `${sign}${+value.toFixed(2)}`.replace('-', '\u2212')}));
+      const value = (low + (high - low) * k / 4) * (map.scale || 1), sign = low < 0 && value > 0 ? '+' : '';
+      ticks.append(element('span', {textContent: `${sign}${map.scale ? +value.toPrecision(3) : +value.toFixed(2)}`.replace('-', '\u2212')}));
     }
     const none = element('i', {style: `background:${map.no_data}`});
     return element('div', {className: 'view3d-legend'}, element('div', {textContent: `${map.title} (mm)`}),
                    bar, ticks, element('small', {}, none, 'no data'));
   };
 
-  return {drawCompass, legendOf};
+  // Whether this browser can show the view at all, and words for a reader where it cannot.
+  const canShow = () => {
+    try {
+      const canvas = document.createElement('canvas');
+      return Boolean(canvas.getContext('webgl2') || canvas.getContext('webgl'));
+    } catch (error) {
+      return false;
+    }
+  };
+
+  return {drawCompass, legendOf, canShow};
 })();

@@ -151,6 +151,7 @@ class SemblanceMeasure {
     this.stages = stages;
     this.draw = draw;
     this.box = box;
+    this.digits = Math.max(1, Math.ceil(3 - Math.log10(Math.max(1e-9, box.getSize(new THREE.Vector3()).length()))));
     this.tool = 'none';
     this.marks = [];
     this.pending = null;
@@ -196,9 +197,9 @@ class SemblanceMeasure {
     const straight = start.hit.point.distanceTo(hit.point), same = start.hit.object === hit.object;
     const {length, way} = same ? SemblanceSurface.alongSurface(hit.object.geometry, start.hit, hit)
                                : {length: NaN, way: [start.hit.point, hit.point]};
-    const along = isFinite(length) ? `, along the surface ${length.toFixed(1)} mm`
+    const along = isFinite(length) ? `, along the surface ${length.toFixed(this.digits)} mm`
                                    : same ? ', not joined along the surface' : '';
-    this.mark(stage, hit.point, `${straight.toFixed(1)} mm${along}`, isFinite(length) ? way : [start.hit.point, hit.point]);
+    this.mark(stage, hit.point, `${straight.toFixed(this.digits)} mm${along}`, isFinite(length) ? way : [start.hit.point, hit.point]);
   }
 
   // From bone along its normal to each face that is shown.
@@ -326,7 +327,8 @@ class SemblanceMeasure {
     full.addEventListener('click', () => {
       if (document.fullscreenElement) { document.exitFullscreen(); } else { fullScreenOf.requestFullscreen(); }
     });
-    return [made('div', {className: 'view3d-buttons'}, tool('distance', 'Distance'), tool('depth', 'Depth'),
+    const hasBone = this.stages.some((stage) => !stage.description.axes);  // depth is asked of bone, which heads have
+    return [made('div', {className: 'view3d-buttons'}, tool('distance', 'Distance'), hasBone ? tool('depth', 'Depth') : '',
                  tool('label', 'Pin'), clear, full),
             made('label', {className: 'view3d-choice'}, 'label ', this.text), this.status,
             made('label', {className: 'view3d-choice'}, 'cut ', axis), slider,

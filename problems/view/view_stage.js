@@ -9,7 +9,9 @@ class SemblanceStage {
     this.shared = shared;
     // The buffer is kept so that a picture can be saved at any time.
     this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
-    this.renderer.setClearColor(0xffffff);
+    this.paper();
+    // Dark or light, as the page.
+    window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.paper(); this.draw(); });
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
     this.ray = new THREE.Raycaster();
     this.material = {
@@ -21,6 +23,13 @@ class SemblanceStage {
     this.afterDraw = [];             // called after each picture
     canvas.addEventListener('pointermove', (event) => this.point(event));
     canvas.addEventListener('pointerleave', () => { this.tip.hidden = true; });
+  }
+
+  // The canvas lies on the colour that its style gives it; without one, on white.
+  paper() {
+    const colour = getComputedStyle(this.canvas).backgroundColor;
+    const none = !colour || colour === 'transparent' || colour === 'rgba(0, 0, 0, 0)';
+    this.renderer.setClearColor(new THREE.Color(none ? '#ffffff' : colour));
   }
 
   // Lights go with the camera: what is looked at is lit.
@@ -96,9 +105,9 @@ class SemblanceStage {
         const end = tip.clone().lerp(vector(dowel.on_face), exaggeration);
         parts.push(cylinder(tip, end, 0.7, this.material.residual), ball(end, 0.9, this.material.residual));
       }
-      const residual = dowel.on_face ? `, residual ${dowel.residual_mm.toFixed(2)} mm` : ', not fitted';
+      const residual = dowel.on_face ? `, face ${dowel.residual_mm.toFixed(2)} mm off` : ', not fitted';
       for (const part of parts) {
-        part.userData.text = `dowel ${dowel.site}: depth ${dowel.depth_mm.toFixed(2)} mm${residual}`;
+        part.userData.text = `${dowel.name || `dowel ${dowel.site}`}: depth ${dowel.depth_mm.toFixed(2)} mm${residual}`;
         object.add(part);
       }
     }
@@ -123,11 +132,17 @@ class SemblanceStage {
     this.draw();
   }
 
+  // What a surface is coloured by: {values, map}, or nothing. A difference from another stage goes before its own map.
+  mapOf(layer, mesh) {
+    const {values, difference} = mesh.userData;
+    if (difference && this.shared.difference) { return {values: difference, map: this.description.maps.error}; }
+    return values && (layer.always_mapped || this.shared.mapped) ? {values, map: this.description.maps[layer.map]} : null;
+  }
+
   paint(layer, mesh) {
-    const mapped = mesh.userData.values && (layer.always_mapped || this.shared.mapped);
+    const mapped = this.mapOf(layer, mesh);
     if (mapped) {
-      const map = this.description.maps[layer.map];
-      mesh.geometry.setAttribute('color', SemblanceGeometry.coloursOf(mesh.userData.values, map, this.shared.range_mm));
+      mesh.geometry.setAttribute('color', SemblanceGeometry.coloursOf(mapped.values, mapped.map, this.shared.range_mm));
     }
     // Colours that carry numbers are shown matte.
     mesh.material.specular.set(mapped ? 0x000000 : 0x222222);
@@ -181,9 +196,12 @@ class SemblanceStage {
   textOf(hit) {
     if (hit.object.userData.text) { return hit.object.userData.text; }
     const found = [...this.layers.values()].find(({object}) => object === hit.object);
-    const values = hit.object.userData.values;
+    const difference = this.shared.difference && hit.object.userData.difference;
+    const values = difference || hit.object.userData.values, map = found.layer.map;
     if (!values) { return found.layer.label; }
-    const value = values[hit.face.a], sign = value > 0 && found.layer.map === 'error' ? '+' : '';
+    const value = values[hit.face.a], scale = difference ? 0 : this.description.maps[map].scale;
+    if (scale && !isNaN(value)) { return `${found.layer.label}: ${+(scale * value).toPrecision(3)} mm`; }
+    const sign = value > 0 && (difference || map === 'error') ? '+' : '';
     return `${found.layer.label}: ${isNaN(value) ? 'no value here' : `${sign}${value.toFixed(1)} mm`}`;
   }
 }

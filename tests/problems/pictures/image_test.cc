@@ -9,10 +9,10 @@
 #include <cmath>
 
 #include "problems/pictures/colour_map.h"
-#include "problems/pictures/srgb.h"
 #include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
+#include "surfaces/base/srgb.h"
 
 namespace semblance {
 namespace {

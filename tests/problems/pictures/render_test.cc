@@ -9,9 +9,9 @@
 
 #include "problems/pictures/mesh_primitives.h"
 #include "problems/pictures/pictures.h"
-#include "problems/pictures/srgb.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "surfaces/base/srgb.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {

@@ -8,6 +8,8 @@
 #include <regex>
 
 #include "problems/pictures/image.h"
+#include "problems/plots/escape_html.h"
+#include "problems/report/report_assets.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -24,8 +26,9 @@ ReportImage Picture(std::string alt) {
 Report Full() {
   Report report{.title = "Face of \"A & B\" <1>",
                 .subtitle = "it's one line",
-                .tiles = {{"mean error", "1.84", "mm", "within 2.5 mm: 74 %"}},
+                .notes = {"of <i> note"},
                 .main_images = {Picture("the recovered face")},
+                .tiles = {{"mean error", "1.84", "mm", "within 2.5 mm: 74 %"}},
                 .sections = {},
                 .footer = "Semblance"};
   report.sections.push_back(
@@ -36,7 +39,7 @@ Report Full() {
                    .header = {"site", "depth (mm)", "note"},
                    .rows = {{"g", "5.25", "1st"}, {"n", "-6.5", "x"}, {"go_l", "", "2 > 1"}}}},
        .preformatted = "a: 1\n  b: <2>\n"});
-  report.sections.push_back({.heading = "Inputs"});
+  report.sections.push_back({.heading = "Inputs", .paragraphs = {"for who asks"}, .folded = true});
   return report;
 }
 
@@ -44,15 +47,6 @@ int Count(const std::string& text, const std::string& regex) {
   const std::regex pattern(regex);
   return static_cast<int>(std::distance(std::sregex_iterator(text.begin(), text.end(), pattern),
                                         std::sregex_iterator()));
-}
-
-TEST(Base64, Rfc4648Examples) {
-  EXPECT_EQ(Base64(""), "");
-  EXPECT_EQ(Base64("f"), "Zg==");
-  EXPECT_EQ(Base64("fo"), "Zm8=");
-  EXPECT_EQ(Base64("foo"), "Zm9v");
-  EXPECT_EQ(Base64("foobar"), "Zm9vYmFy");
-  EXPECT_EQ(Base64("\xff\xfe\xfd"), "//79");
 }
 
 TEST(Html, SpecialCharactersAreEscaped) {
@@ -66,7 +60,8 @@ TEST(Html, TextOfTheReportIsEscapedEverywhere) {
                           HasSubstr("<title>Face of &quot;A &amp; B&quot; &lt;1&gt;</title>"),
                           HasSubstr("it&#39;s one line"), HasSubstr("<p>a &lt; b</p>"),
                           HasSubstr("Depths &amp; dowels</h2>"), HasSubstr("b: &lt;2&gt;\n</pre>"),
-                          HasSubstr("<td>2 &gt; 1</td>"), Not(HasSubstr("<b>"))));
+                          HasSubstr(">2 &gt; 1</td>"), HasSubstr("<p>of &lt;i&gt; note</p>"),
+                          Not(HasSubstr("<b>"))));
 }
 
 TEST(Html, EveryImageIsInsideTheFileAndHasAltText) {
@@ -83,7 +78,7 @@ TEST(Html, NeedsNothingElse) {
   const std::string html = ReportHtml(Full());
   EXPECT_EQ(Count(html, "://|url\\(|@import|<script[^>]*src|<link|<iframe"), 0);
   EXPECT_EQ(Count(html, "src=\"(?!data:)"), 0);
-  EXPECT_EQ(Count(html, "href=\"(?!#s)"), 0);
+  EXPECT_EQ(Count(html, "href=\"(?!#)"), 0);
 }
 
 TEST(Html, TagsAreBalanced) {
@@ -95,15 +90,25 @@ TEST(Html, TagsAreBalanced) {
   pugi::xml_document document;
   const pugi::xml_parse_result parsed = document.load_string(xml.c_str());
   EXPECT_TRUE(parsed) << parsed.description() << ": " << xml.substr(parsed.offset, 80);
-  EXPECT_STREQ(document.select_node("//section[1]/h2").node().attribute("id").value(), "s1");
+  EXPECT_STREQ(document.select_node("//section[1]/h2").node().attribute("id").value(), "notes");
+  // Each entry of the contents leads to a heading, and each heading is there.
+  std::vector<std::string> ids, links;
+  for (const auto& heading : document.select_nodes("//h2")) {
+    ids.push_back(std::string("#") + heading.node().attribute("id").value());
+  }
+  for (const auto& link : document.select_nodes("//nav//a")) {
+    links.emplace_back(link.node().attribute("href").value());
+  }
+  EXPECT_EQ(links, ids);
   EXPECT_EQ(document.select_nodes("//tbody/tr").size(), 3u);
 }
 
 TEST(Html, ColumnsOfNumbersAreAlignedRight) {
   const std::string html = ReportHtml(Full());
-  EXPECT_THAT(html, AllOf(HasSubstr("<td class=\"n\">5.25</td>"),
+  EXPECT_THAT(html, AllOf(HasSubstr("<td class=\"n\" data-head=\"depth (mm)\">5.25</td>"),
                           HasSubstr("<th scope=\"col\" class=\"n\">depth (mm)</th>"),
-                          HasSubstr("<td class=\"n\">\u2013</td>"), HasSubstr("<td>1st</td>")));
+                          HasSubstr("<td class=\"n\" data-head=\"depth (mm)\">\u2013</td>"),
+                          HasSubstr("<td data-head=\"note\">1st</td>")));
 }
 
 TEST(Html, SameReportSameBytes) { EXPECT_EQ(ReportHtml(Full()), ReportHtml(Full())); }
@@ -121,11 +126,49 @@ TEST(Html, WrongPartsAreErrors) {
   EXPECT_THROW(ReportImageFromFile("/nowhere/x.png", "", "x"), IoError);
 }
 
-TEST(Html, SvgIsTakenAsSvg) {
+TEST(Html, AnSvgIsPartOfThePage) {
   Report report = Full();
-  report.main_images = {
-      {.bytes = "<?xml version=\"1.0\"?>\n<svg></svg>", .caption = "", .alt = "plot"}};
-  EXPECT_THAT(ReportHtml(report), HasSubstr("data:image/svg+xml;base64,"));
+  report.main_images = {{.bytes = "<?xml version=\"1.0\"?>\n<svg width=\"2\"><circle/></svg>\n",
+                         .caption = "",
+                         .alt = "a \"plot\""}};
+  EXPECT_THAT(ReportHtml(report),
+              HasSubstr("<figure><svg class=\"plot\" role=\"img\" aria-label=\"a "
+                        "&quot;plot&quot;\" width=\"2\"><circle/></svg>"));
+}
+
+TEST(Html, NotesThenPicturesThenTheScoreThenTheRest) {
+  const std::string html = ReportHtml(Full());
+  const std::vector<std::string> order = {"<nav ",
+                                          "id=\"notes\"",
+                                          "alt=\"the recovered face\"",
+                                          "id=\"score\"",
+                                          "class=\"tiles\"",
+                                          "id=\"s1\"",
+                                          "<details class=\"fold\"><summary><h2 id=\"s2\">"};
+  std::size_t at = 0;
+  for (const std::string& part : order) {
+    const std::size_t found = html.find(part, at);
+    ASSERT_NE(found, std::string::npos) << part;
+    at = found;
+  }
+}
+
+TEST(Html, RowsHaveIdsAndLinksThatAreEscaped) {
+  Report report = Full();
+  ReportTable& table = report.sections[0].tables[0];
+  table.ids = {"a\"b", ""};
+  table.links = {"#x", "", "y.html?<"};
+  table.filter = true;
+  EXPECT_THAT(ReportHtml(report),
+              AllOf(HasSubstr("<tr id=\"a&quot;b\"><td data-head=\"site\"><a href=\"#x\">g</a>"),
+                    HasSubstr("<a href=\"y.html?&lt;\">go_l</a>"), HasSubstr("data-filter")));
+}
+
+TEST(Html, WithoutThreeJsThePageSaysSo) {
+  Report report = Full();
+  report.scenes = "{\"scenes\": [], \"blobs\": {}}";
+  EXPECT_THAT(ReportHtml(report),
+              HasSubstr(ThreeScript().empty() ? "built without three.js" : "<noscript>"));
 }
 
 }  // namespace

@@ -45,12 +45,27 @@ addEventListener('load', () => setTimeout(() => {
     box.click();
     out.toggles[box.dataset.layer] *= changed(before, picture(canvases[0])) === 0;
   }
+  // The wheel and one finger belong to the page until the canvas is clicked, and again once the pointer has left.
+  const taken = () => !canvases[0].dispatchEvent(new WheelEvent('wheel', {deltaY: 0, cancelable: true}));
+  const press = (kind) => canvases[0].dispatchEvent(new PointerEvent(kind, {pointerId: 1, clientX: 5, clientY: 5}));
+  canvases[0].setPointerCapture = () => {};
+  out.wheel = [taken()];
+  press('pointerdown');
+  press('pointerup');
+  out.wheel.push(taken());
+  press('pointerleave');
+  out.wheel.push(taken());
+  out.touch = getComputedStyle(canvases[0]).touchAction;
   const choose = (select, value) => { select.value = value; select.dispatchEvent(new Event('change')); };
   const byText = (tag, text) => [...document.querySelectorAll(tag)].find((e) => e.textContent.includes(text));
   let before = picture(canvases[0]);
   choose(byText('.view3d-choice', 'faces by').querySelector('select'), 'error');
   out.coloured = changed(before, picture(canvases[0]));
   out.legend = byText('.view3d-legend', 'true skin').textContent;
+  before = picture(canvases[0]);
+  choose(byText('.view3d-choice', 'faces by').querySelector('select'), 'difference');
+  out.differs = changed(before, picture(canvases[0]));
+  out.differenceLegend = byText('.view3d-legend', 'other view') !== undefined;
   const choices = document.querySelectorAll('.view3d-head select');
   out.different = changed(picture(canvases[0]), picture(canvases[1]));
   choose(choices[1], '0');
@@ -106,25 +121,32 @@ class ReportViewTest : public ::testing::Test {
       GTEST_SKIP() << "there is no chromium here";
     }
   }
+  // What the page's script has written, in a window of this size.
+  nlohmann::json Outcome(const std::string& html, const std::string& size) {
+    WriteFileAtomically(folder_ / "page.html", html);
+    const std::string command = fmt::format(
+        "HOME={0} timeout 120 chromium --headless --no-sandbox --use-gl=angle "
+        "--use-angle=swiftshader --enable-unsafe-swiftshader --user-data-dir={0}/profile "
+        "--window-size={1} --virtual-time-budget=20000 "
+        "--dump-dom file://{0}/page.html > {0}/dom.html 2> {0}/log",
+        folder_.Path().string(), size);
+    EXPECT_EQ(std::system(command.c_str()), 0) << ReadFileBytes(folder_ / "log");
+    const std::string dom = ReadFileBytes(folder_ / "dom.html");
+    const std::size_t at = dom.rfind("<pre id=\"outcome\">");
+    EXPECT_NE(at, dom.npos) << ReadFileBytes(folder_ / "log");
+    return at == dom.npos
+               ? nlohmann::json()
+               : nlohmann::json::parse(dom.substr(at + 18, dom.find("</pre>", at) - at - 18));
+  }
+
   ScratchFolder folder_;
 };
 
 TEST_F(ReportViewTest, RendersTogglesLinksAndSortsWithoutAFault) {
-  WriteFileAtomically(folder_ / "page.html", Page());
-  const std::string command = fmt::format(
-      "HOME={0} timeout 120 chromium --headless --no-sandbox --use-gl=angle "
-      "--use-angle=swiftshader "
-      "--enable-unsafe-swiftshader --user-data-dir={0}/profile --window-size=1400,1800 "
-      "--virtual-time-budget=20000 "
-      "--dump-dom file://{0}/page.html > {0}/dom.html 2> {0}/log",
-      folder_.Path().string());
-  ASSERT_EQ(std::system(command.c_str()), 0) << ReadFileBytes(folder_ / "log");
-  const std::string dom = ReadFileBytes(folder_ / "dom.html");
-  const std::size_t at = dom.rfind("<pre id=\"outcome\">");
-  ASSERT_NE(at, dom.npos) << ReadFileBytes(folder_ / "log");
-  const std::string text = dom.substr(at + 18, dom.find("</pre>", at) - at - 18);
-  const auto out = nlohmann::json::parse(text);
+  const nlohmann::json out = Outcome(Page(), "1400,1800");
   EXPECT_EQ(out["faults"], nlohmann::json::array());
+  EXPECT_EQ(out["wheel"], nlohmann::json({false, true, false}));
+  EXPECT_EQ(out["touch"], "pan-y");
   EXPECT_EQ(out["canvases"], 2);
   EXPECT_GT(out["inked"][0], 5000);
   EXPECT_GT(out["inked"][1], 5000);
@@ -133,11 +155,61 @@ TEST_F(ReportViewTest, RendersTogglesLinksAndSortsWithoutAFault) {
     EXPECT_GT(pixels, 50) << layer;  // hidden or shown, and back again
   }
   EXPECT_GT(out["coloured"], 5000);
+  EXPECT_GT(out["differs"], 5000);
+  EXPECT_EQ(out["differenceLegend"], true);
   EXPECT_GT(out["different"], 1000);
   EXPECT_GT(out["turned"], 5000);
   EXPECT_EQ(out["apart"], 0);  // the same scene twice, one camera
   EXPECT_EQ(out["up"], nlohmann::json({"9.5", "10", "–"}));
   EXPECT_EQ(out["down"], nlohmann::json({"10", "9.5", "–"}));
+}
+
+// A phone: 400 pixels. Tables of many columns are cards, contents and folded parts open on demand.
+constexpr const char* kOnAPhone = R"js(<script>
+addEventListener('load', () => setTimeout(() => {
+  const shown = (node) => node.getClientRects().length > 0;
+  const links = [...document.querySelectorAll('nav a')], fold = document.querySelector('details.fold');
+  const out = {width: innerWidth, contents: links.filter(shown).length, folded: !fold.open};
+  for (const part of document.querySelectorAll('details')) { part.open = true; }
+  out.across = document.documentElement.scrollWidth;
+  out.boxes = [...document.querySelectorAll('.scroll')].filter((box) => box.scrollWidth > box.clientWidth + 1).length;
+  fold.open = false;
+  location.hash = 'row-9';
+  setTimeout(() => {
+    out.opened = fold.open;
+    const filter = document.querySelector('input[type=search]'), rows = [...document.querySelectorAll('tr[id]')];
+    filter.value = 'row 12';
+    filter.dispatchEvent(new Event('input'));
+    out.left = rows.filter((row) => !row.hidden).map((row) => row.id);
+    out.faults = faults;
+    document.body.insertAdjacentHTML('beforeend', '<pre id="outcome">' + JSON.stringify(out) + '</pre>');
+  }, 100);
+}, 0));
+</script>)js";
+
+TEST_F(ReportViewTest, FitsAPhoneAndFindsWhatIsFolded) {
+  Report report;
+  report.title = "a_title_without_a_single_blank_in_it_that_goes_on_and_on_and_on_and_on_and_on";
+  report.notes = {"a note"};
+  report.tiles = {{"mean", "1", "mm", ""}};
+  ReportTable table{"many columns", {"a", "b", "c", "d", "e", "f", "g", "h"}, {}};
+  for (int row = 0; row < 20; ++row) {
+    table.rows.emplace_back(8, fmt::format("row {} of words_that_cannot_be_broken", row));
+    table.ids.push_back(fmt::format("row-{}", row));
+  }
+  table.filter = true;
+  report.sections.push_back({.heading = "open", .preformatted = std::string(300, 'x')});
+  report.sections.push_back({.heading = "folded", .tables = {table}, .folded = true});
+  std::string html = ReportHtml(report);
+  html.insert(html.find("<head>") + 6, kListen);
+  const nlohmann::json out = Outcome(html + kOnAPhone, "400,800");
+  EXPECT_EQ(out["faults"], nlohmann::json::array());
+  EXPECT_LE(out["across"], out["width"]);
+  EXPECT_EQ(out["boxes"], 0);
+  EXPECT_EQ(out["contents"], 0);
+  EXPECT_EQ(out["folded"], true);
+  EXPECT_EQ(out["opened"], true);
+  EXPECT_EQ(out["left"], nlohmann::json({"row-12"}));
 }
 
 }  // namespace

@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/pipeline/experiment_config.h"
-#include "problems/study/study_report.h"
 #include "problems/study/study_run.h"
-#include "problems/study/study_subtables.h"
+#include "problems/study_report/study_report.h"
+#include "problems/study_report/study_subtables.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"

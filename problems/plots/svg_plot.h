@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The plots of a study's report, as SVG files.
+// Plots of one number by row, as SVG files.
 #pragma once
 
 #include <string>
@@ -11,6 +11,7 @@ namespace semblance {
 struct BoxRow {
   std::string label;
   std::vector<double> values;
+  std::vector<std::string> names = {};  // of the values, for the pointer that rests on one; or none
 };
 
 // Boxes side by side over one axis: quartiles, median, whiskers to the last value within 1.5 times

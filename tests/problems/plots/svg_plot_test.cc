@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/report/svg_plot.h"
+#include "problems/plots/svg_plot.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/report/svg_plot.h"
+#include "problems/plots/svg_plot.h"
 
 #include <fmt/format.h>
 
@@ -8,66 +8,18 @@
 #include <cmath>
 
 #include "problems/metrics/statistics.h"
-#include "problems/report/report.h"
+#include "problems/plots/svg_parts.h"
 
 namespace semblance {
 namespace {
 
+using svg::kColours;
+using svg::Line;
+using svg::Open;
+using svg::Shortened;
+using svg::Text;
+
 constexpr double kWidth = 900, kLabels = 330, kRight = 30;
-// Told apart by people who do not see all colours (Okabe & Ito 2008).
-constexpr std::array<const char*, 7> kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                                 "#e69f00", "#56b4e9", "#444444"};
-
-std::string Open(double height) {
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1:.0f}\" width=\"{0}\" "
-      "height=\"{1:.0f}\" font-family=\"system-ui, sans-serif\" font-size=\"14\">\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
-      kWidth, height);
-}
-
-std::string Line(double x1, double y1, double x2, double y2, const char* colour, double width) {
-  return fmt::format(
-      "<line x1=\"{:.2f}\" y1=\"{:.2f}\" x2=\"{:.2f}\" y2=\"{:.2f}\" stroke=\"{}\" "
-      "stroke-width=\"{}\"/>\n",
-      x1, y1, x2, y2, colour, width);
-}
-
-std::string Text(double x, double y, const std::string& text, const char* anchor) {
-  return fmt::format(
-      "<text x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"{}\" fill=\"#1d2126\">{}</text>\n", x, y,
-      anchor, EscapeHtml(text));
-}
-
-// To so many bytes, and no character halved.
-std::string CutTo(const std::string& text, std::size_t most) {
-  if (text.size() <= most) {
-    return text;
-  }
-  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0) == 0x80) {
-    --most;
-  }
-  return text.substr(0, most) + "…";
-}
-
-// What fits beside a plot: each part of a label, between its commas, gets the same room, for what
-// tells them apart stands at their heads.
-std::string Shortened(const std::string& label) {
-  constexpr std::size_t kMost = 40;
-  if (label.size() <= kMost) {
-    return label;
-  }
-  std::vector<std::string> parts;
-  for (std::size_t begin = 0; begin <= label.size();) {
-    const std::size_t end = std::min(label.find(", ", begin), label.size());
-    parts.push_back(label.substr(begin, end - begin));
-    begin = end + 2;
-  }
-  for (std::string& part : parts) {
-    part = CutTo(part, std::max<std::size_t>(kMost / parts.size(), 5) - 2);
-  }
-  return fmt::format("{}", fmt::join(parts, ", "));
-}
 
 // The axis of numbers at the foot of a plot.
 class Axis {
@@ -120,19 +72,20 @@ std::string Box(const BoxRow& row, const Axis& axis, double y) {
       "stroke=\"#0b5c8f\"/>\n",
       axis.At(s.quartile_1), y - 9, axis.At(s.quartile_3) - axis.At(s.quartile_1));
   svg += Line(axis.At(s.median), y - 9, axis.At(s.median), y + 9, "#0b5c8f", 3);
-  for (const double value : row.values) {
-    svg += fmt::format(
-        "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2.5\" fill=\"#1d2126\" fill-opacity=\"0.55\"/>\n",
-        axis.At(value), y);
+  for (std::size_t k = 0; k < row.values.size(); ++k) {
+    const std::string name = k < row.names.size() ? row.names[k] + ": " : "";
+    svg += semblance::svg::Dot(axis.At(row.values[k]), y, 4,
+                               fmt::format("{}{:.6g}", name, row.values[k]));
   }
   return svg;
 }
 
 // The n-th line of a plot: its own colour, dashed where colours come round again.
-std::string Polyline(const std::string& points, std::size_t n) {
-  return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}/>\n",
-                     points, kColours[n % kColours.size()],
-                     n >= kColours.size() ? " stroke-dasharray=\"6 4\"" : "");
+std::string Polyline(const std::string& points, std::size_t n, const std::string& title = "") {
+  return fmt::format(
+      "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"{}>{}</polyline>\n",
+      points, kColours[n % kColours.size()],
+      n >= kColours.size() ? " stroke-dasharray=\"6 4\"" : "", svg::Title(title));
 }
 
 double LegendHeight(const std::vector<BoxRow>& rows) {
@@ -224,8 +177,9 @@ std::string RankPlotSvg(std::vector<RankedLabel> treatments, double critical_dif
       }
       svg += Line(at(rank), y, at(last), y, "#9aa4af", 3);
     }
-    svg += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"6\" fill=\"#0b5c8f\"/>\n", at(rank),
-                       y);
+    svg += fmt::format(
+        "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"6\" fill=\"#0b5c8f\">{}</circle>\n", at(rank), y,
+        semblance::svg::Title(fmt::format("{}: mean rank {:.3f}", treatments[n].label, rank)));
   }
   return svg + "</svg>\n";
 }
@@ -243,7 +197,7 @@ std::string CumulativePlotSvg(const std::vector<BoxRow>& rows, const std::string
                               ShareAt(below / static_cast<double>(values.size())));
       }
     }
-    svg += Polyline(points, n);
+    svg += Polyline(points, n, rows[n].label);
   }
   return svg + LineLegend(rows, kShareLeft, kShareBottom + 68) + "</svg>\n";
 }
@@ -263,7 +217,7 @@ std::string QuantilePlotSvg(const std::vector<BoxRow>& rows, const std::string& 
       const double share = static_cast<double>(k) / static_cast<double>(rows[n].values.size() - 1);
       points += fmt::format("{:.2f},{:.2f} ", axis.At(shown[n].values[k]), ShareAt(share));
     }
-    svg += Polyline(points, n);
+    svg += Polyline(points, n, rows[n].label);
   }
   return svg + LineLegend(rows, kShareLeft, kShareBottom + 68) + "</svg>\n";
 }
@@ -280,7 +234,7 @@ std::string CalibrationPlotSvg(const std::vector<BoxRow>& rows, const std::strin
       points += fmt::format("{:.2f},{:.2f} ", axis.At(stated), ShareAt(rows[n].values[k]));
     }
     points += fmt::format("{:.2f},{:.2f}", axis.At(100), ShareAt(1));
-    svg += Polyline(points, n);
+    svg += Polyline(points, n, rows[n].label);
   }
   return svg + LineLegend(rows, kShareLeft, kShareBottom + 68) + "</svg>\n";
 }
@@ -317,7 +271,7 @@ std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::strin
     for (std::size_t k = 0; k < rows[n].values.size(); ++k) {
       points += fmt::format("{:.2f},{:.2f} ", x(k), y(rows[n].values[k]));
     }
-    svg += Polyline(points, n);
+    svg += Polyline(points, n, rows[n].label);
   }
   return svg + LineLegend(rows, kLeft, kBottom + 68) + "</svg>\n";
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/study/study_report.h"
+#include "problems/study_report/study_report.h"
 
 #include <fmt/format.h>
 
@@ -8,17 +8,22 @@
 #include <string>
 #include <vector>
 
+#include "problems/plots/svg_plot.h"
+#include "problems/report/plain_names.h"
 #include "problems/report/report.h"
 #include "problems/report/scene_json.h"
-#include "problems/report/svg_plot.h"
-#include "problems/study/identify_report.h"
 #include "problems/study/results_sqlite.h"
-#include "problems/study/study_subtables.h"
+#include "problems/study/trial_folder.h"
+#include "problems/study_report/identify_report.h"
+#include "problems/study_report/study_charts.h"
+#include "problems/study_report/study_ranking.h"
+#include "problems/study_report/study_subtables.h"
 
 namespace semblance {
 namespace {
 
 constexpr std::size_t kMostScenes = 40;  // in one list to choose from
+constexpr std::size_t kLongTable = 12;   // rows; longer ones can be filtered
 constexpr int kLeastSubjects = 6;        // two-sided, five subjects cannot reach p < 0.05
 
 std::string IntervalText(const Interval& interval) {
@@ -34,34 +39,26 @@ std::vector<double> ValuesOf(const Treatment& treatment) {
   return values;
 }
 
-double MeanOver(const std::map<std::string, double>& by_subject) {
-  double sum = 0;
-  for (const auto& [subject, value] : by_subject) {
-    sum += value;
-  }
-  return by_subject.empty() ? kNaN : sum / static_cast<double>(by_subject.size());
+std::string Seconds(double seconds) {
+  return std::isfinite(seconds) ? fmt::format("{:.1f}", seconds) : "";
 }
 
-// Best mean first; those without values last.
-std::vector<Treatment> Ranked(std::vector<Treatment> treatments) {
-  std::ranges::stable_sort(treatments, [](const Treatment& a, const Treatment& b) {
-    const double x = MeanOver(a.by_subject), y = MeanOver(b.by_subject);
-    return std::isfinite(x) && (!std::isfinite(y) || x < y);
-  });
-  return treatments;
-}
-
-ReportTable RankingTable(const std::vector<Treatment>& ranked, const std::string& metric) {
-  ReportTable table{
-      fmt::format("Treatments by {}, best mean first", metric),
-      {"treatment", "subjects", "mean", "mean, 95 % interval", "sd", "median", "min", "max"},
-      {}};
+// Each treatment leads to the first of its trials.
+ReportTable RankingTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  ReportTable table{fmt::format("Treatments by {}, best mean first", WordsOfMetric(results.metric)),
+                    {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median",
+                     "min", "max", "mean seconds"},
+                    {}};
   for (const Treatment& treatment : ranked) {
     const SampleSummary s = Summarize(ValuesOf(treatment));
-    table.rows.push_back({treatment.label, std::to_string(s.n), TableNumber(s.mean),
-                          IntervalText(s.mean_95), TableNumber(s.sd), TableNumber(s.median),
-                          TableNumber(s.min), TableNumber(s.max)});
+    table.rows.push_back({treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "",
+                          std::to_string(s.n), TableNumber(s.mean), IntervalText(s.mean_95),
+                          TableNumber(s.sd), TableNumber(s.median), TableNumber(s.min),
+                          TableNumber(s.max), Seconds(MeanSeconds(results, treatment))});
+    table.links.push_back(
+        treatment.trials.empty() ? "" : "#" + TrialAnchor(results.trials[treatment.trials[0]]));
   }
+  table.filter = table.rows.size() > kLongTable;
   return table;
 }
 
@@ -119,15 +116,38 @@ std::vector<std::vector<double>> CompleteTable(const std::vector<Treatment>& tre
   return rows;
 }
 
+// Where all subjects agree, F grows without bound, and no table of F tells how likely that is.
+std::string FriedmanWords(const FriedmanResult& f) {
+  if (!std::isfinite(f.chi2)) {
+    return fmt::format("In all {} subjects the {} treatments have the same value.", f.subjects,
+                       f.treatments);
+  }
+  if (!std::isfinite(f.f)) {
+    const double log10_p = (1 - f.subjects) * std::lgamma(f.treatments + 1.0) / std::log(10.0);
+    return fmt::format(
+        "All {} subjects put the {} treatments in the same order. Were the treatments alike, each "
+        "order would be as likely as any other, and this would happen with a probability of {}.",
+        f.subjects, f.treatments,
+        log10_p > -4 ? fmt::format("{:.2g}", std::pow(10, log10_p))
+                     : fmt::format("10^{:.0f}", std::floor(log10_p)));
+  }
+  return fmt::format(
+      "Over {} subjects and {} treatments: Friedman's chi-square is {:.3f}; in Iman and "
+      "Davenport's form F = {:.3f}, p {}.",
+      f.subjects, f.treatments, f.chi2, f.f,
+      f.p < 1e-12 ? "below 1e-12" : fmt::format("= {:.2g}", f.p));
+}
+
 // Of two treatments or more.
 ReportSection RankSection(const std::vector<Treatment>& ranked) {
   ReportSection section{.heading = "Do the treatments differ?"};
   const auto rows = CompleteTable(ranked);
   if (static_cast<int>(rows.size()) < kLeastSubjects) {
     section.paragraphs = {fmt::format(
-        "{} subjects have a value for all {} treatments. That is too few for a test: at least {} "
+        "{} {} a value for all {} treatments. That is too few for a test: at least {} "
         "subjects are needed. The differences above stand for themselves.",
-        rows.size(), ranked.size(), kLeastSubjects)};
+        rows.empty() ? "No subject" : Counted(static_cast<long long>(rows.size()), "subject"),
+        rows.size() < 2 ? "has" : "have", ranked.size(), kLeastSubjects)};
     return section;
   }
   const FriedmanResult f = Friedman(rows);
@@ -140,27 +160,34 @@ ReportSection RankSection(const std::vector<Treatment>& ranked) {
        "Ranks within each subject, averaged. Treatments that a grey line joins cannot "
        "be told apart at 5 % (Nemenyi).",
        "mean ranks of the treatments with the critical difference"}};
-  section.paragraphs = {fmt::format(
-      "Over {} subjects and {} treatments: Friedman's chi-square is {:.3f}; in Iman and "
-      "Davenport's form F = {:.3f}, p = {:.2g}.",
-      f.subjects, f.treatments, f.chi2, f.f, f.p)};
+  section.paragraphs = {FriedmanWords(f)};
   return section;
 }
 
-ReportSection TrialsSection(const StudyResults& results) {
-  ReportSection section{.heading = "Trials"};
-  section.paragraphs = results.notes;
-  ReportTable table{fmt::format("Every trial, with {}", results.metric),
-                    {"trial", "subject", "treatment", "status", "value", "reason"},
+// A trial leads to its own report, where it was kept, else to what it left.
+std::string TrialLink(const TrialRow& row, const std::filesystem::path& root) {
+  for (const char* file : {"report.html", "trial.json"}) {
+    if (std::filesystem::exists(TrialFolder(root, row.id) / file)) {
+      return fmt::format("trials/{}/{}", row.id, file);
+    }
+  }
+  return "";
+}
+
+ReportSection TrialsSection(const StudyResults& results, const std::filesystem::path& root) {
+  ReportTable table{fmt::format("Every trial, with {}", WordsOfMetric(results.metric)),
+                    {"trial", "subject", "treatment", "status", "value", "seconds", "reason"},
                     {}};
   for (const TrialRow& row : results.trials) {
     const auto value = row.metrics.find(results.metric);
     table.rows.push_back({row.id, row.subject, TreatmentLabel(results.axes, row.values), row.status,
                           value == row.metrics.end() ? "" : TableNumber(value->second),
-                          row.reason});
+                          Seconds(row.wall_s), row.reason});
+    table.ids.push_back(TrialAnchor(row));
+    table.links.push_back(TrialLink(row, root));
   }
-  section.tables = {table};
-  return section;
+  table.filter = table.rows.size() > kLongTable;
+  return {.heading = "Trials", .tables = {table}, .folded = true};
 }
 
 // The mean of one curve of the trials over subjects, point by point, one row per treatment; of
@@ -214,12 +241,12 @@ std::vector<ReportImage> CalibrationPlots(const StudyResults& results,
 }
 
 ReportSection CurvesSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportSection section{.heading = "Errors, convergence, calibration"};
+  ReportSection section{.heading = "Errors, convergence, calibration", .folded = true};
   const auto errors = MeanCurves(results, ranked, &TrialRow::quantiles_mm);
   const auto steps = MeanCurves(results, ranked, &TrialRow::step_rms_mm);
   if (!errors.empty()) {
     section.images.push_back(
-        {QuantilePlotSvg(errors, "distance of the H-spline face from the true skin (mm)"),
+        {QuantilePlotSvg(errors, "distance of the recovered face from the true skin (mm)"),
          "Share of the scored skin within each distance, quantiles averaged over subjects, up to "
          "95 %.",
          "cumulative distribution of the face's error, one line per treatment"});
@@ -237,7 +264,10 @@ ReportSection CurvesSection(const StudyResults& results, const std::vector<Treat
 std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
   std::vector<BoxRow> rows;
   for (const Treatment& treatment : ranked) {
-    rows.push_back({treatment.label, ValuesOf(treatment)});
+    rows.push_back({treatment.label, ValuesOf(treatment), {}});
+    for (const auto& [subject, value] : treatment.by_subject) {
+      rows.back().names.push_back(subject);
+    }
   }
   return rows;
 }
@@ -290,7 +320,8 @@ std::string SceneNote(const StudyResults& results, const SceneCollection& scenes
   return scenes.count == 0 || left == 0
              ? ""
              : fmt::format(
-                   "{} of {} trials are here, best treatments first, subject by subject, to keep "
+                   "{} of {} trials are shown here, best treatments first, subject by subject, to "
+                   "keep "
                    "this file small; each other one can be run by itself from its trial.json.",
                    scenes.count, results.Count("done"));
 }
@@ -310,10 +341,10 @@ std::vector<ReportTile> Tiles(const StudyResults& results, const std::vector<Tre
 
 ReportSection TreatmentsSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportSection section{.heading = "Treatments"};
-  section.tables = {RankingTable(ranked, results.metric)};
+  section.tables = {RankingTable(results, ranked)};
   if (ranked.size() > 1) {
     section.tables.push_back(PairsTable(ranked));
-    section.images = {{CumulativePlotSvg(Boxes(ranked), results.metric),
+    section.images = {{CumulativePlotSvg(Boxes(ranked), WordsOfMetric(results.metric)),
                        "Share of subjects below each value.",
                        "cumulative distribution of the metric, one line per treatment"}};
   }
@@ -333,18 +364,38 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
   if (ranked.size() > 1) {
     sections.push_back(RankSection(ranked));
   }
+  sections.push_back({.heading = "Along each axis", .images = AxisPlots(results, ranked)});
+  sections.push_back({.heading = "Subject by subject", .images = SubjectMap(results, ranked)});
   std::ranges::move(IdentifySections(results, ranked), std::back_inserter(sections));
-  sections.push_back({.heading = "Behind the metric", .tables = Subtables(results, ranked)});
+  sections.push_back(
+      {.heading = "Behind the metric", .tables = Subtables(results, ranked), .folded = true});
   sections.push_back(CurvesSection(results, ranked));
-  sections.push_back({.heading = "Depth maps", .images = maps});
+  sections.push_back({.heading = "Depth maps", .images = maps, .folded = true});
   std::erase_if(sections, [](const ReportSection& section) {
     return section.paragraphs.empty() && section.images.empty() && section.tables.empty();
   });
   return sections;
 }
 
-std::string ReportOf(const StudyResults& results, const SceneCollection& scenes,
-                     const std::vector<ReportImage>& maps) {
+// What is missing or failed stands before what was found.
+std::vector<std::string> Notes(const StudyResults& results) {
+  std::vector<std::string> notes;
+  const int failed = results.Count("failed"), missing = results.Count("missing");
+  if (failed > 0) {
+    notes.push_back(
+        fmt::format("{} failed; the table of trials says why.", Counted(failed, "trial")));
+  }
+  if (missing > 0) {
+    notes.push_back(fmt::format("{} not run yet: what follows may still change.",
+                                Counted(missing, "trial is", "trials are")));
+  }
+  notes.insert(notes.end(), results.notes.begin(), results.notes.end());
+  return notes;
+}
+
+std::string ReportOf(const StudyResults& results, const std::filesystem::path& root) {
+  const SceneCollection scenes = Scenes(results, root);
+  const std::vector<ReportImage> maps = DepthMaps(results, root);
   const std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
   Report report;
   report.title = results.title;
@@ -353,14 +404,15 @@ std::string ReportOf(const StudyResults& results, const SceneCollection& scenes,
       results.axes.empty() ? "subjects alone" : fmt::format("{}", fmt::join(results.axes, ", ")));
   report.tiles = Tiles(results, ranked);
   if (!ranked.empty() && !ranked[0].by_subject.empty()) {
-    report.main_images = {{BoxPlotSvg(Boxes(ranked), results.metric),
+    report.main_images = {{BoxPlotSvg(Boxes(ranked), WordsOfMetric(results.metric)),
                            "One dot per subject; box: quartiles and median.",
                            "box plot of the metric, one row per treatment"}};
   }
   report.sections = MetricSections(results, ranked, maps);
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
-  report.sections.push_back(TrialsSection(results));
+  report.notes = Notes(results);
+  report.sections.push_back(TrialsSection(results, root));
   report.footer = "semblance " SEMBLANCE_VERSION;
   return ReportHtml(report);
 }
@@ -372,8 +424,7 @@ StudyResults WriteStudyTables(OutputFolder& folder) {
   folder.Write("trials.csv", TrialsCsv(results));
   folder.Write("summary.csv", SummaryCsv(results));
   folder.Write("results.sqlite", ResultsSqlite(results));
-  folder.Write("report.html", ReportOf(results, Scenes(results, folder.Root()),
-                                       DepthMaps(results, folder.Root())));
+  folder.Write("report.html", ReportOf(results, folder.Root()));
   return results;
 }
 

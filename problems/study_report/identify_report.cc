@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/study/identify_report.h"
+#include "problems/study_report/identify_report.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <map>
 
 #include "problems/metrics/identification.h"
-#include "problems/report/svg_plot.h"
+#include "problems/plots/svg_plot.h"
 
 namespace semblance {
 namespace {

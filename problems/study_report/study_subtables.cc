@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/study/study_subtables.h"
+#include "problems/study_report/study_subtables.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/plots/heat_map.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "problems/pictures/colour_map.h"
+#include "problems/plots/escape_html.h"
+#include "problems/plots/svg_parts.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kLabels = 250, kRow = 26, kHead = 110, kMostWidth = 900, kWidest = 84;
+constexpr double kRoomForNumber = 40;
+
+struct Limits {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+};
+
+Limits LimitsOf(const HeatMap& map) {
+  Limits limits;
+  for (const auto& row : map.values) {
+    if (row.size() != map.columns.size()) {
+      throw InputError(fmt::format("map '{}': a row has {} values for {} columns", map.title,
+                                   row.size(), map.columns.size()));
+    }
+    for (const double value : row) {
+      if (std::isfinite(value)) {
+        limits = {std::min(limits.low, value), std::max(limits.high, value)};
+      }
+    }
+  }
+  return limits;
+}
+
+// Slanted, so that long names have room.
+std::string ColumnName(double x, const std::string& name) {
+  std::string text = svg::Text(0, 0, svg::Shortened(name), "start");
+  return fmt::format("<g transform=\"translate({:.2f} {:.2f}) rotate(-40)\">{}{}</g>\n", x,
+                     kHead - 8, text, svg::Title(name));
+}
+
+std::string Cell(const HeatMap& map, std::size_t r, std::size_t c, const Limits& limits,
+                 double width) {
+  const double value = map.values[r][c], x = kLabels + width * static_cast<double>(c),
+               y = kHead + kRow * static_cast<double>(r);
+  const std::string where = fmt::format("{} | {}: ", map.rows[r], map.columns[c]);
+  if (!std::isfinite(value)) {
+    return svg::Text(x + width / 2, y + kRow / 2 + 5, "–", "middle");
+  }
+  const double share =
+      limits.high > limits.low ? (value - limits.low) / (limits.high - limits.low) : 0.5;
+  const ColourMap colours = SequentialMap(0, 1);
+  std::string text = fmt::format(
+      "<rect class=\"cell\" x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
+      "fill=\"{}\">{}</rect>\n",
+      x, y, width - 1, kRow - 1, HexText(ColourAt(colours, share)),
+      svg::Title(fmt::format("{}{:.6g}", where, value)));
+  if (width >= kRoomForNumber) {
+    text += fmt::format(
+        "<text class=\"in-cell\" x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"middle\" font-size=\"12\" "
+        "fill=\"{}\" pointer-events=\"none\">{:.3g}</text>\n",
+        x + width / 2, y + kRow / 2 + 4, share > 0.6 ? "#000" : "#fff", value);
+  }
+  const bool leads = r < map.links.size() && c < map.links[r].size() && !map.links[r][c].empty();
+  return leads ? fmt::format("<a href=\"{}\">{}</a>\n", EscapeHtml(map.links[r][c]), text) : text;
+}
+
+}  // namespace
+
+std::string HeatMapSvg(const HeatMap& map) {
+  const Limits limits = LimitsOf(map);
+  const auto columns = static_cast<double>(std::max<std::size_t>(1, map.columns.size()));
+  const double width = std::min(kWidest, (kMostWidth - kLabels - 60) / columns);
+  const double bottom = kHead + kRow * static_cast<double>(map.rows.size());
+  std::string text = svg::Open(bottom + 34, kLabels + width * columns + 60);
+  for (std::size_t c = 0; c < map.columns.size(); ++c) {
+    text += ColumnName(kLabels + width * (static_cast<double>(c) + 0.4), map.columns[c]);
+  }
+  for (std::size_t r = 0; r < map.rows.size(); ++r) {
+    text += svg::Text(kLabels - 10, kHead + kRow * (static_cast<double>(r) + 0.5) + 5,
+                      svg::Shortened(map.rows[r]), "end");
+    for (std::size_t c = 0; c < map.columns.size(); ++c) {
+      text += Cell(map, r, c, limits, width);
+    }
+  }
+  const std::string ends = limits.low <= limits.high ? fmt::format(": {:.4g} dark to {:.4g} yellow",
+                                                                   limits.low, limits.high)
+                                                     : "";
+  return text + svg::Text(kLabels, bottom + 24, map.title + ends, "start") + "</svg>\n";
+}
+
+}  // namespace semblance

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/report/plain_names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <utility>
+
+#include "problems/subject/sites.h"
+
+namespace semblance {
+namespace {
+
+const std::map<std::string_view, std::string_view>& Words() {
+  static const std::map<std::string_view, std::string_view> kWords = {
+      {"areas", "areas between the depth markers"},
+      {"assigned", "bone vertices with a depth"},
+      {"cell_mm", "cell of the grid (mm)"},
+      {"corner_evaluations", "evaluations at cells' corners"},
+      {"crossed_cells", "cells that the surface crosses"},
+      {"decimation_ended_by", "thinning out ended by"},
+      {"decimation_error_mm", "error of thinning out (mm)"},
+      {"dowel_rms_mm", "RMS distance of the depth markers (mm)"},
+      {"dowels", "depth markers"},
+      {"dropped_components", "loose pieces dropped"},
+      {"edge_evaluations", "evaluations along cells' edges"},
+      {"flips", "triangles between markers turned over"},
+      {"flips_prevented", "folds prevented"},
+      {"max_mm", "largest depth (mm)"},
+      {"mean_mm", "mean depth (mm)"},
+      {"min_mm", "smallest depth (mm)"},
+      {"not_facing", "bone vertices that face away from tissue"},
+      {"outside", "bone vertices outside the network"},
+      {"point_rms_mm", "RMS distance of all fitted points (mm)"},
+      {"points", "fitted points"},
+      {"restored_features", "details of eyes, nose and mouth given back"},
+      {"seeds", "extra points taken from the first face"},
+      {"seeds_folded", "extra points left out: folded"},
+      {"seeds_masked", "extra points left out: at eyes, nose and mouth"},
+      {"seeds_missed", "extra points left out: nothing there"},
+      {"sharpest_crease_deg", "sharpest crease between markers (°)"},
+      {"template_scale", "size against the generic face"},
+      {"triangles", "triangles"},
+      {"triangles_dense", "triangles before thinning out"},
+      {"usable", "result can be used"},
+      {"vertices", "bone vertices"},
+  };
+  return kWords;
+}
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kUnits = {
+    {{"_mm", "mm"}, {"_cm2", "cm²"}, {"_cm3", "cm³"}, {"_deg", "°"}, {"_s", "s"}, {"_mm2", "mm²"}}};
+
+// The words of a list of pairs; empty where there are none.
+template <std::size_t N>
+std::string_view Find(const std::array<std::pair<std::string_view, std::string_view>, N>& pairs,
+                      std::string_view key) {
+  const auto found = std::ranges::find(pairs, key, [](const auto& pair) { return pair.first; });
+  return found == pairs.end() ? "" : found->second;
+}
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kMeasures = {
+    {{"rms_mm", "RMS distance (mm)"},
+     {"mean_abs_mm", "mean distance (mm)"},
+     {"median_mm", "median distance (mm)"},
+     {"p95_mm", "95th percentile of the distance (mm)"},
+     {"max_mm", "largest distance (mm)"},
+     {"within_2_5mm", "share within 2.5 mm"},
+     {"mean_signed_mm", "mean signed distance (mm)"}}};
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kOfWhat = {
+    {{"face", "of the recovered face"},
+     {"implicit_face", "of the first face"},
+     {"fit", "of the fit"},
+     {"depth_truth", "of the depths from the true ones"},
+     {"cross_validation", "at markers left out"}}};
+
+// Underscores as blanks, the unit in brackets.
+std::string Spelt(std::string_view key) {
+  std::string words(key), unit;
+  for (const auto& [ending, name] : kUnits) {
+    if (key.ends_with(ending) && key.size() > ending.size()) {
+      words.resize(key.size() - ending.size());
+      unit = fmt::format(" ({})", name);
+    }
+  }
+  std::ranges::replace(words, '_', ' ');
+  return words + unit;
+}
+
+}  // namespace
+
+std::string WordsOfKey(std::string_view key) {
+  const auto found = Words().find(key);
+  return found == Words().end() ? Spelt(key) : std::string(found->second);
+}
+
+std::string WordsOfMetric(std::string_view path) {
+  const std::string_view last = path.substr(path.rfind('.') == path.npos ? 0 : path.rfind('.') + 1);
+  const std::string_view of_what = Find(kOfWhat, path.substr(0, path.find('.')));
+  const std::string_view measure = Find(kMeasures, last);
+  if (of_what.empty() || measure.empty()) {
+    return std::string(path);
+  }
+  return fmt::format("{} {} ({})", measure, of_what, path);
+}
+
+std::string WordsOfSite(std::string_view site) {
+  for (const std::vector<Site>* sites : {&StandardSites(), &FurtherSites()}) {
+    for (const Site& known : *sites) {
+      if (known.code == site) {
+        const bool left = site.ends_with("_l"), right = site.ends_with("_r");
+        return fmt::format("{}{} ({})", known.name, left ? ", left" : right ? ", right" : "", site);
+      }
+    }
+  }
+  return std::string(site);
+}
+
+std::string Counted(long long count, std::string_view noun, std::string_view plural) {
+  return count == 1 ? fmt::format("1 {}", noun)
+                    : fmt::format("{} {}", count,
+                                  plural.empty() ? fmt::format("{}s", noun) : std::string(plural));
+}
+
+}  // namespace semblance

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/study_report/study_ranking.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/report/plain_names.h"
+#include "surfaces/base/geometry.h"
+
+namespace semblance {
+
+double MeanOf(const Treatment& treatment) {
+  double sum = 0;
+  for (const auto& [subject, value] : treatment.by_subject) {
+    sum += value;
+  }
+  const auto count = static_cast<double>(treatment.by_subject.size());
+  return treatment.by_subject.empty() ? kNaN : sum / count;
+}
+
+std::vector<Treatment> Ranked(std::vector<Treatment> treatments) {
+  std::ranges::stable_sort(treatments, [](const Treatment& a, const Treatment& b) {
+    const double x = MeanOf(a), y = MeanOf(b);
+    return std::isfinite(x) && (!std::isfinite(y) || x < y);
+  });
+  return treatments;
+}
+
+double MeanSeconds(const StudyResults& results, const Treatment& treatment) {
+  double sum = 0;
+  int count = 0;
+  for (const std::size_t n : treatment.trials) {
+    if (std::isfinite(results.trials[n].wall_s)) {
+      sum += results.trials[n].wall_s;
+      ++count;
+    }
+  }
+  return count > 0 ? sum / count : kNaN;
+}
+
+std::string RankingText(const StudyResults& results) {
+  constexpr std::size_t kMost = 20;
+  std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
+  std::erase_if(ranked, [](const Treatment& t) { return t.by_subject.empty(); });
+  if (ranked.empty()) {
+    return {};
+  }
+  std::string text = fmt::format("{}, best mean first:\n", WordsOfMetric(results.metric));
+  for (std::size_t n = 0; n < std::min(ranked.size(), kMost); ++n) {
+    const double seconds = MeanSeconds(results, ranked[n]);
+    const auto subjects = static_cast<long long>(ranked[n].by_subject.size());
+    text += fmt::format(
+        "{:>4}  {:>10.4g}  {}{}  {}\n", n + 1, MeanOf(ranked[n]), Counted(subjects, "subject"),
+        std::isfinite(seconds) ? fmt::format(", {:.1f} s", seconds) : "", ranked[n].label);
+  }
+  if (ranked.size() > kMost) {
+    text += fmt::format("      and {} more in summary.csv\n", ranked.size() - kMost);
+  }
+  return text;
+}
+
+}  // namespace semblance

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Which treatment of a study is best, and for how long each trial ran.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "problems/study/study_tables.h"
+
+namespace semblance {
+
+// The metric's mean over subjects; NaN without one.
+double MeanOf(const Treatment& treatment);
+
+// Best mean first; those without values last.
+std::vector<Treatment> Ranked(std::vector<Treatment> treatments);
+
+// The mean wall time of the treatment's trials, of those that say it; NaN if none does. Work that
+// another trial did for one is not in it.
+double MeanSeconds(const StudyResults& results, const Treatment& treatment);
+
+// A line a treatment for a terminal: rank, mean, subjects, seconds and label; the first twenty, and
+// how many more there are. Empty where no trial has a value.
+std::string RankingText(const StudyResults& results);
+
+}  // namespace semblance
