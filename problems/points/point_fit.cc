@@ -12,6 +12,7 @@
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
 #include "problems/metrics/quantile.h"
+#include "problems/points/fit_page.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/residual_files.h"
 #include "problems/report/fit_json.h"
@@ -74,6 +75,13 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
                {"faults", result.Faults()}};
   if (result.fit.automatic) {
     json["automatic"] = AutoJson(*result.fit.automatic);
+  }
+  if (const auto tolerance = ToleranceOf(options, result)) {
+    json["tolerance"] = {{"tolerance_mm", tolerance->tolerance_mm},
+                         {"met", tolerance->Met()},
+                         {"points_beyond", tolerance->beyond},
+                         {"cells", tolerance->cells},
+                         {"cells_on_finest_level", tolerance->at_finest}};
   }
   json.update(StepsToJson(result.fit));
   return json;
@@ -140,6 +148,13 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
   return faults;
 }
 
+std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result) {
+  const auto* adaptive = std::get_if<AdaptivePlan>(&options.fit.plan);
+  return adaptive == nullptr || !result.Faults().empty()
+             ? std::nullopt
+             : std::optional(ToleranceOf(result.fit, adaptive->tolerance_mm, adaptive->finest));
+}
+
 PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
                    const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
@@ -170,6 +185,9 @@ void WritePointFit(const PointFitOptions& options, const PointSource& source,
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
   folder.Write("surface.ply", mesh);
   WriteResiduals(options.residuals, result.fit, folder);
+  if (options.report && result.Faults().empty()) {
+    folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
+  }
   folder.Write("timing.json", TimingJson(result.times));
   folder.Write(
       "result.json",

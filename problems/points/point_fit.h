@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "problems/config/config_errors.h"
 #include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
+#include "problems/points/fit_maps.h"
 #include "problems/points/point_table.h"
 #include "surfaces/base/auto_or.h"
 
@@ -36,6 +38,7 @@ struct PointFitOptions {
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);
   ResidualFile residuals = ResidualFile::kCsv;
+  bool report = true;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PointFitOptions& o) {
@@ -62,6 +65,10 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                   .doc = "what is written of each point: csv: residuals.csv; ply: residuals.ply, "
                          "binary, faster and smaller; none: nothing"},
         o.residuals);
+  visit(FieldInfo{.name = "report",
+                  .doc = "whether report.html is written: the surface, the points' distances and "
+                         "the refinement, as one page"},
+        o.report);
 }
 
 // What the fit's plan, terms and solver cannot do together. Told with the other faults when a
@@ -77,6 +84,9 @@ struct PointFit {
   std::vector<std::string> Faults() const { return FaultsIn(fit); }
 };
 
+// Of an adaptive fit: whether every point is within its tolerance (fit_maps.h).
+std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
+
 // Throws InputError as Parametrise, StartSurface and Fit do, for a closure that does not suit the
 // parameters (a cylinder is periodic, a plane is not), and for a chord so fine against the points'
 // extent that no surface could be written with it.
@@ -84,8 +94,8 @@ PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
                    const RunContext& context);
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
-// surface.hspline.json, surface.ply and timing.json; the same bytes for the same input, timing.json
-// apart. source: what the points came from.
+// surface.hspline.json, surface.ply, report.html and timing.json; the same bytes for the same
+// input, timing.json apart. source: what the points came from.
 struct PointSource {
   std::string name, sha256;
 };

@@ -157,6 +157,9 @@ int FitCommand(const Arguments& arguments) {
   if (result.fit.automatic) {
     fmt::print("{}", AutoText(*result.fit.automatic));
   }
+  if (const auto tolerance = ToleranceOf(options, result)) {
+    fmt::print("{}\n", ToleranceText(*tolerance));
+  }
   fmt::print("folder: {}\n", folder.Root().string());
   return TellFaults(result.Faults());
 }

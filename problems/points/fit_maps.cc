@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/points/fit_maps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "surfaces/hspline/patch_tree.h"
+#include "surfaces/hspline_query/hspline_batch.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kGrid = 141;  // vertices along u and v
+
+// Per point; an outlier is no point of the surface.
+std::vector<char> CountedPoints(const FitResult& fit) {
+  std::vector<char> counted(fit.residual_mm.size(), 1);
+  if (fit.automatic) {
+    for (const std::uint32_t outlier : fit.automatic->outliers) {
+      counted[outlier] = 0;
+    }
+  }
+  return counted;
+}
+
+// Cells along u and v that hold four points each, were they spread evenly; no more than vertices.
+int CellsAcross(std::size_t points) {
+  constexpr int kFewest = 8;
+  return std::clamp(static_cast<int>(std::sqrt(static_cast<double>(points)) / 2), kFewest, kGrid);
+}
+
+// A vertex tells of the points in its cell.
+void AddSquares(const FitResult& fit, FitGrid& grid) {
+  const std::vector<char> counted = CountedPoints(fit);
+  const int across = CellsAcross(fit.uv.size());
+  const auto cell_at = [&](const Vec2& uv) {
+    const auto place = [&](double t) {
+      return std::min(across - 1, static_cast<int>(std::clamp(t, 0.0, 1.0) * across));
+    };
+    return static_cast<std::size_t>(place(uv.y())) * across + place(uv.x());
+  };
+  std::vector<double> sum(static_cast<std::size_t>(across) * across, 0);
+  std::vector<int> count(sum.size(), 0);
+  for (std::size_t k = 0; k < fit.uv.size(); ++k) {
+    if (counted[k] != 0 && fit.uv[k].allFinite()) {
+      const std::size_t cell = cell_at(fit.uv[k]);
+      sum[cell] += fit.residual_mm[k] * fit.residual_mm[k];
+      ++count[cell];
+    }
+  }
+  for (int j = 0; j < grid.rows; ++j) {
+    for (int i = 0; i < grid.columns; ++i) {
+      const std::size_t cell = cell_at({i / (grid.columns - 1.0), j / (grid.rows - 1.0)});
+      grid.rms_mm.push_back(count[cell] > 0 ? std::sqrt(sum[cell] / count[cell]) : kNaN);
+    }
+  }
+}
+
+}  // namespace
+
+FitGrid GridOf(const FitResult& fit, int threads) {
+  FitGrid grid{.columns = kGrid, .rows = kGrid, .mesh = {}, .rms_mm = {}};
+  std::vector<Vec2> uv;
+  for (int j = 0; j < grid.rows; ++j) {
+    for (int i = 0; i < grid.columns; ++i) {
+      uv.emplace_back(i / (grid.columns - 1.0), j / (grid.rows - 1.0));
+    }
+  }
+  grid.mesh.points = HSplineBatch(fit.surface).Points(uv, threads);
+  for (int j = 0; j + 1 < grid.rows; ++j) {
+    for (int i = 0; i + 1 < grid.columns; ++i) {
+      const int a = i + grid.columns * j, b = a + 1, c = a + grid.columns, d = c + 1;
+      grid.mesh.triangles.push_back({a, b, d});
+      grid.mesh.triangles.push_back({a, d, c});
+    }
+  }
+  AddSquares(fit, grid);
+  return grid;
+}
+
+std::vector<FitCell> CellsOf(const FitResult& fit) {
+  const PatchTree tree(fit.surface);
+  const HSplineShape& shape = fit.surface.shape();
+  std::vector<FitCell> cells;
+  for (const PatchId& leaf : tree.leaves()) {
+    const double width = 1.0 / shape.PatchesU(leaf.level),
+                 height = 1.0 / shape.PatchesV(leaf.level);
+    cells.push_back({.level = leaf.level,
+                     .u = leaf.i * width,
+                     .v = leaf.j * height,
+                     .width = width,
+                     .height = height});
+  }
+  const std::vector<char> counted = CountedPoints(fit);
+  for (std::size_t k = 0; k < fit.uv.size(); ++k) {
+    if (counted[k] != 0 && fit.uv[k].allFinite()) {
+      FitCell& cell = cells[static_cast<std::size_t>(tree.LeafAt(tree.IntoDomain(fit.uv[k])))];
+      ++cell.points;
+      cell.sum_squares_mm2 += fit.residual_mm[k] * fit.residual_mm[k];
+      cell.largest_mm = std::max(cell.largest_mm, fit.residual_mm[k]);
+    }
+  }
+  return cells;
+}
+
+ToleranceReport ToleranceOf(const FitResult& fit, double tolerance_mm, int finest) {
+  ToleranceReport report{.tolerance_mm = tolerance_mm};
+  const std::vector<char> counted = CountedPoints(fit);
+  const PatchTree tree(fit.surface);
+  std::set<std::int32_t> cells;
+  for (std::size_t k = 0; k < fit.residual_mm.size(); ++k) {
+    if (counted[k] == 0) {
+      continue;
+    }
+    ++report.points;
+    report.largest_mm = std::max(report.largest_mm, fit.residual_mm[k]);
+    if (!(fit.residual_mm[k] <= tolerance_mm)) {
+      ++report.beyond;
+      cells.insert(tree.LeafAt(tree.IntoDomain(fit.uv[k])));
+    }
+  }
+  report.cells = static_cast<int>(cells.size());
+  report.at_finest = static_cast<int>(std::ranges::count_if(cells, [&](std::int32_t cell) {
+    return tree.leaves()[static_cast<std::size_t>(cell)].level >= finest;
+  }));
+  return report;
+}
+
+std::string ToleranceText(const ToleranceReport& r) {
+  if (r.Met()) {
+    return fmt::format(
+        "the tolerance of {:.4g} mm is met: every one of {} points is within {:.4g} mm",
+        r.tolerance_mm, r.points, r.largest_mm);
+  }
+  std::string text = fmt::format(
+      "THE TOLERANCE WAS MISSED: {} of {} points ({:.2g} %) are farther off than {:.4g} mm, the "
+      "farthest {:.4g} mm; they lie in {} {}",
+      r.beyond, r.points, 100.0 * r.beyond / r.points, r.tolerance_mm, r.largest_mm, r.cells,
+      r.cells == 1 ? "cell" : "cells");
+  if (r.at_finest > 0) {
+    text +=
+        fmt::format("; {} of the finest level that was allowed: a higher fit.plan.finest may help",
+                    r.at_finest);
+  }
+  if (r.at_finest < r.cells) {
+    text += fmt::format("; {} not refined, for want of points: see fit.plan.min_points",
+                        r.cells - r.at_finest);
+  }
+  return text;
+}
+
+}  // namespace semblance

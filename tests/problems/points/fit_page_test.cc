@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/points/fit_page.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "problems/points/fit_maps.h"
+#include "tests/testing/scattered_data.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::AllOf;
+using testing::FrankePoint;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::Scattered;
+
+PointTable Points(int count) {
+  const FitTarget target = Scattered(FrankePoint, count, 1e-3, 1);
+  PointTable table;
+  for (const FitPoint& p : target.points) {
+    table.positions.push_back(p.position);
+    table.uv.push_back(p.uv);
+  }
+  return table;
+}
+
+PointFitOptions Adaptive(double tolerance_mm, int finest) {
+  PointFitOptions options;
+  options.fit.plan = AdaptivePlan{.tolerance_mm = tolerance_mm, .finest = finest};
+  options.patches_u = 2;
+  options.patches_v = 2;
+  return options;
+}
+
+TEST(FitMaps, EveryPointIsInOneCellAndTheCellsCoverTheDomain) {
+  const PointFit fit = FitPoints(Points(2000), Adaptive(0.01, 3), {});
+  double area = 0;
+  long points = 0;
+  for (const FitCell& cell : CellsOf(fit.fit)) {
+    area += cell.width * cell.height;
+    points += cell.points;
+  }
+  EXPECT_NEAR(area, 1, 1e-12);
+  EXPECT_EQ(points, 2000);
+}
+
+TEST(FitMaps, TheGridIsTheSurfaceAndHoldsTheDistances) {
+  const PointFit fit = FitPoints(Points(2000), Adaptive(0.01, 3), {});
+  const FitGrid grid = GridOf(fit.fit, 1);
+  const int i = 30, j = 77;
+  const Vec2 uv(i / (grid.columns - 1.0), j / (grid.rows - 1.0));
+  EXPECT_LT((grid.mesh.points[i + grid.columns * j] - fit.fit.surface.Point(uv)).norm(), 1e-12);
+  double largest = 0;
+  for (const double value : grid.rms_mm) {
+    largest = std::isnan(value) ? largest : std::max(largest, value);
+  }
+  EXPECT_LE(largest, *std::ranges::max_element(fit.fit.residual_mm));
+  EXPECT_GT(largest, fit.fit.point_rms_mm);
+}
+
+TEST(FitMaps, AMissedToleranceIsSaidWithWhatMayHelp) {
+  const PointFit coarse = FitPoints(Points(2000), Adaptive(0.004, 0), {});
+  const ToleranceReport missed = ToleranceOf(coarse.fit, 0.004, 0);
+  const auto beyond =
+      std::ranges::count_if(coarse.fit.residual_mm, [](double r) { return r > 0.004; });
+  EXPECT_EQ(missed.beyond, beyond);
+  EXPECT_GT(missed.beyond, 0);
+  EXPECT_EQ(missed.at_finest, missed.cells);
+  EXPECT_THAT(ToleranceText(missed), AllOf(HasSubstr("THE TOLERANCE WAS MISSED"),
+                                           HasSubstr("of 2000 points"), HasSubstr("finest")));
+  const ToleranceReport met = ToleranceOf(coarse.fit, 10, 0);
+  EXPECT_TRUE(met.Met());
+  EXPECT_THAT(ToleranceText(met), HasSubstr("is met"));
+}
+
+TEST(FitPage, SaysWhatWasMissedAndEscapesWhatItIsGiven) {
+  const PointFitOptions options = Adaptive(0.004, 0);
+  const PointFit fit = FitPoints(Points(500), options, {});
+  const PointSource source{"<b>hostile</b>.csv", "0123"};
+  const std::string html = FitPageHtml(options, source, fit, 2);
+  EXPECT_THAT(html,
+              AllOf(HasSubstr("THE TOLERANCE WAS MISSED"), HasSubstr("id=\"notes\""),
+                    HasSubstr("&lt;b&gt;hostile&lt;/b&gt;.csv"), Not(HasSubstr("<b>hostile"))));
+  EXPECT_LT(html.find("<p>THE TOLERANCE"), html.find("id=\"s1\""));
+  EXPECT_EQ(html, FitPageHtml(options, source, fit, 1));  // whatever the number of threads
+}
+
+}  // namespace
+}  // namespace semblance
