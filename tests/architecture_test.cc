@@ -62,7 +62,7 @@ const std::map<std::string, Layers> kRooms = {
       {"pipeline", "plots", "propose"},
       {kHall},
       {"report"},
-      {"command_line", "points", "study", "workbench"},
+      {"command_line", "exports", "points", "study", "workbench"},
       {"study_report"},
       {"program", "python"}}},
 };

@@ -5,22 +5,16 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cmath>
 #include <cstdint>
 #include <map>
-#include <nlohmann/json.hpp>
-#include <optional>
 #include <utility>
 
-#include "surfaces/base/srgb.h"
 #include "surfaces/base/atomic_file.h"
-#include "surfaces/base/error.h"
+#include "surfaces/mesh_files/glb.h"
 
 namespace semblance {
 namespace {
 
-using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr std::array<double, 3> kSkinColour = {0.85, 0.65, 0.54};
@@ -128,152 +122,24 @@ std::vector<Piece> PiecesOf(const Bust& bust, const BustModel& model) {
   return pieces;
 }
 
-// ---------------------------------------------------------------------------------------------
-// glTF
-// ---------------------------------------------------------------------------------------------
+GlbPart PartOf(const Piece& piece) {
+  return {.material = {.name = piece.name,
+                       .colour = piece.colour,
+                       .roughness = piece.roughness,
+                       .texture = piece.texture.empty() ? "" : ReadFileBytes(piece.texture)},
+          .points = piece.points,
+          .normals = piece.normals,
+          .uv = piece.uv,
+          .triangles = piece.triangles};
+}
 
-// From LPS to glTF's axes: +z up becomes +y up, the face looks along +z.
-Eigen::Vector3f ToGltf(const Vec3& v) { return Vec3(v.x(), v.z(), -v.y()).cast<float>(); }
-
-class GlbWriter {
- public:
-  std::string Write(const std::vector<Piece>& pieces) {
-    json_["asset"] = {{"version", "2.0"}, {"generator", "semblance"}};
-    json_["scene"] = 0;
-    json_["scenes"] = Json::array({{{"nodes", {0}}}});
-    json_["nodes"] = Json::array({{{"mesh", 0}, {"name", "bust"}}});
-    Json primitives = Json::array();
-    for (const Piece& piece : pieces) {
-      primitives.push_back(Primitive(piece));
-    }
-    json_["meshes"] = Json::array({{{"primitives", primitives}}});
-    json_["buffers"] = Json::array({{{"byteLength", binary_.size()}}});
-    return Bytes();
+std::string BustGlb(const Bust& bust, const BustModel& model) {
+  GlbNode node{.name = "bust"};
+  for (const Piece& piece : PiecesOf(bust, model)) {
+    node.parts.push_back(PartOf(piece));
   }
-
- private:
-  Json Primitive(const Piece& piece) {
-    Json attributes = {{"POSITION", Positions(piece.points)}, {"NORMAL", Normals(piece.normals)}};
-    if (!piece.uv.empty()) {
-      std::string bytes;
-      for (const Vec2& uv : piece.uv) {
-        Append(bytes, static_cast<float>(uv.x()));
-        Append(bytes, static_cast<float>(1 - uv.y()));  // glTF's v goes down
-      }
-      attributes["TEXCOORD_0"] = Accessor(bytes, kFloat, piece.uv.size(), "VEC2", kVertices);
-    }
-    std::string bytes;
-    for (const Triangle& t : piece.triangles) {
-      for (const std::int32_t corner : t) {
-        Append(bytes, static_cast<std::uint32_t>(corner));
-      }
-    }
-    const int indices = Accessor(bytes, kUnsigned, 3 * piece.triangles.size(), "SCALAR", kIndices);
-    return {{"attributes", attributes}, {"indices", indices}, {"material", Material(piece)}};
-  }
-
-  int Positions(const std::vector<Vec3>& points) {
-    std::string bytes;
-    Eigen::AlignedBox3f box;
-    for (const Vec3& point : points) {
-      const Eigen::Vector3f p = ToGltf(point / 1000);
-      box.extend(p);
-      Append(bytes, p);
-    }
-    const int accessor = Accessor(bytes, kFloat, points.size(), "VEC3", kVertices);
-    json_["accessors"][accessor]["min"] = {box.min().x(), box.min().y(), box.min().z()};
-    json_["accessors"][accessor]["max"] = {box.max().x(), box.max().y(), box.max().z()};
-    return accessor;
-  }
-
-  int Normals(const std::vector<Vec3>& normals) {
-    std::string bytes;
-    for (const Vec3& normal : normals) {
-      Append(bytes, ToGltf(normal.isZero() ? -Vec3::UnitY() : normal));  // glTF allows no zero
-    }
-    return Accessor(bytes, kFloat, normals.size(), "VEC3", kVertices);
-  }
-
-  int Material(const Piece& piece) {
-    const auto& c = piece.colour;
-    Json look = {
-        {"baseColorFactor", {LinearFromSrgb(c[0]), LinearFromSrgb(c[1]), LinearFromSrgb(c[2]), 1}},
-        {"metallicFactor", 0},
-        {"roughnessFactor", piece.roughness}};
-    if (!piece.texture.empty()) {
-      look["baseColorFactor"] = {1, 1, 1, 1};
-      look["baseColorTexture"] = {{"index", Texture(piece.texture)}};
-    }
-    json_["materials"].push_back({{"name", piece.name}, {"pbrMetallicRoughness", look}});
-    return static_cast<int>(json_["materials"].size()) - 1;
-  }
-
-  int Texture(const fs::path& file) {
-    if (const auto known = textures_.find(file); known != textures_.end()) {
-      return known->second;
-    }
-    std::string ending = file.extension().string();
-    std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
-    const int view = View(ReadFileBytes(file), std::nullopt);
-    json_["images"].push_back(
-        {{"bufferView", view}, {"mimeType", ending == ".png" ? "image/png" : "image/jpeg"}});
-    json_["textures"].push_back({{"source", json_["images"].size() - 1}});
-    return textures_[file] = static_cast<int>(json_["textures"].size()) - 1;
-  }
-
-  int View(const std::string& bytes, std::optional<int> target) {
-    Json view = {{"buffer", 0}, {"byteOffset", binary_.size()}, {"byteLength", bytes.size()}};
-    if (target) {
-      view["target"] = *target;
-    }
-    binary_ += bytes;
-    binary_.append((4 - binary_.size() % 4) % 4, '\0');
-    json_["bufferViews"].push_back(view);
-    return static_cast<int>(json_["bufferViews"].size()) - 1;
-  }
-
-  int Accessor(const std::string& bytes, int component, std::size_t count, const char* type,
-               int target) {
-    json_["accessors"].push_back({{"bufferView", View(bytes, target)},
-                                  {"componentType", component},
-                                  {"count", count},
-                                  {"type", type}});
-    return static_cast<int>(json_["accessors"].size()) - 1;
-  }
-
-  // glTF's numbers are little-endian whatever the machine.
-  static void Append(std::string& bytes, std::uint32_t value) {
-    for (int k = 0; k < 4; ++k) {
-      bytes += static_cast<char>(value >> (8 * k) & 0xff);
-    }
-  }
-  static void Append(std::string& bytes, float value) {
-    Append(bytes, std::bit_cast<std::uint32_t>(value));
-  }
-  static void Append(std::string& bytes, const Eigen::Vector3f& v) {
-    for (const float x : {v.x(), v.y(), v.z()}) {
-      Append(bytes, x);
-    }
-  }
-
-  std::string Bytes() const {
-    std::string text = json_.dump();
-    text.append((4 - text.size() % 4) % 4, ' ');
-    std::string bytes = "glTF";
-    Append(bytes, std::uint32_t{2});
-    Append(bytes, static_cast<std::uint32_t>(12 + 8 + text.size() + 8 + binary_.size()));
-    Append(bytes, static_cast<std::uint32_t>(text.size()));
-    bytes += "JSON" + text;
-    Append(bytes, static_cast<std::uint32_t>(binary_.size()));
-    bytes.append("BIN\0", 4);
-    return bytes + binary_;
-  }
-
-  static constexpr int kFloat = 5126, kUnsigned = 5125, kVertices = 34962, kIndices = 34963;
-  Json json_;
-  std::string binary_;
-  std::map<fs::path, int> textures_;
-};
+  return EncodeGlb({&node, 1});
+}
 
 // ---------------------------------------------------------------------------------------------
 // OBJ
@@ -320,7 +186,7 @@ std::pair<std::string, std::string> ObjAndMtl(const Bust& bust, const BustModel&
 }  // namespace
 
 std::vector<NamedBytes> BustToFiles(const Bust& bust, const BustModel& model) {
-  std::vector<NamedBytes> files = {{"bust.glb", GlbWriter().Write(PiecesOf(bust, model))}};
+  std::vector<NamedBytes> files = {{"bust.glb", BustGlb(bust, model)}};
   auto [obj, mtl] = ObjAndMtl(bust, model);
   files.push_back({"bust.obj", std::move(obj)});
   if (!mtl.empty()) {

@@ -11,12 +11,12 @@
 
 #include "problems/config/config.h"
 #include "problems/edits/edit_script.h"
+#include "problems/exports/export_file.h"
 #include "problems/face_template/template_io.h"
 #include "problems/prior/hspline_prior.h"
 #include "problems/program/exit_code.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
@@ -74,7 +74,9 @@ int Edit(const FaceArguments& a) {
 int Export(const FaceArguments& a) {
   RefuseToReplace(a.out, a);
   const std::string bytes =
-      EncodeFace(ReadHSpline(a.face), fs::path(a.out).extension().string(), a.chord_mm, a.threads);
+      ExportedBytes(a.face, {.extension = fs::path(a.out).extension().string(),
+                             .chord_mm = a.chord_mm,
+                             .threads = a.threads});
   WriteFileAtomically(a.out, bytes);
   fmt::print("{}: {} bytes\n", a.out, bytes.size());
   return kDone;
@@ -192,10 +194,16 @@ void DeclareEdit(CLI::App& edit, CommandLine& line) {
 
 void DeclareExport(CLI::App& to, CommandLine& line) {
   FaceArguments& a = *Bind(to, line, &Export);
-  AddFace(to, a);
-  to.add_option("--to", a.out, "file; exact: .vtu .step .iges, triangles: .glb .ply .obj .off .stl")
+  to.add_option("FROM", a.face,
+                "an H-spline (.json), a mesh (.ply .obj .off .stl) or the folder of a run")
       ->required();
-  to.add_option("--chord_mm", a.chord_mm, "how far a triangle may be from the surface [0.1]")
+  to.add_option("--to", a.out,
+                "file; of an H-spline exact: .vtu .step .iges, triangles: .glb .vtp .ply .obj .off "
+                ".stl; of a mesh with its values: .vtp .vtu .ply, colours: .glb, shape: .obj .off "
+                ".stl; of a run: .glb with skull, face and dowels")
+      ->required();
+  to.add_option("--chord_mm", a.chord_mm,
+                "how far a triangle of an H-spline may be from the surface [0.1]")
       ->check(Finite());
   to.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
       ->check(CLI::Range(1, 1024));
@@ -281,7 +289,7 @@ void DeclareFeature(CLI::App& feature, CommandLine& line) {
 
 constexpr std::array kCommands = {
     ProgramCommand{"edit", "move vertices of an H-spline face as a script says", &DeclareEdit},
-    ProgramCommand{"export", "write an H-spline face for other programs", &DeclareExport},
+    ProgramCommand{"export", "write a face, a mesh or a run for other programs", &DeclareExport},
     ProgramCommand{"prior", "put the modes of a face model onto the H-spline of its mean",
                    &DeclarePrior},
     ProgramCommand{"feature", "carry detail from one face to another (thesis 4.3)",

@@ -16,6 +16,7 @@
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/curvature.h"
 #include "surfaces/mesh_files/mesh_io.h"
+#include "surfaces/mesh_files/vtk_xml.h"
 
 namespace semblance {
 namespace {
@@ -56,9 +57,12 @@ std::string TriangleBytes(const HSplineSurface& surface, const std::string& exte
     return TessellationToGlb(tessellation);
   }
   MeshAttributes attributes;
-  if (extension == ".ply") {
+  if (extension == ".ply" || extension == ".vtp") {
     attributes.scalars = CurvatureScalars(surface, tessellation.uv, threads);
     attributes.normals = std::move(tessellation.normals);
+  }
+  if (extension == ".vtp") {
+    return EncodeVtp(tessellation.mesh, attributes);
   }
   return EncodeMesh(tessellation.mesh, extension, attributes);
 }
@@ -68,7 +72,7 @@ std::string TriangleBytes(const HSplineSurface& surface, const std::string& exte
 std::string EncodeFace(const HSplineSurface& surface, const std::string& given,
                        std::optional<double> chord_mm, int threads) {
   const std::set<std::string> exact = {".vtu", ".step", ".stp", ".iges", ".igs"},
-                              triangles = {".glb", ".ply", ".obj", ".off", ".stl"};
+                              triangles = {".glb", ".vtp", ".ply", ".obj", ".off", ".stl"};
   const std::string extension = LowerCase(given);
   if (exact.contains(extension)) {
     if (chord_mm) {
@@ -81,7 +85,7 @@ std::string EncodeFace(const HSplineSurface& surface, const std::string& given,
   if (!triangles.contains(extension)) {
     throw InputError(
         fmt::format("export: '{}' is no format; the file's name must end in .vtu .step .stp .iges "
-                    ".igs .glb .ply .obj .off or .stl",
+                    ".igs .glb .vtp .ply .obj .off or .stl",
                     given));
   }
   constexpr double kChord_mm = 0.1;

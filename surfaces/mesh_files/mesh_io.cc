@@ -79,18 +79,6 @@ void AppendVector(std::string& bytes, const Vec3& v) {
   }
 }
 
-void CheckAttributes(const TriMesh& mesh, const MeshAttributes& attributes) {
-  const auto fits = [&](std::size_t size) { return size == 0 || size == mesh.points.size(); };
-  bool all_fit = fits(attributes.normals.size()) && fits(attributes.colors.size());
-  for (const VertexScalar& scalar : attributes.scalars) {
-    all_fit = all_fit && scalar.values.size() == mesh.points.size();
-  }
-  if (!all_fit) {
-    throw InputError(fmt::format(
-        "mesh attributes: each needs one entry for each of the {} vertices", mesh.points.size()));
-  }
-}
-
 std::string PlyHeader(const TriMesh& mesh, const MeshAttributes& attributes) {
   std::string header = "ply\nformat binary_little_endian 1.0\ncomment units mm, frame LPS\n";
   header += fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
@@ -162,6 +150,18 @@ std::string EncodeThroughOpenMesh(const TriMesh& mesh, const std::string& extens
 
 }  // namespace
 
+void CheckAttributes(std::size_t vertices, const MeshAttributes& attributes) {
+  const auto fits = [&](std::size_t size) { return size == 0 || size == vertices; };
+  bool all_fit = fits(attributes.normals.size()) && fits(attributes.colors.size());
+  for (const VertexScalar& scalar : attributes.scalars) {
+    all_fit = all_fit && scalar.values.size() == vertices;
+  }
+  if (!all_fit) {
+    throw InputError(
+        fmt::format("mesh attributes: each needs one entry for each of the {} vertices", vertices));
+  }
+}
+
 TriMesh ReadMesh(const std::filesystem::path& path) {
   const std::string name = path.string(), extension = LowerExtension(path);
   CheckExtension(extension, name);
@@ -183,7 +183,7 @@ TriMesh ReadMesh(const std::filesystem::path& path) {
 std::string EncodeMesh(const TriMesh& mesh, const std::string& extension,
                        const MeshAttributes& attributes) {
   CheckExtension(extension, "mesh");
-  CheckAttributes(mesh, attributes);
+  CheckAttributes(mesh.points.size(), attributes);
   return extension == ".ply" ? EncodePly(mesh, attributes) : EncodeThroughOpenMesh(mesh, extension);
 }
 

@@ -2,13 +2,11 @@
 // Meshes in files: PLY, OBJ, STL and OFF, in mm.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "surfaces/mesh/tri_mesh.h"
+#include "surfaces/mesh_files/mesh_attributes.h"
 
 namespace semblance {
 
@@ -19,17 +17,6 @@ namespace semblance {
 // unknown extension, empty) or InputError (no triangles, or anything in the file that is not of its
 // format), naming the file and the line or byte. Memory follows the file's size, not its claims.
 TriMesh ReadMesh(const std::filesystem::path& path);
-
-// What a PLY may carry beside the shape; each vector is empty or has one entry per vertex.
-struct VertexScalar {
-  std::string name;            // MeshLab shows "quality"; CloudCompare any "scalar_..."
-  std::vector<double> values;  // NaN where there is no data
-};
-struct MeshAttributes {
-  std::vector<Vec3> normals;
-  std::vector<std::array<std::uint8_t, 3>> colors;
-  std::vector<VertexScalar> scalars;
-};
 
 // The bytes of a mesh file. extension: ".ply" (binary little-endian, float coordinates, all
 // attributes), or ".obj", ".stl", ".off" through OpenMesh (shape only). Throws InputError for

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -204,6 +205,92 @@ std::string Names(const PlyElement& element) {
   return names.size() > kLongest ? names.substr(0, kLongest) + "..." : names;
 }
 
+// Where each property of a vertex goes.
+struct PlyPlaces {
+  std::optional<std::array<std::size_t, 3>> normal, colour;
+  std::vector<std::size_t> scalars;
+};
+
+// The properties of these names, all plain.
+std::optional<std::array<std::size_t, 3>> FindThree(const PlyElement& vertex,
+                                                    const std::array<std::string, 3>& names) {
+  std::array<std::size_t, 3> three;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto found = FindProperty(vertex, names[k]);
+    if (!found || vertex.properties[*found].length_type) {
+      return std::nullopt;
+    }
+    three[k] = *found;
+  }
+  return three;
+}
+
+PlyPlaces PlacesOf(const PlyElement& vertex) {
+  PlyPlaces places{.normal = FindThree(vertex, {"nx", "ny", "nz"}),
+                   .colour = FindThree(vertex, {"red", "green", "blue"}),
+                   .scalars = {}};
+  if (places.colour && std::ranges::any_of(*places.colour, [&](std::size_t k) {
+        return vertex.properties[k].type != PlyType::kUint8;
+      })) {
+    places.colour.reset();
+  }
+  const auto is_of = [](const std::optional<std::array<std::size_t, 3>>& three, std::size_t k) {
+    return three && std::ranges::find(*three, k) != three->end();
+  };
+  for (std::size_t k = 0; k < vertex.properties.size(); ++k) {
+    const PlyProperty& property = vertex.properties[k];
+    const bool is_axis = property.name == "x" || property.name == "y" || property.name == "z";
+    if (!is_axis && !property.length_type && !is_of(places.normal, k) && !is_of(places.colour, k)) {
+      places.scalars.push_back(k);
+    }
+  }
+  return places;
+}
+
+// One row of values as the attributes of a vertex.
+void AppendVertex(const std::vector<double>& row, const PlyPlaces& places,
+                  MeshAttributes& attributes) {
+  if (places.normal) {
+    const auto& n = *places.normal;
+    attributes.normals.emplace_back(row[n[0]], row[n[1]], row[n[2]]);
+  }
+  if (places.colour) {
+    const auto byte = [&](std::size_t k) { return static_cast<std::uint8_t>(row[k]); };
+    const auto& c = *places.colour;
+    attributes.colors.push_back({byte(c[0]), byte(c[1]), byte(c[2])});
+  }
+  for (std::size_t k = 0; k < places.scalars.size(); ++k) {
+    attributes.scalars[k].values.push_back(row[places.scalars[k]]);
+  }
+}
+
+template <class Data>
+MeshAttributes ReadAttributesData(Data data, const PlyHeader& header, const PlyElement& vertex) {
+  const PlyPlaces places = PlacesOf(vertex);
+  MeshAttributes attributes;
+  for (const std::size_t k : places.scalars) {
+    attributes.scalars.push_back({vertex.properties[k].name, {}});
+  }
+  std::vector<double> row(vertex.properties.size());
+  for (const PlyElement& element : header.elements) {
+    const bool is_vertex = &element == &vertex;
+    ForEachValue(
+        data, element,
+        [&](std::int64_t, std::size_t k, double value) {
+          if (is_vertex) {
+            row[k] = value;
+          }
+        },
+        [&](std::int64_t) {
+          if (is_vertex) {
+            AppendVertex(row, places, attributes);
+          }
+        });
+  }
+  data.End();
+  return attributes;
+}
+
 }  // namespace
 
 TriMesh ReadPly(std::string_view bytes, const std::string& name) {
@@ -228,6 +315,14 @@ std::vector<double> PlyVertexScalar(std::string_view bytes, const std::string& s
   return header.format == PlyFormat::kText
              ? ReadScalar(PlyTextData(bytes, header, name), header, vertex, *found)
              : ReadScalar(PlyBinaryData(bytes, header, name), header, vertex, *found);
+}
+
+MeshAttributes ReadPlyAttributes(std::string_view bytes, const std::string& name) {
+  PlyHeader header = ReadPlyHeader(bytes, name);
+  const PlyElement& vertex = FindElement(header, "vertex", name);
+  return header.format == PlyFormat::kText
+             ? ReadAttributesData(PlyTextData(bytes, header, name), header, vertex)
+             : ReadAttributesData(PlyBinaryData(bytes, header, name), header, vertex);
 }
 
 }  // namespace semblance

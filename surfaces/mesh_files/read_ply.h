@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "surfaces/mesh/tri_mesh.h"
+#include "surfaces/mesh_files/mesh_attributes.h"
 
 namespace semblance {
 
@@ -22,5 +23,10 @@ TriMesh ReadPly(std::string_view bytes, const std::string& name);
 // InputError as ReadPly, and if a vertex has no such property or it is a list.
 std::vector<double> PlyVertexScalar(std::string_view bytes, const std::string& scalar,
                                     const std::string& name);
+
+// All that the vertices carry beside x, y, z: nx, ny, nz as normals, where all three are there;
+// red, green, blue as colours, where all three are of type uchar; every other plain property as a
+// scalar of its own name, in the file's order. Lists are not kept. Throws InputError as ReadPly.
+MeshAttributes ReadPlyAttributes(std::string_view bytes, const std::string& name);
 
 }  // namespace semblance

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/mesh_files/glb.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using Json = nlohmann::json;
+
+GlbPart Triangle1(const std::string& material) {
+  return {.material = {.name = material, .colour = {1, 0.5, 0}},
+          .points = {{0, 0, 0}, {1000, 0, 0}, {0, 2000, 3000}},
+          .normals = {{0, -2, 0}, {0, 0, 0}, {1, 0, 0}},
+          .triangles = {{0, 1, 2}}};
+}
+
+struct Read {
+  Json json;
+  std::string binary;
+};
+
+template <class T>
+T At(const std::string& bytes, std::size_t offset) {
+  T value;
+  std::memcpy(&value, bytes.data() + offset, sizeof(T));
+  return value;
+}
+
+Read Parse(const std::string& glb) {
+  EXPECT_EQ(glb.substr(0, 4), "glTF");
+  EXPECT_EQ(At<std::uint32_t>(glb, 8), glb.size());
+  const std::size_t length = At<std::uint32_t>(glb, 12);
+  return {Json::parse(glb.substr(20, length)), glb.substr(28 + length)};
+}
+
+// The numbers of an accessor, of type T.
+template <class T>
+std::vector<T> Numbers(const Read& read, const Json& accessor) {
+  const Json& a = read.json["accessors"][accessor.get<int>()];
+  const Json& view = read.json["bufferViews"][a["bufferView"].get<int>()];
+  std::vector<T> numbers(view["byteLength"].get<std::size_t>() / sizeof(T));
+  std::memcpy(numbers.data(), read.binary.data() + view["byteOffset"].get<std::size_t>(),
+              numbers.size() * sizeof(T));
+  return numbers;
+}
+
+TEST(Glb, NodesHaveTheirNamesAndMaterials) {
+  const std::vector<GlbNode> nodes = {
+      {.name = "skull", .parts = {Triangle1("bone")}},
+      {.name = "dowels",
+       .children = {{.name = "dowel g", .parts = {Triangle1("rod")}},
+                    {.name = "dowel \"n\"", .parts = {Triangle1("rod")}}}}};
+  const Json json = Parse(EncodeGlb(nodes)).json;
+  EXPECT_EQ(json["scenes"][0]["nodes"], Json({0, 1}));
+  EXPECT_EQ(json["nodes"][1]["children"], Json({2, 3}));
+  EXPECT_FALSE(json["nodes"][1].contains("mesh"));
+  EXPECT_EQ(json["nodes"][3]["name"], "dowel \"n\"");
+  EXPECT_EQ(json["meshes"][json["nodes"][0]["mesh"].get<int>()]["name"], "skull");
+  ASSERT_EQ(json["materials"].size(), 2u);  // the rods share one
+  EXPECT_EQ(json["materials"][1]["name"], "rod");
+}
+
+TEST(Glb, PointsAreInMetresWithTheFaceTowardsZ) {
+  const GlbNode node{.name = "n", .parts = {Triangle1("m")}};
+  const Read read = Parse(EncodeGlb({&node, 1}));
+  const Json& attributes = read.json["meshes"][0]["primitives"][0]["attributes"];
+  EXPECT_EQ(Numbers<float>(read, attributes["POSITION"]),
+            (std::vector<float>{0, 0, 0, 1, 0, 0, 0, 3, -2}));
+  // Of length one; where there is none, forwards.
+  EXPECT_EQ(Numbers<float>(read, attributes["NORMAL"]),
+            (std::vector<float>{0, 0, 1, 0, 0, 1, 1, 0, 0}));
+  const Json& position = read.json["accessors"][attributes["POSITION"].get<int>()];
+  EXPECT_EQ(position["min"], Json({0.0, 0.0, -2.0}));
+  EXPECT_EQ(position["max"], Json({1.0, 3.0, 0.0}));
+}
+
+TEST(Glb, ColoursAreLinear) {
+  GlbNode node{.name = "n", .parts = {Triangle1("m")}};
+  node.parts[0].colours = {{0, 128, 255}, {10, 20, 30}, {0, 0, 0}};
+  const Read read = Parse(EncodeGlb({&node, 1}));
+  const Json& colour = read.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"];
+  EXPECT_EQ(read.json["accessors"][colour.get<int>()]["normalized"], true);
+  const auto shorts = Numbers<std::uint16_t>(read, colour);
+  ASSERT_EQ(shorts.size(), 12u);
+  EXPECT_EQ(shorts[0], 0);
+  EXPECT_NEAR(shorts[1] / 65535.0, 0.2158605, 1e-5);  // of 128, IEC 61966-2-1
+  EXPECT_EQ(shorts[2], 65535);
+  EXPECT_EQ(shorts[3], 65535);
+  EXPECT_NEAR(shorts[4] / 65535.0, 10 / 255.0 / 12.92, 1e-5);
+}
+
+TEST(Glb, WhatGlTfCannotHoldIsRefused) {
+  const auto refuses = [](GlbPart part) {
+    const GlbNode node{.name = "n", .parts = {std::move(part)}};
+    EXPECT_THROW(EncodeGlb({&node, 1}), InputError);
+  };
+  GlbPart part = Triangle1("m");
+  part.triangles.clear();
+  refuses(part);
+  part = Triangle1("m");
+  part.normals.pop_back();
+  refuses(part);
+  part = Triangle1("m");
+  part.colours = {{1, 2, 3}};
+  refuses(part);
+}
+
+}  // namespace
+}  // namespace semblance
