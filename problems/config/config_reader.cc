@@ -146,6 +146,19 @@ void ReadInteger(ConfigErrors& errors, const ConfigItem& item, Integer& out) {
   }
 }
 
+// Where a run's folder was moved to another machine, the whole paths in its resolved.yaml lead
+// nowhere; a file of the same name that lies beside it is meant then.
+std::filesystem::path FoundPath(const std::filesystem::path& folder, const std::string& text) {
+  const std::filesystem::path named = std::filesystem::absolute(folder / text).lexically_normal();
+  const std::filesystem::path beside =
+      std::filesystem::absolute(folder / named.filename()).lexically_normal();
+  std::error_code ignored;
+  const bool moved = std::filesystem::path(text).is_absolute() &&
+                     !std::filesystem::exists(named, ignored) &&
+                     std::filesystem::exists(beside, ignored);
+  return moved ? beside : named;
+}
+
 }  // namespace
 
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, bool& out) {
@@ -213,7 +226,7 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::p
   } else {
     const auto& source = item.node.place.source;
     const std::filesystem::path folder = source ? source->folder : std::filesystem::path();
-    out = std::filesystem::absolute(folder / text).lexically_normal();
+    out = FoundPath(folder, text);
   }
 }
 

@@ -7,9 +7,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "problems/config/spelling_suggestion.h"
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/config_samples.h"
+#include "tests/testing/scratch_folder.h"
 
 namespace semblance {
 namespace {
@@ -266,6 +269,24 @@ TEST(NearestWord, CountsEditsAndSwaps) {
   const std::vector<std::string> known = {"thesis", "split", "flat"};
   EXPECT_EQ(NearestWord("splt", known), "split");
   EXPECT_EQ(NearestWord("voronoi", known), "");
+}
+
+// A run's folder that was sent to somebody: what went in lies beside resolved.yaml.
+TEST(Config, AWholePathThatLeadsNowhereIsAFileBesideThisOne) {
+  const testing::ScratchFolder folder;
+  const std::filesystem::path file = folder / "resolved.yaml";
+  const auto skull = [&](const std::filesystem::path& named) {
+    WriteFileAtomically(file, fmt::format("skull: {}\n", named.string()));
+    return ReadConfig<Options>(file).skull;
+  };
+  EXPECT_EQ(skull("/elsewhere/heads/skull.ply"), "/elsewhere/heads/skull.ply");
+  WriteFileAtomically(folder / "skull.ply", "ply");
+  EXPECT_EQ(skull("/elsewhere/heads/skull.ply"), folder / "skull.ply");
+  // A file that is there is taken as it is named, and so is a path that is not whole.
+  std::filesystem::create_directories(folder / "heads");
+  EXPECT_EQ(skull("heads/skull.ply"), folder / "heads/skull.ply");
+  WriteFileAtomically(folder / "heads/skull.ply", "ply");
+  EXPECT_EQ(skull(folder / "heads/skull.ply"), folder / "heads/skull.ply");
 }
 
 }  // namespace
