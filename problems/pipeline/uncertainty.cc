@@ -61,8 +61,14 @@ std::int32_t NearestCorner(const TriMesh& shell, const MeshPoint& at) {
   });
 }
 
-std::vector<DepthBehind> DepthsBehind(const FitTarget& target, const DepthStage& stage,
-                                      std::span<const Dowel> dowels, const RunContext& context) {
+// The deviations of surface_matern hold what lies between dowels, too, which kriging states here.
+bool StatesDowelsAlone(const Experiment& experiment) {
+  return !std::holds_alternative<SurfaceMatern>(experiment.interp);
+}
+
+std::vector<DepthBehind> DepthsBehind(const Experiment& experiment, const FitTarget& target,
+                                      const DepthStage& stage, std::span<const Dowel> dowels,
+                                      const RunContext& context) {
   const MeshQuery shell(stage.shell);
   std::vector<DepthBehind> depths(target.points.size());
   ParallelFor(depths.size(), context.threads, 64, [&](std::size_t k) {
@@ -75,7 +81,7 @@ std::vector<DepthBehind> DepthsBehind(const FitTarget& target, const DepthStage&
     }
     const MeshPoint at = shell.Closest(point.position);
     const std::int32_t corner = NearestCorner(stage.shell, at);
-    const double stated = stage.depth.sd_mm[corner];
+    const double stated = StatesDowelsAlone(experiment) ? stage.depth.sd_mm[corner] : kNaN;
     depths[k] = {at.position, std::isfinite(stated) ? stated : SdNear(dowels, at.position),
                  stage.depth.depth_mm[corner]};
   });
@@ -152,7 +158,7 @@ PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
   const std::vector<Dowel> dowels = WithSd(stage.dowels_on_shell, experiment);
   const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network,
                          stage.expected_on_shell};
-  const std::vector<DepthBehind> depths = DepthsBehind(target, stage, dowels, context);
+  const std::vector<DepthBehind> depths = DepthsBehind(experiment, target, stage, dowels, context);
   Eigen::MatrixXd covariance = DepthErrors(experiment, input, depths, result, context);
   PointErrors errors;
   std::vector<double> laid_mm;  // seeds alone

@@ -173,6 +173,17 @@ TEST(Experiment, ASchemeCanBeSetByItsTypeAlone) {
       set("interp: {type: kriging}", {"interp.type=natural_neighbour"})));
 }
 
+TEST(Experiment, AMeanOfATableIsForDepthsThatAreNotTheTables) {
+  for (const std::string scheme : {"kriging", "surface_matern"}) {
+    const std::string interp = fmt::format("interp: {{type: {}, mean: table}}\n", scheme);
+    EXPECT_THAT(Faults(interp), HasSubstr("interp.mean: the depths are the table's own"));
+    EXPECT_THAT(Faults(interp + "tissue: {depths: measured}\n"),
+                HasSubstr("interp.mean: `table` takes the mean depths of tissue.table"));
+    const std::string both = interp + "tissue: {depths: measured, table: a.yaml}\n";
+    EXPECT_NO_THROW(ReadConfigText<Experiment>(both, "a.yaml"));
+  }
+}
+
 TEST(Experiment, TheLevelsOfATemplateFromFilesAreThoseOfItsSurface) {
   const testing::ScratchFolder folder;
   const FileTemplate files = WriteTemplate(folder.Path(), MakeTemplateFace({.max_level = 1}));
