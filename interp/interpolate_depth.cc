@@ -1,28 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/interpolate_depth.h"
 
+#include <algorithm>
 #include <type_traits>
 
 namespace semblance {
-namespace {
-
-template <class Scheme>
-bool GoesAlong(const Scheme& scheme) {
-  if constexpr (requires { scheme.distance == DowelDistance::kGeodesic; }) {
-    if (scheme.distance == DowelDistance::kGeodesic) {
-      return true;
-    }
-  }
-  if constexpr (requires { scheme.mean == DepthMean::kCovariates; }) {
-    if (scheme.mean == DepthMean::kCovariates) {
-      return true;
-    }
-  }
-  return std::is_same_v<Scheme, SurfaceMatern> || std::is_same_v<Scheme, Harmonic> ||
-         std::is_same_v<Scheme, Biharmonic>;
-}
-
-}  // namespace
 
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run) {
@@ -31,23 +13,48 @@ DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
 }
 
 bool NeedsSurface(const DepthScheme& scheme) {
-  return std::visit([](const auto& options) { return GoesAlong(options); }, scheme);
+  return std::visit(
+      [](const auto& options) {
+        using Scheme = std::decay_t<decltype(options)>;
+        if constexpr (std::is_same_v<Scheme, AutoScheme>) {
+          return std::ranges::any_of(options.schemes, SingleNeedsSurface);
+        } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
+          return false;
+        } else {
+          return SingleNeedsSurface(options);
+        }
+      },
+      scheme);
 }
 
 bool NeedsExpected(const DepthScheme& scheme) {
   return std::visit(
       [](const auto& options) {
-        if constexpr (requires { options.mean == DepthMean::kTable; }) {
-          return options.mean == DepthMean::kTable;
+        using Scheme = std::decay_t<decltype(options)>;
+        if constexpr (std::is_same_v<Scheme, AutoScheme>) {
+          return std::ranges::any_of(options.schemes, SingleNeedsExpected);
+        } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
+          return false;
+        } else {
+          return SingleNeedsExpected(options);
         }
-        return false;
       },
       scheme);
 }
 
 bool NeedsNetwork(const DepthScheme& scheme) {
-  return std::holds_alternative<Barycentric>(scheme) ||
-         std::holds_alternative<NetworkSpline>(scheme);
+  return std::visit(
+      [](const auto& options) {
+        using Scheme = std::decay_t<decltype(options)>;
+        if constexpr (std::is_same_v<Scheme, AutoScheme>) {
+          return std::ranges::all_of(options.schemes, SingleNeedsNetwork);
+        } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
+          return false;
+        } else {
+          return SingleNeedsNetwork(options);
+        }
+      },
+      scheme);
 }
 
 }  // namespace semblance

@@ -1,29 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // From a few depths to a depth at every vertex of a skull. A new scheme is one options struct with
-// its overload of InterpolateDepth in a file of its own, and one entry of the variant.
+// its overload of InterpolateDepth in a file of its own, and one entry of SingleScheme.
 #pragma once
 
+#include <utility>
 #include <variant>
 
-#include "interp/kriging/kriging.h"
-#include "interp/kriging/surface_matern.h"
-#include "interp/schemes/barycentric.h"
-#include "interp/schemes/biharmonic.h"
 #include "interp/schemes/depth_map.h"
-#include "interp/schemes/harmonic.h"
-#include "interp/schemes/inverse_distance.h"
-#include "interp/schemes/mean.h"
-#include "interp/schemes/moving_least_squares.h"
-#include "interp/schemes/natural_neighbour.h"
-#include "interp/schemes/nearest.h"
-#include "interp/schemes/network_spline.h"
-#include "interp/schemes/radial_basis.h"
+#include "interp/stacking/auto_scheme.h"
+#include "interp/stacking/single_scheme.h"
 
 namespace semblance {
 
-using DepthScheme = std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis,
-                                 MovingLeastSquares, Kriging, SurfaceMatern, Harmonic, Biharmonic,
-                                 NaturalNeighbour, NetworkSpline, DepthMap>;
+// Each scheme by itself, then what is made of several, and last what is no scheme.
+template <class... Single>
+std::variant<Single..., AutoScheme, DepthMap> WithTheRest(const std::variant<Single...>&);
+using DepthScheme = decltype(WithTheRest(std::declval<SingleScheme>()));
 
 // One entry per vertex. Where the status is kAssigned the depth is finite and within the range of
 // the dowels' depths (without a scheme's `clamp`: above 0; depth_map's are the map's); elsewhere it

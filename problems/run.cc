@@ -70,7 +70,7 @@ std::optional<TruthComparison> Measure(const Experiment& experiment, const Skull
   truth.face = CompareFaces(skin, truth.skin.region, face, context);
   truth.details = MeasureDetails(skin, truth.skin, subject.basis, face, context);
   truth.implicit = CompareFaces(skin, truth.skin.region, skull.implicit.mesh, context);
-  truth.depth = CompareDepths(experiment, *skull.depth_stage, context);
+  truth.depth = CompareDepths(experiment, *skull.depth_stage, skull.depth_stage->depth, context);
   if (uncertainty && experiment.uncertainty.sigma) {
     truth.sigma = MeasureCoverage({skin, truth.face.signed_mm, truth.skin.region.part}, face,
                                   uncertainty->sigma_mm, masks, context);

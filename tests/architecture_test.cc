@@ -44,7 +44,7 @@ const std::map<std::string, Layers> kRooms = {
       {"decimate", "emitters", "hspline_query", "marching", "mesh_files"},
       {"hspline_files", "implicit"},
       {kHall}}},
-    {"interp", {{"dowels"}, {"on_surface"}, {"kriging"}, {"schemes"}, {kHall}, {"evaluation"}}},
+    {"interp", {{"dowels"}, {"on_surface"}, {"kriging"}, {"schemes"}, {"stacking"}, {kHall}, {"evaluation"}}},
     {"fitting",
      {{"least_squares", "problem"},
       {"shape_model", "space"},

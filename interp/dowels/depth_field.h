@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
@@ -16,11 +17,18 @@ enum class DepthStatus : std::uint8_t {
   kNotFacing,  // in an area, but on bone that faces away from its dowels (inner table, far side)
 };
 
-// All vectors have one entry per vertex.
+// What one scheme counts in an average of several.
+struct SchemeShare {
+  std::string scheme;
+  double weight = kNaN;  // 0..1
+};
+
+// All vectors but the last have one entry per vertex.
 struct DepthField {
   std::vector<double> depth_mm;  // NaN where there is none: such a vertex does not emit
   std::vector<DepthStatus> status;
-  std::vector<double> sd_mm;  // NaN where the scheme knows none
+  std::vector<double> sd_mm;             // NaN where the scheme knows none
+  std::vector<SchemeShare> shares = {};  // of sum 1; empty where one scheme alone was asked for
 };
 
 }  // namespace semblance

@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "interp/dowels/left_out_dowels.h"
+#include "interp/evaluation/scores.h"
 #include "interp/interpolate_depth.h"
 #include "interp/schemes/outside_rule.h"
+#include "interp/stacking/sd_by_distance.h"
 
 namespace semblance {
-
-// Indices of dowels that are left out together.
-using Folds = std::vector<std::vector<std::size_t>>;
 
 // A site's left and right (suffixes _l and _r) together: its twin tells much of a left-out dowel.
 Folds EachLandmark(std::span<const Dowel> dowels);
@@ -28,7 +28,8 @@ struct LeftOut {
   double depth_mm = kNaN;      // the dowel's
   double predicted_mm = kNaN;  // at its base, without it; NaN where scheme and rule give none
   double error_mm = kNaN;      // predicted less the dowel's
-  double sd_mm = kNaN;         // that the scheme states there; NaN where it states none
+  double sd_mm = kNaN;         // the scheme's own there; else by distance, from the other folds
+  double nearest_mm = kNaN;    // from its base to the nearest dowel that was shown
   DepthStatus status = DepthStatus::kOutside;  // kAssigned: the scheme's; else the rule's
   std::optional<bool> within_90;  // is |error| at most 1.645 sd_mm? none without error or sd
 };
@@ -43,16 +44,21 @@ struct CrossValidation {
   double most_mm = kNaN;         // largest absolute error
   std::vector<double> coverage;  // of those with a stated sd_mm (calibration.h)
   double coverage_90 = kNaN;     // its share at 90 %; 0.9 where the sd is true
+  DepthScores scores;            // where the scheme itself answers
+  DepthScores scores_with_rule;  // and where the outside rule does
+  bool own_sd = false;           // does the scheme state an sd of its own?
+  SdByDistance sd;               // learned from all folds; of a scheme without one
 };
 
-// Leaves each fold out, with the network's areas at its dowels, and asks at the left-out bases, as
-// if the bone there faced along the dowel's direction. Schemes that need the skull's surface are
-// solved on all of it once per fold and asked at the nearest corner of the closest triangle. Where
-// a scheme on the network is left without an area, the rule alone answers. Folds on run.threads
-// threads; no result depends on them. Throws InputError as CheckDepthInput, if a fold names a dowel
-// that is not there or leaves none, and what the scheme throws without the fold's dowels; Cancelled
-// if stopped.
+// Leaves each fold out, as LeaveOut (stacking/leave_out.h). Where the scheme states no sd_mm of its
+// own at any dowel, that of a fold is learned from what was missed in the other folds
+// (sd_by_distance.h). Throws as LeaveOut.
 CrossValidation CrossValidate(const DepthScheme& scheme, const OutsideRule& rule,
                               const DepthInput& input, const Folds& folds, const RunContext& run);
+
+// The field with the sd_mm of `known` at each vertex with a depth, by the distance to the nearest
+// dowel, where the scheme states none of its own; else as it is.
+DepthField WithStatedSd(DepthField field, const CrossValidation& known, const DepthInput& input,
+                        const RunContext& run);
 
 }  // namespace semblance

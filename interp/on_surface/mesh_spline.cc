@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "interp/on_surface/mesh_laplacian.h"
 #include "interp/on_surface/mesh_solver.h"
@@ -77,25 +78,11 @@ class Spline {
   }
 
   std::vector<double> Solve(const std::vector<DepthSample>& samples, const RunContext& run) const {
-    const Eigen::Index n = Size();
-    const Eigen::MatrixXd kernel = Centred(Kernel(run));
-    const std::vector<int> used = UsedPieces();
-    const auto tail = static_cast<Eigen::Index>(used.size());
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + tail, n + tail);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(n + tail);
-    matrix.topLeftCorner(n, n) = kernel;
-    const double spread = kernel.diagonal().mean(), scale = spread > 0 ? spread : 1;
-    const double softness = std::max(options_.softness, kLeastSoftness) * scale;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      matrix(i, i) += softness;
-      const auto at = std::ranges::find(used, means_[i].piece) - used.begin();
-      matrix(i, n + at) = matrix(n + at, i) = scale;
-      right[i] = samples[i].depth_mm;
-    }
-    const Eigen::VectorXd pull = Eigen::PartialPivLU<Eigen::MatrixXd>(matrix).solve(right).head(n);
-    const Eigen::VectorXd varying = Varying(Combined(pull));
-    const Eigen::VectorXd constants =
-        MeanByPiece(right.head(n) - softness * pull - LocalMeansOf(varying));
+    std::vector<Eigen::Index> all(means_.size());
+    std::iota(all.begin(), all.end(), 0);
+    const Pulls pulls = PullsOf(Kernel(run), samples, all);
+    const Eigen::VectorXd varying = Varying(Combined(pulls.pull));
+    const Eigen::VectorXd constants = MeanByPiece(pulls.met - LocalMeansOf(varying), PiecesOf(all));
     std::vector<double> values(pieces_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = constants[pieces_[i]] + varying[static_cast<Eigen::Index>(i)];
@@ -103,7 +90,91 @@ class Spline {
     return values;
   }
 
+  // The local means of the function that is not shown these samples. kernel: S of all.
+  std::vector<double> ValuesWithout(const std::vector<std::size_t>& fold,
+                                    const std::vector<DepthSample>& samples,
+                                    const Eigen::MatrixXd& kernel) const {
+    std::vector<Eigen::Index> shown;
+    for (std::size_t k = 0; k < means_.size(); ++k) {
+      if (std::ranges::find(fold, k) == fold.end()) {
+        shown.push_back(static_cast<Eigen::Index>(k));
+      }
+    }
+    const Eigen::MatrixXd between = kernel(shown, shown);
+    const Pulls pulls = PullsOf(between, samples, shown);
+    const Eigen::VectorXd constants =
+        MeanByPiece(pulls.met - between * pulls.pull, PiecesOf(shown));
+    std::vector<double> values;
+    for (const std::size_t i : fold) {
+      const Eigen::RowVectorXd to_shown = kernel(static_cast<Eigen::Index>(i), shown);
+      values.push_back(constants[means_[i].piece] + to_shown.dot(pulls.pull));
+    }
+    return values;
+  }
+
+  // S, but for what centring takes off.
+  Eigen::MatrixXd Kernel(const RunContext& run) const {
+    const Eigen::Index n = Size();
+    const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMostHeld;
+    Eigen::MatrixXd held(inner_product ? laplacian_.area_mm2.size() : 0, n), kernel(n, n);
+    const std::size_t blocks = (means_.size() + kSolvedTogether - 1) / kSolvedTogether;
+    ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
+      run.ThrowIfStopped();
+      const auto first = static_cast<Eigen::Index>(block * kSolvedTogether);
+      const Eigen::Index count = std::min<Eigen::Index>(kSolvedTogether, n - first);
+      const Eigen::MatrixXd right =
+          Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count));
+      if (inner_product) {
+        held.middleCols(first, count) = HalfVarying(right);
+      } else {
+        kernel.middleCols(first, count) = LocalMeansOf(Varying(right));
+      }
+    });
+    return inner_product ? Products(held) : kernel;
+  }
+
  private:
+  // Of the local means that are shown: the l_i, and the means that the function is to have.
+  struct Pulls {
+    Eigen::VectorXd pull, met;
+  };
+
+  // between: S of the shown ones.
+  Pulls PullsOf(const Eigen::MatrixXd& between, const std::vector<DepthSample>& samples,
+                const std::vector<Eigen::Index>& shown) const {
+    const Eigen::Index n = std::ssize(shown);
+    const std::vector<int> pieces = PiecesOf(shown);
+    const Eigen::MatrixXd kernel = Centred(between, pieces);
+    const std::vector<int> used = Distinct(pieces);
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + std::ssize(used), n + std::ssize(used));
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(matrix.rows());
+    matrix.topLeftCorner(n, n) = kernel;
+    const double spread = kernel.diagonal().mean(), scale = spread > 0 ? spread : 1;
+    const double softness = std::max(options_.softness, kLeastSoftness) * scale;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      matrix(i, i) += softness;
+      const auto at = std::ranges::find(used, pieces[i]) - used.begin();
+      matrix(i, n + at) = matrix(n + at, i) = scale;
+      right[i] = samples[shown[i]].depth_mm;
+    }
+    const Eigen::VectorXd pull = Eigen::PartialPivLU<Eigen::MatrixXd>(matrix).solve(right).head(n);
+    return {pull, right.head(n) - softness * pull};
+  }
+
+  std::vector<int> PiecesOf(const std::vector<Eigen::Index>& shown) const {
+    std::vector<int> pieces;
+    for (const Eigen::Index k : shown) {
+      pieces.push_back(means_[k].piece);
+    }
+    return pieces;
+  }
+
+  static std::vector<int> Distinct(std::vector<int> pieces) {
+    std::ranges::sort(pieces);
+    pieces.erase(std::unique(pieces.begin(), pieces.end()), pieces.end());
+    return pieces;
+  }
+
   Eigen::Index Size() const { return static_cast<Eigen::Index>(means_.size()); }
 
   // The stiffness with one vertex per piece held, which changes no solution but for a constant.
@@ -177,24 +248,25 @@ class Spline {
     return at;
   }
 
-  // Over the local means of each piece, of one value per local mean; NaN on pieces without any.
-  Eigen::VectorXd MeanByPiece(const Eigen::VectorXd& of_mean) const {
+  // Over the local means of each piece, of one value per local mean, whose pieces are given; NaN on
+  // pieces without any.
+  Eigen::VectorXd MeanByPiece(const Eigen::VectorXd& of_mean, const std::vector<int>& piece) const {
     const auto count = static_cast<Eigen::Index>(piece_area_.size());
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(count), members = sum;
-    for (Eigen::Index k = 0; k < Size(); ++k) {
-      sum[means_[k].piece] += of_mean[k];
-      ++members[means_[k].piece];
+    for (Eigen::Index k = 0; k < of_mean.size(); ++k) {
+      sum[piece[k]] += of_mean[k];
+      ++members[piece[k]];
     }
     return sum.cwiseQuotient(members);
   }
 
   // S without the means, piece by piece, of its columns and then of its rows.
-  Eigen::MatrixXd Centred(Eigen::MatrixXd matrix) const {
+  Eigen::MatrixXd Centred(Eigen::MatrixXd matrix, const std::vector<int>& piece) const {
     for (int side = 0; side < 2; ++side) {
-      for (Eigen::Index c = 0; c < Size(); ++c) {
-        const Eigen::VectorXd mean = MeanByPiece(matrix.col(c));
-        for (Eigen::Index r = 0; r < Size(); ++r) {
-          matrix(r, c) -= mean[means_[r].piece];
+      for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
+        const Eigen::VectorXd mean = MeanByPiece(matrix.col(c), piece);
+        for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+          matrix(r, c) -= mean[piece[r]];
         }
       }
       matrix.transposeInPlace();
@@ -202,40 +274,9 @@ class Spline {
     return matrix;
   }
 
-  // S, but for what centring takes off.
-  Eigen::MatrixXd Kernel(const RunContext& run) const {
-    const Eigen::Index n = Size();
-    const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMostHeld;
-    Eigen::MatrixXd held(inner_product ? laplacian_.area_mm2.size() : 0, n), kernel(n, n);
-    const std::size_t blocks = (means_.size() + kSolvedTogether - 1) / kSolvedTogether;
-    ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
-      run.ThrowIfStopped();
-      const auto first = static_cast<Eigen::Index>(block * kSolvedTogether);
-      const Eigen::Index count = std::min<Eigen::Index>(kSolvedTogether, n - first);
-      const Eigen::MatrixXd right =
-          Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count));
-      if (inner_product) {
-        held.middleCols(first, count) = HalfVarying(right);
-      } else {
-        kernel.middleCols(first, count) = LocalMeansOf(Varying(right));
-      }
-    });
-    return inner_product ? Products(held) : kernel;
-  }
-
   // Twice the Laplacian makes an inner product of half-way functions: half of the solves.
   Eigen::MatrixXd Products(const Eigen::MatrixXd& half_way) const {
     return half_way.transpose() * laplacian_.area_mm2.asDiagonal() * half_way;
-  }
-
-  std::vector<int> UsedPieces() const {
-    std::vector<int> used;
-    for (const LocalMean& mean : means_) {
-      used.push_back(mean.piece);
-    }
-    std::ranges::sort(used);
-    used.erase(std::unique(used.begin(), used.end()), used.end());
-    return used;
   }
 
   MeshSpline options_;
@@ -254,6 +295,35 @@ std::vector<double> SolveMeshSpline(const MeshSpline& spline, std::string_view s
   run.ThrowIfStopped();
   CheckSurface(scheme, skull);
   return Spline(spline, skull, samples, run).Solve(samples, run);
+}
+
+std::vector<DepthField> MeshSplineLeftOut(const MeshSpline& spline, std::string_view scheme,
+                                          bool clamp, double max_angle_deg, const DepthInput& input,
+                                          const Folds& folds, const RunContext& run) {
+  CheckDepthInput(input);
+  CheckSurface(scheme, input.skull);
+  std::vector<DepthSample> samples;
+  for (const Dowel& dowel : input.dowels) {
+    samples.push_back({dowel.base, dowel.direction, dowel.depth_mm, dowel.sd_mm});
+  }
+  const Spline function(spline, input.skull, samples, run);
+  const Eigen::MatrixXd kernel = function.Kernel(run);
+  std::vector<DepthField> fields;
+  for (const std::vector<std::size_t>& fold : folds) {
+    run.ThrowIfStopped();
+    const ShownDowels shown = Without(input, fold);
+    const std::vector<DepthSample> shown_samples = DepthSamples(shown.dowels);
+    TriMesh bases;
+    std::vector<Vec3> directions;
+    for (const std::size_t i : fold) {
+      bases.points.push_back(input.dowels[i].base);
+      directions.push_back(input.dowels[i].direction);
+    }
+    fields.push_back(AssignSpline(
+        function.ValuesWithout(fold, samples, kernel), DepthLimits(shown_samples, clamp),
+        {bases, directions, shown.dowels, shown.network}, shown_samples, max_angle_deg, run));
+  }
+  return fields;
 }
 
 DepthField AssignSpline(const std::vector<double>& depth_mm, const DepthLimits& limits,

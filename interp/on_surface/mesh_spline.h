@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "interp/dowels/dowel_samples.h"
+#include "interp/dowels/left_out_dowels.h"
 
 namespace semblance {
 
@@ -33,6 +34,14 @@ std::vector<double> SolveMeshSpline(const MeshSpline& spline, std::string_view s
 DepthField AssignSpline(const std::vector<double>& depth_mm, const DepthLimits& limits,
                         const DepthInput& input, const std::vector<DepthSample>& samples,
                         double max_angle_deg, const RunContext& run);
+
+// One field a fold, with an entry for each of its dowels: the function's local mean around a dowel
+// that it is not shown, limited, for bone that faces along the dowel's direction. The skull is
+// factored once for all folds; each then costs the cube of the number of dowels. Throws as
+// SolveMeshSpline.
+std::vector<DepthField> MeshSplineLeftOut(const MeshSpline& spline, std::string_view scheme,
+                                          bool clamp, double max_angle_deg, const DepthInput& input,
+                                          const Folds& folds, const RunContext& run);
 
 template <class Visitor>
 void SoftnessField(Visitor& visit, double& softness) {

@@ -14,4 +14,10 @@ DepthField InterpolateDepth(const Biharmonic& options, const DepthInput& input,
                       options.max_angle_deg, run);
 }
 
+std::vector<DepthField> InterpolateLeftOut(const Biharmonic& options, const DepthInput& input,
+                                           const Folds& folds, const RunContext& run) {
+  return MeshSplineLeftOut({SplineEnergy::kLaplacian, 0, options.softness}, Biharmonic::kName,
+                           options.clamp, options.max_angle_deg, input, folds, run);
+}
+
 }  // namespace semblance

@@ -29,4 +29,8 @@ void Fields(Visitor& visit, Biharmonic& o) {
 DepthField InterpolateDepth(const Biharmonic& options, const DepthInput& input,
                             const RunContext& run);
 
+// At dowels that it is not shown, with one factor for all folds (MeshSplineLeftOut).
+std::vector<DepthField> InterpolateLeftOut(const Biharmonic& options, const DepthInput& input,
+                                           const Folds& folds, const RunContext& run);
+
 }  // namespace semblance

@@ -14,4 +14,10 @@ DepthField InterpolateDepth(const Harmonic& options, const DepthInput& input,
                       run);
 }
 
+std::vector<DepthField> InterpolateLeftOut(const Harmonic& options, const DepthInput& input,
+                                           const Folds& folds, const RunContext& run) {
+  return MeshSplineLeftOut({SplineEnergy::kGradient, options.radius_mm, options.softness},
+                           Harmonic::kName, true, options.max_angle_deg, input, folds, run);
+}
+
 }  // namespace semblance

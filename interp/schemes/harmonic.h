@@ -37,4 +37,8 @@ void Fields(Visitor& visit, Harmonic& o) {
 DepthField InterpolateDepth(const Harmonic& options, const DepthInput& input,
                             const RunContext& run);
 
+// At dowels that it is not shown, with one factor for all folds (MeshSplineLeftOut).
+std::vector<DepthField> InterpolateLeftOut(const Harmonic& options, const DepthInput& input,
+                                           const Folds& folds, const RunContext& run);
+
 }  // namespace semblance

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/schemes/mean.h"
 
-#include <algorithm>
+#include <vector>
 
 namespace semblance {
 
@@ -16,10 +16,10 @@ double MeanDepth(std::span<const Dowel> dowels) {
 DepthField InterpolateDepth(const Mean&, const DepthInput& input, const RunContext& run) {
   CheckDepthInput(input);
   run.ThrowIfStopped();
-  DepthField field = EmptyDepthField(input.skull.points.size());
-  std::ranges::fill(field.depth_mm, MeanDepth(input.dowels));
-  std::ranges::fill(field.status, DepthStatus::kAssigned);
-  return field;
+  const std::size_t vertices = input.skull.points.size();  // each vector is written once
+  return {std::vector<double>(vertices, MeanDepth(input.dowels)),
+          std::vector<DepthStatus>(vertices, DepthStatus::kAssigned),
+          std::vector<double>(vertices, kNaN)};
 }
 
 }  // namespace semblance

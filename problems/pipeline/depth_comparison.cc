@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/pipeline/depth_comparison.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "interp/evaluation/calibration.h"
 #include "surfaces/base/parallel.h"
@@ -9,6 +11,31 @@
 
 namespace semblance {
 namespace {
+
+// Of the vertices that count.
+DepthScores ScoresWhere(const DepthErrors& errors, const DepthField& depth,
+                        const std::vector<double>& areas_mm2,
+                        const std::function<bool(std::size_t)>& counts) {
+  std::vector<double> error_mm = errors.error_mm;
+  for (std::size_t v = 0; v < error_mm.size(); ++v) {
+    error_mm[v] = counts(v) ? error_mm[v] : kNaN;
+  }
+  return ScoreDepths(error_mm, depth.sd_mm, areas_mm2);
+}
+
+void Score(const FaceRegion& region, const DepthField& depth, const std::vector<double>& areas_mm2,
+           DepthErrors& errors) {
+  errors.scores = ScoreDepths(errors.error_mm, depth.sd_mm, areas_mm2);
+  errors.scheme_scores = ScoresWhere(errors, depth, areas_mm2, [&](std::size_t v) {
+    return depth.status[v] == DepthStatus::kAssigned;
+  });
+  for (const auto& [name, summary] : errors.regions) {
+    const auto part = std::ranges::find(kFaceParts, name) - kFaceParts.begin();
+    errors.region_scores[name] = ScoresWhere(errors, depth, areas_mm2, [&](std::size_t v) {
+      return region.part[v] == static_cast<int>(part);
+    });
+  }
+}
 
 DepthErrors ErrorsAgainst(const TruthMap& truth, const FaceRegion& region, const DepthField& depth,
                           const std::vector<double>& areas_mm2) {
@@ -24,6 +51,7 @@ DepthErrors ErrorsAgainst(const TruthMap& truth, const FaceRegion& region, const
   errors.regions = SummarizeParts(errors.error_mm, areas_mm2, region);
   errors.coverage = Coverage(errors.error_mm, depth.sd_mm, areas_mm2);
   errors.coverage_90 = CoverageAt90(errors.coverage);
+  Score(region, depth, areas_mm2, errors);
   return errors;
 }
 
@@ -46,7 +74,7 @@ std::vector<double> TipErrors(const DepthStage& stage, const DepthComparison& co
 }  // namespace
 
 DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
-                              const RunContext& context) {
+                              const DepthField& depth, const RunContext& context) {
   DepthComparison comparison;
   comparison.region = InFrontOfNetwork(stage.shell, stage.dowels_on_shell, stage.subject.network,
                                        stage.subject.basis.sites->points, experiment.region);
@@ -55,9 +83,8 @@ DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& st
                                        experiment.depth_truth, context);
   const std::vector<double> areas = VertexAreas(stage.shell);
   comparison.along_direction =
-      ErrorsAgainst(comparison.truth.along_direction, comparison.region, stage.depth, areas);
-  comparison.closest =
-      ErrorsAgainst(comparison.truth.closest, comparison.region, stage.depth, areas);
+      ErrorsAgainst(comparison.truth.along_direction, comparison.region, depth, areas);
+  comparison.closest = ErrorsAgainst(comparison.truth.closest, comparison.region, depth, areas);
   comparison.tips = SummarizeDistances(TipErrors(stage, comparison, context), areas,
                                        [](std::size_t) { return true; });
   return comparison;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "interp/evaluation/depth_truth.h"
+#include "interp/evaluation/scores.h"
 #include "problems/metrics/face_metrics.h"
 #include "problems/pipeline/skull_stage.h"
 
@@ -20,6 +21,9 @@ struct DepthErrors {
   std::map<TruthStatus, int> vertices;  // of the scored region, by what the truth says
   std::vector<double> coverage;         // of the area with a stated sd_mm (interp/calibration.h)
   double coverage_90 = kNaN;            // its share at 90 %
+  DepthScores scores;                   // by area, over all that is scored
+  DepthScores scheme_scores;            // where the scheme itself gave the depth
+  std::map<std::string, DepthScores> region_scores;  // over all, by part of the face
 };
 
 struct DepthComparison {
@@ -33,7 +37,8 @@ struct DepthComparison {
 // Over the vertices of the region where the depth is finite, also where the outside rule gave it,
 // and the truth is valid. The subject must have a skin. Throws InputError as InFrontOfNetwork and
 // DepthDirections; Cancelled if stopped.
+// depth: of the stage, with such an sd_mm as is to be scored.
 DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
-                              const RunContext& context);
+                              const DepthField& depth, const RunContext& context);
 
 }  // namespace semblance

@@ -276,4 +276,34 @@ std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::strin
   return svg + LineLegend(rows, kLeft, kBottom + 68) + "</svg>\n";
 }
 
+std::string HistogramsSvg(const std::vector<BoxRow>& rows) {
+  constexpr std::size_t kAcross = 3;
+  constexpr double kLeft = 16, kPanel = 290, kBars = 262, kTall = 110, kRow = 156, kHead = 24;
+  double most = 0;
+  for (const BoxRow& row : rows) {
+    for (const double share : row.values) {
+      most = std::max(most, share * static_cast<double>(row.values.size()));
+    }
+  }
+  most = std::max(most, 1.5);
+  std::string svg = Open(kRow * static_cast<double>((rows.size() + kAcross - 1) / kAcross) + 8);
+  for (std::size_t n = 0; n < rows.size(); ++n) {
+    const double left = kLeft + kPanel * static_cast<double>(n % kAcross),
+                 foot = kRow * static_cast<double>(n / kAcross) + kHead + kTall,
+                 wide = kBars / static_cast<double>(rows[n].values.size());
+    svg += Text(left, foot - kTall - 8, Shortened(rows[n].label), "start");
+    for (std::size_t k = 0; k < rows[n].values.size(); ++k) {
+      const double tall =
+          kTall * rows[n].values[k] * static_cast<double>(rows[n].values.size()) / most;
+      svg += fmt::format(
+          "<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
+          "fill=\"#cfe3f1\" stroke=\"#0b5c8f\"/>\n",
+          left + wide * static_cast<double>(k), foot - tall, wide, tall);
+    }
+    svg += Line(left, foot - kTall / most, left + kBars, foot - kTall / most, "#9aa4af", 2) +
+           Text(left, foot + 16, "0", "start") + Text(left + kBars, foot + 16, "1", "end");
+  }
+  return svg + "</svg>\n";
+}
+
 }  // namespace semblance

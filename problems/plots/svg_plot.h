@@ -42,6 +42,10 @@ std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::strin
 // bold.
 std::string CalibrationPlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
 
+// Small histograms side by side, one a row: its values are the shares in equal parts of 0..1. The
+// grey line is where all would be equal; all have one scale.
+std::string HistogramsSvg(const std::vector<BoxRow>& rows);
+
 // A round step for about `count` ticks over [low, high]: 1, 2 or 5 times a power of ten.
 double TickStep(double low, double high, int count);
 

@@ -17,10 +17,28 @@ int CountStatus(const DepthField& field, DepthStatus status) {
   return static_cast<int>(std::count(field.status.begin(), field.status.end(), status));
 }
 
+Json ScoresToJson(const DepthScores& s) {
+  return {{"n", s.points},
+          {"stated", s.stated},
+          {"mae_mm", s.mae_mm},
+          {"rmse_mm", s.rmse_mm},
+          {"bias_mm", s.bias_mm},
+          {"crps_mm", s.crps_mm},
+          {"log_score", s.log_score},
+          {"interval_score_90_mm", s.interval_score_90_mm},
+          {"coverage_50", s.coverage_50},
+          {"coverage_90", s.coverage_90},
+          {"coverage_95", s.coverage_95},
+          {"mean_sd_mm", s.mean_sd_mm},
+          {"pit", s.pit}};
+}
+
 Json ErrorsToJson(const DepthErrors& errors) {
   Json json = SummaryToJson(errors.all);
   json["coverage_90"] = errors.coverage_90;
   json["coverage"] = errors.coverage;
+  json["scores"] = {{"all", ScoresToJson(errors.scores)},
+                    {"scheme", ScoresToJson(errors.scheme_scores)}};
   const auto count = [&](TruthStatus status) {
     const auto it = errors.vertices.find(status);
     return it == errors.vertices.end() ? 0 : it->second;
@@ -32,30 +50,32 @@ Json ErrorsToJson(const DepthErrors& errors) {
   json["regions"] = Json::object();
   for (const auto& [name, summary] : errors.regions) {
     json["regions"][name] = SummaryToJson(summary);
+    json["regions"][name]["scores"] = ScoresToJson(errors.region_scores.at(name));
   }
   return json;
 }
 
-struct RegionErrors {
-  int count = 0;
-  double absolute = 0, squares = 0;
-};
-
-Json RegionsToJson(const CrossValidation& result) {
-  std::map<std::string, RegionErrors> regions;
+// Those of the part of the face; the outside rule's too.
+DepthScores ScoresIn(const std::string& part, const CrossValidation& result) {
+  std::vector<double> errors_mm, sds_mm;
   for (const LeftOut& out : result.left_out) {
-    if (std::isfinite(out.error_mm)) {
-      RegionErrors& region = regions[kFaceParts[FacePartOfSite(out.site)]];
-      ++region.count;
-      region.absolute += std::abs(out.error_mm);
-      region.squares += out.error_mm * out.error_mm;
+    if (kFaceParts[FacePartOfSite(out.site)] == part) {
+      errors_mm.push_back(out.error_mm);
+      sds_mm.push_back(out.sd_mm);
     }
   }
+  return ScoreDepths(errors_mm, sds_mm);
+}
+
+Json RegionsToJson(const CrossValidation& result) {
   Json json = Json::object();
-  for (const auto& [name, region] : regions) {
-    json[name] = {{"n", region.count},
-                  {"rms_mm", std::sqrt(region.squares / region.count)},
-                  {"mean_abs_mm", region.absolute / region.count}};
+  for (const std::string part : kFaceParts) {
+    if (const DepthScores scores = ScoresIn(part, result); scores.points > 0) {
+      json[part] = {{"n", scores.points},
+                    {"rms_mm", scores.rmse_mm},
+                    {"mean_abs_mm", scores.mae_mm},
+                    {"scores", ScoresToJson(scores)}};
+    }
   }
   return json;
 }
@@ -78,6 +98,9 @@ Json DepthToJson(const DepthField& depth, const Case& subject) {
                {"max_mm", nullptr},
                {"dowels", subject.dowels_on_bone.size()},
                {"areas", subject.network.areas.size()}};
+  for (const SchemeShare& share : depth.shares) {
+    json["shares"][share.scheme] = share.weight;
+  }
   if (!assigned.empty()) {
     json["min_mm"] = *std::min_element(assigned.begin(), assigned.end());
     json["mean_mm"] = std::accumulate(assigned.begin(), assigned.end(), 0.0) /
@@ -94,16 +117,20 @@ Json ComparisonToJson(const DepthComparison& comparison) {
 }
 
 Json CrossValidationToJson(const CrossValidation& result) {
-  Json json = {{"n", result.left_out.size()},
-               {"predicted", result.predicted},
-               {"rms_mm", result.rms_mm},
-               {"mean_signed_mm", result.mean_mm},
-               {"mean_abs_mm", result.mean_absolute_mm},
-               {"max_mm", result.most_mm},
-               {"coverage_90", result.coverage_90},
-               {"coverage", result.coverage},
-               {"regions", RegionsToJson(result)},
-               {"sites", Json::object()}};
+  Json json = {
+      {"n", result.left_out.size()},
+      {"predicted", result.predicted},
+      {"rms_mm", result.rms_mm},
+      {"mean_signed_mm", result.mean_mm},
+      {"mean_abs_mm", result.mean_absolute_mm},
+      {"max_mm", result.most_mm},
+      {"coverage_90", result.coverage_90},
+      {"coverage", result.coverage},
+      {"own_sd", result.own_sd},
+      {"scores",
+       {{"all", ScoresToJson(result.scores_with_rule)}, {"scheme", ScoresToJson(result.scores)}}},
+      {"regions", RegionsToJson(result)},
+      {"sites", Json::object()}};
   for (const LeftOut& out : result.left_out) {
     json["sites"][out.site] = out.error_mm;
   }

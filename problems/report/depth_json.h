@@ -9,14 +9,17 @@
 
 namespace semblance {
 
-// Counts of vertices by status, range and mean of the assigned depths, dowels and areas.
+// Counts of vertices by status, range and mean of the assigned depths, dowels and areas; shares{}
+// of an average of schemes.
 nlohmann::ordered_json DepthToJson(const DepthField& depth, const Case& subject);
 
-// along_direction{...}, closest{...}: each a distance summary with regions{}, coverage_90 and the
-// counts of scored vertices by what the truth says there; tips{...}.
+// along_direction{...}, closest{...}: each a distance summary with regions{}, coverage_90, the
+// counts of scored vertices by what the truth says there, and scores{all{}, scheme{}}: of all that
+// is scored, and where the scheme itself answers; tips{...}.
 nlohmann::ordered_json ComparisonToJson(const DepthComparison& comparison);
 
-// The summary, coverage_90, regions{} and sites{}: the error of each left-out dowel.
+// The summary, coverage_90, scores{all{}, scheme{}}, regions{} and sites{}: the error of each
+// left-out dowel.
 nlohmann::ordered_json CrossValidationToJson(const CrossValidation& result);
 
 }  // namespace semblance

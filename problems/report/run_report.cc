@@ -201,6 +201,16 @@ ReportTable CountsTable(const std::string& caption, const Json& values) {
   return table;
 }
 
+// With the weights of an average of schemes.
+ReportTable DepthTable(const Json& depth) {
+  ReportTable table = CountsTable("Tissue depth over the bone", depth);
+  const Json shares = depth.value("shares", Json::object());
+  for (const auto& [scheme, weight] : shares.items()) {
+    table.rows.push_back({fmt::format("weight of {}", scheme), Number(weight, 3)});
+  }
+  return table;
+}
+
 void AddProtocols(const Json& face, ReportSection& section) {
   if (!face.contains("protocols")) {
     return;
@@ -411,7 +421,7 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
     sections.push_back(UncertaintySection(result, folder));
   }
   sections.push_back({.heading = "Depth and first face",
-                      .tables = {CountsTable("Tissue depth over the bone", result.at("depth")),
+                      .tables = {DepthTable(result.at("depth")),
                                  CountsTable("First face: the implicit surface of these depths",
                                              result.at("implicit"))},
                       .folded = true});

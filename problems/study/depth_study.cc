@@ -67,8 +67,44 @@ std::string TruthText(const DepthComparison& truth) {
   return text + SummaryLine("  the depth's end", truth.tips);
 }
 
+std::string SharesText(const DepthField& depth) {
+  std::string text;
+  for (const SchemeShare& share : depth.shares) {
+    text +=
+        fmt::format("{}{} {:.2f}", text.empty() ? "weights: " : ", ", share.scheme, share.weight);
+  }
+  return text.empty() ? "" : text + "\n";
+}
+
+std::string ScoresLine(const std::string& what, const DepthScores& s) {
+  return s.stated == 0
+             ? ""
+             : fmt::format(
+                   "{:<26} {:6} {:6.2f} {:6.2f} {:7.2f} {:9.2f} {:4.0f} {:4.0f} "
+                   "{:4.0f} %\n",
+                   what, s.stated, s.mean_sd_mm, s.crps_mm, s.log_score, s.interval_score_90_mm,
+                   100 * s.coverage_50, 100 * s.coverage_90, 100 * s.coverage_95);
+}
+
+// What the stated standard deviations are worth.
+std::string ScoresText(const DepthResult& result) {
+  std::string lines;
+  if (result.truth) {
+    const DepthErrors& errors = result.truth->along_direction;
+    lines += ScoresLine("  true depth, all scored", errors.scores) +
+             ScoresLine("  true depth, by the scheme", errors.scheme_scores);
+  }
+  for (const auto& [kind, left_out] : result.left_out) {
+    lines += ScoresLine(fmt::format("  {} left out", kind), left_out.scores);
+  }
+  return lines.empty() ? ""
+                       : "stated sd                  points     sd   CRPS     log  interval within "
+                         "50,  90,  95 %\n" +
+                             lines;
+}
+
 std::string DepthPly(const DepthResult& result) {
-  const DepthField& depth = result.stage->depth;
+  const DepthField& depth = result.depth;
   MeshAttributes attributes;
   attributes.scalars = {{"quality", depth.depth_mm},
                         {"scalar_depth_mm", depth.depth_mm},
@@ -120,16 +156,21 @@ DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context
   DepthResult result;
   result.stage = MakeDepthStage(experiment, cache ? *cache : own_cache, step, context);
   const DepthStage& stage = *result.stage;
-  if (stage.subject.skin) {
-    result.truth =
-        step("compare with the truth", [&] { return CompareDepths(experiment, stage, context); });
-  }
-  result.directions = result.truth ? result.truth->directions
-                                   : DepthDirections(experiment.direction, stage.Input(), context);
+  result.depth = stage.depth;
   if (!std::holds_alternative<DepthMap>(experiment.interp)) {  // no dowel has a part in a map
     result.left_out =
         step("leave dowels out", [&] { return LeaveOut(experiment, stage, context); });
   }
+  if (!result.left_out.empty()) {
+    result.depth = WithStatedSd(std::move(result.depth), result.left_out.front().second,
+                                stage.Input(), context);
+  }
+  if (stage.subject.skin) {
+    result.truth = step("compare with the truth",
+                        [&] { return CompareDepths(experiment, stage, result.depth, context); });
+  }
+  result.directions = result.truth ? result.truth->directions
+                                   : DepthDirections(experiment.direction, stage.Input(), context);
   result.times = step.Take();
   return result;
 }
@@ -139,7 +180,7 @@ std::string DepthResultJson(const Experiment& experiment, const DepthResult& res
                {"subject", result.stage->subject.name},
                {"usable", result.usable()},
                {"faults", result.Faults()},
-               {"depth", DepthToJson(result.stage->depth, result.stage->subject)},
+               {"depth", DepthToJson(result.depth, result.stage->subject)},
                {"depth_truth", nullptr},
                {"cross_validation", Json::object()}};
   if (result.truth) {
@@ -166,7 +207,7 @@ std::string LeftOutCsv(const DepthResult& result) {
 }
 
 std::string DepthText(const DepthResult& result) {
-  std::string text;
+  std::string text = SharesText(result.depth);
   if (result.truth) {
     text += TruthText(*result.truth);
   }
@@ -181,7 +222,7 @@ std::string DepthText(const DepthResult& result) {
                             ? fmt::format("{:.0f} %", 100 * left_out.coverage_90)
                             : "no sd stated");
   }
-  return text;
+  return text + ScoresText(result);
 }
 
 std::string DepthPicture(const DepthResult& result, const std::string& title, int threads) {

@@ -18,6 +18,8 @@ namespace semblance {
 
 struct DepthResult {
   std::shared_ptr<const DepthStage> stage;
+  // The stage's; where the scheme states no sd_mm, with one learned from left-out landmarks.
+  DepthField depth;
   std::vector<Vec3> directions;          // one per vertex of the shell
   std::optional<DepthComparison> truth;  // where the true skin is known
   // What was left out together: "landmark" (both its sides), "side", "k_fold" (random parts).
@@ -30,7 +32,7 @@ struct DepthResult {
   bool usable() const { return Faults().empty(); }
 };
 
-// Loads the case, fills the skull, interpolates, compares, leaves dowels out. Throws as
+// Loads the case, fills the skull, interpolates, leaves dowels out, compares. Throws as
 // LoadSubject, and Cancelled. cache: as Run's.
 DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context,
                          StageCache* cache = nullptr);

@@ -47,6 +47,8 @@ void ReadCurves(const Json& result, TrialRow& row) {
   row.quantiles_mm = NumbersAt(result, "/face/quantiles_mm");
   row.depth_coverage = NumbersAt(result, "/depth_truth/along_direction/coverage");
   row.left_out_coverage = NumbersAt(result, "/cross_validation/landmark/coverage");
+  row.depth_pit = NumbersAt(result, "/depth_truth/along_direction/scores/all/pit");
+  row.left_out_pit = NumbersAt(result, "/cross_validation/landmark/scores/scheme/pit");
   const Json levels = result.value(Json::json_pointer("/fit/levels"), Json());
   for (const Json& level : levels.is_array() ? levels : Json::array()) {
     const auto number = [&](const char* name) {

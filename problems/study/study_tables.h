@@ -26,6 +26,7 @@ struct TrialRow {
   // Of its timing.json: work that another trial did for it is not in it. NaN: not told. It is in no
   // table that is the same in every run.
   double wall_s = kNaN;
+  std::vector<double> depth_pit = {}, left_out_pit = {};  // the same as shares by bin (scores.h)
 };
 
 struct StudyResults {

@@ -240,6 +240,29 @@ std::vector<ReportImage> CalibrationPlots(const StudyResults& results,
   return plots;
 }
 
+// One histogram a treatment that states a standard deviation.
+std::vector<ReportImage> PitPlots(const StudyResults& results,
+                                  const std::vector<Treatment>& ranked) {
+  std::vector<ReportImage> plots;
+  const auto add = [&](std::vector<double> TrialRow::*histogram, const std::string& of_what) {
+    const auto rows = MeanCurves(results, ranked, histogram);
+    if (!rows.empty()) {
+      plots.push_back({HistogramsSvg(rows),
+                       fmt::format("Probability integral transform of {}: where in the stated "
+                                   "distribution they lie, averaged over subjects. Flat at the "
+                                   "grey line it is right; heaped up at both ends it is too bold, "
+                                   "in the middle too cautious, at one end biased.",
+                                   of_what),
+                       fmt::format("histogram of the probability integral transform of {}, one "
+                                   "per treatment",
+                                   of_what)});
+    }
+  };
+  add(&TrialRow::depth_pit, "the true depths over the scored bone");
+  add(&TrialRow::left_out_pit, "the landmarks that were left out");
+  return plots;
+}
+
 ReportSection CurvesSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportSection section{.heading = "Errors, convergence, calibration", .folded = true};
   const auto errors = MeanCurves(results, ranked, &TrialRow::quantiles_mm);
@@ -258,6 +281,7 @@ ReportSection CurvesSection(const StudyResults& results, const std::vector<Treat
          "root mean square distance by step of the schedule, one line per treatment"});
   }
   std::ranges::move(CalibrationPlots(results, ranked), std::back_inserter(section.images));
+  std::ranges::move(PitPlots(results, ranked), std::back_inserter(section.images));
   return section;
 }
 

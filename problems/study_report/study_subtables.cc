@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 
 namespace semblance {
@@ -59,6 +60,20 @@ ReportTable TableOf(const StudyResults& results, const std::vector<Treatment>& r
   return table;
 }
 
+std::string DifferenceText(const std::map<std::string, double>& values,
+                           const std::map<std::string, double>& first) {
+  double sum = 0;
+  int pairs = 0, worse = 0;
+  for (const auto& [subject, value] : values) {
+    if (const auto it = first.find(subject); it != first.end()) {
+      sum += value - it->second;
+      ++pairs;
+      worse += value > it->second;
+    }
+  }
+  return pairs == 0 ? "" : fmt::format("{} ({} of {})", TableNumber(sum / pairs), worse, pairs);
+}
+
 // Names n of metrics `prefix`n`suffix`, sorted.
 std::set<std::string> NamesBetween(const StudyResults& results, const std::string& prefix,
                                    const std::string& suffix) {
@@ -103,6 +118,68 @@ ReportTable RegionsTable(const StudyResults& results, const std::vector<Treatmen
                  columns);
 }
 
+constexpr const char* kTruthScores = "depth_truth.along_direction.scores.all.";
+constexpr const char* kLeftOutScores = "cross_validation.landmark.scores.scheme.";
+constexpr const char* kSideScores = "cross_validation.side.scores.scheme.";
+
+ReportTable ScoresTable(const StudyResults& results, const std::vector<Treatment>& ranked,
+                        const std::string& caption, const std::string& prefix) {
+  std::vector<Column> columns;
+  for (const auto& [head, name] : std::to_array<std::pair<const char*, const char*>>(
+           {{"points", "n"},
+            {"MAE (mm)", "mae_mm"},
+            {"RMSE (mm)", "rmse_mm"},
+            {"bias (mm)", "bias_mm"},
+            {"stated sd (mm)", "mean_sd_mm"},
+            {"CRPS (mm)", "crps_mm"},
+            {"log score", "log_score"},
+            {"interval score (mm)", "interval_score_90_mm"},
+            {"within 50 %", "coverage_50"},
+            {"within 90 %", "coverage_90"},
+            {"within 95 %", "coverage_95"}})) {
+    columns.push_back({head, prefix + name});
+  }
+  return TableOf(results, ranked, caption, columns);
+}
+
+// Each treatment's score less that of the first, over the subjects that both have.
+ReportTable PairedScoresTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  ReportTable table{"", {"treatment"}, {}};
+  if (ranked.size() < 2) {
+    return table;
+  }
+  table.caption = fmt::format(
+      "Scores less those of {}, paired by subject: mean difference (worse "
+      "in how many subjects)",
+      ranked[0].label);
+  for (const Treatment& treatment : ranked) {
+    table.rows.push_back({treatment.label});
+  }
+  for (const auto& [head, metric] : std::to_array<std::pair<const char*, std::string>>(
+           {{"true depth: CRPS (mm)", fmt::format("{}crps_mm", kTruthScores)},
+            {"true depth: log score", fmt::format("{}log_score", kTruthScores)},
+            {"true depth: interval (mm)", fmt::format("{}interval_score_90_mm", kTruthScores)},
+            {"landmarks: CRPS (mm)", fmt::format("{}crps_mm", kLeftOutScores)},
+            {"landmarks: log score", fmt::format("{}log_score", kLeftOutScores)}})) {
+    const auto treatments = Treatments(results, metric);
+    const auto of = [&](const Treatment& t) {
+      return std::ranges::find(treatments, t.values, &Treatment::values)->by_subject;
+    };
+    const auto first = of(ranked[0]);
+    if (first.empty()) {
+      continue;
+    }
+    table.header.emplace_back(head);
+    for (std::size_t n = 0; n < ranked.size(); ++n) {
+      table.rows[n].push_back(DifferenceText(of(ranked[n]), first));
+    }
+  }
+  if (table.header.size() == 1) {
+    table.rows.clear();
+  }
+  return table;
+}
+
 ReportTable LeftOutTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
   std::vector<Column> columns;
   for (const auto& [kind, words] : std::to_array<std::pair<const char*, const char*>>(
@@ -113,6 +190,22 @@ ReportTable LeftOutTable(const StudyResults& results, const std::vector<Treatmen
                        fmt::format("cross_validation.{}.coverage_90", kind)});
   }
   return TableOf(results, ranked, "Dowels left out and predicted, means over subjects", columns);
+}
+
+// Of treatments that average schemes, what each counts.
+ReportTable SharesTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
+  const std::string prefix = "depth.shares.";
+  std::vector<Column> columns;
+  for (const std::string& name : NamesBetween(results, prefix, "")) {
+    columns.push_back({name, prefix + name});
+  }
+  ReportTable table = TableOf(
+      results, ranked, "Weights of the schemes that are averaged, means over subjects", columns);
+  std::erase_if(table.rows, [](const std::vector<std::string>& row) {
+    return std::all_of(row.begin() + 1, row.end(),
+                       [](const std::string& cell) { return cell.empty(); });
+  });
+  return table;
 }
 
 ReportTable SitesTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
@@ -142,6 +235,17 @@ std::vector<ReportTable> Subtables(const StudyResults& results,
   std::vector<ReportTable> tables = {SiblingsTable(results, ranked, parent),
                                      RegionsTable(results, ranked, parent, leaf),
                                      LeftOutTable(results, ranked), SitesTable(results, ranked)};
+  const auto scores = [&](const std::string& of_what, const char* prefix) {
+    tables.push_back(ScoresTable(
+        results, ranked,
+        fmt::format("Proper scores of {}, means over subjects; smaller is better", of_what),
+        prefix));
+  };
+  scores("the depth against the true one", kTruthScores);
+  scores("landmarks left out, where the scheme itself answers", kLeftOutScores);
+  scores("a side left out, where the scheme itself answers", kSideScores);
+  tables.push_back(PairedScoresTable(results, ranked));
+  tables.push_back(SharesTable(results, ranked));
   std::erase_if(tables, [](const ReportTable& table) { return table.rows.empty(); });
   return tables;
 }

@@ -14,6 +14,10 @@ namespace semblance {
 // out:
 // - the metric's siblings (RMS, mean, p95, ... of the same distances);
 // - the metric in each part of the face (`regions` beside it);
+// - proper scores of the depth (interp/evaluation/scores.h): over the true depth, and over
+// landmarks
+//   left out where the scheme itself answers; and each treatment's CRPS less that of the first,
+//   paired by subject; weights of schemes that are averaged;
 // - cross-validation: RMS of what was left out by landmark, side and random part, and the share
 //   within the stated 90 %;
 // - the RMS over subjects of each landmark's error when it was left out, one row per site.

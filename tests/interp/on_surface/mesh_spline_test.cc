@@ -229,6 +229,31 @@ TEST(MeshSplines, DoNotHeedADowelGivenTwice) {  // 64 and 65 dowels are solved i
   }
 }
 
+// The one factor for all folds gives what a solve without the fold's dowels gives.
+TEST(MeshSplines, LeftOutAreAsIfTheDowelHadNotBeenThere) {
+  for (const int count : {12, 66}) {  // more than 64 are solved in another way
+    const DowelScene scene = ScatteredScene(count);
+    const Folds folds = {{3}, {0, 7}};
+    const auto check = [&](const auto& scheme) {
+      const auto fields = InterpolateLeftOut(scheme, scene.Input(), folds, RunContext{});
+      ASSERT_EQ(fields.size(), folds.size());
+      for (std::size_t f = 0; f < folds.size(); ++f) {
+        const ShownDowels shown = Without(scene.Input(), folds[f]);
+        const DepthField whole = InterpolateDepth(
+            scheme, {scene.skull, scene.normals, shown.dowels, shown.network}, RunContext{});
+        for (std::size_t k = 0; k < folds[f].size(); ++k) {
+          const auto at = std::ranges::find(scene.skull.points, scene.dowels[folds[f][k]].base) -
+                          scene.skull.points.begin();
+          EXPECT_NEAR(fields[f].depth_mm[k], whole.depth_mm[at], 1e-8);
+        }
+      }
+    };
+    check(Biharmonic{.clamp = false});
+    check(Harmonic{.radius_mm = 0});
+    check(Harmonic{.radius_mm = 0, .softness = 0.1});
+  }
+}
+
 TEST(MeshSplines, SayThatTheyNeedTriangles) {
   const DowelScene scene = FlatScene().At({{1, 2, 3}});
   try {

@@ -77,6 +77,16 @@ TEST(CalibrationPlot, TrueStatementsLieOnTheDiagonal) {
       HasSubstr("60.00,340.00 465.00,308.00 870.00,20.00\""));  // 10 % where 50 % is expected
 }
 
+TEST(Histograms, ShowEqualSharesAtTheLineAndOthersInProportion) {
+  const std::string svg = HistogramsSvg({{"flat", {0.5, 0.5}}, {"to the left", {0.75, 0.25}}});
+  EXPECT_EQ(Count(svg, "<rect"), 1 + 4);  // the ground and the bars
+  // Of at most 110: 1.5 times the even share is the tallest.
+  EXPECT_EQ(Count(svg, "height=\"73.33\""), 2);
+  EXPECT_EQ(Count(svg, "height=\"110.00\""), 1);
+  EXPECT_EQ(Count(svg, "height=\"36.67\""), 1);
+  EXPECT_THAT(svg, HasSubstr("to the left"));
+}
+
 TEST(RankPlot, PutsTheBestFirst) {
   const std::string svg = RankPlotSvg({{"worse", 1.8}, {"better", 1.2}}, 0.4);
   EXPECT_EQ(Count(svg, "circle"), 2);

@@ -81,7 +81,10 @@ TEST(DepthStudy, ErrorsAreInterpolatedLessTrueAndTheMeansDepthIsEverywhereTheSam
     }
   }
   EXPECT_LT(truth.tips.rms_mm, truth.along_direction.all.rms_mm);  // tips go to the closest skin
-  EXPECT_TRUE(std::isnan(truth.along_direction.coverage_90));
+  // The mean states no sd; one is learned from left-out landmarks, everywhere where there is depth.
+  EXPECT_EQ(truth.along_direction.scores.stated, truth.along_direction.scores.points);
+  EXPECT_NEAR(truth.along_direction.scores.rmse_mm, truth.along_direction.all.rms_mm, 1e-9);
+  EXPECT_NEAR(truth.along_direction.scores.bias_mm, truth.along_direction.all.mean_signed_mm, 1e-9);
   double area = 0;
   for (const auto& [name, part] : truth.along_direction.regions) {
     area += part.area_cm2;
@@ -93,6 +96,42 @@ TEST(DepthStudy, KrigingStatesAnSdThatMostErrorsKeepTo) {
   const DepthResult result = Measured({"interp=kriging"});
   EXPECT_GT(result.truth->along_direction.coverage_90, 0.6);
   EXPECT_LE(result.truth->along_direction.coverage_90, 1);
+}
+
+// Every scheme's 90 % holds most of the true depths, stated by itself or learned.
+TEST(DepthStudy, EverySchemeStatesAnSdThatIsHonestEnough) {
+  for (const char* scheme : {"auto", "barycentric", "natural_neighbour", "biharmonic"}) {
+    double within = 0;
+    for (const char* seed : {"1", "2"}) {
+      const DepthResult result =
+          Measured({fmt::format("interp={}", scheme), fmt::format("subject.random_seed={}", seed)});
+      within += result.truth->along_direction.scores.coverage_90 / 2;
+    }
+    EXPECT_GT(within, 0.78) << scheme;
+    EXPECT_LE(within, 1) << scheme;
+  }
+}
+
+// A side left out leaves a network on one side alone: the scheme answers there nowhere.
+TEST(DepthStudy, ASideLeftOutSaysWhereTheSchemeAnswersAndWhereTheRule) {
+  const DepthResult result = Measured({"interp=barycentric"});
+  const CrossValidation& side = result.left_out[1].second;
+  EXPECT_EQ(side.scores_with_rule.points, 22);
+  EXPECT_LT(side.scores.points, 5);
+  const CrossValidation everywhere = Measured({"interp=kriging"}).left_out[1].second;
+  EXPECT_GT(everywhere.scores.points, 10);
+}
+
+TEST(DepthStudy, AutoSaysWhatItTook) {
+  const Experiment experiment = SmallPhantom({"interp=auto"});
+  const DepthResult result = MeasureDepth(experiment, {});
+  const Json shares = Json::parse(DepthResultJson(experiment, result)).at("depth").at("shares");
+  double sum = 0;
+  for (const auto& [scheme, weight] : shares.items()) {
+    sum += weight.get<double>();
+  }
+  EXPECT_NEAR(sum, 1, 1e-9);
+  EXPECT_THAT(DepthText(result), HasSubstr("weights: radial_basis 0."));
 }
 
 TEST(DepthStudy, TheDirectionTurnsTheEndsAndTheTruthAlongIt) {
@@ -128,7 +167,12 @@ TEST(DepthStudy, JsonHasEveryNumberByItsPath) {
         "/depth_truth/along_direction/vertices/valid", "/depth_truth/along_direction/coverage_90",
         "/depth_truth/tips/mean_abs_mm", "/cross_validation/landmark/sites/go_l",
         "/cross_validation/side/rms_mm", "/cross_validation/k_fold/regions/nose/rms_mm",
-        "/cross_validation/landmark/coverage_90"}) {
+        "/cross_validation/landmark/coverage_90", "/depth_truth/along_direction/scores/all/crps_mm",
+        "/depth_truth/along_direction/scores/scheme/interval_score_90_mm",
+        "/depth_truth/along_direction/regions/cheeks/scores/log_score",
+        "/depth_truth/along_direction/scores/all/pit/9",
+        "/cross_validation/landmark/scores/scheme/crps_mm",
+        "/cross_validation/side/scores/scheme/n"}) {
     EXPECT_TRUE(json.at(Json::json_pointer(path)).is_number()) << path;
   }
 }
@@ -171,7 +215,7 @@ TEST(DepthStudy, AsAStudyItRanksBreaksDownAndShowsTheFirstSubjectsMaps) {
   const auto treatments = Treatments(results, results.metric);
   ASSERT_EQ(treatments.size(), 2u);
   const auto tables = Subtables(results, treatments);
-  ASSERT_EQ(tables.size(), 4u);
+  ASSERT_EQ(tables.size(), 8u);
   EXPECT_THAT(tables[0].header, Contains("p95 (mm)"));
   EXPECT_THAT(tables[1].header, Contains("cheeks"));
   EXPECT_THAT(tables[2].header, Contains("a side: RMS (mm)"));
@@ -180,6 +224,10 @@ TEST(DepthStudy, AsAStudyItRanksBreaksDownAndShowsTheFirstSubjectsMaps) {
   // The mean of the two subjects' own numbers.
   const auto& rms = treatments[1].by_subject;
   EXPECT_EQ(tables[0].rows[1][1], fmt::format("{:.3f}", (rms.at("a") + rms.at("b")) / 2));
+  EXPECT_THAT(tables[4].header, Contains("CRPS (mm)"));
+  EXPECT_THAT(tables[5].caption, HasSubstr("where the scheme itself answers"));
+  EXPECT_THAT(tables[7].caption, HasSubstr("paired by subject"));
+  EXPECT_THAT(tables[7].rows[0][1], ::testing::StartsWith("0.000 (0 of 2)"));
   int maps = 0;
   for (const StudyTrial& trial : plan.trials) {
     const bool is_there = fs::exists(folder / "out" / "trials" / trial.id / "depth.png");

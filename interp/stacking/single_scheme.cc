@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/stacking/single_scheme.h"
+
+#include <type_traits>
+
+namespace semblance {
+namespace {
+
+template <class Scheme>
+bool GoesAlong(const Scheme& scheme) {
+  if constexpr (requires { scheme.distance == DowelDistance::kGeodesic; }) {
+    if (scheme.distance == DowelDistance::kGeodesic) {
+      return true;
+    }
+  }
+  if constexpr (requires { scheme.mean == DepthMean::kCovariates; }) {
+    if (scheme.mean == DepthMean::kCovariates) {
+      return true;
+    }
+  }
+  return std::is_same_v<Scheme, SurfaceMatern> || std::is_same_v<Scheme, Harmonic> ||
+         std::is_same_v<Scheme, Biharmonic>;
+}
+
+}  // namespace
+
+bool SingleNeedsSurface(const SingleScheme& scheme) {
+  return std::visit([](const auto& options) { return GoesAlong(options); }, scheme);
+}
+
+bool SingleNeedsExpected(const SingleScheme& scheme) {
+  return std::visit(
+      [](const auto& options) {
+        if constexpr (requires { options.mean == DepthMean::kTable; }) {
+          return options.mean == DepthMean::kTable;
+        }
+        return false;
+      },
+      scheme);
+}
+
+bool SingleNeedsNetwork(const SingleScheme& scheme) {
+  return std::holds_alternative<Barycentric>(scheme) ||
+         std::holds_alternative<NetworkSpline>(scheme);
+}
+
+}  // namespace semblance

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/evaluation/scores.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "surfaces/base/random.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+double NormalCumulative(double z) { return std::erfc(-z / std::numbers::sqrt2) / 2; }
+
+// Half the width of the interval that holds a share, by bisection of the distribution.
+double HalfWidth(double sd_mm, double share) {
+  double low = 0, high = 10 * sd_mm;
+  for (int k = 0; k < 80; ++k) {
+    const double middle = (low + high) / 2;
+    (2 * NormalCumulative(middle / sd_mm) - 1 < share ? low : high) = middle;
+  }
+  return low;
+}
+
+// The definition, summed over small steps: the squared distance of the forecast's distribution from
+// that of the truth, which jumps from 0 to 1.
+double CrpsBySum(double error_mm, double sd_mm) {
+  constexpr int kSteps = 400000;
+  const double reach = 12 * sd_mm + std::abs(error_mm), step = 2 * reach / kSteps;
+  double sum = 0;
+  for (int k = 0; k < kSteps; ++k) {
+    const double x = -reach + (k + 0.5) * step;  // from the truth
+    const double off = NormalCumulative((x - error_mm) / sd_mm) - (x >= 0 ? 1 : 0);
+    sum += off * off * step;
+  }
+  return sum;
+}
+
+TEST(Crps, IsItsDefinition) {
+  for (const double sd : {0.2, 1.0, 3.5}) {
+    for (const double error : {-4.0, -0.3, 0.0, 0.7, 2.5}) {
+      EXPECT_NEAR(GaussianCrps_mm(error, sd), CrpsBySum(error, sd), 1e-4) << error << " " << sd;
+    }
+  }
+}
+
+TEST(Crps, OfACertainForecastIsItsAbsoluteError) {
+  EXPECT_NEAR(GaussianCrps_mm(2.5, 1e-9), 2.5, 1e-8);
+}
+
+TEST(IntervalScore, IsItsDefinition) {
+  for (const double share : {0.5, 0.9, 0.95}) {
+    for (const double error : {-5.0, -1.0, 0.2, 3.0}) {
+      const double sd = 1.3, half = HalfWidth(sd, share);
+      const double low = error - half, high = error + half, truth = 0;
+      const double expected = (high - low) + 2 / (1 - share) * std::max(low - truth, 0.0) +
+                              2 / (1 - share) * std::max(truth - high, 0.0);
+      EXPECT_NEAR(GaussianIntervalScore_mm(error, sd, share), expected, 1e-9);
+    }
+  }
+}
+
+TEST(LogScore, IsLessTheLogarithmOfTheDensity) {
+  const double h = 1e-5, sd = 0.8, error = 1.1;
+  const double density =
+      (NormalCumulative((error + h) / sd) - NormalCumulative((error - h) / sd)) / (2 * h);
+  EXPECT_NEAR(GaussianLogScore(error, sd), -std::log(density), 1e-8);
+}
+
+// No statement is better in the mean than the true one.
+TEST(Scores, AreProper) {
+  Random random(3);
+  std::vector<double> errors, shifted;
+  for (int n = 0; n < 20000; ++n) {
+    errors.push_back(2 * random.BoundedNormal());
+    shifted.push_back(errors.back() + 0.3);
+  }
+  const auto of = [](const std::vector<double>& e, double sd) {
+    return ScoreDepths(e, std::vector<double>(e.size(), sd));
+  };
+  const DepthScores best = of(errors, 2);
+  for (const DepthScores& other : {of(errors, 1.7), of(errors, 2.3), of(shifted, 2)}) {
+    EXPECT_GT(other.crps_mm, best.crps_mm);
+    EXPECT_GT(other.log_score, best.log_score);
+    EXPECT_GT(other.interval_score_90_mm, best.interval_score_90_mm);
+  }
+}
+
+TEST(Scores, OfATrueStatementHoldWhatTheyStateAndArePlain) {
+  Random random(5);
+  std::vector<double> errors, sds;
+  for (int n = 0; n < 40000; ++n) {
+    sds.push_back(random.Uniform(0.5, 3));
+    errors.push_back(sds.back() * random.BoundedNormal());
+  }
+  const DepthScores scores = ScoreDepths(errors, sds);
+  EXPECT_NEAR(scores.coverage_50, 0.5, 0.015);
+  EXPECT_NEAR(scores.coverage_90, 0.9, 0.01);
+  EXPECT_NEAR(scores.coverage_95, 0.95, 0.01);
+  ASSERT_EQ(scores.pit.size(), static_cast<std::size_t>(kPitBins));
+  EXPECT_NEAR(std::accumulate(scores.pit.begin(), scores.pit.end(), 0.0), 1, 1e-12);
+  for (const double share : scores.pit) {
+    EXPECT_NEAR(share, 0.1, 0.01);
+  }
+}
+
+TEST(Pit, TellsTooThickFromTooThin) {
+  EXPECT_NEAR(GaussianPit(1.6448536269514722, 1), 0.05, 1e-12);  // predicted too thick
+  EXPECT_NEAR(GaussianPit(-1.6448536269514722, 1), 0.95, 1e-12);
+}
+
+TEST(Scores, AreMeansByWeightOverWhatIsKnown) {
+  const std::vector<double> errors = {1, -2, kNaN, 4}, sds = {1, 2, 1, kNaN},
+                            weights = {3, 1, 100, 2};
+  const DepthScores scores = ScoreDepths(errors, sds, weights);
+  EXPECT_EQ(scores.points, 3);
+  EXPECT_EQ(scores.stated, 2);
+  EXPECT_NEAR(scores.mae_mm, (3 * 1 + 2 + 2 * 4) / 6.0, 1e-12);
+  EXPECT_NEAR(scores.rmse_mm, std::sqrt((3 * 1 + 4 + 2 * 16) / 6.0), 1e-12);
+  EXPECT_NEAR(scores.bias_mm, (3 - 2 + 8) / 6.0, 1e-12);
+  EXPECT_NEAR(scores.mean_sd_mm, 5 / 4.0, 1e-12);
+  EXPECT_NEAR(scores.crps_mm, (3 * GaussianCrps_mm(1, 1) + GaussianCrps_mm(-2, 2)) / 4, 1e-12);
+  EXPECT_EQ(scores.coverage_90, 1);
+  EXPECT_EQ(scores.coverage_50, 0);
+}
+
+TEST(Scores, OfNothingAreNothing) {
+  const DepthScores scores = ScoreDepths({}, {});
+  EXPECT_EQ(scores.points, 0);
+  EXPECT_TRUE(std::isnan(scores.mae_mm));
+  EXPECT_TRUE(std::isnan(scores.crps_mm));
+  EXPECT_TRUE(scores.pit.empty());
+}
+
+}  // namespace
+}  // namespace semblance
