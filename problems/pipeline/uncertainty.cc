@@ -61,9 +61,10 @@ std::int32_t NearestCorner(const TriMesh& shell, const MeshPoint& at) {
   });
 }
 
-// The deviations of surface_matern hold what lies between dowels, too, which kriging states here.
+// The deviations of these hold what lies between dowels, too, which kriging states here.
 bool StatesDowelsAlone(const Experiment& experiment) {
-  return !std::holds_alternative<SurfaceMatern>(experiment.interp);
+  return !std::holds_alternative<SurfaceMatern>(experiment.interp) &&
+         !std::holds_alternative<AutoScheme>(experiment.interp);
 }
 
 std::vector<DepthBehind> DepthsBehind(const Experiment& experiment, const FitTarget& target,
