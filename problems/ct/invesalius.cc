@@ -34,7 +34,9 @@ using Archive = std::unique_ptr<archive, ArchiveCloser>;
 
 Archive OpenArchive(const std::string& name) {
   if (!std::filesystem::is_regular_file(name)) {
-    throw IoError(fmt::format("{}: no such file", name));
+    throw IoError(
+        fmt::format("{}: {}", name,
+                    std::filesystem::exists(name) ? "is a folder, not a file" : "no such file"));
   }
   Archive a(archive_read_new());
   archive_read_support_filter_gzip(a.get());

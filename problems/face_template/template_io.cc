@@ -172,7 +172,8 @@ void For(const std::filesystem::path& path, const Action& action) {
   try {
     action();
   } catch (const nlohmann::json::exception& error) {
-    throw InputError(fmt::format("{}: not a file of features: {}", path.string(), error.what()));
+    throw InputError(
+        fmt::format("{}: not a file of features: {}", path.string(), JsonFault(error)));
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", path.string(), error.what()));
   }

@@ -36,6 +36,13 @@ void RefuseIfNotEmpty(const fs::path& folder) {
     throw IoError(fmt::format("{}: the folder cannot be read: {}; choose another one",
                               folder.string(), error.message()));
   }
+  if (fs::exists(folder / kUnfinishedPart, error)) {
+    throw IoError(fmt::format(
+        "{}: the output folder is unfinished: its writing was cut short (killed, or the disk was "
+        "full), and some of its files are the old ones or are missing; say --force to write them "
+        "anew, or choose another folder",
+        folder.string()));
+  }
   if (!is_empty) {
     throw IoError(fmt::format(
         "{}: the output folder exists and is not empty, and nothing is overwritten unless asked; "

@@ -15,6 +15,10 @@ namespace semblance {
 // name, one by one, and deletes nothing.
 enum class WhenNotEmpty { kRefuse, kReplaceFiles };
 
+// In a folder while its files are put there; what a killed process leaves of it says that they are
+// not all there (staged_folder.h).
+inline constexpr const char* kUnfinishedPart = ".semblance-part";
+
 // The folder of one run. Constructing it creates the folder (with its parents) and tries out that a
 // file can be written there, so that a wrong folder is known before any long work.
 class OutputFolder {

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPart = ".semblance-part";
+constexpr const char* kPart = kUnfinishedPart;
 
 // Absolute, without links and without a slash at the end.
 fs::path Resolved(const fs::path& root) {

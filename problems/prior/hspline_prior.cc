@@ -204,7 +204,7 @@ HSplineModes HSplineModesFromJson(std::string_view text, std::string_view name) 
   try {
     return ModesFrom(ParseJson(text, name));
   } catch (const nlohmann::json::exception& error) {
-    throw InputError(fmt::format("{}: not a file of modes: {}", name, error.what()));
+    throw InputError(fmt::format("{}: not a file of modes: {}", name, JsonFault(error)));
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", name, error.what()));
   }

@@ -13,6 +13,7 @@
 
 #include "problems/program/exit_code.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/base/out_of_memory.h"
 
 namespace semblance {
@@ -61,7 +62,7 @@ Failure Describe(const std::exception_ptr& thrown) {
   } catch (const std::filesystem::filesystem_error& e) {
     return {kBadInput, WordsOf(e)};
   } catch (const nlohmann::json::exception& e) {
-    return {kBadInput, fmt::format("JSON that cannot be used: {}", e.what())};
+    return {kBadInput, fmt::format("JSON that cannot be used: {}", JsonFault(e))};
   } catch (const std::bad_alloc&) {
     return {kNotUsable, kNoMemory};
   } catch (const std::length_error&) {

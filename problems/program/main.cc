@@ -7,7 +7,10 @@
 #include <exception>
 #include <iostream>
 #include <string>
+#include <vector>
 
+#include "problems/command_line/command_tree.h"
+#include "problems/command_line/unknown_word.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/face_commands.h"
 #include "problems/program/failure.h"
@@ -52,7 +55,11 @@ int ParseAndRun(int argc, char** argv) {
   } catch (const CLI::Success& e) {
     return app.exit(e) == 0 ? kDone : kBadInput;
   } catch (const CLI::ParseError& e) {
-    return Complain(Shortened(fmt::format("{}; --help tells more", e.what())), kBadInput);
+    const std::string unknown =
+        UnknownWord(TreeOf(app), std::vector<std::string>(argv + 1, argv + argc));
+    return Complain(
+        Shortened(fmt::format("{}; --help tells more", unknown.empty() ? e.what() : unknown)),
+        kBadInput);
   }
   return line.chosen();
 }

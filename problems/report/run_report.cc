@@ -489,7 +489,7 @@ void WriteReport(OutputFolder& folder) {
     folder.Write("report.html",
                  ReportHtml(BuildReport(ParseJson(ReadFileBytes(file), file.string()), folder)));
   } catch (const nlohmann::json::exception& e) {
-    throw IoError(fmt::format("{}: not the result of a run: {}", file.string(), e.what()));
+    throw IoError(fmt::format("{}: not the result of a run: {}", file.string(), JsonFault(e)));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "surfaces/base/error.h"
 
@@ -32,12 +33,18 @@ void CheckJsonDepth(std::string_view text) {
   }
 }
 
+std::string JsonFault(const std::exception& error) {
+  const std::string_view words = error.what();
+  const std::size_t end = words.starts_with("[json.exception.") ? words.find("] ") : words.npos;
+  return std::string(end == words.npos ? words : words.substr(end + 2));
+}
+
 nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name) {
   try {
     CheckJsonDepth(text);
     return nlohmann::ordered_json::parse(text);
   } catch (const nlohmann::json::exception& error) {
-    throw IoError(fmt::format("{}: this is not JSON: {}", name, error.what()));
+    throw IoError(fmt::format("{}: this is not JSON: {}", name, JsonFault(error)));
   } catch (const IoError& error) {
     throw IoError(fmt::format("{}: {}", name, error.what()));
   }

@@ -2,7 +2,9 @@
 // Text to JSON, within the depth that a recursion over the tree can stand.
 #pragma once
 
+#include <exception>
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 #include <string_view>
 
 namespace semblance {
@@ -14,5 +16,8 @@ void CheckJsonDepth(std::string_view text);
 
 // Throws IoError, which begins with `name`, for deeper nesting and for what is no JSON.
 nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name);
+
+// What an exception of the JSON library says, for people: without its own name and number.
+std::string JsonFault(const std::exception& error);
 
 }  // namespace semblance

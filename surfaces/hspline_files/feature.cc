@@ -8,6 +8,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
@@ -193,7 +194,7 @@ Feature FeatureFromJson(std::string_view text, const std::string& source) {
   try {
     return ParsedFeature(json_parts::ParseWithoutRepeats(text));
   } catch (const nlohmann::json::exception& e) {
-    throw IoError(fmt::format("{}: not a feature that can be read: {}", source, e.what()));
+    throw IoError(fmt::format("{}: not a feature that can be read: {}", source, JsonFault(e)));
   } catch (const Error& e) {
     throw IoError(fmt::format("{}: not a feature that can be read: {}", source, e.what()));
   }

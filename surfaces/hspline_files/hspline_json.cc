@@ -7,6 +7,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
@@ -69,10 +70,17 @@ std::string HSplineToJson(const HSplineSurface& surface) {
 }
 
 HSplineSurface HSplineFromJson(std::string_view text, const std::string& name) {
+  const std::size_t start = text.find_first_not_of(" \t\r\n");
+  if (start == text.npos || text[start] != '{') {
+    throw IoError(
+        fmt::format("{}: not an H-spline: it is no JSON; an H-spline is a file such as "
+                    "face.hspline.json of a run, or surface.hspline.json of a fit",
+                    name));
+  }
   try {
     return SurfaceFromJson(ParseWithoutRepeats(text));
   } catch (const nlohmann::json::exception& e) {
-    throw IoError(fmt::format("{}: not an H-spline that can be read: {}", name, e.what()));
+    throw IoError(fmt::format("{}: not an H-spline that can be read: {}", name, JsonFault(e)));
   } catch (const Error& e) {
     throw IoError(fmt::format("{}: not an H-spline that can be read: {}", name, e.what()));
   }
