@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_file.h"
 #include "problems/subject/phantom_landmarks.h"
+#include "problems/thinning/thinned_network.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -151,6 +153,42 @@ std::vector<Dowel> ExpectedDowels(const Experiment& experiment, const LandmarkFi
   }
   FillDepths(*table, landmarks, dowels);
   return dowels;
+bool UsesAllAsGiven(const PlaceOptions& options) {
+  return std::holds_alternative<KeepAll>(options.keep) && options.noise_mm == 0;
+}
+
+// The dowels of the landmarks that the experiment uses, in place of all. Returns notes.
+std::vector<std::string> UseSome(const SubjectData& data, const PlaceOptions& options,
+                                 const TissueOptions& tissue, const MeshQuery& skull,
+                                 Case& subject) {
+  UsedLandmarks used = LandmarksInUse(data.landmarks, skull, options);
+  subject.dowels_on_bone = PlaceDowels(used.file, data.skull, skull, options);
+  Append(used.notes, FillDepths(tissue, used.file, subject.dowels_on_bone));
+  return used.notes;
+}
+
+// The network's plan, closed over the landmarks that the experiment does not use.
+NetworkPlan PlanFor(const Experiment& experiment, const LandmarkFile& landmarks) {
+  NetworkPlan plan = ReadNetworkPlan(experiment.network);
+  if (std::holds_alternative<KeepAll>(experiment.landmarks.keep)) {
+    return plan;
+  }
+  std::map<std::string, Vec3> points;
+  std::vector<std::string> sites;
+  std::vector<Vec3> at;
+  for (const Landmark& landmark : landmarks.landmarks) {
+    sites.push_back(landmark.site);
+    at.emplace_back(landmark.point[0], landmark.point[1], landmark.point[2]);
+    points[landmark.site] = at.back();
+  }
+  const std::vector<bool> kept = KeptSites(experiment.landmarks.keep, sites, at);
+  std::set<std::string> gone;
+  for (std::size_t k = 0; k < sites.size(); ++k) {
+    if (!kept[k]) {
+      gone.insert(sites[k]);
+    }
+  }
+  return WithoutSites(std::move(plan), gone, points);
 }
 
 void CheckFilesNamed(const Experiment& experiment) {
@@ -195,14 +233,18 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
       .inputs = data.inputs};
   Append(subject.notes, remarks);
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
-  Append(subject.notes, FillDepths(WithSiteDepths(experiment, data.landmarks), data.landmarks,
-                                   subject.dowels_on_bone));
+  const TissueOptions tissue = WithSiteDepths(experiment, data.landmarks);
+  const std::vector<std::string> on_depths =
+      FillDepths(tissue, data.landmarks, subject.dowels_on_bone);
   for (const Landmark& landmark : data.landmarks.landmarks) {
     subject.points[landmark.site] = {landmark.point[0], landmark.point[1], landmark.point[2]};
   }
   subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
+  const bool all = UsesAllAsGiven(experiment.landmarks);
+  Append(subject.notes,
+         all ? on_depths : UseSome(data, experiment.landmarks, tissue, query, subject));
   InsertDowels(experiment, data, query, subject);
-  const NetworkPlan plan = ReadNetworkPlan(experiment.network);
+  const NetworkPlan plan = PlanFor(experiment, data.landmarks);
   subject.network = BuildNetwork(plan, subject.dowels_on_bone);
   if (subject.network.areas.empty()) {
     throw InputError(fmt::format(

@@ -12,7 +12,6 @@
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <span>
 #include <string>
 #include <thread>
@@ -20,11 +19,12 @@
 
 #include "problems/ct/mr_skin.h"
 #include "problems/ct/read_volume.h"
+#include "problems/inputs/input_check.h"
+#include "problems/inputs/input_files.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/stage_cache.h"
-#include "problems/pipeline/stage_key.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
@@ -51,7 +51,7 @@ struct Arguments {
   std::vector<std::string> overrides;
   std::string out;
   int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool force = false, quiet = false, schema = false;
+  bool force = false, quiet = false, schema = false, without_inputs = false;
   std::string options_of = "experiment";
   std::string config, landmarks;
   std::vector<std::string> exclude;
@@ -164,85 +164,102 @@ int FitCommand(const Arguments& arguments) {
   return TellFaults(result.Faults());
 }
 
-// Looks at the subjects of experiments, each once, so that a run of hours does not begin with sides
-// exchanged.
-class SubjectCheck {
- public:
-  explicit SubjectCheck(const RunContext& context) : context_(context) {}
-
-  void Look(const std::string& file, const Experiment& experiment) {
-    const bool made = std::holds_alternative<PhantomOptions>(experiment.subject);  // not measured
-    if (made && experiment.sites.empty()) {
-      return;
+// Each file that is named and not there, where it is named. Template and bust are read with the
+// options, which depend on them, and are told there.
+void AddMissing(std::span<const NamedFile> named, const ConfigNode& tree, ConfigErrors& errors) {
+  std::error_code ignored;
+  for (const NamedFile& input : named) {
+    const bool is_told = input.option.starts_with("template.") || input.option.starts_with("bust.");
+    if (!is_told && !std::filesystem::exists(input.file, ignored)) {
+      errors.Add(PlaceOf(tree, input.option), input.option,
+                 fmt::format("no such file: {}; paths are relative to the file that they stand in",
+                             input.file.string()));
     }
-    const std::string key =
-        StageKey("subject", experiment.subject, experiment.landmarks, experiment.sites);
-    if (sound_.contains(key)) {
-      return;
-    }
-    const auto subject = subjects_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
-      return LoadSubject(experiment.subject, context_);
-    });
-    for (const std::string& note :
-         made ? std::vector<std::string>() : CheckSubject(*subject, experiment.landmarks)) {
-      fmt::print("{}: warning: {}\n", file, note);
-    }
-    if (!experiment.sites.empty()) {
-      MakeCase(*subject, experiment);  // whether each can be placed
-    }
-    sound_.insert(key);
   }
+}
 
- private:
-  RunContext context_;
-  StageCache subjects_{4};
-  std::set<std::string> sound_;
-};
+// A configuration with its faults all at once, files that are missing among them.
+template <class Options>
+Options ReadChecked(const std::string& file, const Arguments& arguments,
+                    std::vector<NamedFile> (*inputs_of)(const Options&)) {
+  ConfigErrors errors;
+  const ConfigNode tree =
+      LoadConfigTree(file, arguments.overrides, ConfigTreeOf(Options{}), errors);
+  const auto options = ReadConfigTree<Options>(tree, errors);
+  if (!arguments.without_inputs) {
+    AddMissing(inputs_of(options), tree, errors);
+  }
+  errors.ThrowIfAny();
+  return options;
+}
 
-void CheckStudy(const std::string& file, std::span<const std::string> overrides,
-                SubjectCheck& subjects) {
-  if (!overrides.empty()) {
+CheckFindings CheckStudy(const std::string& file, const Arguments& arguments, InputCheck& inputs) {
+  if (!arguments.overrides.empty()) {
     throw InputError(fmt::format(
         "{}: --set is for experiments and fits; write it into the study, under set:", file));
   }
-  for (const StudyTrial& trial : ReadStudy(file).trials) {
-    subjects.Look(file, trial.experiment);
+  CheckFindings findings;
+  const StudyPlan plan = ReadStudy(file);
+  findings.warnings = plan.notes;
+  for (const StudyTrial& trial : plan.trials) {
+    if (!arguments.without_inputs) {
+      findings.Add(inputs.Look(trial.experiment));
+    }
   }
+  return findings;
 }
 
-void CheckExperiment(const std::string& file, const Experiment& experiment,
-                     SubjectCheck& subjects) {
-  for (const std::string& warning : DepthWarnings(experiment.tissue)) {
-    fmt::print("{}: warning: {}\n", file, warning);
-  }
-  subjects.Look(file, experiment);
+CheckFindings CheckExperiment(const std::string& file, const Arguments& arguments,
+                              InputCheck& inputs) {
+  const auto experiment = ReadChecked<Experiment>(file, arguments, &NamedInputsOf);
+  CheckFindings findings;
+  std::vector<Experiment> all = {experiment};
   for (const NamedExperiment& alternative :
        AlternativesOf(experiment, std::filesystem::path(file).parent_path())) {
-    CheckExperiment(file, alternative.experiment, subjects);
+    all.push_back(alternative.experiment);
   }
+  for (const Experiment& one : all) {
+    if (!arguments.without_inputs) {
+      findings.Add(inputs.Look(one));
+    }
+  }
+  return findings;
 }
 
 // The keys at the top tell what a file is for: an experiment, where no other fits better.
-void CheckConfig(const std::string& file, std::span<const std::string> overrides,
-                 SubjectCheck& subjects) {
+CheckFindings CheckConfig(const std::string& file, const Arguments& arguments, InputCheck& inputs) {
   if (OwnKeys<StudyFile>(file) > OwnKeys<Experiment>(file)) {
-    CheckStudy(file, overrides, subjects);
-  } else if (KnownKeys<PointFitOptions>(file) > KnownKeys<Experiment>(file)) {
-    ReadConfig<PointFitOptions>(file, overrides);
-  } else {
-    CheckExperiment(file, ReadConfig<Experiment>(file, overrides), subjects);
+    return CheckStudy(file, arguments, inputs);
   }
+  if (KnownKeys<PointFitOptions>(file) > KnownKeys<Experiment>(file)) {
+    ReadChecked<PointFitOptions>(file, arguments, &NamedFiles<PointFitOptions>);
+    return {};
+  }
+  return CheckExperiment(file, arguments, inputs);
+}
+
+// Returns whether there was no fault.
+bool TellFindings(const std::string& file, const CheckFindings& findings) {
+  for (const std::string& warning : findings.warnings) {
+    fmt::print("{}: warning: {}\n", file, warning);
+  }
+  for (const std::string& fault : findings.faults) {
+    fmt::print(stderr, "{}\n", Shortened(fmt::format("{}: {}", file, fault)));
+  }
+  if (findings.sound()) {
+    fmt::print("{}: no fault found\n", file);
+  }
+  return findings.sound();
 }
 
 int CheckCommand(const Arguments& arguments) {
   RunContext context;
   context.threads = arguments.threads;
-  SubjectCheck subjects(context);
+  InputCheck inputs(context);
   bool sound = true;
   for (const std::string& file : arguments.files) {
     try {
-      CheckConfig(file, arguments.overrides, subjects);
-      fmt::print("{}: no fault found\n", file);
+      sound = TellFindings(file, CheckConfig(file, arguments, inputs)) && sound;
     } catch (...) {
       fmt::print(stderr, "{}\n", FailureOf(std::current_exception()).words);
       sound = false;
@@ -453,6 +470,9 @@ void DeclareCheck(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &CheckCommand);
   command.add_option("CONFIG", a.files, "YAML files")->required();
   AddSet(command, a);
+  command.add_flag("--without-inputs", a.without_inputs,
+                   "look at the options alone; else every file that they name is opened, and the "
+                   "landmarks are laid on the bone");
 }
 
 void DeclareOptions(CLI::App& command, CommandLine& line) {
@@ -501,10 +521,11 @@ constexpr std::array kCommands = {
                    "make meshes of skull and skin from a CT volume, or of the skin from an MR, in "
                    "mm",
                    &DeclareImportCt},
-    ProgramCommand{"check",
-                   "check configurations of experiments, studies and fits, and the experiments' "
-                   "skulls and landmarks; run nothing",
-                   &DeclareCheck},
+    ProgramCommand{
+        "check",
+        "check configurations of experiments, studies and fits, and all inputs that they "
+        "name; run nothing",
+        &DeclareCheck},
     ProgramCommand{"options", "list every option: default, unit, range, meaning", &DeclareOptions},
     ProgramCommand{"evaluate", "measure how far a face is from the true one, as JSON",
                    &DeclareEvaluate},

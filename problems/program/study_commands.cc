@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdio>
@@ -11,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "problems/compare/comparison_files.h"
+#include "problems/output/staged_folder.h"
 #include "problems/program/exit_code.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_submit.h"
@@ -26,6 +29,8 @@ namespace fs = std::filesystem;
 struct StudyArguments {
   std::vector<std::string> files;
   std::string out, shard;
+  std::string rerun, metric;
+  bool force = false;
   bool quiet = false, list = false, slurm = false;
   StudyRunOptions run;
   SubmitOptions submit;
@@ -55,12 +60,19 @@ void SetShard(const std::string& text, StudyRunOptions& options) {
   }
 }
 
-int PrintPlan(const StudyPlan& plan) {
-  for (const StudyTrial& trial : plan.trials) {
-    fmt::print("{} {} | {}\n", trial.id, trial.subject, fmt::join(trial.values, " | "));
+int PrintPlan(const StudyPlan& plan, const std::string& only) {
+  const std::vector<bool> chosen = TrialsThat(plan, only);
+  for (std::size_t n = 0; n < plan.trials.size(); ++n) {
+    const StudyTrial& trial = plan.trials[n];
+    if (chosen[n]) {
+      fmt::print("{} {} | {}\n", trial.id, trial.subject, fmt::join(trial.values, " | "));
+    }
   }
   fmt::print("plan {}: {} trials over {}\n", plan.hash, plan.trials.size(),
              fmt::join(plan.axes, ", "));
+  if (!only.empty()) {
+    fmt::print("of these {} where {}\n", std::ranges::count(chosen, true), only);
+  }
   return kDone;
 }
 
@@ -84,6 +96,34 @@ int PrintStudyState(const StudyResults& results, const fs::path& root) {
   return results.Count("done") == static_cast<int>(results.trials.size()) ? kDone : kNotUsable;
 }
 
+// Of the trials that were asked for; the others may be missing.
+int PrintPartState(const StudyResults& results, const std::vector<bool>& asked,
+                   const fs::path& root) {
+  int count = 0, done = 0;
+  for (std::size_t n = 0; n < results.trials.size(); ++n) {
+    const TrialRow& row = results.trials[n];
+    count += asked[n] ? 1 : 0;
+    done += asked[n] && row.status == "done" ? 1 : 0;
+    if (asked[n] && row.status != "done") {
+      fmt::print("{}: {} {} | {}: {}\n", row.status, row.id, row.subject,
+                 fmt::join(row.values, " | "), row.reason);
+    }
+  }
+  fmt::print("{} of the {} trials asked for done; of all {} of the study {} are missing\n", done,
+             count, results.trials.size(), results.Count("missing"));
+  fmt::print("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
+  return done == count ? kDone : kNotUsable;
+}
+
+void TellChange(const StudySummary& summary, const fs::path& root) {
+  if (summary.changed) {
+    fmt::print(
+        "note: the study has changed since {} was written: {} of its trials were there already; {} "
+        "of the earlier plan are no longer in it, and stay in trials/\n",
+        root.string(), summary.skipped, summary.left_over);
+  }
+}
+
 int StudyCommand(const StudyArguments& a) {
   const bool plan_only = a.list || (a.files.size() == 2 && a.files[0] == "plan");
   if (a.files.size() == 2 && !plan_only) {
@@ -95,12 +135,16 @@ int StudyCommand(const StudyArguments& a) {
   const fs::path file = a.files.back();
   StudyRunOptions options = a.run;
   SetShard(a.shard, options);
+  options.rerun = a.rerun == "failed"     ? Rerun::kFailed
+                  : a.rerun == "unusable" ? Rerun::kUnusable
+                  : a.rerun == "all"      ? Rerun::kAll
+                                          : Rerun::kNothing;
   const StudyPlan plan = ReadStudy(file);
   for (const std::string& note : plan.notes) {
     fmt::print("note: {}\n", note);
   }
   if (plan_only) {
-    return PrintPlan(plan);
+    return PrintPlan(plan, options.only);
   }
   const fs::path root = a.out.empty() ? "out/" + file.stem().string() : a.out;
   if (!a.quiet) {
@@ -109,6 +153,7 @@ int StudyCommand(const StudyArguments& a) {
   RunContext context;
   context.stop_token = a.stop;
   const StudySummary summary = RunStudy(plan, root, options, context);
+  TellChange(summary, root);
   if (options.shards > 1) {
     fmt::print(
         "shard {} of {}: {} trials, {} already there, {} done, {} failed; gather with "
@@ -118,7 +163,9 @@ int StudyCommand(const StudyArguments& a) {
     return kDone;
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
-  return PrintStudyState(WriteStudyTables(folder), root);
+  const StudyResults results = WriteStudyTables(folder);
+  return options.only.empty() ? PrintStudyState(results, root)
+                              : PrintPartState(results, TrialsThat(plan, options.only), root);
 }
 
 int MergeCommand(const StudyArguments& a) {
@@ -136,6 +183,19 @@ int MergeCommand(const StudyArguments& a) {
 int StatusCommand(const StudyArguments& a) {
   const fs::path root = a.files.at(0);
   return PrintStudyState(ReadStudyResults(root), root);
+}
+
+int CompareCommand(const StudyArguments& a) {
+  const StudyComparison comparison =
+      CompareStudies(ReadStudies({a.files.begin(), a.files.end()}), a.metric);
+  fmt::print("{}", ComparisonText(comparison));
+  if (!a.out.empty()) {
+    StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
+    WriteComparison(comparison, folder.Files());
+    folder.Publish();
+    fmt::print("report: {}\n", (folder.Root() / "report.html").string());
+  }
+  return kDone;
 }
 
 int SubmitCommand(const StudyArguments& a) {
@@ -166,7 +226,14 @@ void DeclareStudy(CLI::App& study, CommandLine& line) {
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   study.add_flag("--list", a.list, "print the plan and run nothing");
-  study.add_flag("--retry-failed", a.run.retry_failed, "run again what failed before");
+  study.add_option(
+      "--only", a.run.only,
+      "condition for the trials to run, over subject, tag and axes, e.g. \"subject = a "
+      "and rounds >= 2\"; = != < <= > >=, ~ with * and ?, and, or, not, ( )");
+  study
+      .add_option("--rerun", a.rerun,
+                  "run again although it is there: failed; unusable, and what failed; all")
+      ->check(CLI::IsMember({"failed", "unusable", "all"}));
   study.add_flag("--quiet", a.quiet, "no progress");
 }
 
@@ -200,12 +267,28 @@ void DeclareStatus(CLI::App& status, CommandLine& line) {
   status.add_option("DIR", a.files, "folder of the study")->required()->expected(1);
 }
 
+void DeclareCompare(CLI::App& compare, CommandLine& line) {
+  StudyArguments& a = *Bind(compare, line, &CompareCommand);
+  compare
+      .add_option("DIR", a.files,
+                  "folders of two studies or more; the others are compared with the first")
+      ->required()
+      ->expected(2, 100);
+  compare.add_option("--metric", a.metric,
+                     "number of result.json by its path; else that of the first study");
+  compare.add_option("--out", a.out, "folder for pairs.csv, values.csv and report.html");
+  compare.add_flag("--force", a.force,
+                   "replace files of the same name in a folder that is not empty");
+}
+
 constexpr std::array kCommands = {
     ProgramCommand{"study", "run every trial of a study that is not done yet", &DeclareStudy},
     ProgramCommand{"submit", "run a study on a cluster: an array of shards, then the merge",
                    &DeclareSubmit},
     ProgramCommand{"merge", "make the tables and the report of a study from its shards",
                    &DeclareMerge},
+    ProgramCommand{"compare", "compare the treatments of studies over the subjects they share",
+                   &DeclareCompare},
     ProgramCommand{"status", "say how far a study has come", &DeclareStatus},
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands that work on a study: study, submit, merge, status.
+// The commands that work on a study: study, submit, merge, compare, status.
 #pragma once
 
 #include <span>

@@ -21,6 +21,7 @@ CREATE TABLE setting (trial TEXT NOT NULL REFERENCES trial, axis INTEGER NOT NUL
   value TEXT NOT NULL, PRIMARY KEY (trial, axis)) STRICT;
 CREATE TABLE metric (trial TEXT NOT NULL REFERENCES trial, name TEXT NOT NULL,
   value REAL NOT NULL, PRIMARY KEY (trial, name)) STRICT;
+CREATE TABLE tag (word TEXT NOT NULL) STRICT;
 )sql";
 
 class Database {
@@ -98,8 +99,11 @@ class Inserter {
 
 void AddRows(const StudyResults& results, const Database& database) {
   Inserter study(database, "study", 3), axis(database, "axis", 2), trial(database, "trial", 5),
-      setting(database, "setting", 3), metric(database, "metric", 3);
+      setting(database, "setting", 3), metric(database, "metric", 3), tag(database, "tag", 1);
   study(results.title, results.hash, results.metric);
+  for (const std::string& word : results.tags) {
+    tag(word);
+  }
   for (std::size_t k = 0; k < results.axes.size(); ++k) {
     axis(k, results.axes[k]);
   }

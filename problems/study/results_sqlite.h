@@ -14,6 +14,7 @@ namespace semblance {
 //   trial(id, position, subject, status, reason)  in the order of the plan
 //   setting(trial, axis, value)                   what a trial sets on an axis (axis.position)
 //   metric(trial, name, value)                    by dotted path in result.json
+//   tag(word)                                     of the study
 // Throws InputError if SQLite cannot make it.
 std::string ResultsSqlite(const StudyResults& results);
 

@@ -11,6 +11,7 @@
 //     zip: {fit.features: [restore, free], title: [a, b]}              # side by side
 //     list: [{seeds.level: 1}, {seeds.level: 2, rounds: 2}]            # by hand
 //     sample: {method: lhs, n: 20, random_seed: 1, ranges: {seeds.weight: [0.1, 1.0]}}
+//     tags: [paper, 2026]              # words that people find it by
 //     metric: face.rms_mm              # that the report ranks by; lower is better
 //     keep: summary
 //     job: face
@@ -58,6 +59,7 @@ struct StudySubject {
   std::filesystem::path base;  // laid over the study's base; empty: none
   OptionValues set;            // laid over both, and over the study's own `set`
   bool optional = false;       // not the default: a study that lacks a subject says something else
+  std::vector<std::string> tags;  // words that --only can ask for, e.g. [phantom]
 };
 template <class Visitor>
 void Fields(Visitor& visit, StudySubject& o) {
@@ -69,6 +71,10 @@ void Fields(Visitor& visit, StudySubject& o) {
                   .doc = "skip the subject where its files are missing, and say so, rather than "
                          "refuse the study"},
         o.optional);
+  visit(FieldInfo{.name = "tags",
+                  .doc = "words of one's own, e.g. [phantom, broken], for `study --only 'tag = "
+                         "phantom'`"},
+        o.tags);
 }
 
 // The gallery is the study's subjects and these others; everyone in it has a true skin.
@@ -139,6 +145,7 @@ struct StudyFile {
   OptionAxes zip;
   std::vector<OptionValues> list;
   std::optional<StudySamples> sample;
+  std::vector<std::string> tags;
   std::string metric = "face.rms_mm";
   TrialFiles keep = TrialFiles::kSummary;  // the files of a run are some 30 MB, of a summary 10 kB
   StudyJob job = StudyJob::kFace;
@@ -163,6 +170,10 @@ void Fields(Visitor& visit, StudyFile& o) {
         o.zip);
   visit(FieldInfo{.name = "list", .min = 1, .doc = "rows by hand: values by option path"}, o.list);
   visit(FieldInfo{.name = "sample", .doc = "rows of numbers drawn from ranges"}, o.sample);
+  visit(FieldInfo{.name = "tags",
+                  .doc = "words of one's own that the study is found by; they stand in its report "
+                         "and in results.sqlite"},
+        o.tags);
   visit(FieldInfo{.name = "metric",
                   .doc = "a number of result.json by its path, which the report ranks by; lower is "
                          "better"},

@@ -10,8 +10,11 @@
 #include <sstream>
 
 #include "problems/config/config_reader.h"
+#include "problems/config/value_filter.h"
+#include "problems/inputs/input_files.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/study/study_metrics.h"
 #include "problems/study/study_rows.h"
 
 namespace semblance {
@@ -24,6 +27,7 @@ struct SubjectTree {
   std::string name;
   ConfigNode tree;
   bool optional = false;
+  std::vector<std::string> tags = {};
 };
 
 // The experiments' trees that a study file names and edits. Faults go to `errors`.
@@ -64,7 +68,7 @@ class SubjectReader {
       }
       Apply(study_.set, tree);
       Apply(list[n].set, tree);
-      trees.push_back({list[n].name, std::move(tree), list[n].optional});
+      trees.push_back({list[n].name, std::move(tree), list[n].optional, list[n].tags});
     }
     return trees;
   }
@@ -187,7 +191,7 @@ StudyTrial MakeTrial(const SubjectTree& subject, const StudyRow& row,
                      TrialFaults& faults) {
   ConfigErrors errors;
   ConfigNode tree = subject.tree;
-  StudyTrial trial{"", subject.name, std::vector<std::string>(axes.size()), {}};
+  StudyTrial trial{"", subject.name, std::vector<std::string>(axes.size()), {}, subject.tags};
   for (const OptionSetting& setting : row) {
     ApplySetting(setting, defaults, tree, errors);
     const auto axis = std::find(axes.begin(), axes.end(), setting.key);
@@ -250,7 +254,7 @@ class ExperimentHash {
   std::map<std::string, std::string> file_hashes_;
 };
 
-// What the trials of a study have in common beside their experiments; empty for job: face.
+// What the results of a study's trials rest on beside their experiments; empty for job: face.
 std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
   std::string common = plan.job == StudyJob::kDepth ? "depth" : "";
   if (plan.job == StudyJob::kIdentify) {
@@ -272,7 +276,7 @@ void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     StudyTrial& trial = plan.trials[n];
     trial.id = hash(trial.experiment);
-    if (plan.job == StudyJob::kIdentify) {  // its result is not the experiment's alone
+    if (plan.job != StudyJob::kFace) {
       trial.id = Sha256OfText(trial.id + common).substr(0, ExperimentHash::kIdDigits);
     }
     ids += trial.id;
@@ -309,7 +313,7 @@ void AddTrials(const fs::path& file, const SubjectTree& subject, const std::vect
 void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& plan,
                   TrialFaults& faults) {
   ConfigErrors errors;
-  StudyTrial as_trial{"", person.name, {}, ReadConfigTree<Experiment>(person.tree, errors)};
+  StudyTrial as_trial{"", person.name, {}, ReadConfigTree<Experiment>(person.tree, errors), {}};
   faults.Add(errors);
   const std::set<std::string> missing = MissingFiles({as_trial});
   if (missing.empty()) {
@@ -323,9 +327,33 @@ void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& pl
   }
 }
 
-std::vector<fs::path> FilesOf(const PhantomOptions&) { return {}; }
-std::vector<fs::path> FilesOf(const FileSubject& o) { return {o.skull, o.skin, o.landmarks}; }
-std::vector<fs::path> FilesOf(const CtSubject& o) { return {o.volume, o.landmarks}; }
+void CheckMetric(const StudyFile& study, const ConfigNode& tree, ConfigErrors& errors) {
+  if (const std::string complaint = ComplaintAboutMetric(study.metric, study.job);
+      !complaint.empty()) {
+    errors.Add(PlaceOf(tree, "metric"), "metric", complaint);
+  }
+}
+
+bool HasSkin(const StudyTrial& trial) {
+  const auto* files = std::get_if<FileSubject>(&trial.experiment.subject);
+  return !files || !files->skin.empty();  // a phantom and a CT have theirs
+}
+
+bool NoneHasSkin(const StudyPlan& plan) { return std::ranges::none_of(plan.trials, HasSkin); }
+
+// What a condition can ask of a trial.
+NamedValues ValuesOf(const StudyPlan& plan, const StudyTrial& trial) {
+  NamedValues values = {{"subject", trial.subject}, {"id", trial.id}};
+  for (const std::string& tag : trial.tags) {
+    values.emplace("tag", tag);
+  }
+  for (std::size_t k = 0; k < plan.axes.size(); ++k) {
+    if (!trial.values[k].empty()) {
+      values.emplace(plan.axes[k], trial.values[k]);
+    }
+  }
+  return values;
+}
 
 }  // namespace
 
@@ -334,14 +362,21 @@ StudyPlan ReadStudy(const fs::path& file) {
   ConfigNode tree;
   const StudyFile study = ReadStudyFile(file, tree, errors);
   const ConfigNode defaults = ConfigTreeOf(Experiment{});
-  const auto [subjects, others] = SubjectReader(study, tree, defaults, errors).Read();
+  CheckMetric(study, tree, errors);
+  TrialFaults faults;
+  ConfigErrors of_bases;
+  const auto [subjects, others] = SubjectReader(study, tree, defaults, of_bases).Read();
   const std::vector<StudyRow> rows = StudyRows(study, errors);
-  errors.ThrowIfAny();
+  faults.Add(errors);
+  faults.Add(of_bases);
+  if (of_bases.size() > 0) {  // the trials would repeat what is wrong with their base
+    faults.ThrowIfAny();
+  }
 
   StudyPlan plan{
       .title = study.title, .metric = study.metric, .keep = study.keep, .job = study.job};
+  plan.tags = study.tags;
   plan.axes = AxesOf(rows);
-  TrialFaults faults;
   for (const SubjectTree& subject : subjects) {
     AddTrials(file, subject, rows, defaults, plan, faults);
   }
@@ -357,25 +392,34 @@ StudyPlan ReadStudy(const fs::path& file) {
   if (plan.trials.empty()) {
     faults.Add(
         fmt::format("{}: no subject is left; all are optional and lack files", file.string()));
+  } else if (NeedsTrueSkin(plan.metric) && NoneHasSkin(plan)) {
+    faults.Add(fmt::format(
+        "{}: metric: '{}' is measured against the true skin, which no subject has; name the skins "
+        "(subject.skin), or another metric",
+        ToText(PlaceOf(tree, "metric")), plan.metric));
   }
   NameTrials(file, plan, faults);
   faults.ThrowIfAny();
   return plan;
 }
 
-std::vector<fs::path> InputFilesOf(const Experiment& experiment) {
-  std::vector<fs::path> files =
-      std::visit([](const auto& subject) { return FilesOf(subject); }, experiment.subject);
-  files.push_back(experiment.network);
-  for (const fs::path& table : TablesOf(experiment.tissue)) {
-    files.push_back(table);
+std::vector<bool> TrialsThat(const StudyPlan& plan, const std::string& condition) {
+  if (condition.empty()) {
+    return std::vector<bool>(plan.trials.size(), true);
   }
-  if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
-    files.push_back(map->file);
-    files.push_back(map->mesh);
+  std::vector<std::string> names = {"subject", "tag", "id"};
+  names.insert(names.end(), plan.axes.begin(), plan.axes.end());
+  const ValueFilter filter(condition, names);
+  std::vector<bool> chosen;
+  for (const StudyTrial& trial : plan.trials) {
+    chosen.push_back(filter.Holds(ValuesOf(plan, trial)));
   }
-  std::erase(files, fs::path());
-  return files;
+  if (std::ranges::find(chosen, true) == chosen.end()) {
+    throw InputError(
+        fmt::format("{}: none of the {} trials is so; `semblance study plan` lists their values",
+                    condition, plan.trials.size()));
+  }
+  return chosen;
 }
 
 }  // namespace semblance

@@ -15,6 +15,7 @@
 #include <system_error>
 #include <thread>
 
+#include "problems/inputs/input_files.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
@@ -51,7 +52,10 @@ void AppendProvenance(const StudyTrial& trial, Json& json) {
   std::string config = WriteConfig(trial.experiment);
   json["inputs"] = Json::array();
   for (const fs::path& file : InputFilesOf(trial.experiment)) {
-    json["inputs"].push_back({{"file", file.filename().string()}, {"sha256", Sha256OfFile(file)}});
+    for (const fs::path& part : fs::is_directory(file) ? VolumeFiles(file) : std::vector{file}) {
+      json["inputs"].push_back(
+          {{"file", part.filename().string()}, {"sha256", Sha256OfFile(part)}});
+    }
     for (std::size_t at = config.find(file.string()); at != config.npos;
          at = config.find(file.string(), at)) {
       config.replace(at, file.string().size(), file.filename().string());
@@ -89,8 +93,9 @@ class StudyRunner {
         cache_(4 * options.jobs + 6, CacheOnDisk(options)) {}
 
   StudySummary Run() {
+    const std::vector<bool> chosen = TrialsThat(plan_, options_.only);
     for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
-      if (static_cast<int>(n % options_.shards) == options_.shard) {
+      if (static_cast<int>(n % options_.shards) == options_.shard && chosen[n]) {
         Queue(plan_.trials[n]);
       }
     }
@@ -123,11 +128,44 @@ class StudyRunner {
  private:
   void Queue(const StudyTrial& trial) {
     ++summary_.trials;
-    const auto status = StatusOf(folder_, trial.id);
-    if (status && (*status != "failed" || !options_.retry_failed)) {
+    std::optional<Json> there = ReadTrialFile(folder_, trial.id);
+    if (there && !IsAskedAgain(there->value("status", "failed")) && HasWhatIsKept(trial, *there)) {
+      TellAxesOfNow(trial, *there);
       ++summary_.skipped;
     } else {
       queue_.push_back(&trial);
+    }
+  }
+
+  bool IsAskedAgain(const std::string& status) const {
+    return options_.rerun == Rerun::kAll ||
+           (status == "failed" && options_.rerun != Rerun::kNothing) ||
+           (status == "unusable" && options_.rerun == Rerun::kUnusable);
+  }
+
+  // Whether the trial's folder has the files that `keep` asks for, which may have asked for less
+  // when it ran.
+  bool HasWhatIsKept(const StudyTrial& trial, const Json& there) const {
+    const bool is_depth = plan_.job == StudyJob::kDepth;
+    const bool has_none = there.value("status", "failed") == "failed" ||
+                          (plan_.keep == TrialFiles::kView && is_depth &&
+                           trial.subject != plan_.trials.front().subject);
+    const char* file = plan_.keep == TrialFiles::kRun    ? "result.json"
+                       : plan_.keep == TrialFiles::kView ? (is_depth ? "depth.png" : "scene.json")
+                                                         : "trial.json";
+    return has_none || fs::exists(TrialFolder(folder_, trial.id) / file);
+  }
+
+  // A trial of an earlier plan says the axes of that plan.
+  void TellAxesOfNow(const StudyTrial& trial, Json& there) const {
+    const Json head = TrialHead(plan_, trial);
+    bool is_otherwise = false;
+    for (const auto& [key, value] : head.items()) {
+      is_otherwise = is_otherwise || !there.contains(key) || there[key] != value;
+      there[key] = value;
+    }
+    if (is_otherwise) {
+      WriteFileAtomically(TrialFolder(folder_, trial.id) / "trial.json", there.dump(1) + "\n");
     }
   }
 
@@ -315,7 +353,8 @@ class StudyRunner {
 // plan.json as text.
 std::string PlanJson(const StudyPlan& plan) {
   Json json = {{"title", plan.title}, {"hash", plan.hash},       {"metric", plan.metric},
-               {"axes", plan.axes},   {"trials", Json::array()}, {"notes", plan.notes}};
+               {"axes", plan.axes},   {"trials", Json::array()}, {"notes", plan.notes},
+               {"tags", plan.tags}};
   for (const StudyTrial& trial : plan.trials) {
     json["trials"].push_back(
         {{"id", trial.id}, {"subject", trial.subject}, {"values", trial.values}});
@@ -323,19 +362,31 @@ std::string PlanJson(const StudyPlan& plan) {
   return json.dump(1) + "\n";
 }
 
+bool Contains(const StudyPlan& plan, const std::string& id) {
+  return std::ranges::find(plan.trials, id, &StudyTrial::id) != plan.trials.end();
+}
+
 }  // namespace
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {
+  TrialsThat(plan, options.only);  // what is wrong with it is said before anything is written
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
-  const std::string there = PlanHashOf(folder);
-  if (!there.empty() && there != plan.hash) {
-    throw IoError(fmt::format(
-        "{}: the folder holds another study (plan {}, this is {}); choose another --out",
-        folder.string(), there, plan.hash));
+  const PlanThere there = ReadPlanThere(folder);
+  const auto left_over =
+      std::ranges::count_if(there.ids, [&](const std::string& id) { return !Contains(plan, id); });
+  const bool changed = !there.hash.empty() && there.hash != plan.hash;
+  if (changed && left_over == static_cast<std::ptrdiff_t>(there.ids.size())) {
+    throw IoError(
+        fmt::format("{}: the folder holds another study (plan {}, this is {}), of which no trial "
+                    "is one of this; choose another --out",
+                    folder.string(), there.hash, plan.hash));
   }
   output.Write("plan.json", PlanJson(plan));
-  return StudyRunner(plan, folder, options, context).Run();
+  StudySummary summary = StudyRunner(plan, folder, options, context).Run();
+  summary.changed = changed;
+  summary.left_over = static_cast<int>(left_over);
+  return summary;
 }
 
 std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {

@@ -14,11 +14,15 @@
 
 namespace semblance {
 
+// What is run although it is there: trials that failed; those that are not usable too; all.
+enum class Rerun { kNothing, kFailed, kUnusable, kAll };
+
 struct StudyRunOptions {
   int jobs = 1;   // trials at a time, each on one thread
   int shard = 0;  // of shards: trials n with n % shards == shard
   int shards = 1;
-  bool retry_failed = false;         // run again what failed before
+  Rerun rerun = Rerun::kNothing;
+  std::string only = {};             // a condition for the trials to run (TrialsThat); empty: all
   std::filesystem::path cache = {};  // folder for implicit faces, shared by processes; empty: none
   int cache_limit_mb = 2000;
   // May be empty. Called from one thread at a time: each second, and after each trial with its
@@ -27,9 +31,11 @@ struct StudyRunOptions {
 };
 
 struct StudySummary {
-  int trials = 0;   // of this shard
+  int trials = 0;   // of this shard, of those that were asked for
   int skipped = 0;  // were there already
   int done = 0, failed = 0;
+  int left_over = 0;     // trials of an earlier plan in this folder that are none of this one
+  bool changed = false;  // the folder held an earlier plan
   int shared_made = 0;  // subjects, shells, skulls with their implicit face, and generic faces that
                         // were made; each serves all trials that have it in common
 };
@@ -38,8 +44,13 @@ struct StudySummary {
 // experiment, versions; the same bytes whenever and wherever it ran) and timing.json; with
 // `keep: view` scene.json (of a study of depth: the first subject's depth.png), with `keep: run`
 // all files of a run beside them. A trial that cannot be done is a trial.json with the reason. What
-// trials have in common is made once. Throws IoError if the folder cannot be written or holds
-// another plan, Cancelled on request (after the trials at hand).
+// trials have in common is made once.
+//
+// The study may have changed since: a trial that is there and still in the plan is taken as it is
+// (its trial.json told the axes of now), unless it lacks the files that `keep` asks for now; one
+// that is no longer in the plan stays where it is and is in no table. Throws IoError if the folder
+// cannot be written or holds a plan that shares no trial with this one, InputError as TrialsThat,
+// Cancelled on request (after the trials at hand).
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);
 

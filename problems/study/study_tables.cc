@@ -2,9 +2,11 @@
 #include "problems/study/study_tables.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -113,6 +115,19 @@ std::set<std::string> MetricsOf(const StudyResults& results) {
   return metrics;
 }
 
+// The area that the study's metric is taken over: the closest `area_cm2` above it.
+std::string AreaMetricOf(const StudyResults& results) {
+  const std::set<std::string> known = MetricsOf(results);
+  std::string group = results.metric;
+  while (group.find('.') != group.npos) {
+    group = group.substr(0, group.rfind('.'));
+    if (known.contains(group + ".area_cm2")) {
+      return group + ".area_cm2";
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 int StudyResults::Count(const std::string& status) const {
@@ -138,10 +153,47 @@ StudyResults ReadStudyResults(const fs::path& folder) {
       ReadTrial(folder, row);
       results.trials.push_back(std::move(row));
     }
-  } catch (const nlohmann::json::exception& error) {
-    throw IoError(fmt::format("{}: not the plan of a study: {}", file.string(), error.what()));
+    results.tags = plan.value("tags", std::vector<std::string>());
+  } catch (const nlohmann::json::exception&) {
+    throw IoError(fmt::format(
+        "{}: not the plan of a study, or of a part of it only; run the study again, which writes "
+        "it anew",
+        file.string()));
+  }
+  std::ranges::copy(AreaNotes(results), std::back_inserter(results.notes));
+  if (!results.tags.empty()) {
+    results.notes.push_back(fmt::format("tags: {}", fmt::join(results.tags, ", ")));
   }
   return results;
+}
+
+std::vector<std::string> AreaNotes(const StudyResults& results) {
+  constexpr double kAlike = 0.005;
+  const std::string metric = AreaMetricOf(results);
+  std::map<std::string, std::pair<double, double>> range_cm2;  // by subject: least and most
+  for (const TrialRow& row : results.trials) {
+    const auto area = row.metrics.find(metric);
+    if (row.status == "done" && area != row.metrics.end()) {
+      auto& [least, most] =
+          range_cm2.try_emplace(row.subject, area->second, area->second).first->second;
+      least = std::min(least, area->second);
+      most = std::max(most, area->second);
+    }
+  }
+  std::vector<std::string> unlike;
+  for (const auto& [subject, range] : range_cm2) {
+    if (range.second - range.first > kAlike * range.second) {
+      unlike.push_back(fmt::format("{} ({:.1f} to {:.1f})", subject, range.first, range.second));
+    }
+  }
+  if (unlike.empty()) {
+    return {};
+  }
+  return {fmt::format(
+      "the treatments were not measured on the same area ({}, cm²): of {}. Their figures can not "
+      "be compared as they stand; let them differ in nothing that decides what is measured "
+      "(region, network)",
+      metric, fmt::join(unlike, ", "))};
 }
 
 std::string TreatmentLabel(const std::vector<std::string>& axes,

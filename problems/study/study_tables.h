@@ -32,14 +32,20 @@ struct TrialRow {
 struct StudyResults {
   std::string title, hash, metric;
   std::vector<std::string> axes;
-  std::vector<TrialRow> trials;  // in the order of the plan
-  std::vector<std::string> notes;
+  std::vector<TrialRow> trials;    // in the order of the plan
+  std::vector<std::string> notes;  // of the plan; AreaNotes; the tags
+  std::vector<std::string> tags = {};
 
   int Count(const std::string& status) const;
 };
 
 // Throws IoError if plan.json is missing or not that of a study.
 StudyResults ReadStudyResults(const std::filesystem::path& folder);
+
+// Where the treatments were measured on unlike areas of one subject (by more than 0.5 %): one line
+// that says so and whose, for their difference is then not that of the treatments alone. Empty
+// where all areas are alike, or where the metric has none.
+std::vector<std::string> AreaNotes(const StudyResults& results);
 
 // One treatment: the trials that differ in the subject only.
 struct Treatment {

@@ -102,10 +102,10 @@ std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) 
   return is_whole ? std::optional(std::move(json)) : std::nullopt;
 }
 
-std::string PlanHashOf(const fs::path& study) {
+PlanThere ReadPlanThere(const fs::path& study) {
   const fs::path file = study / "plan.json";
   if (!IsThere(file)) {
-    return "";
+    return {};
   }
   const Json json = ParsedOrNull(file);
   if (!json.is_object() || !json.contains("hash") || !json["hash"].is_string()) {
@@ -114,8 +114,17 @@ std::string PlanHashOf(const fs::path& study) {
         "goes on with the trials that are there",
         file.string()));
   }
-  return json["hash"].get<std::string>();
+  PlanThere there{.hash = json["hash"].get<std::string>(), .ids = {}};
+  const Json trials = json.value("trials", Json());
+  for (const Json& trial : trials.is_array() ? trials : Json::array()) {
+    if (trial.is_object() && trial.contains("id") && trial["id"].is_string()) {
+      there.ids.push_back(trial["id"].get<std::string>());
+    }
+  }
+  return there;
 }
+
+std::string PlanHashOf(const fs::path& study) { return ReadPlanThere(study).hash; }
 
 Json HashesOf(const fs::path& trial, const std::vector<std::string>& names) {
   Json list = Json::array();

@@ -18,8 +18,15 @@ std::filesystem::path TrialFolder(const std::filesystem::path& study, const std:
 std::optional<nlohmann::ordered_json> ReadTrialFile(const std::filesystem::path& study,
                                                     const std::string& id);
 
-// The hash in a study's plan.json; empty where there is none. Throws IoError if the file is not the
-// plan of a study.
+// What a study's plan.json says.
+struct PlanThere {
+  std::string hash;              // empty: there is no plan
+  std::vector<std::string> ids;  // of its trials
+};
+// Throws IoError if the file is there and not the plan of a study.
+PlanThere ReadPlanThere(const std::filesystem::path& study);
+
+// The hash alone.
 std::string PlanHashOf(const std::filesystem::path& study);
 
 // One entry {file, sha256} per name, for trial.json.

@@ -10,6 +10,7 @@
 #include "problems/config/config.h"
 #include "problems/subject/averaged_normal.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -57,6 +58,58 @@ Vec3 DirectionAt(const LandmarkFile& file, const Landmark& landmark, const TriMe
         OfSubject(file), SiteInWords(landmark.site), options.normal_radius_mm));
   }
   return normal;
+}
+
+// Each moved along the axes at random, and laid on the bone.
+void Move(const MeshQuery& skull, const PlaceOptions& options, UsedLandmarks& used) {
+  Random random(options.random_seed);
+  for (Landmark& landmark : used.file.landmarks) {
+    const double x = random.Normal(), y = random.Normal(), z = random.Normal();
+    const Vec3 moved = ToVec3(landmark.point) + options.noise_mm * Vec3(x, y, z);
+    landmark.point = ToArray(skull.Closest(moved).position);
+    landmark.normal.reset();  // of the bone where it was
+  }
+  used.notes.push_back(fmt::format(
+      "landmarks: each is moved at random by {} mm (sd along each axis) and laid on the bone",
+      options.noise_mm));
+}
+
+void NoteNamesThatLack(const LandmarksKept& kept, std::span<const std::string> sites,
+                       std::vector<std::string>& notes) {
+  const auto* names = std::get_if<KeepNames>(&kept);
+  for (const std::string& name : names ? names->sites : std::vector<std::string>()) {
+    if (std::ranges::find(sites, name) == sites.end()) {
+      notes.push_back(
+          fmt::format("landmarks.keep: the subject has no landmark at {}", SiteInWords(name)));
+    }
+  }
+}
+
+void Keep(const LandmarkFile& all, const LandmarksKept& kept, UsedLandmarks& used) {
+  std::vector<std::string> sites, left;
+  std::vector<Vec3> points;
+  for (const Landmark& landmark : all.landmarks) {
+    sites.push_back(landmark.site);
+    points.push_back(ToVec3(landmark.point));
+  }
+  NoteNamesThatLack(kept, sites, used.notes);
+  const std::vector<bool> stays = KeptSites(kept, sites, points);
+  std::vector<Landmark> landmarks;
+  for (std::size_t k = 0; k < sites.size(); ++k) {
+    if (stays[k]) {
+      landmarks.push_back(used.file.landmarks[k]);
+      left.push_back(sites[k]);
+    }
+  }
+  used.file.landmarks = std::move(landmarks);
+  if (left.size() < 3) {
+    throw InputError(fmt::format("{}: landmarks.keep leaves {} of {}; at least three are needed",
+                                 OfSubject(all), left.size(), sites.size()));
+  }
+  if (left.size() < sites.size()) {
+    used.notes.push_back(fmt::format("landmarks: {} of {} are used: {}", left.size(), sites.size(),
+                                     fmt::join(left, ", ")));
+  }
 }
 
 }  // namespace
@@ -125,6 +178,18 @@ LandmarkFile ReadLandmarkFile(const std::filesystem::path& path) {
   file.axes = "LPS";
   file.units = "mm";
   return file;
+}
+
+UsedLandmarks LandmarksInUse(const LandmarkFile& file, const MeshQuery& skull,
+                             const PlaceOptions& options) {
+  UsedLandmarks used{.file = file, .notes = {}};
+  if (options.noise_mm > 0) {
+    Move(skull, options, used);
+  }
+  if (!std::holds_alternative<KeepAll>(options.keep)) {
+    Keep(file, options.keep, used);
+  }
+  return used;
 }
 
 std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,

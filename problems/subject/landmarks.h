@@ -11,6 +11,7 @@
 
 #include "interp/dowels/dowel.h"
 #include "problems/subject/length_unit.h"
+#include "problems/thinning/kept_landmarks.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/tri_mesh.h"
@@ -54,6 +55,9 @@ struct PlaceOptions {
   double normal_radius_mm = 3;  // of the mean normal where a landmark has none
   double max_misfit_mm = 25;    // of a landmark from where the others foresee it; more is an error
   double max_opening_deg = 15;  // of the mandible; more is an error
+  LandmarksKept keep = KeepAll{};  // which of them are used
+  double noise_mm = 0;             // by which each is moved at random, as an unsure hand would
+  std::uint64_t random_seed = 1;   // of the noise
 };
 
 template <class Visitor>
@@ -134,7 +138,33 @@ void Fields(Visitor& visit, PlaceOptions& o) {
                   .doc = "a mandible that is open further than this is an error; from the sites of "
                          "both jaws and an average skull, to some degrees"},
         o.max_opening_deg);
+  visit(FieldInfo{.name = "keep",
+                  .doc = "which landmarks are used; the dowel network closes over the others. All "
+                         "are looked at for mistakes, and what is scored rests on all. As an axis "
+                         "of a study: [all, {type: spread, n: 16}, {type: spread, n: 8}]"},
+        o.keep);
+  visit(FieldInfo{.name = "noise_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 20,
+                  .doc = "standard deviation along each axis by which each landmark is moved at "
+                         "random; it is then laid on the nearest bone and takes the direction "
+                         "there, while its depth stays that of its site"},
+        o.noise_mm);
+  visit(FieldInfo{.name = "random_seed", .doc = "of the noise"}, o.random_seed);
 }
+
+// The landmarks as an experiment uses them, and what a reader should know of that.
+struct UsedLandmarks {
+  LandmarkFile file;
+  std::vector<std::string> notes;  // none where all are used as they are
+};
+
+// Those that options.keep says, moved by options.noise_mm. A landmark's noise depends on its place
+// in the file and on the seed, not on which others are kept. skull: on which they are laid.
+// Throws InputError if fewer than three are left.
+UsedLandmarks LandmarksInUse(const LandmarkFile& file, const MeshQuery& skull,
+                             const PlaceOptions& options);
 
 // The one way to read such a file, as the checks are made here; points and normals come in mm and
 // LPS whatever the file is in. Throws IoError if the file cannot

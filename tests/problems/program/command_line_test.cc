@@ -165,7 +165,10 @@ TEST_F(CommandLine, ASkullWithTooFewLandmarksIsRefused) {
 TEST_F(CommandLine, CheckFindsSidesThatAreSwapped) {
   const Phantom phantom = MakePhantom({.rings = 30});
   Write("skull.ply", EncodeMesh(phantom.skull, ".ply"));
-  Write("e.yaml", "subject: {type: files, skull: skull.ply, landmarks: marks.yaml}\n");
+  Write("e.yaml", fmt::format("subject: {{type: files, skull: skull.ply, landmarks: marks.yaml}}\n"
+                              "network: {0}/networks/standard32.yaml\n"
+                              "tissue: {{table: {0}/tables/rhine_caucasoid.yaml}}\n",
+                              kConfigs));
   for (const bool swapped : {false, true}) {
     std::string marks = "subject: P\nlandmarks:\n";
     for (const PhantomSite& s : phantom.sites) {
@@ -244,7 +247,9 @@ TEST_F(CommandLine, TheReadmeHasEveryCommandAndNoOther) {
 }
 
 TEST_F(CommandLine, CheckWarnsOfATableWhoseDepthsDoNotGrowWithTheBuild) {
-  Write("e.yaml", fmt::format("tissue: {{table: {}/tables/rhine_black.yaml}}\n", kConfigs));
+  Write("e.yaml", fmt::format("tissue: {{table: {0}/tables/rhine_black.yaml}}\n"
+                              "network: {0}/networks/standard32.yaml\n",
+                              kConfigs));
   const Outcome outcome = Call("check e.yaml");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("e.yaml: warning: tissue table 'rhine_black', sg "
@@ -252,6 +257,61 @@ TEST_F(CommandLine, CheckWarnsOfATableWhoseDepthsDoNotGrowWithTheBuild) {
                                      "obese: female 5.00 4.50 3.50 mm\n"));
   EXPECT_THAT(outcome.out, HasSubstr("e.yaml: no fault found"));
   EXPECT_THAT(Call("check e.yaml --set tissue.depths=measured").out, Not(HasSubstr("warning")));
+}
+
+TEST_F(CommandLine, CheckOpensEveryInputAndTellsEachFaultAtItsLine) {
+  Write("e.yaml", fmt::format("base: {}/phantom.yaml\n"
+                              "network: nowhere.yaml\n"
+                              "tissue: {{depths: table, table: none.yaml}}\n"
+                              "subject: {{type: files, skull: none.ply, landmarks: none.csv}}\n"
+                              "rounds: 1000\n",
+                              kConfigs));
+  const Outcome outcome = Call("check e.yaml");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("e.yaml:2:10: network: no such file: "),
+                                 HasSubstr("e.yaml:3:32: tissue.table: no such file: "),
+                                 HasSubstr("e.yaml:4:31: subject.skull: no such file: "),
+                                 HasSubstr("e.yaml:4:52: subject.landmarks: no such file: "),
+                                 HasSubstr("e.yaml:5:9: rounds: 1000 is out of range")));
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 5) << outcome.err;
+  EXPECT_EQ(Call("check --without-inputs e.yaml --set rounds=1").code, 0);
+  Write("s.yaml", fmt::format("base: {}/phantom.yaml\n"
+                              "grid: {{network: [{}/networks/standard32.yaml, broken.yaml]}}\n",
+                              kConfigs, kConfigs));
+  Write("broken.yaml", "areas: []\n");
+  EXPECT_THAT(Call("check s.yaml").err, HasSubstr("broken.yaml"));
+}
+
+TEST_F(CommandLine, AMistypedWordIsAnsweredWithTheNearest) {
+  EXPECT_THAT(Call("rnu e.yaml").err, HasSubstr("there is no command 'rnu'; did you mean 'run'?"));
+  EXPECT_THAT(Call("run e.yaml --sett a=b").err,
+              HasSubstr("run: there is no option '--sett'; did you mean '--set'?"));
+  EXPECT_EQ(Call("rnu").code, 2);
+}
+
+// Every command that reads a file, with files of the wrong kind: a line of our own words.
+TEST_F(CommandLine, NoLibraryHasAWordInARefusal) {
+  Write("mesh.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 82, 10), ".ply"));
+  Write("empty.json", "");
+  Write("map.json", "{}");
+  fs::create_directories(folder_ / "dir");
+  Write("dir/result.json", "{}");
+  Write("dir/plan.json", "{}");
+  for (const char* file : {"mesh.ply", "empty.json", "map.json", "dir"}) {
+    for (const char* command :
+         {"run {} --out o", "evaluate {} {}", "report {}", "study {} --out o", "merge o {}",
+          "status {}", "edit {} {} --out o.json", "export {} --to o.glb", "feature list {}",
+          "feature mirror {} --name a --library o"}) {
+      const std::string line = std::regex_replace(command, std::regex(R"(\{\})"), file);
+      const Outcome outcome = Call(line);
+      EXPECT_THAT(outcome.code, ::testing::AnyOf(0, 2)) << line << "\n" << outcome.err;
+      EXPECT_THAT(outcome.err, ::testing::ContainsRegex(outcome.code == 0 ? "" : "[a-z]")) << line;
+      for (const char* word : {"exception", "std::", "basic_", "terminate", "YAML::", "CGAL"}) {
+        EXPECT_THAT(outcome.err, Not(HasSubstr(word))) << line;
+      }
+    }
+    fs::remove_all(folder_ / "o");
+  }
 }
 
 TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {

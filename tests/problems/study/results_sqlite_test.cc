@@ -70,7 +70,7 @@ TEST_F(SqliteTest, AnswersWhatTheResultsHold) {
 
 TEST_F(SqliteTest, TablesAreStrict) {
   EXPECT_THAT(Ask("SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND strict = 1"),
-              ElementsAre("5"));
+              ElementsAre("6"));
   EXPECT_THAT(Ask("INSERT INTO metric VALUES ('t1', 'x', 'word')"),
               ElementsAre(::testing::HasSubstr("cannot store TEXT value in REAL column")));
 }

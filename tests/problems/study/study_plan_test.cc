@@ -141,6 +141,44 @@ TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
   EXPECT_THAT(Faults("set: {rounds: 2}\n"), HasSubstr("study.yaml:4:1: set: the key stands twice"));
 }
 
+TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreToldTogetherAndOnce) {
+  const std::string words = Faults(
+      "subjects: [{name: a}, {name: b, set: {subject.random_seed: 2}}]\n"
+      "grid:\n  interp: [nearest, krigging]\n  rounds: [1, 2000]\nkeep: all\nmetric: "
+      "face.rms\n");
+  EXPECT_THAT(words, AllOf(HasSubstr("keep: unknown word 'all'"),
+                           HasSubstr("metric: no trial of job: face has a number 'face.rms'; did "
+                                     "you mean 'face.rms_mm'?"),
+                           HasSubstr("krigging"), HasSubstr("rounds: 2000 is out of range")));
+  EXPECT_EQ(std::count(words.begin(), words.end(), '\n'), 3) << words;
+}
+
+TEST_F(StudyPlanTest, AMetricMustBeOneThatTheJobAndTheSubjectsHave) {
+  EXPECT_THAT(Faults("metric: face.rms_mm\njob: depth\n"), HasSubstr("no trial of job: depth"));
+  EXPECT_NO_THROW(Plan("metric: cross_validation.landmark.sites.g\njob: depth\n"));
+  EXPECT_NO_THROW(Plan("metric: identify.surface.rank\njob: identify\n"));
+  WriteFileAtomically(folder_ / "skull.ply", "");
+  WriteFileAtomically(folder_ / "marks.yaml", "");
+  EXPECT_THAT(Faults("subjects: [{name: a, set: {subject: {type: files, skull: skull.ply, "
+                     "landmarks: marks.yaml}}}]\n"),
+              HasSubstr("measured against the true skin, which no subject has"));
+}
+
+TEST_F(StudyPlanTest, AConditionChoosesTrialsBySubjectTagAndAxes) {
+  const StudyPlan plan = Plan(
+      "subjects: [{name: a, tags: [odd]}, {name: b, tags: [even, big], set: {subject.random_seed: "
+      "7}}]\ngrid: {interp: [nearest, mean], rounds: [1, 2, 10]}\n");
+  const auto count = [&](const std::string& condition) {
+    const std::vector<bool> chosen = TrialsThat(plan, condition);
+    return std::count(chosen.begin(), chosen.end(), true);
+  };
+  EXPECT_EQ(count(""), 12);
+  EXPECT_EQ(count("tag = big"), 6);
+  EXPECT_EQ(count("tag != big and interp = mean"), 3);
+  EXPECT_EQ(count("rounds >= 2"), 8);
+  EXPECT_EQ(count("id = " + plan.trials[3].id), 1);
+}
+
 TEST_F(StudyPlanTest, AnAxisOfTypesTakesEachWithItsOwnDefaults) {
   const StudyPlan plan = Plan("grid: {interp.type: [network_spline, natural_neighbour]}\n");
   ASSERT_EQ(plan.trials.size(), 2u);

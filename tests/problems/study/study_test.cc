@@ -6,9 +6,11 @@
 
 #include <map>
 #include <regex>
+#include <string>
 
 #include "problems/config/config.h"
 #include "problems/run.h"
+#include "problems/study/study_metrics.h"
 #include "problems/study/study_run.h"
 #include "problems/study_report/study_report.h"
 #include "surfaces/base/atomic_file.h"
@@ -86,6 +88,90 @@ TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
   EXPECT_EQ(Tables(folder_ / "one"), one);
 }
 
+// A study whose file has changed is, trial for trial and table for table, the study that was never
+// another one.
+TEST_F(StudyTest, AChangedStudyKeepsTheTrialsThatItStillHasAndEndsAsIfItHadBeenSoFromTheFirst) {
+  RunStudy(Plan(kSmall), folder_ / "run", {}, {});
+  const StudyPlan changed = Plan(
+      "subjects:\n  - {name: b, set: {subject.random_seed: 2}}\n"
+      "  - {name: c, set: {subject.random_seed: 3}}\n"
+      "grid: {interp: [{type: mean}, harmonic], rounds: [1], fit.features: [restore]}\nmetric: "
+      "implicit_face.rms_mm\n");
+  const StudySummary on = RunStudy(changed, folder_ / "run", {}, {});
+  EXPECT_TRUE(on.changed);
+  EXPECT_EQ(on.skipped, 1);  // b with mean
+  EXPECT_EQ(on.done, 3);
+  EXPECT_EQ(on.left_over, 3);
+  const StudySummary anew = RunStudy(changed, folder_ / "new", {}, {});
+  EXPECT_FALSE(anew.changed);
+  auto run = Tables(folder_ / "run");
+  for (const auto& [name, bytes] : Tables(folder_ / "new")) {
+    EXPECT_EQ(run.at(name), bytes) << name;
+  }
+  EXPECT_EQ(RunStudy(changed, folder_ / "run", {}, {}).skipped, 4);
+}
+
+TEST_F(StudyTest, TrialsThatLackWhatIsKeptNowAreRunAgain) {
+  const std::string one = "grid: {landmarks.max_distance_mm: [50]}\n";
+  const StudyPlan summary = Plan(one), view = Plan(one + "keep: view\n");
+  RunStudy(summary, folder_ / "run", {}, {});
+  EXPECT_EQ(RunStudy(view, folder_ / "run", {}, {}).done, 1);
+  EXPECT_TRUE(fs::exists(folder_ / "run" / "trials" / view.trials[0].id / "scene.json"));
+  EXPECT_EQ(RunStudy(view, folder_ / "run", {}, {}).skipped, 1);
+  EXPECT_EQ(RunStudy(summary, folder_ / "run", {}, {}).skipped, 1);
+}
+
+TEST_F(StudyTest, OnlyWhatIsAskedForRunsAndTheRestFollowsLater) {
+  const StudyPlan plan = Plan(kSmall);
+  const StudySummary part =
+      RunStudy(plan, folder_ / "run", {.only = "subject = b and interp = mean"}, {});
+  EXPECT_EQ(part.trials, 1);
+  EXPECT_EQ(part.done, 1);
+  EXPECT_EQ(ReadStudyResults(folder_ / "run").Count("missing"), 3);
+  EXPECT_EQ(RunStudy(plan, folder_ / "run", {.rerun = Rerun::kAll, .only = "subject = b"}, {}).done,
+            2);
+  EXPECT_EQ(RunStudy(plan, folder_ / "run", {}, {}).done, 2);
+  RunStudy(plan, folder_ / "whole", {}, {});
+  EXPECT_EQ(Tables(folder_ / "run"), Tables(folder_ / "whole"));
+  EXPECT_THAT(
+      WordsOf<InputError>([&] { RunStudy(plan, folder_ / "none", {.only = "subject = x"}, {}); }),
+      HasSubstr("none of the 4 trials is so"));
+  EXPECT_FALSE(fs::exists(folder_ / "none"));
+}
+
+TEST_F(StudyTest, ADepthStudyTakesNoTrialOfAFaceStudy) {
+  const std::string one = "grid: {landmarks.max_distance_mm: [50]}\n";
+  const StudyPlan face = Plan(one),
+                  depth = Plan(one + "job: depth\nmetric: depth_truth.tips.rms_mm\n");
+  EXPECT_NE(face.trials[0].id, depth.trials[0].id);
+}
+
+// Every number of a real result is among those that are known beforehand.
+TEST_F(StudyTest, TheMetricsOfARunAreKnownBeforeIt) {
+  for (const auto& [job, text] :
+       {std::pair{StudyJob::kFace, ""},
+        std::pair{StudyJob::kDepth, "job: depth\nmetric: depth_truth.tips.rms_mm\n"}}) {
+    const StudyPlan plan = Plan(fmt::format("grid: {{landmarks.max_distance_mm: [50]}}\n{}", text));
+    const fs::path root = folder_ / EnumNames(job)[static_cast<int>(job)];
+    RunStudy(plan, root, {}, {});
+    const auto metrics = ReadStudyResults(root).trials.at(0).metrics;
+    EXPECT_NE(ComplaintAboutMetric("face.rms_mmx", job), "");
+    EXPECT_GT(metrics.size(), 50u);
+    for (const auto& [name, value] : metrics) {
+      EXPECT_EQ(ComplaintAboutMetric(name, job), "");
+    }
+  }
+}
+
+TEST_F(StudyTest, UnlikeAreasAreSaid) {
+  RunStudy(Plan("grid: {region.extent: [face, network]}\n"), folder_ / "unlike", {}, {});
+  EXPECT_THAT(Tables(folder_ / "unlike").at("report.html"),
+              HasSubstr("were not measured on the same area (face.area_cm2"));
+  RunStudy(Plan("grid: {landmarks.keep: [all, {type: spread, n: 12}]}\n"), folder_ / "alike", {},
+           {});
+  EXPECT_THAT(AreaNotes(ReadStudyResults(folder_ / "alike")), ::testing::IsEmpty());
+}
+
 TEST_F(StudyTest, AFailedTrialIsARowWithItsReason) {
   // With this radius no landmark is close enough to a skull of so few triangles.
   const StudyPlan plan = Plan("grid: {landmarks.max_distance_mm: [0, 50]}\n");
@@ -96,7 +182,7 @@ TEST_F(StudyTest, AFailedTrialIsARowWithItsReason) {
   EXPECT_THAT(files.at("trials.csv"), HasSubstr("failed,\"landmarks of phantom 1"));
   EXPECT_THAT(files.at("report.html"), HasSubstr("max_distance_mm"));
   EXPECT_EQ(RunStudy(plan, folder_ / "run", {}, {}).skipped, 2);
-  EXPECT_EQ(RunStudy(plan, folder_ / "run", {.retry_failed = true}, {}).failed, 1);
+  EXPECT_EQ(RunStudy(plan, folder_ / "run", {.rerun = Rerun::kFailed}, {}).failed, 1);
 }
 
 TEST_F(StudyTest, WhatIsMissingIsCountedAndSaid) {

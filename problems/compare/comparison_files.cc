@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/compare/comparison_files.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+#include "problems/report/report.h"
+#include "surfaces/base/csv.h"
+
+namespace semblance {
+namespace {
+
+std::string Called(const ComparedTreatment& treatment) {
+  return fmt::format("{}: {}", treatment.study, treatment.label);
+}
+
+std::string IntervalText(const Interval& interval) {
+  return std::isfinite(interval.low)
+             ? fmt::format("{} to {}", TableNumber(interval.low), TableNumber(interval.high))
+             : "";
+}
+
+ReportTable TreatmentTable(const StudyComparison& comparison) {
+  ReportTable table{fmt::format("{} over the {} subjects of all studies; lower is better",
+                                comparison.metric, comparison.subjects.size()),
+                    {"study", "treatment", "subjects", "mean", "sd", "95 % of the mean"},
+                    {}};
+  for (const ComparedTreatment& t : comparison.treatments) {
+    table.rows.push_back({t.study, t.label, std::to_string(t.summary.n),
+                          TableNumber(t.summary.mean), TableNumber(t.summary.sd),
+                          IntervalText(t.summary.mean_95)});
+  }
+  return table;
+}
+
+ReportTable PairTable(const StudyComparison& comparison) {
+  ReportTable table{
+      "Each treatment of the later studies less its reference, over the subjects that both have",
+      {"treatment", "reference", "subjects", "mean difference", "95 % of it", "better of",
+       "worse of", "p (Wilcoxon, Holm)"},
+      {}};
+  for (const TreatmentPair& pair : comparison.pairs) {
+    table.rows.push_back({Called(pair.other), Called(pair.reference),
+                          std::to_string(pair.difference.n), TableNumber(pair.difference.mean),
+                          IntervalText(pair.difference.mean_95), std::to_string(pair.better),
+                          std::to_string(pair.worse), TableNumber(pair.p_holm)});
+  }
+  return table;
+}
+
+Report ReportOf(const StudyComparison& comparison) {
+  Report report{.title = fmt::format("{} compared", fmt::join(comparison.studies, ", ")),
+                .subtitle = fmt::format("{}, paired by subject", comparison.metric),
+                .tiles = {},
+                .main_images = {},
+                .sections = {},
+                .footer = fmt::format("semblance {}", SEMBLANCE_VERSION)};
+  report.sections.push_back(
+      {.heading = "Differences",
+       .paragraphs = {"A treatment's reference is the one of the same name in the first study, "
+                      "else the best of the first study. Below six subjects there is no test."},
+       .tables = {PairTable(comparison)}});
+  report.sections.push_back({.heading = "Treatments", .tables = {TreatmentTable(comparison)}});
+  report.sections.push_back({.heading = "Notes", .paragraphs = comparison.notes});
+  return report;
+}
+
+}  // namespace
+
+std::string ComparisonText(const StudyComparison& comparison) {
+  std::string text = fmt::format("{} over {} subjects; lower is better\n", comparison.metric,
+                                 comparison.subjects.size());
+  for (const ComparedTreatment& t : comparison.treatments) {
+    text += fmt::format("  {}: {}\n", Called(t), TableNumber(t.summary.mean));
+  }
+  for (const TreatmentPair& pair : comparison.pairs) {
+    const std::string interval = IntervalText(pair.difference.mean_95);
+    text += fmt::format("{} less {}: {:+.3f}{}, better of {} and worse of {} of {} subjects{}\n",
+                        Called(pair.other), Called(pair.reference), pair.difference.mean,
+                        interval.empty() ? "" : fmt::format(" ({})", interval), pair.better,
+                        pair.worse, pair.difference.n,
+                        std::isfinite(pair.p_holm) ? fmt::format(", p = {:.3g}", pair.p_holm) : "");
+  }
+  for (const std::string& note : comparison.notes) {
+    text += fmt::format("note: {}\n", note);
+  }
+  return text;
+}
+
+std::string PairsCsv(const StudyComparison& comparison) {
+  CsvWriter csv({"study", "treatment", "reference_study", "reference", "subjects",
+                 "mean_difference", "mean_low_95", "mean_high_95", "better", "worse", "p",
+                 "p_holm"});
+  for (const TreatmentPair& p : comparison.pairs) {
+    csv.Row(p.other.study, p.other.label, p.reference.study, p.reference.label, p.difference.n,
+            p.difference.mean, p.difference.mean_95.low, p.difference.mean_95.high, p.better,
+            p.worse, p.test.p, p.p_holm);
+  }
+  return csv.Text();
+}
+
+std::string ComparedCsv(const StudyComparison& comparison) {
+  CsvWriter csv({"study", "treatment", "subject", "metric", "value"});
+  for (const ComparedTreatment& treatment : comparison.treatments) {
+    for (const auto& [subject, value] : treatment.by_subject) {
+      csv.Row(treatment.study, treatment.label, subject, comparison.metric, value);
+    }
+  }
+  return csv.Text();
+}
+
+void WriteComparison(const StudyComparison& comparison, OutputFolder& folder) {
+  folder.Write("pairs.csv", PairsCsv(comparison));
+  folder.Write("values.csv", ComparedCsv(comparison));
+  folder.Write("report.html", ReportHtml(ReportOf(comparison)));
+}
+
+}  // namespace semblance

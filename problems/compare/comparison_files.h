@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A comparison of studies as text, as tables and as a page.
+#pragma once
+
+#include <string>
+
+#include "problems/compare/study_comparison.h"
+#include "problems/output/files.h"
+
+namespace semblance {
+
+// For a terminal: a line for each treatment, then one for each pair.
+std::string ComparisonText(const StudyComparison& comparison);
+
+// One line a pair: study, treatment, reference_study, reference, subjects, mean_difference,
+// mean_low_95, mean_high_95, better, worse, p, p_holm. An empty cell where there is no number.
+std::string PairsCsv(const StudyComparison& comparison);
+
+// One line a treatment and subject: study, treatment, subject, metric, value.
+std::string ComparedCsv(const StudyComparison& comparison);
+
+// pairs.csv, values.csv and report.html.
+void WriteComparison(const StudyComparison& comparison, OutputFolder& folder);
+
+}  // namespace semblance

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/config/value_filter.h"
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "problems/config/spelling_suggestion.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+
+// all: every part holds; any: one does; negated: its part does not; else a comparison.
+struct ValueFilter::Node {
+  enum class Kind { kAll, kAny, kNot, kCompare };
+  Kind kind = Kind::kCompare;
+  std::vector<Node> parts;
+  std::string name, sign, value;
+};
+
+namespace {
+
+using Node = ValueFilter::Node;
+
+std::optional<double> NumberIn(const std::string& text) {
+  double number = 0;
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return fault == std::errc() && end == text.data() + text.size() && std::isfinite(number)
+             ? std::optional(number)
+             : std::nullopt;
+}
+
+bool Equal(const std::string& a, const std::string& b) {
+  const std::optional<double> x = NumberIn(a), y = NumberIn(b);
+  return x && y ? *x == *y : a == b;
+}
+
+bool InOrder(const Node& node, const std::string& found) {
+  const std::optional<double> a = NumberIn(found), b = NumberIn(node.value);
+  if (!a || !b) {
+    throw InputError(fmt::format("{} {} {}: '{}' is no number; compare texts with =, != or ~",
+                                 node.name, node.sign, node.value, a ? node.value : found));
+  }
+  return node.sign == "<"    ? *a < *b
+         : node.sign == "<=" ? *a <= *b
+         : node.sign == ">"  ? *a > *b
+                             : *a >= *b;
+}
+
+bool Compares(const Node& node, const std::string& found) {
+  return node.sign == "=" || node.sign == "!=" ? Equal(found, node.value)
+         : node.sign == "~" ? ::fnmatch(node.value.c_str(), found.c_str(), 0) == 0
+                            : InOrder(node, found);
+}
+
+bool Holds(const Node& node, const NamedValues& values) {
+  const auto part_holds = [&](const Node& part) { return Holds(part, values); };
+  switch (node.kind) {
+    case Node::Kind::kAll:
+      return std::ranges::all_of(node.parts, part_holds);
+    case Node::Kind::kAny:
+      return std::ranges::any_of(node.parts, part_holds);
+    case Node::Kind::kNot:
+      return !Holds(node.parts.front(), values);
+    case Node::Kind::kCompare:
+      break;
+  }
+  const auto [first, last] = values.equal_range(node.name);
+  const bool one =
+      std::any_of(first, last, [&](const auto& entry) { return Compares(node, entry.second); });
+  return node.sign == "!=" ? !one : one;
+}
+
+struct Token {
+  std::string text;
+  std::size_t at = 0;
+  bool quoted = false;
+};
+
+constexpr std::string_view kSigns = "=!<>~()";
+
+class Parser {
+ public:
+  Parser(std::string_view text, std::span<const std::string> names) : text_(text), names_(names) {
+    for (std::size_t at = 0; at < text_.size();) {
+      at = AddToken(at);
+    }
+  }
+
+  Node Parse() {
+    Node node = Any();
+    if (next_ < tokens_.size()) {
+      Fail("'and' or 'or' is missing before this");
+    }
+    return node;
+  }
+
+ private:
+  // Returns where the next one may begin.
+  std::size_t AddToken(std::size_t at) {
+    const char c = text_[at];
+    if (c == ' ' || c == '\t') {
+      return at + 1;
+    }
+    if (c == '\'' || c == '"') {
+      const std::size_t end = text_.find(c, at + 1);
+      if (end == text_.npos) {
+        throw InputError(
+            fmt::format("{}: the quote at '{}' is not closed", text_, text_.substr(at)));
+      }
+      tokens_.push_back({std::string(text_.substr(at + 1, end - at - 1)), at, true});
+      return end + 1;
+    }
+    std::size_t end = at;
+    if (kSigns.find(c) != kSigns.npos) {
+      const bool is_pair = c != '(' && c != ')' && at + 1 < text_.size() && text_[at + 1] == '=';
+      end = at + (is_pair ? 2 : 1);
+    } else {
+      end = std::min(text_.find_first_of(" \t=!<>~()", at), text_.size());
+    }
+    tokens_.push_back({std::string(text_.substr(at, end - at)), at});
+    return end;
+  }
+
+  bool Take(std::string_view word) {
+    const bool there =
+        next_ < tokens_.size() && !tokens_[next_].quoted && tokens_[next_].text == word;
+    next_ += there ? 1 : 0;
+    return there;
+  }
+
+  [[noreturn]] void Fail(const std::string& what) const {
+    const std::string where = next_ < tokens_.size()
+                                  ? fmt::format("at '{}'", text_.substr(tokens_[next_].at))
+                                  : std::string("at its end");
+    throw InputError(fmt::format("{}: {}: {}; a condition is e.g. \"subject = a and rounds >= 2\"",
+                                 text_, where, what));
+  }
+
+  Node Any() {
+    return Joined(Node::Kind::kAny, "or", [this] { return All(); });
+  }
+  Node All() {
+    return Joined(Node::Kind::kAll, "and", [this] { return One(); });
+  }
+
+  template <class Part>
+  Node Joined(Node::Kind kind, std::string_view word, const Part& part) {
+    Node node{.kind = kind, .parts = {}, .name = {}, .sign = {}, .value = {}};
+    do {
+      node.parts.push_back(part());
+    } while (Take(word));
+    return node;
+  }
+
+  Node One() {
+    if (Take("not")) {
+      Node node{.kind = Node::Kind::kNot, .parts = {}, .name = {}, .sign = {}, .value = {}};
+      node.parts.push_back(One());
+      return node;
+    }
+    if (Take("(")) {
+      Node node = Any();
+      if (!Take(")")) {
+        Fail("')' is missing");
+      }
+      return node;
+    }
+    return Comparison();
+  }
+
+  Node Comparison() {
+    Node node;
+    node.name = NameCalled(Word("a name"));
+    const std::vector<std::string> signs = {"=", "==", "!=", "<", "<=", ">", ">=", "~"};
+    const auto sign = std::ranges::find_if(signs, [&](const std::string& s) { return Take(s); });
+    if (sign == signs.end()) {
+      Fail("one of = != < <= > >= ~ is missing");
+    }
+    node.sign = *sign == "==" ? "=" : *sign;
+    node.value = Word("a value");
+    return node;
+  }
+
+  std::string Word(const char* what) {
+    if (next_ >= tokens_.size() ||
+        (!tokens_[next_].quoted && kSigns.find(tokens_[next_].text[0]) != kSigns.npos)) {
+      Fail(fmt::format("{} is missing", what));
+    }
+    return tokens_[next_++].text;
+  }
+
+  std::string NameCalled(const std::string& word) const {
+    std::vector<std::string> meant;
+    for (const std::string& name : names_) {
+      if (name == word) {
+        return name;
+      }
+      if (name.ends_with("." + word)) {
+        meant.push_back(name);
+      }
+    }
+    if (meant.size() != 1) {
+      throw InputError(fmt::format("{}: {} '{}'{}", text_,
+                                   meant.empty() ? "unknown name" : "there are several", word,
+                                   Suggestion(word, meant.empty() ? names_ : meant)));
+    }
+    return meant.front();
+  }
+
+  std::string_view text_;
+  std::span<const std::string> names_;
+  std::vector<Token> tokens_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace
+
+ValueFilter::ValueFilter(std::string_view text, std::span<const std::string> names)
+    : root_(std::make_unique<const Node>(Parser(text, names).Parse())) {}
+ValueFilter::~ValueFilter() = default;
+ValueFilter::ValueFilter(ValueFilter&&) noexcept = default;
+
+bool ValueFilter::Holds(const NamedValues& values) const {
+  return semblance::Holds(*root_, values);
+}
+
+}  // namespace semblance

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/inputs/input_check.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+#include <sstream>
+
+#include "problems/bust/bust_model.h"
+#include "problems/edits/edit_script.h"
+#include "problems/inputs/input_files.h"
+#include "problems/landmark_files/read_landmarks.h"
+#include "problems/pipeline/case.h"
+#include "problems/pipeline/extra_dowels.h"
+#include "problems/pipeline/make_face.h"
+#include "problems/pipeline/stage_key.h"
+#include "problems/subject/network_file.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/csv.h"
+#include "surfaces/mesh_files/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Lines = std::vector<std::string>;
+
+void AddNew(const std::string& line, Lines& lines) {
+  if (std::ranges::find(lines, line) == lines.end()) {
+    lines.push_back(line);
+  }
+}
+
+// What an error says, a line a fault.
+void AddFault(const std::exception& error, CheckFindings& findings) {
+  std::istringstream words(error.what());
+  for (std::string line; std::getline(words, line);) {
+    AddNew(line, findings.faults);
+  }
+}
+
+// What `look` throws becomes faults.
+void Try(CheckFindings& findings, const std::function<void()>& look) {
+  try {
+    look();
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::exception& error) {
+    AddFault(error, findings);
+  }
+}
+
+bool IsMade(const Experiment& experiment) {
+  return std::holds_alternative<PhantomOptions>(experiment.subject);
+}
+
+// A loader stops at the first file that is at fault; this looks at each by itself.
+void LookAtParts(const FileSubject& subject, CheckFindings& findings) {
+  for (const fs::path& mesh : {subject.skull, subject.skin, subject.mandible.mesh}) {
+    Try(findings, [&] { mesh.empty() ? TriMesh() : ReadMesh(mesh); });
+  }
+  Try(findings, [&] { ReadLandmarks(subject.landmarks); });
+}
+void LookAtParts(const CtSubject& subject, CheckFindings& findings) {
+  Try(findings, [&] { VolumeFiles(subject.volume); });
+  Try(findings, [&] { ReadLandmarks(subject.landmarks); });
+}
+void LookAtParts(const PhantomOptions&, CheckFindings&) {}
+
+// Whether the file of landmarks can be asked for its sites; a phantom has all of them.
+LandmarkFile LandmarksOf(const Subject& subject) {
+  if (const auto* files = std::get_if<FileSubject>(&subject)) {
+    return ReadLandmarks(files->landmarks).file;
+  }
+  if (const auto* ct = std::get_if<CtSubject>(&subject)) {
+    return ReadLandmarks(ct->landmarks).file;
+  }
+  LandmarkFile all;
+  for (const std::string& site : StandardSiteCodes()) {
+    all.landmarks.emplace_back().site = site;
+  }
+  return all;
+}
+
+// Which sites of the subject the tables leave without a depth.
+void LookAtCover(const Experiment& experiment, const LandmarkFile& landmarks,
+                 CheckFindings& findings) {
+  std::vector<Dowel> dowels;
+  for (const Landmark& landmark : landmarks.landmarks) {
+    dowels.push_back(Dowel{.site = landmark.site});
+  }
+  Lines lost;
+  const std::vector<Dowel> all = dowels;
+  FillDepths(WithSiteDepths(experiment, landmarks), landmarks, dowels);
+  for (const Dowel& dowel : all) {
+    if (std::ranges::find(dowels, dowel.site, &Dowel::site) == dowels.end()) {
+      lost.push_back(dowel.site);
+    }
+  }
+  if (!lost.empty()) {
+    findings.warnings.push_back(fmt::format(
+        "tissue: no depth for {} of the {} landmarks, which get no dowel: {}; fill_from names "
+        "another table, set_mm a depth",
+        lost.size(), all.size(), fmt::join(lost, ", ")));
+  }
+}
+
+// All that can be known of a map without the skull that it is laid on.
+void LookAtMap(const DepthMap& map) {
+  if (map.file.extension() == ".csv" && map.mesh.empty()) {
+    CsvReader(ReadFileBytes(map.file), map.file.string()).ColumnOf(map.scalar);
+    return;
+  }
+  TriMesh point;
+  point.points = {Vec3::Zero()};
+  const std::vector<Vec3> up = {Vec3::UnitZ()};
+  const std::vector<Dowel> dowels = {
+      {.site = "n", .base = Vec3::Zero(), .direction = Vec3::UnitZ(), .depth_mm = 1}};
+  InterpolateDepth(map, {point, up, dowels, DowelNetwork{}}, {});
+}
+
+bool NamesAFile(const Experiment& experiment) {
+  return !NamedFiles(experiment.face_template).empty() || !NamedFiles(experiment.prior).empty() ||
+         !NamedFiles(experiment.bust).empty();
+}
+
+}  // namespace
+
+void CheckFindings::Add(const CheckFindings& more) {
+  for (const std::string& fault : more.faults) {
+    AddNew(fault, faults);
+  }
+  for (const std::string& warning : more.warnings) {
+    AddNew(warning, warnings);
+  }
+}
+
+const CheckFindings& InputCheck::Once(const std::string& key,
+                                      const std::function<void(CheckFindings&)>& look) {
+  const auto [at, is_new] = known_.try_emplace(key);
+  if (is_new) {
+    CheckFindings findings;
+    Try(findings, [&] { look(findings); });
+    at->second = std::move(findings);
+  }
+  return at->second;
+}
+
+CheckFindings InputCheck::LookAtSubject(const Experiment& experiment) {
+  if (IsMade(experiment)) {
+    return {};
+  }
+  const std::string key = StageKey("subject", experiment.subject);
+  CheckFindings findings = Once(key, [&](CheckFindings& found) {
+    try {
+      loaded_.Get<SubjectData>(key, [&] { return LoadSubject(experiment.subject, context_); });
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const std::exception& error) {
+      AddFault(error, found);
+      CheckFindings parts;
+      std::visit([&](const auto& subject) { LookAtParts(subject, parts); }, experiment.subject);
+      found.Add(parts);
+    }
+  });
+  return findings;
+}
+
+CheckFindings InputCheck::LookAtTissue(const Experiment& experiment) {
+  CheckFindings findings;
+  for (const fs::path& table : TablesOf(experiment.tissue)) {
+    findings.Add(Once("table " + table.string(), [&](CheckFindings& found) {
+      found.warnings = TableWarnings(ReadTissueTable(table));
+    }));
+  }
+  const bool measured = experiment.tissue.depths == DepthSource::kMeasured;
+  if (findings.sound() && !(IsMade(experiment) && measured)) {
+    const std::string key = StageKey("cover", experiment.tissue, experiment.sites) +
+                            (IsMade(experiment) ? "" : StageKey("of", experiment.subject));
+    findings.Add(Once(key, [&](CheckFindings& found) {
+      LookAtCover(experiment, LandmarksOf(experiment.subject), found);
+    }));
+  }
+  return findings;
+}
+
+CheckFindings InputCheck::LookAtFace(const Experiment& experiment) {
+  CheckFindings findings;
+  if (NamesAFile(experiment)) {
+    const std::string key = StageKey("face", experiment.face_template, experiment.prior,
+                                     experiment.bust, experiment.face);
+    findings.Add(Once(key, [&](CheckFindings& found) {
+      Try(found, [&] { LoadBust(experiment.bust, experiment.face_template, context_); });
+      const TemplateFace generic = LoadTemplate(experiment.face_template);
+      GivenPrior(experiment, generic, loaded_, context_);
+    }));
+  }
+  if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
+    findings.Add(Once(StageKey("map", *map), [&](CheckFindings&) { LookAtMap(*map); }));
+  }
+  if (!experiment.edits.empty()) {
+    findings.Add(Once("edits " + experiment.edits.string(),
+                      [&](CheckFindings&) { ReadEditScript(experiment.edits); }));
+  }
+  return findings;
+}
+
+CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
+  if (IsMade(experiment) && experiment.sites.empty()) {
+    return {};  // its landmarks lie on its bone
+  }
+  const std::string key = StageKey("case", experiment.subject, experiment.landmarks,
+                                   experiment.tissue, experiment.sites, experiment.network);
+  return Once(key, [&](CheckFindings& found) {
+    const auto subject = loaded_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
+      return LoadSubject(experiment.subject, context_);
+    });
+    if (!IsMade(experiment)) {
+      found.warnings = CheckSubject(*subject, experiment.landmarks);
+    }
+    MakeCase(*subject, experiment);
+  });
+}
+
+CheckFindings InputCheck::Look(const Experiment& experiment) {
+  CheckFindings findings;
+  const bool has_network = !experiment.network.empty();
+  findings.Add(Once("network " + experiment.network.string(), [&](CheckFindings&) {
+    has_network ? ReadNetworkPlan(experiment.network)
+                : throw InputError(
+                      "network: no file is named; give the path of a dowel network "
+                      "(configs/networks/ has the standard one)");
+  }));
+  findings.Add(LookAtSubject(experiment));
+  findings.Add(LookAtTissue(experiment));
+  findings.Add(LookAtFace(experiment));
+  if (findings.sound()) {
+    findings.Add(LookAtCase(experiment));
+  }
+  return findings;
+}
+
+}  // namespace semblance

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/inputs/input_files.h"
+
+namespace semblance {
+
+std::vector<NamedFile> NamedInputsOf(const Experiment& experiment) {
+  std::vector<NamedFile> files = NamedFiles(experiment);
+  if (TablesOf(experiment.tissue).empty()) {
+    std::erase_if(files,
+                  [](const NamedFile& named) { return named.option.starts_with("tissue."); });
+  }
+  return files;
+}
+
+std::vector<std::filesystem::path> InputFilesOf(const Experiment& experiment) {
+  std::vector<std::filesystem::path> files;
+  for (const NamedFile& named : NamedInputsOf(experiment)) {
+    files.push_back(named.file);
+  }
+  return files;
+}
+
+}  // namespace semblance

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/compare/study_comparison.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "problems/compare/comparison_files.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+using testing::WordsOf;
+
+constexpr const char* kMetric = "face.rms_mm";
+
+// A study of the given treatments over subjects s0, s1, ...
+NamedStudy Study(const std::string& name, const std::vector<std::string>& treatments, int subjects,
+                 std::uint64_t random_seed) {
+  Random random(random_seed);
+  NamedStudy study{.name = name, .results = {}};
+  study.results.metric = kMetric;
+  study.results.axes = {"interp"};
+  for (int s = 0; s < subjects; ++s) {
+    for (const std::string& treatment : treatments) {
+      TrialRow row{.id = fmt::format("{}{}", treatment, s),
+                   .subject = fmt::format("s{}", s),
+                   .values = {treatment},
+                   .status = "done",
+                   .reason = "",
+                   .metrics = {{kMetric, 2 + random.Uniform()}, {"face.area_cm2", 300}}};
+      study.results.trials.push_back(row);
+    }
+  }
+  return study;
+}
+
+double Value(const NamedStudy& study, const std::string& treatment, const std::string& subject) {
+  for (const TrialRow& row : study.results.trials) {
+    if (row.subject == subject && row.values[0] == treatment) {
+      return row.metrics.at(kMetric);
+    }
+  }
+  return kNaN;
+}
+
+TEST(StudyComparison, ADifferenceIsTheMeanOverSubjectsThatBothHave) {
+  const NamedStudy a = Study("a", {"x", "y"}, 9, 1), b = Study("b", {"x"}, 7, 2);
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, "");
+  EXPECT_THAT(comparison.subjects, SizeIs(7));
+  ASSERT_THAT(comparison.pairs, SizeIs(1));
+  const TreatmentPair& pair = comparison.pairs[0];
+  double sum = 0;
+  int better = 0;
+  for (int s = 0; s < 7; ++s) {
+    const std::string subject = fmt::format("s{}", s);
+    const double difference = Value(b, "x", subject) - Value(a, "x", subject);
+    sum += difference;
+    better += difference < 0 ? 1 : 0;
+  }
+  EXPECT_NEAR(pair.difference.mean, sum / 7, 1e-12);
+  EXPECT_EQ(pair.better, better);
+  EXPECT_EQ(pair.better + pair.worse, 7);
+  EXPECT_TRUE(pair.same_label);
+  EXPECT_THAT(comparison.notes, Contains(HasSubstr("a: 2 subjects are not in all the studies")));
+}
+
+TEST(StudyComparison, OfAStudyAndItsCopyNothingDiffersAndOrderTurnsTheSign) {
+  const NamedStudy a = Study("a", {"x", "y"}, 8, 1), b = Study("b", {"x", "y"}, 8, 2);
+  NamedStudy copy = a;
+  copy.name = "copy";
+  for (const TreatmentPair& pair : CompareStudies(std::vector{a, copy}, "").pairs) {
+    EXPECT_EQ(pair.difference.mean, 0);
+    EXPECT_EQ(pair.better + pair.worse, 0);
+  }
+  const auto there = CompareStudies(std::vector{a, b}, "").pairs,
+             back = CompareStudies(std::vector{b, a}, "").pairs;
+  for (const TreatmentPair& pair : there) {
+    for (const TreatmentPair& other : back) {
+      if (other.other.label == pair.other.label) {
+        EXPECT_NEAR(other.difference.mean, -pair.difference.mean, 1e-12);
+        EXPECT_NEAR(other.p_holm, pair.p_holm, 1e-12);
+      }
+    }
+  }
+}
+
+TEST(StudyComparison, AStrangerIsComparedWithTheBestOfTheFirst) {
+  const NamedStudy a = Study("a", {"x", "y", "z"}, 8, 1), b = Study("b", {"other"}, 8, 2);
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, "");
+  ASSERT_THAT(comparison.pairs, SizeIs(1));
+  EXPECT_FALSE(comparison.pairs[0].same_label);
+  for (const ComparedTreatment& treatment : comparison.treatments) {
+    if (treatment.study == "a") {
+      EXPECT_LE(comparison.pairs[0].reference.summary.mean, treatment.summary.mean);
+    }
+  }
+}
+
+TEST(StudyComparison, BelowSixSubjectsThereIsNoTest) {
+  const StudyComparison comparison =
+      CompareStudies(std::vector{Study("a", {"x"}, 5, 1), Study("b", {"x"}, 5, 2)}, "");
+  EXPECT_TRUE(std::isnan(comparison.pairs[0].p_holm));
+}
+
+TEST(StudyComparison, WhatCannotBeComparedIsRefusedOrSaid) {
+  const NamedStudy a = Study("a", {"x"}, 3, 1);
+  NamedStudy b = Study("b", {"x"}, 3, 2);
+  EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector{a}, ""); }),
+              HasSubstr("one study alone"));
+  EXPECT_THAT(WordsOf<InputError>([&] {
+                CompareStudies(std::vector{a, b}, "face.nothing");
+              }),
+              HasSubstr("a: no trial that is done has the number 'face.nothing'"));
+  b.results.trials[0].metrics["face.area_cm2"] = 200;
+  EXPECT_THAT(CompareStudies(std::vector{a, b}, "").notes,
+              Contains(HasSubstr("not measured on the same area")));
+  for (TrialRow& row : b.results.trials) {
+    row.subject += "'";
+  }
+  EXPECT_THAT(WordsOf<InputError>([&] {
+                CompareStudies(std::vector{a, b}, "");
+              }),
+              HasSubstr("no subject in common"));
+}
+
+TEST(StudyComparison, FoldersAreCalledByAsMuchOfTheirPathAsTellsThemApart) {
+  const testing::ScratchFolder folder;
+  const std::string plan =
+      R"({"title": "t", "hash": "0", "metric": "m", "axes": [], "trials": [], "notes": []})";
+  for (const char* name : {"one/out", "two/out", "two/other"}) {
+    std::filesystem::create_directories(folder / name);
+    WriteFileAtomically(folder / name / "plan.json", plan);
+  }
+  const auto names = [&](const std::vector<std::filesystem::path>& folders) {
+    std::vector<std::string> called;
+    for (const NamedStudy& study : ReadStudies(folders)) {
+      called.push_back(study.name);
+    }
+    return called;
+  };
+  EXPECT_THAT(names({folder / "one/out", folder / "two/other/"}), ElementsAre("out", "other"));
+  EXPECT_THAT(names({folder / "one/out", folder / "two/out"}), ElementsAre("one/out", "two/out"));
+  EXPECT_THAT(WordsOf<InputError>([&] {
+                names({folder / "one/out", folder / "one/../one/out"});
+              }),
+              HasSubstr("stands twice"));
+}
+
+TEST(ComparisonFiles, TheTablesHoldEveryPairAndValue) {
+  const StudyComparison comparison =
+      CompareStudies(std::vector{Study("a", {"x", "y"}, 8, 1), Study("b", {"x", "y"}, 8, 2)}, "");
+  const std::string pairs = PairsCsv(comparison), values = ComparedCsv(comparison);
+  EXPECT_EQ(std::count(pairs.begin(), pairs.end(), '\n'), 1 + 2);
+  EXPECT_EQ(std::count(values.begin(), values.end(), '\n'), 1 + 2 * 2 * 8);
+  const testing::ScratchFolder folder;
+  OutputFolder output(folder / "out", WhenNotEmpty::kRefuse);
+  WriteComparison(comparison, output);
+  EXPECT_THAT(ReadFileBytes(folder / "out" / "report.html"), HasSubstr("a, b compared"));
+  EXPECT_THAT(ComparisonText(comparison), HasSubstr("b: x less a: x: "));
+}
+
+}  // namespace
+}  // namespace semblance

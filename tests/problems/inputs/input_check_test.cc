@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What `check` finds in the inputs that an experiment names.
+#include "problems/inputs/input_check.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <iterator>
+#include <regex>
+#include <string>
+
+#include "problems/inputs/input_files.h"
+#include "problems/pipeline/experiment_config.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "tests/testing/scratch_folder.h"
+#include "tests/testing/shapes.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::ScratchFolder;
+using ::testing::SizeIs;
+
+const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs";
+
+class InputCheckTest : public ::testing::Test {
+ protected:
+  InputCheckTest() {
+    WriteFileAtomically(folder_ / "ball.ply",
+                        EncodeMesh(testing::SphereMesh({0, 0, 0}, 90, 20), ".ply"));
+    Write("broken.ply", "ply\nnothing more");
+    Write("broken.yaml", "areas: [");
+    Write("marks.yaml", "subject: x\nlandmarks: [{site: g, point: [0, -90, 0]}]\n");
+  }
+  void Write(const std::string& name, const std::string& text) {
+    WriteFileAtomically(folder_ / name, text);
+  }
+  Experiment Of(const std::string& text) {
+    return ReadConfigText<Experiment>(text, folder_ / "e.yaml");
+  }
+  CheckFindings Look(const std::string& text) { return InputCheck({}).Look(Of(text)); }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(InputCheckTest, ASoundExperimentHasNoFault) {
+  const CheckFindings found = Look(fmt::format("base: {}/phantom.yaml\n", kConfigs));
+  EXPECT_THAT(found.faults, IsEmpty());
+}
+
+TEST_F(InputCheckTest, AllFaultsOfAllInputsAreToldALineEach) {
+  const CheckFindings found = Look(
+      "subject: {type: files, skull: broken.ply, skin: none.ply, landmarks: broken.yaml}\n"
+      "network: broken.yaml\ntissue: {table: none.yaml}\nedits: none_edits.yaml\n"
+      "interp: {type: depth_map, file: none_map.ply}\n");
+  for (const char* file :
+       {"broken.ply", "none.ply", "broken.yaml", "none.yaml", "none_edits.yaml", "none_map.ply"}) {
+    EXPECT_THAT(found.faults, Contains(HasSubstr(file))) << file;
+  }
+  for (const std::string& fault : found.faults) {
+    EXPECT_EQ(fault.find('\n'), fault.npos);
+  }
+}
+
+TEST_F(InputCheckTest, LandmarksAreLaidOnTheBone) {
+  const std::string skull = "subject: {type: files, skull: ball.ply, landmarks: marks.yaml}\n";
+  Write("marks.yaml", "subject: x\nlandmarks: [{site: g, point: [0, -99, 0]}]\n");
+  const CheckFindings found = Look(fmt::format(
+      "{}network: {}/networks/standard32.yaml\ntissue: {{depths: measured}}\n", skull, kConfigs));
+  EXPECT_THAT(found.faults, Contains(HasSubstr("no dowel has a tissue depth")));
+  const CheckFindings with_table = Look(fmt::format(
+      "{0}network: {1}/networks/standard32.yaml\ntissue: {{table: {1}/tables/rhine_caucasoid.yaml}}"
+      "\n",
+      skull, kConfigs));
+  EXPECT_THAT(with_table.faults, Contains(HasSubstr("mm from the skull")));
+}
+
+TEST_F(InputCheckTest, WhatATableDoesNotCoverIsSaid) {
+  const CheckFindings found = Look(fmt::format(
+      "base: {}/phantom.yaml\ntissue: {{depths: table, table: {}/tables/rhine_caucasoid.yaml, "
+      "build: emaciated}}\n",
+      kConfigs, kConfigs));
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.warnings, Contains(HasSubstr("no depth for 2 of the 32 landmarks")));
+}
+
+TEST_F(InputCheckTest, AnInputIsToldOnceHoweverManyExperimentsNameIt) {
+  InputCheck check({});
+  const Experiment experiment = Of("network: broken.yaml\n");
+  CheckFindings all = check.Look(experiment);
+  const std::size_t faults = all.faults.size();
+  all.Add(check.Look(experiment));
+  EXPECT_GE(faults, 1u);
+  EXPECT_THAT(all.faults, SizeIs(faults));
+}
+
+// Whatever option names a file, a file that is missing there is a fault.
+TEST_F(InputCheckTest, NoOptionMayNameAFileThatIsNotThere) {
+  const std::regex word("none");
+  for (const std::string text :
+       {"network: none.x", "tissue: {table: none.x}", "edits: none.x",
+        "tissue: {table: none.x, fill_from: none.x}",
+        "subject: {type: files, skull: none.x, skin: none.x, landmarks: none.x, mandible: {mesh: "
+        "none.x}}",
+        "subject: {type: ct, volume: none.x, landmarks: none.x}",
+        "prior: {type: modes, mean: none.x, modes: none.x, sites: none.x, features: none.x}",
+        "prior: {type: hspline, modes: none.x}",
+        "interp: {type: depth_map, file: none.x, mesh: none.x}"}) {
+    const Experiment experiment = Of(text + "\n");
+    const auto named = NamedInputsOf(experiment);
+    const auto times = std::sregex_iterator(text.begin(), text.end(), word);
+    EXPECT_EQ(named.size(), static_cast<std::size_t>(std::distance(times, {}))) << text;
+    EXPECT_FALSE(InputCheck({}).Look(experiment).sound()) << text;
+  }
+}
+
+// Those that other options depend on are read with the options.
+TEST_F(InputCheckTest, TemplateAndBustAreReadWithTheOptions) {
+  for (const char* text : {"template: {type: file, surface: none.x, sites: none.x}\n",
+                           "bust: {type: hspline, file: none.x}\n",
+                           "bust: {type: mesh, mesh: none.x, landmarks: none.x}\n"}) {
+    EXPECT_THROW(Of(text), ConfigError) << text;
+  }
+}
+
+TEST_F(InputCheckTest, ATableThatGivesNoDepthIsNoInput) {
+  EXPECT_THAT(NamedInputsOf(Of("tissue: {depths: measured, table: none.x}\n")), IsEmpty());
+}
+
+}  // namespace
+}  // namespace semblance
