@@ -84,9 +84,11 @@ tidy: setup
 	@git diff --name-only --diff-filter=d $(BASE) -- 'surfaces/*.cc' 'interp/*.cc' 'fitting/*.cc' 'problems/*.cc' | \
 	  xargs -r -n 1 -P $$(nproc) clang-tidy -p build-tidy --quiet --extra-arg=-Wno-unknown-warning-option
 
-# Every configuration and every study is one that the program takes.
+# Every configuration and every study is one that the program takes, with all inputs that it names; the heads' and the demo's own are not in
+# this project.
 configs: build
 	@$(BUILD)/problems/semblance check configs/*.yaml configs/fit/*.yaml configs/studies/*.yaml
+	@$(BUILD)/problems/semblance check --without-inputs configs/heads/*.yaml configs/demo_phantom/*.yaml
 
 clean:
 	@rm -rf build build-debug build-sanitize build-quick build-tidy
