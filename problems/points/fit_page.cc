@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <sstream>
 
 #include "problems/config/config.h"
@@ -28,22 +29,27 @@ std::size_t VerticesOf(const HSplineSurface& surface) {
   return surface.Net(0).vertices.size() + surface.Offsets().size();
 }
 
-struct Residuals {
+// What several parts of the page tell, found once.
+struct Figures {
   double median_mm = kNaN, p95_mm = kNaN, max_mm = kNaN;
+  std::optional<ToleranceReport> tolerance;
 };
 
-Residuals ResidualsOf(const FitResult& fit) {
-  const std::vector<WeightedValue> sorted = SortedValues(fit.residual_mm);
-  return {Quantile(sorted, 0.5), Quantile(sorted, 0.95), Quantile(sorted, 1)};
+Figures FiguresOf(const PointFitOptions& options, const PointFit& result) {
+  const std::vector<WeightedValue> sorted = SortedValues(result.fit.residual_mm);
+  return {.median_mm = Quantile(sorted, 0.5),
+          .p95_mm = Quantile(sorted, 0.95),
+          .max_mm = Quantile(sorted, 1),
+          .tolerance = ToleranceOf(options, result)};
 }
 
-std::vector<std::string> Notes(const PointFitOptions& options, const PointFit& result) {
+std::vector<std::string> Notes(const PointFit& result, const Figures& figures) {
   std::vector<std::string> notes;
   for (const std::string& fault : result.Faults()) {
     notes.push_back("The result is not usable: " + fault);
   }
-  if (const auto tolerance = ToleranceOf(options, result)) {
-    notes.push_back(ToleranceText(*tolerance));
+  if (figures.tolerance) {
+    notes.push_back(ToleranceText(*figures.tolerance));
   }
   if (result.fit.automatic) {
     std::istringstream lines(AutoText(*result.fit.automatic));
@@ -54,8 +60,7 @@ std::vector<std::string> Notes(const PointFitOptions& options, const PointFit& r
   return notes;
 }
 
-std::vector<ReportTile> Tiles(const PointFitOptions& options, const PointFit& result) {
-  const Residuals r = ResidualsOf(result.fit);
+std::vector<ReportTile> Tiles(const PointFit& result, const Figures& r) {
   std::vector<ReportTile> tiles = {
       {"points", std::to_string(result.fit.residual_mm.size()), "", "(u,v): " + result.parameters},
       {"RMS distance", Figure(result.fit.point_rms_mm), "mm", "of the points from the surface"},
@@ -63,7 +68,7 @@ std::vector<ReportTile> Tiles(const PointFitOptions& options, const PointFit& re
       {"95th percentile", Figure(r.p95_mm), "mm", ""},
       {"largest", Figure(r.max_mm), "mm", ""},
       {"control vertices", std::to_string(VerticesOf(result.fit.surface)), "", ""}};
-  if (const auto tolerance = ToleranceOf(options, result)) {
+  if (const auto& tolerance = r.tolerance) {
     tiles.push_back({"tolerance", tolerance->Met() ? "met" : "missed", "",
                      fmt::format("{:.4g} mm; {} beyond it", tolerance->tolerance_mm,
                                  Counted(tolerance->beyond, "point"))});
@@ -78,11 +83,10 @@ std::vector<ReportTile> Tiles(const PointFitOptions& options, const PointFit& re
   return tiles;
 }
 
-ReportSection DistanceSection(const PointFitOptions& options, const PointFit& result) {
-  std::vector<HistogramMark> marks = {{result.fit.point_rms_mm, "RMS"},
-                                      {ResidualsOf(result.fit).p95_mm, "95 %"}};
-  if (const auto tolerance = ToleranceOf(options, result)) {
-    marks.push_back({tolerance->tolerance_mm, "tolerance"});
+ReportSection DistanceSection(const PointFit& result, const Figures& figures) {
+  std::vector<HistogramMark> marks = {{result.fit.point_rms_mm, "RMS"}, {figures.p95_mm, "95 %"}};
+  if (figures.tolerance) {
+    marks.push_back({figures.tolerance->tolerance_mm, "tolerance"});
   }
   return {.heading = "How far the points are off",
           .images = {{HistogramSvg(result.fit.residual_mm, marks, "distance (mm)"),
@@ -182,6 +186,7 @@ ReportSection RoundsSection(const FitResult& fit) {
 
 std::string FitPageHtml(const PointFitOptions& options, const PointSource& source,
                         const PointFit& result, int threads) {
+  const Figures figures = FiguresOf(options, result);
   const FitGrid grid = GridOf(result.fit, threads);
   const std::vector<FitCell> cells = CellsOf(result.fit);
   Report report;
@@ -189,14 +194,14 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
   report.subtitle = fmt::format(
       "An H-spline surface through {} of {}",
       Counted(static_cast<long long>(result.fit.residual_mm.size()), "point"), source.name);
-  report.notes = Notes(options, result);
+  report.notes = Notes(result, figures);
   report.scenes = FitScene(grid);
   report.scenes_note = "Thinned out for looking; surface.hspline.json is exact.";
   report.main_images = {
       {SurfacePng(grid, threads), "", "the surface, and the points' distances in colours on it"}};
-  report.tiles = Tiles(options, result);
+  report.tiles = Tiles(result, figures);
   report.sections = {
-      DistanceSection(options, result),
+      DistanceSection(result, figures),
       {.heading = "Where it was refined",
        .images = {{DomainPng(grid, cells),
                    "The domain: u to the right, v upwards. Grey: no point there.",

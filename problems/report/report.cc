@@ -137,7 +137,7 @@ std::string TableHtml(const ReportTable& table) {
   const std::vector<bool> numeric = NumericColumns(table);
   std::string html = fmt::format("<div class=\"scroll\" tabindex=\"0\"><table{}{}>\n",
                                  table.header.size() > kFitsAPhone ? " class=\"cards\"" : "",
-                                 table.filter ? " data-filter" : "");
+                                 table.filter ? " data-filter=\"\"" : "");
   if (!table.caption.empty()) {
     html += fmt::format("<caption>{}</caption>\n", EscapeHtml(table.caption));
   }
@@ -216,7 +216,7 @@ std::string NavigationHtml(const Report& report) {
     return {};
   }
   std::string html =
-      "<nav aria-label=\"Contents\"><details open><summary>Contents</summary>\n<ul>\n";
+      "<nav aria-label=\"Contents\"><details open=\"\"><summary>Contents</summary>\n<ul>\n";
   for (const auto& [id, heading] : headings) {
     html += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", id, EscapeHtml(heading));
   }
