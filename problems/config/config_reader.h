@@ -31,7 +31,9 @@ struct ConfigItem {
 //   text     any scalar, plain or quoted, other than null
 //   any      whatever stands there, for who knows later what it is
 //   path     a text; relative ones are relative to the folder of the file it stands in (or to the
-//            current folder, in an override); absolute and normal when read; empty stays empty
+//            current folder, in an override); an absolute one that leads nowhere is a file of that
+//            name beside the file, where one lies there (a run's folder that was sent to somebody);
+//            absolute and normal when read; empty stays empty
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, bool& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, int& out);
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::uint64_t& out);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "surfaces/hspline/patch_tree.h"
@@ -24,6 +25,21 @@ std::vector<char> CountedPoints(const FitResult& fit) {
     }
   }
   return counted;
+}
+
+// The quantile of values that weigh the same. Reorders them.
+double QuantileOf(std::vector<double>& values, double share) {
+  const auto count = static_cast<double>(values.size());
+  const double wanted = share * count, whole = std::round(wanted);
+  const bool is_met = std::abs(wanted - whole) <= 1e-12 * count;  // exactly between two values
+  const auto below = static_cast<std::size_t>(is_met ? whole : std::floor(wanted));
+  const std::size_t at = std::min(below, values.size() - 1);
+  std::ranges::nth_element(values, values.begin() + static_cast<long>(at));
+  if (!is_met || below == 0 || below == values.size()) {
+    return values[at];
+  }
+  return (*std::max_element(values.begin(), values.begin() + static_cast<long>(at)) + values[at]) /
+         2;
 }
 
 // Cells along u and v that hold four points each, were they spread evenly; no more than vertices.
@@ -60,6 +76,18 @@ void AddSquares(const FitResult& fit, FitGrid& grid) {
 }
 
 }  // namespace
+
+DistanceQuantiles QuantilesOf(const FitResult& fit) {
+  std::vector<double> known;
+  std::ranges::copy_if(fit.residual_mm, std::back_inserter(known),
+                       [](double v) { return std::isfinite(v); });
+  if (known.empty()) {
+    return {};
+  }
+  return {.median_mm = QuantileOf(known, 0.5),
+          .p95_mm = QuantileOf(known, 0.95),
+          .max_mm = *std::ranges::max_element(known)};
+}
 
 FitGrid GridOf(const FitResult& fit, int threads) {
   FitGrid grid{.columns = kGrid, .rows = kGrid, .mesh = {}, .rms_mm = {}};

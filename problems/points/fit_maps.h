@@ -11,6 +11,12 @@
 
 namespace semblance {
 
+// Of the points' distances, outliers too: Quantile of quantile.h, without sorting them all.
+struct DistanceQuantiles {
+  double median_mm = kNaN, p95_mm = kNaN, max_mm = kNaN;
+};
+DistanceQuantiles QuantilesOf(const FitResult& fit);
+
 // The surface over a grid of (u,v), with the points' distances near each vertex.
 struct FitGrid {
   int columns = 0, rows = 0;   // of vertices, from (0,0) to (1,1); row by row

@@ -10,7 +10,6 @@
 #include <sstream>
 
 #include "problems/config/config.h"
-#include "problems/metrics/quantile.h"
 #include "problems/plots/histogram.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
@@ -31,16 +30,12 @@ std::size_t VerticesOf(const HSplineSurface& surface) {
 
 // What several parts of the page tell, found once.
 struct Figures {
-  double median_mm = kNaN, p95_mm = kNaN, max_mm = kNaN;
+  DistanceQuantiles distance;
   std::optional<ToleranceReport> tolerance;
 };
 
 Figures FiguresOf(const PointFitOptions& options, const PointFit& result) {
-  const std::vector<WeightedValue> sorted = SortedValues(result.fit.residual_mm);
-  return {.median_mm = Quantile(sorted, 0.5),
-          .p95_mm = Quantile(sorted, 0.95),
-          .max_mm = Quantile(sorted, 1),
-          .tolerance = ToleranceOf(options, result)};
+  return {.distance = QuantilesOf(result.fit), .tolerance = ToleranceOf(options, result)};
 }
 
 std::vector<std::string> Notes(const PointFit& result, const Figures& figures) {
@@ -64,9 +59,9 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Figures& r) {
   std::vector<ReportTile> tiles = {
       {"points", std::to_string(result.fit.residual_mm.size()), "", "(u,v): " + result.parameters},
       {"RMS distance", Figure(result.fit.point_rms_mm), "mm", "of the points from the surface"},
-      {"median", Figure(r.median_mm), "mm", ""},
-      {"95th percentile", Figure(r.p95_mm), "mm", ""},
-      {"largest", Figure(r.max_mm), "mm", ""},
+      {"median", Figure(r.distance.median_mm), "mm", ""},
+      {"95th percentile", Figure(r.distance.p95_mm), "mm", ""},
+      {"largest", Figure(r.distance.max_mm), "mm", ""},
       {"control vertices", std::to_string(VerticesOf(result.fit.surface)), "", ""}};
   if (const auto& tolerance = r.tolerance) {
     tiles.push_back({"tolerance", tolerance->Met() ? "met" : "missed", "",
@@ -84,7 +79,8 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Figures& r) {
 }
 
 ReportSection DistanceSection(const PointFit& result, const Figures& figures) {
-  std::vector<HistogramMark> marks = {{result.fit.point_rms_mm, "RMS"}, {figures.p95_mm, "95 %"}};
+  std::vector<HistogramMark> marks = {{result.fit.point_rms_mm, "RMS"},
+                                      {figures.distance.p95_mm, "95 %"}};
   if (figures.tolerance) {
     marks.push_back({figures.tolerance->tolerance_mm, "tolerance"});
   }

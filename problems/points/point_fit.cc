@@ -11,7 +11,6 @@
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
-#include "problems/metrics/quantile.h"
 #include "problems/points/fit_page.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/residual_files.h"
@@ -59,7 +58,7 @@ Json VerticesJson(const HSplineSurface& surface) {
 
 Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
                   const PointFit& result) {
-  const std::vector<WeightedValue> residual = SortedValues(result.fit.residual_mm);
+  const DistanceQuantiles distance = QuantilesOf(result.fit);
   Json json = {{"title", options.title},
                {"version", SEMBLANCE_VERSION},
                {"points_file", source.name},
@@ -67,9 +66,9 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
                {"points", result.fit.residual_mm.size()},
                {"parameters", result.parameters},
                {"rms_mm", result.fit.point_rms_mm},
-               {"median_mm", Quantile(residual, 0.5)},
-               {"p95_mm", Quantile(residual, 0.95)},
-               {"max_mm", Quantile(residual, 1)},
+               {"median_mm", distance.median_mm},
+               {"p95_mm", distance.p95_mm},
+               {"max_mm", distance.max_mm},
                {"control_vertices", VerticesJson(result.fit.surface)},
                {"usable", result.Faults().empty()},
                {"faults", result.Faults()}};

@@ -4,8 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <numeric>
+#include <cmath>
 
+#include "problems/metrics/quantile.h"
 #include "problems/points/fit_maps.h"
 #include "tests/testing/scattered_data.h"
 
@@ -60,6 +61,22 @@ TEST(FitMaps, TheGridIsTheSurfaceAndHoldsTheDistances) {
   }
   EXPECT_LE(largest, *std::ranges::max_element(fit.fit.residual_mm));
   EXPECT_GT(largest, fit.fit.point_rms_mm);
+}
+
+TEST(FitMaps, QuantilesAreThoseOfAllFigures) {
+  for (const int count : {1, 2, 3, 20, 21, 40, 1000}) {
+    PointFit fit = FitPoints(Points(30), Adaptive(0.01, 0), {});
+    fit.fit.residual_mm.clear();
+    for (int k = 0; k < count; ++k) {
+      fit.fit.residual_mm.push_back((k * 7919) % count * 0.37);  // in no order
+    }
+    fit.fit.residual_mm.push_back(NAN);
+    const std::vector<WeightedValue> sorted = SortedValues(fit.fit.residual_mm);
+    const DistanceQuantiles found = QuantilesOf(fit.fit);
+    EXPECT_EQ(found.median_mm, Quantile(sorted, 0.5)) << count;
+    EXPECT_EQ(found.p95_mm, Quantile(sorted, 0.95)) << count;
+    EXPECT_EQ(found.max_mm, Quantile(sorted, 1)) << count;
+  }
 }
 
 TEST(FitMaps, AMissedToleranceIsSaidWithWhatMayHelp) {
