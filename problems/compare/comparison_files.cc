@@ -53,8 +53,9 @@ ReportTable PairTable(const StudyComparison& comparison) {
 Report ReportOf(const StudyComparison& comparison) {
   Report report{.title = fmt::format("{} compared", fmt::join(comparison.studies, ", ")),
                 .subtitle = fmt::format("{}, paired by subject", comparison.metric),
-                .tiles = {},
+                .notes = comparison.notes,
                 .main_images = {},
+                .tiles = {},
                 .sections = {},
                 .footer = fmt::format("semblance {}", SEMBLANCE_VERSION)};
   report.sections.push_back(
@@ -63,7 +64,6 @@ Report ReportOf(const StudyComparison& comparison) {
                       "else the best of the first study. Below six subjects there is no test."},
        .tables = {PairTable(comparison)}});
   report.sections.push_back({.heading = "Treatments", .tables = {TreatmentTable(comparison)}});
-  report.sections.push_back({.heading = "Notes", .paragraphs = comparison.notes});
   return report;
 }
 

@@ -153,6 +153,8 @@ std::vector<Dowel> ExpectedDowels(const Experiment& experiment, const LandmarkFi
   }
   FillDepths(*table, landmarks, dowels);
   return dowels;
+}
+
 bool UsesAllAsGiven(const PlaceOptions& options) {
   return std::holds_alternative<KeepAll>(options.keep) && options.noise_mm == 0;
 }
