@@ -60,8 +60,8 @@ SparseMatrix Scaled(const SparseMatrix& lower) {
   return scale.asDiagonal() * lower * scale.asDiagonal();
 }
 
-// From log det(A + more) - log det(A + less): each eigenvalue well below `less` adds the log of their
-// ratio, each well above `more` nothing, whatever the order of the pivots.
+// From log det(A + more) - log det(A + less): each eigenvalue well below `less` adds the log of
+// their ratio, each well above `more` nothing, whatever the order of the pivots.
 double CountBelow(double less, double log_less, double more, double log_more) {
   return (log_more - log_less) / std::log(more / less);
 }
@@ -80,8 +80,8 @@ int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
   int rank = static_cast<int>(scaled.rows());
   if (!(less.Pivots().minCoeff() > kPlain)) {
     const SparseFactor more(scaled, kMore);
-    rank -= static_cast<int>(std::lround(
-        CountBelow(kLess, less.LogDeterminant(), kMore, more.LogDeterminant())));
+    rank -= static_cast<int>(
+        std::lround(CountBelow(kLess, less.LogDeterminant(), kMore, more.LogDeterminant())));
   }
   return static_cast<int>(std::min<std::size_t>(rank, rows));
 }

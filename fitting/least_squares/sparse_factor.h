@@ -25,9 +25,9 @@ class SparseFactor {
   std::unique_ptr<Cholmod> cholmod_;
 };
 
-// Estimated rank of the matrix whose normal matrix `lower` is; it has so many rows. With its columns
-// scaled to length 1, those directions count whose squares exceed some 1e-10. -1 if rounding leaves
-// no factor, as with a number that is not finite.
+// Estimated rank of the matrix whose normal matrix `lower` is; it has so many rows. With its
+// columns scaled to length 1, those directions count whose squares exceed some 1e-10. -1 if
+// rounding leaves no factor, as with a number that is not finite.
 int NumericalRank(const SparseMatrix& lower, std::size_t rows);
 
 // OpenBLAS, where the sparse Cholesky uses it, sums in an order that depends on its number of

@@ -380,7 +380,7 @@ std::vector<std::string> Notes(const Json& result) {
   return notes;
 }
 
-ReportSection FitSection(const Json& fit, const OutputFolder& folder) {
+ReportSection FitSection(const Json& fit) {
   return {.heading = "The fit",
           .images = {ConvergencePlot(fit)},
           .tables = Filled({LevelsTable(fit), RelaxationTable(fit), FeaturesTable(fit),
@@ -416,7 +416,7 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   sections.push_back({.heading = "Depth at the landmarks",
                       .tables = {DowelsTable(folder.Root() / "dowels.csv")},
                       .folded = true});
-  sections.push_back(FitSection(result.at("fit"), folder));
+  sections.push_back(FitSection(result.at("fit")));
   if (HasSigma(result)) {
     sections.push_back(UncertaintySection(result, folder));
   }
