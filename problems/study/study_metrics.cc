@@ -38,6 +38,7 @@ DepthComparison EmptyComparison() {
   for (DepthErrors* errors : {&comparison.along_direction, &comparison.closest}) {
     for (const char* part : kFaceParts) {
       errors->regions[part] = {};
+      errors->region_scores[part] = {};
     }
   }
   return comparison;

@@ -73,7 +73,7 @@ HSplineSurface HSplineFromJson(std::string_view text, const std::string& name) {
   const std::size_t start = text.find_first_not_of(" \t\r\n");
   if (start == text.npos || text[start] != '{') {
     throw IoError(
-        fmt::format("{}: not an H-spline: it is no JSON; an H-spline is a file such as "
+        fmt::format("{}: not an H-spline: it is no JSON object; an H-spline is a file such as "
                     "face.hspline.json of a run, or surface.hspline.json of a fit",
                     name));
   }

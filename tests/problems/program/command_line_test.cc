@@ -105,7 +105,7 @@ TEST_F(CommandLine, DepthSaysHowFarTheSchemeIsFromTheTruthAndFromLeftOutDowels) 
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_THAT(outcome.out, AllOf(HasSubstr("along the direction"), HasSubstr("cheeks"),
-                                 HasSubstr("  k_fold"), HasSubstr("no sd stated")));
+                                 HasSubstr("  k_fold"), HasSubstr("landmark left out")));
   EXPECT_TRUE(fs::exists(folder_ / "depth" / "depth.ply"));
   ExpectRefused("depth " + kConfigs +
                     "/phantom.yaml --out map --quiet --set subject.rings=30 "
@@ -321,7 +321,8 @@ TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
   const Outcome written = Call("template e.yaml --out generic");
   EXPECT_EQ(written.code, 0) << written.err;
   const std::string from_file =
-      "check e.yaml --set 'template={type: file, surface: generic/head.hspline.json, "
+      "check --without-inputs e.yaml --set 'template={type: file, surface: "
+      "generic/head.hspline.json, "
       "sites: generic/sites.csv, features: generic/features.json}'";
   EXPECT_EQ(Call(from_file).code, 0);
   EXPECT_THAT(Call(from_file + " --set fit.plan.finest=2").err,
