@@ -80,14 +80,6 @@ FitTarget Without(std::span<const std::uint32_t> outliers, FitTarget target) {
   return target;
 }
 
-double PointWeight(std::span<const Term> terms) {
-  double sum = 0;
-  for (const Term& term : terms) {
-    sum += std::holds_alternative<PointTerm>(term) ? WeightOf(term) : 0;
-  }
-  return sum;
-}
-
 bool HasSmoothness(std::span<const Term> terms) {
   return std::any_of(terms.begin(), terms.end(),
                      [](const Term& t) { return std::holds_alternative<SmoothnessTerm>(t); });

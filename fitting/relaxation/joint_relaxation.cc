@@ -15,6 +15,7 @@
 
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/relaxation/relaxer.h"
+#include "fitting/solve/auto_weight.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/bspline_basis.h"
@@ -119,15 +120,6 @@ class PenaltyCost final : public ceres::SizedCostFunction<2, 2> {
   Mat2 root_;
   Vec2 right_;
 };
-
-double PointWeight(std::span<const Term> terms) {
-  double sum = 0;
-  for (const Term& term : terms) {
-    const auto* const points = std::get_if<PointTerm>(&term);
-    sum += points != nullptr ? points->weight : 0;
-  }
-  return sum;
-}
 
 class JointRound {
  public:

@@ -150,6 +150,14 @@ int AutoTerm(std::span<const Term> terms) {
   return found;
 }
 
+double PointWeight(std::span<const Term> terms) {
+  double sum = 0;
+  for (const Term& term : terms) {
+    sum += std::holds_alternative<PointTerm>(term) ? WeightOf(term) : 0;
+  }
+  return sum;
+}
+
 void SetWeight(double weight, Term& term) {
   std::visit(
       [&]<class T>(T& t) {

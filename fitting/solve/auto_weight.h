@@ -35,6 +35,8 @@ WeightChoice ChooseWeight(const WeightProblem& problem, double near = 0);
 
 // The index of the term that is `auto`, or -1; InputError for more than one.
 int AutoTerm(std::span<const Term> terms);
+// The sum of those of the terms `points`.
+double PointWeight(std::span<const Term> terms);
 // Gives a smoothness or membrane term a weight.
 void SetWeight(double weight, Term& term);
 

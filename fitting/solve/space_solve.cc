@@ -400,7 +400,7 @@ double SpaceSolve::Move(const Eigen::MatrixX3d& step, const Eigen::MatrixX3d& ri
   const double moved = Take(Moved(space_.Values(), step));
   return AloneInItsLevel()
              ? moved
-             : std::sqrt(std::max(step.cwiseProduct(right).sum(), 0.0) / PointWeight()) /
+             : std::sqrt(std::max(step.cwiseProduct(right).sum(), 0.0) / PointWeight(terms_)) /
                    NetSize(space_);
 }
 
@@ -571,16 +571,8 @@ bool SpaceSolve::HasLoss() const {
   });
 }
 
-double SpaceSolve::PointWeight() const {
-  double sum = 0;
-  for (const Term& term : terms_) {
-    sum += std::holds_alternative<PointTerm>(term) ? WeightOf(term) : 0;
-  }
-  return sum;
-}
-
 double SpaceSolve::Scale() const {
-  const double weight = PointWeight();
+  const double weight = PointWeight(terms_);
   return cloud_.weight_sum() > 0 ? (weight > 0 ? weight : 1) / cloud_.weight_sum() : 0;
 }
 

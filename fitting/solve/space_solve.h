@@ -98,8 +98,7 @@ class SpaceSolve {
   double CostOf(const Term& term);
   double LeastLossWidth_mm() const;
   double MaxMove() const;
-  double PointWeight() const;  // of the terms `points`
-  double Scale() const;        // of w |e|^2 in the cost
+  double Scale() const;  // of w |e|^2 in the cost
   double LandmarkShare(std::size_t k) const;
   bool AloneInItsLevel() const { return space_.finest() == 0; }
   bool HasLoss() const;
