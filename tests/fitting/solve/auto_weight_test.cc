@@ -125,7 +125,10 @@ TEST(AutoWeight, WrongInputIsNamed) {
   const auto message = [&](std::vector<Term> terms) -> std::string {
     try {
       Fit(PlainStart(kShape), target, {},
-          {.plan = ListedPlan{.schedule = {{0, 1}}}, .terms = std::move(terms)}, {});
+          {.plan = ListedPlan{.schedule = {{0, 1}}},
+           .terms = std::move(terms),
+           .solver = Solver::kFastest},
+          {});
     } catch (const InputError& e) {
       return e.what();
     }
