@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "interp/kriging/bounded_minimum.h"
 
@@ -34,20 +33,6 @@ KrigingHyper HyperOf(const Eigen::VectorXd& logs) { return {std::exp(logs[0]), s
 double DepthSpread(const Eigen::VectorXd& depth_mm) {
   const double mean = depth_mm.mean();
   return std::max(std::sqrt((depth_mm.array() - mean).square().mean()), kFlatDepths_mm);
-}
-
-std::vector<Eigen::Index> FarApart(std::span<const Vec3> points, Eigen::Index count) {
-  const Eigen::Index n = std::ssize(points);
-  std::vector<Eigen::Index> chosen;
-  Eigen::VectorXd distance = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::infinity());
-  for (Eigen::Index next = 0; std::ssize(chosen) < std::min(n, count);) {
-    chosen.push_back(next);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      distance[i] = std::min(distance[i], (points[i] - points[next]).norm());
-    }
-    distance.maxCoeff(&next);
-  }
-  return chosen;
 }
 
 KrigingHyper FitHyper(const Kriging& options, const KrigingData& data, const RunContext& run) {

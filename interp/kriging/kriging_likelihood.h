@@ -2,9 +2,6 @@
 // Length and signal of a kriging process by maximum likelihood.
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include "interp/kriging/kriging_process.h"
 #include "surfaces/base/run_context.h"
 
@@ -12,10 +9,6 @@ namespace semblance {
 
 // The rms distance of depths from their mean, mm; at least 1e-3.
 double DepthSpread(const Eigen::VectorXd& depth_mm);
-
-// `count` points (all, if there are no more), each the furthest from those before it, beginning
-// with the first.
-std::vector<Eigen::Index> FarApart(std::span<const Vec3> points, Eigen::Index count);
 
 // What minimises Deviance() plus the length's log-normal prior, within a factor of 20 (e^3) of the
 // prior's median and a signal of 1/30 to 10 times the depths' spread: from the best of a coarse

@@ -13,6 +13,7 @@
 #include "interp/stacking/leave_out.h"
 #include "interp/stacking/sd_by_distance.h"
 #include "interp/stacking/stacking_weights.h"
+#include "surfaces/base/farthest_first.h"
 
 namespace semblance {
 namespace {
@@ -24,20 +25,14 @@ std::string_view NameOf(const SingleScheme& scheme) {
   return std::visit([](const auto& o) { return o.kName; }, scheme);
 }
 
-// `count` dowels that lie far apart, each the furthest from those before it, beginning with the
-// first by site; all where there are no more. As indices, rising.
+// Of dowels that lie far apart, beginning with the first by site; rising.
 std::vector<std::size_t> FarApart(std::span<const Dowel> dowels, std::size_t count) {
-  std::vector<double> distance(dowels.size(), std::numeric_limits<double>::infinity());
-  std::vector<std::size_t> chosen;
-  auto next =
-      static_cast<std::size_t>(std::ranges::min_element(dowels, {}, &Dowel::site) - dowels.begin());
-  while (chosen.size() < std::min(count, dowels.size())) {
-    chosen.push_back(next);
-    for (std::size_t i = 0; i < dowels.size(); ++i) {
-      distance[i] = std::min(distance[i], (dowels[i].base - dowels[next].base).norm());
-    }
-    next = static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
+  std::vector<Vec3> bases;
+  for (const Dowel& dowel : dowels) {
+    bases.push_back(dowel.base);
   }
+  const auto first = std::ranges::min_element(dowels, {}, &Dowel::site) - dowels.begin();
+  std::vector<std::size_t> chosen = FarthestFirst(bases, static_cast<std::size_t>(first), count);
   std::ranges::sort(chosen);
   return chosen;
 }

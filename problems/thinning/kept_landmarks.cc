@@ -2,9 +2,9 @@
 #include "problems/thinning/kept_landmarks.h"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 
+#include "surfaces/base/farthest_first.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {
@@ -19,29 +19,13 @@ std::vector<bool> FirstOf(const std::vector<std::size_t>& order, int n) {
   return kept;
 }
 
-// The points, each the farthest from those before it.
-std::vector<std::size_t> FarthestFirst(std::span<const Vec3> points) {
+// Beginning with the one that is farthest from the mean of all.
+std::vector<std::size_t> SpreadFirst(std::span<const Vec3> points) {
   const Vec3 mean = std::accumulate(points.begin(), points.end(), Vec3(Vec3::Zero())) /
                     static_cast<double>(std::max<std::size_t>(1, points.size()));
-  std::vector<double> distance;
-  for (const Vec3& p : points) {
-    distance.push_back((p - mean).norm());
-  }
-  std::vector<std::size_t> order;
-  while (order.size() < points.size()) {
-    const auto next =
-        static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
-    const bool is_first = order.empty();
-    order.push_back(next);
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const double to_next = (points[k] - points[next]).norm();
-      distance[k] = is_first ? to_next : std::min(distance[k], to_next);
-    }
-    for (const std::size_t taken : order) {
-      distance[taken] = -1;  // also where another lies on the same point
-    }
-  }
-  return order;
+  const auto first =
+      std::ranges::max_element(points, {}, [&](const Vec3& p) { return (p - mean).norm(); });
+  return FarthestFirst(points, static_cast<std::size_t>(first - points.begin()), points.size());
 }
 
 std::vector<bool> Kept(const KeepAll&, std::span<const std::string> sites, std::span<const Vec3>) {
@@ -50,7 +34,7 @@ std::vector<bool> Kept(const KeepAll&, std::span<const std::string> sites, std::
 
 std::vector<bool> Kept(const KeepSpread& o, std::span<const std::string>,
                        std::span<const Vec3> points) {
-  return FirstOf(FarthestFirst(points), o.n);
+  return FirstOf(SpreadFirst(points), o.n);
 }
 
 std::vector<bool> Kept(const KeepNames& o, std::span<const std::string> sites,
