@@ -6,6 +6,7 @@
 
 #include "interp/kriging/kriging_likelihood.h"
 #include "interp/kriging/kriging_process.h"
+#include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -85,7 +86,7 @@ KrigingHyper HyperFor(const Kriging& options, const KrigingScene& scene, const R
   if (scene.data.depth_mm.size() <= kFitSamples) {
     return FitHyper(options, scene.data, run);
   }
-  const std::vector<Eigen::Index> some = FarApart(scene.bases, kFitSamples);
+  const std::vector<std::size_t> some = FarthestFirst(scene.bases, 0, kFitSamples);
   return FitHyper(options,
                   {scene.data.distance_mm(some, some), scene.data.depth_mm(some),
                    scene.data.nugget_mm2(some), scene.data.regressors(some, Eigen::all)},

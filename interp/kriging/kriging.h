@@ -12,6 +12,7 @@
 #include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_samples.h"
 #include "interp/kriging/depth_mean.h"
+#include "interp/kriging/process_fields.h"
 #include "interp/on_surface/surface_distance.h"
 
 namespace semblance {
@@ -52,37 +53,11 @@ void Fields(Visitor& visit, Kriging& o) {
                   .doc = "distance over which depths resemble each other; none: by maximum "
                          "likelihood with the prior below"},
         o.length_mm);
-  visit(FieldInfo{.name = "length_prior_mm",
-                  .unit = "mm",
-                  .min = 1,
-                  .max = 1e4,
-                  .doc = "median of the length's log-normal prior; some dozen dowels alone hardly "
-                         "determine a length, and their likelihood drifts to either end"},
-        o.length_prior_mm);
-  visit(FieldInfo{.name = "length_prior_spread",
-                  .min = 1e-3,
-                  .max = 10,
-                  .doc = "standard deviation of the length's logarithm in the prior: 0.5 means "
-                         "within a factor of 2.7 of the median with 95 %; large: likelihood alone"},
-        o.length_prior_spread);
-  visit(FieldInfo{.name = "signal_mm",
-                  .unit = "mm",
-                  .min = 1e-3,
-                  .max = 1e3,
-                  .doc = "standard deviation of the depth over the skull; none: by maximum "
-                         "likelihood"},
-        o.signal_mm);
-  visit(FieldInfo{.name = "nugget_share",
-                  .min = 0,
-                  .max = 10,
-                  .doc = "a dowel's depth is taken as uncertain by this times its sd_mm (none: "
-                         "certain); 0 honours every dowel, more smooths"},
-        o.nugget_share);
+  LengthPriorFields(visit, o.length_prior_mm, o.length_prior_spread);
+  SignalField(visit, o.signal_mm);
+  NuggetShareField(visit, o.nugget_share);
   ClampField(visit, o.clamp);
-  visit(FieldInfo{.name = "state_sd",
-                  .doc = "give sd_mm at each vertex; costs the square of the number of dowels a "
-                         "vertex"},
-        o.state_sd);
+  StateSdField(visit, o.state_sd);
   MaxAngleField(visit, o.max_angle_deg);
 }
 

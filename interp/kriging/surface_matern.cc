@@ -4,12 +4,14 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "interp/kriging/gaussian_regression.h"
 #include "interp/kriging/kriging_likelihood.h"
 #include "interp/kriging/surface_matern_likelihood.h"
 #include "interp/on_surface/coarse_surface.h"
+#include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -58,11 +60,11 @@ SurfaceScene SceneOf(const SurfaceMatern& options, const DepthInput& input,
 }
 
 // One column per dowel of `some`.
-Eigen::MatrixXd WeightsOf(const SurfaceScene& scene, const std::vector<Eigen::Index>& some) {
+Eigen::MatrixXd WeightsOf(const SurfaceScene& scene, const std::vector<std::size_t>& some) {
   Eigen::MatrixXd weights =
       Eigen::MatrixXd::Zero(std::ssize(scene.domain.points), std::ssize(some));
   for (std::size_t k = 0; k < some.size(); ++k) {
-    const CornerWeights& at = scene.at[static_cast<std::size_t>(some[k])];
+    const CornerWeights& at = scene.at[some[k]];
     for (int c = 0; c < 3; ++c) {
       weights(at.corners[c], static_cast<Eigen::Index>(k)) += at.weights[c];
     }
@@ -75,7 +77,7 @@ SurfaceMaternHyper HyperFor(const SurfaceMatern& options, const SurfaceScene& sc
   if (options.length_mm && options.signal_mm && !options.fit_nugget) {
     return {*options.length_mm, *options.signal_mm, 0};
   }
-  const std::vector<Eigen::Index> some = FarApart(scene.bases, kFitSamples);
+  const std::vector<std::size_t> some = FarthestFirst(scene.bases, 0, kFitSamples);
   const ReducedMatern correlations(scene.domain, WeightsOf(scene, some), SearchPoles(options), run);
   return FitHyper(options,
                   {scene.data.depth_mm(some), scene.data.nugget_mm2(some),
@@ -116,10 +118,8 @@ class SurfaceProcess {
     const MaternField field(scene.domain, options.alpha,
                             MaternKappa(options.alpha, hyper.length_mm));
     const auto n = static_cast<Eigen::Index>(scene.at.size());
-    std::vector<Eigen::Index> all;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      all.push_back(k);
-    }
+    std::vector<std::size_t> all(scene.at.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
     local_ = field.LocalCovariances();
     run.ThrowIfStopped();
     with_dowels_ = field.Covariances(WeightsOf(scene, all), run).transpose();

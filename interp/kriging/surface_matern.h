@@ -8,6 +8,7 @@
 #include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_samples.h"
 #include "interp/kriging/depth_mean.h"
+#include "interp/kriging/process_fields.h"
 
 namespace semblance {
 
@@ -44,30 +45,9 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
                   .doc = "distance along the bone over which depths resemble each other, as "
                          "kriging's; none: by maximum likelihood with the prior below"},
         o.length_mm);
-  visit(FieldInfo{.name = "length_prior_mm",
-                  .unit = "mm",
-                  .min = 1,
-                  .max = 1e4,
-                  .doc = "median of the length's log-normal prior"},
-        o.length_prior_mm);
-  visit(FieldInfo{.name = "length_prior_spread",
-                  .min = 1e-3,
-                  .max = 10,
-                  .doc = "standard deviation of the length's logarithm in the prior"},
-        o.length_prior_spread);
-  visit(FieldInfo{.name = "signal_mm",
-                  .unit = "mm",
-                  .min = 1e-3,
-                  .max = 1e3,
-                  .doc = "standard deviation of the depth around its mean, alike all over the "
-                         "skull; none: by maximum likelihood"},
-        o.signal_mm);
-  visit(FieldInfo{.name = "nugget_share",
-                  .min = 0,
-                  .max = 10,
-                  .doc = "a dowel's depth is taken as uncertain by this times its sd_mm (none: "
-                         "certain); 0 honours every dowel, more smooths"},
-        o.nugget_share);
+  LengthPriorFields(visit, o.length_prior_mm, o.length_prior_spread);
+  SignalField(visit, o.signal_mm);
+  NuggetShareField(visit, o.nugget_share);
   visit(FieldInfo{.name = "fit_nugget",
                   .doc = "let the likelihood find one more uncertainty that all dowels have (what "
                          "varies between neighbouring places): it smooths where depths do not hang "
@@ -83,10 +63,7 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
                        "and costs time; 0: the skull's own mesh"},
       o.edge_mm);
   ClampField(visit, o.clamp);
-  visit(FieldInfo{.name = "state_sd",
-                  .doc = "give sd_mm at each vertex; costs the square of the number of dowels a "
-                         "vertex"},
-        o.state_sd);
+  StateSdField(visit, o.state_sd);
   MaxAngleField(visit, o.max_angle_deg);
 }
 
