@@ -43,4 +43,21 @@ double Quantile(std::span<const WeightedValue> sorted, double share) {
   return last;
 }
 
+double Quantile(std::vector<double>& values, double share) {
+  if (values.empty()) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const auto count = static_cast<double>(values.size());
+  const double wanted = share * count, whole = std::round(wanted);
+  const bool is_met = std::abs(wanted - whole) <= 1e-12 * count;  // exactly between two values
+  const auto below = static_cast<std::size_t>(is_met ? whole : std::floor(wanted));
+  const std::size_t at = std::min(below, values.size() - 1);
+  std::ranges::nth_element(values, values.begin() + static_cast<long>(at));
+  if (!is_met || below == 0 || below == values.size()) {
+    return values[at];
+  }
+  return (*std::max_element(values.begin(), values.begin() + static_cast<long>(at)) + values[at]) /
+         2;
+}
+
 }  // namespace semblance

@@ -26,4 +26,8 @@ std::vector<WeightedValue> SortedValues(std::span<const double> values,
 // weight.
 double Quantile(std::span<const WeightedValue> sorted, double share);
 
+// The same of finite values that weigh the same, in time that grows with their number alone; leaves
+// them in another order.
+double Quantile(std::vector<double>& values, double share);
+
 }  // namespace semblance

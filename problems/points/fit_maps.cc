@@ -8,6 +8,7 @@
 #include <iterator>
 #include <set>
 
+#include "problems/metrics/quantile.h"
 #include "surfaces/hspline/patch_tree.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
@@ -25,21 +26,6 @@ std::vector<char> CountedPoints(const FitResult& fit) {
     }
   }
   return counted;
-}
-
-// The quantile of values that weigh the same. Reorders them.
-double QuantileOf(std::vector<double>& values, double share) {
-  const auto count = static_cast<double>(values.size());
-  const double wanted = share * count, whole = std::round(wanted);
-  const bool is_met = std::abs(wanted - whole) <= 1e-12 * count;  // exactly between two values
-  const auto below = static_cast<std::size_t>(is_met ? whole : std::floor(wanted));
-  const std::size_t at = std::min(below, values.size() - 1);
-  std::ranges::nth_element(values, values.begin() + static_cast<long>(at));
-  if (!is_met || below == 0 || below == values.size()) {
-    return values[at];
-  }
-  return (*std::max_element(values.begin(), values.begin() + static_cast<long>(at)) + values[at]) /
-         2;
 }
 
 // Cells along u and v that hold four points each, were they spread evenly; no more than vertices.
@@ -84,8 +70,8 @@ DistanceQuantiles QuantilesOf(const FitResult& fit) {
   if (known.empty()) {
     return {};
   }
-  return {.median_mm = QuantileOf(known, 0.5),
-          .p95_mm = QuantileOf(known, 0.95),
+  return {.median_mm = Quantile(known, 0.5),
+          .p95_mm = Quantile(known, 0.95),
           .max_mm = *std::ranges::max_element(known)};
 }
 

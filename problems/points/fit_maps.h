@@ -11,7 +11,7 @@
 
 namespace semblance {
 
-// Of the points' distances, outliers too: Quantile of quantile.h, without sorting them all.
+// Of the points' distances, outliers too (problems/metrics/quantile.h).
 struct DistanceQuantiles {
   double median_mm = kNaN, p95_mm = kNaN, max_mm = kNaN;
 };
