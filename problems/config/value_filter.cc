@@ -24,17 +24,19 @@ struct ValueFilter::Node {
   std::string name, sign, value;
 };
 
+std::optional<double> NumberIn(std::string_view text) {
+  const char* const end = text.data() + text.size();
+  double number = 0;
+  const auto [rest, fault] = std::from_chars(text.data(), end, number);
+  return fault == std::errc() && rest == end && std::isfinite(number) ? std::optional(number)
+                                                                      : std::nullopt;
+}
+
 namespace {
 
-using Node = ValueFilter::Node;
+constexpr int kDeepest = 64;  // parts inside each other
 
-std::optional<double> NumberIn(const std::string& text) {
-  double number = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return fault == std::errc() && end == text.data() + text.size() && std::isfinite(number)
-             ? std::optional(number)
-             : std::nullopt;
-}
+using Node = ValueFilter::Node;
 
 bool Equal(const std::string& a, const std::string& b) {
   const std::optional<double> x = NumberIn(a), y = NumberIn(b);
@@ -160,19 +162,25 @@ class Parser {
   }
 
   Node One() {
-    if (Take("not")) {
-      Node node{.kind = Node::Kind::kNot, .parts = {}, .name = {}, .sign = {}, .value = {}};
-      node.parts.push_back(One());
-      return node;
+    const bool negated = Take("not");
+    if (!negated && !Take("(")) {
+      return Comparison();
     }
-    if (Take("(")) {
-      Node node = Any();
-      if (!Take(")")) {
-        Fail("')' is missing");
-      }
-      return node;
+    if (++depth_ > kDeepest) {
+      Fail(fmt::format("more than {} parts inside each other", kDeepest));
     }
-    return Comparison();
+    Node node = negated ? Negated(One()) : Any();
+    --depth_;
+    if (!negated && !Take(")")) {
+      Fail("')' is missing");
+    }
+    return node;
+  }
+
+  static Node Negated(Node part) {
+    Node node{.kind = Node::Kind::kNot, .parts = {}, .name = {}, .sign = {}, .value = {}};
+    node.parts.push_back(std::move(part));
+    return node;
   }
 
   Node Comparison() {
@@ -218,6 +226,7 @@ class Parser {
   std::span<const std::string> names_;
   std::vector<Token> tokens_;
   std::size_t next_ = 0;
+  int depth_ = 0;
 };
 
 }  // namespace

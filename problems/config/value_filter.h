@@ -10,11 +10,15 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 namespace semblance {
+
+// The text as a number, where all of it is one, and a finite one.
+std::optional<double> NumberIn(std::string_view text);
 
 // A name may have several values: = and the like hold if one of them does, != if none is equal.
 using NamedValues = std::multimap<std::string, std::string>;
@@ -23,7 +27,8 @@ class ValueFilter {
  public:
   // A name may also be the last part of one of `names` ("resolution" of "implicit.resolution")
   // where it is of one alone. Throws InputError, in one line that shows where: what is no such
-  // condition, a name that is unknown or could be several.
+  // condition, a name that is unknown or could be several, more than 64 `not` and parentheses
+  // inside each other.
   ValueFilter(std::string_view text, std::span<const std::string> names);
   ~ValueFilter();
   ValueFilter(ValueFilter&&) noexcept;

@@ -4,12 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <set>
 
+#include "problems/config/value_filter.h"
 #include "problems/plots/axis_plot.h"
 #include "problems/plots/heat_map.h"
 #include "problems/report/plain_names.h"
@@ -18,15 +17,6 @@
 
 namespace semblance {
 namespace {
-
-// All of the text as a finite number.
-std::optional<double> NumberIn(const std::string& text) {
-  double value = 0;
-  const char* const end = text.data() + text.size();
-  const auto [rest, fault] = std::from_chars(text.data(), end, value);
-  return fault == std::errc() && rest == end && std::isfinite(value) ? std::optional(value)
-                                                                     : std::nullopt;
-}
 
 bool IsNumeric(const std::vector<Treatment>& treatments, std::size_t axis) {
   std::set<double> values;

@@ -73,6 +73,13 @@ TEST(ValueFilter, SaysWhereAConditionIsNone) {
   EXPECT_THAT(Refusal("(subject = a"), HasSubstr("')' is missing"));
   EXPECT_THAT(Refusal("subject = 'a"), HasSubstr("not closed"));
   EXPECT_THAT(Refusal(""), HasSubstr("a name is missing"));
+  for (const char* part : {"(", "not "}) {
+    std::string deep;
+    for (int n = 0; n < 100000; ++n) {
+      deep += part;
+    }
+    EXPECT_THAT(Refusal(deep + "subject = a"), HasSubstr("more than 64 parts"));
+  }
   EXPECT_THAT(WordsOf<InputError>([] { Holds("interp < 3", kTrial); }),
               HasSubstr("'kriging' is no number"));
 }
