@@ -16,7 +16,7 @@ namespace semblance {
 namespace {
 
 constexpr double kLabels = 250, kRow = 26, kHead = 110, kMostWidth = 900, kWidest = 84;
-constexpr double kRoomForNumber = 40;
+constexpr double kRoomForNumber = 40, kMargin = 10;
 
 struct Limits {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -78,7 +78,12 @@ std::string HeatMapSvg(const HeatMap& map) {
   const auto columns = static_cast<double>(std::max<std::size_t>(1, map.columns.size()));
   const double width = std::min(kWidest, (kMostWidth - kLabels - 60) / columns);
   const double bottom = kHead + kRow * static_cast<double>(map.rows.size());
-  std::string text = svg::Open(bottom + 34, kLabels + width * columns + 60);
+  const std::string ends = limits.low <= limits.high ? fmt::format(": {:.4g} dark to {:.4g} yellow",
+                                                                   limits.low, limits.high)
+                                                     : "";
+  const double all = kLabels + width * columns + 60,
+               title = kMargin + svg::WidthOf(map.title + ends) + kMargin;
+  std::string text = svg::Open(bottom + 34, std::max(all, title));
   for (std::size_t c = 0; c < map.columns.size(); ++c) {
     text += ColumnName(kLabels + width * (static_cast<double>(c) + 0.4), map.columns[c]);
   }
@@ -89,10 +94,7 @@ std::string HeatMapSvg(const HeatMap& map) {
       text += Cell(map, r, c, limits, width);
     }
   }
-  const std::string ends = limits.low <= limits.high ? fmt::format(": {:.4g} dark to {:.4g} yellow",
-                                                                   limits.low, limits.high)
-                                                     : "";
-  return text + svg::Text(kLabels, bottom + 24, map.title + ends, "start") + "</svg>\n";
+  return text + svg::Text(kMargin, bottom + 24, map.title + ends, "start") + "</svg>\n";
 }
 
 }  // namespace semblance

@@ -48,6 +48,8 @@ std::string Text(double x, double y, const std::string& text, const char* anchor
       anchor, EscapeHtml(text));
 }
 
+double WidthOf(const std::string& text) { return 7.5 * static_cast<double>(text.size()); }
+
 std::string Dot(double x, double y, double radius, const std::string& title, const char* colour) {
   return fmt::format(
       "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{}\" fill=\"{}\" "

@@ -19,6 +19,9 @@ std::string Line(double x1, double y1, double x2, double y2, const char* colour,
 // anchor: start, middle or end.
 std::string Text(double x, double y, const std::string& text, const char* anchor);
 
+// About how wide a text stands there, generously.
+double WidthOf(const std::string& text);
+
 // A browser shows the title, unless it is empty, where the pointer rests on the dot.
 std::string Dot(double x, double y, double radius, const std::string& title,
                 const char* colour = "#1d2126");

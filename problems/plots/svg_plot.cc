@@ -51,7 +51,10 @@ class Axis {
       svg += Line(At(value), top, At(value), bottom, "#dfe3e8", 1);
       svg += Text(At(value), bottom + 20, fmt::format("{:.6g}", value), "middle");
     }
-    return svg + Text((left_ + kWidth - kRight) / 2, bottom + 44, label, "middle");
+    // Under the axis; what is too long for that, across the plot.
+    const double room = kWidth - kRight - left_, middle = left_ + room / 2;
+    return svg +
+           Text(svg::WidthOf(label) > room ? kWidth / 2 : middle, bottom + 44, label, "middle");
   }
 
  private:

@@ -42,7 +42,7 @@ std::string ConvergencePlotSvg(const std::vector<BoxRow>& rows, const std::strin
 // bold.
 std::string CalibrationPlotSvg(const std::vector<BoxRow>& rows, const std::string& axis_label);
 
-// Small histograms side by side, one a row: its values are the shares in equal parts of 0..1. The
+// Small histograms side by side, one per row: its values are the shares in equal parts of 0..1. The
 // grey line is where all would be equal; all have one scale.
 std::string HistogramsSvg(const std::vector<BoxRow>& rows);
 
