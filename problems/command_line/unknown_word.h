@@ -9,9 +9,9 @@
 
 namespace semblance {
 
-// The first word of a line that was refused (without the program's name) which is no command where
-// one is due, or no option of its command, in a sentence with the nearest that there is; empty
-// where all words are known.
+// words: a line that was refused, without the program's name. The first of them that is no command
+// where one is expected, or no option of its command, in a sentence with the nearest that there
+// is. Empty where all words are known.
 std::string UnknownWord(const CommandNode& program, std::span<const std::string> words);
 
 }  // namespace semblance

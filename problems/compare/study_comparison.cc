@@ -8,6 +8,7 @@
 #include <iterator>
 #include <set>
 
+#include "problems/report/plain_names.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -142,14 +143,14 @@ std::vector<std::string> NotesOn(std::span<const NamedStudy> studies, const std:
         [&](const TrialRow& row) { return std::ranges::binary_search(subjects, row.subject); });
     const auto left = SubjectsOf(study, metric).size() - subjects.size();
     if (left > 0) {
-      notes.push_back(fmt::format("{}: {} subjects are not in all the studies, and left out",
-                                  study.name, left));
+      notes.push_back(fmt::format("{}: left out, for they are not in all the studies: {}",
+                                  study.name, Counted(static_cast<long long>(left), "subject")));
     }
     const int not_done =
         static_cast<int>(study.results.trials.size()) - study.results.Count("done");
     if (not_done > 0) {
-      notes.push_back(fmt::format("{}: {} of {} trials are not done, and have no part", study.name,
-                                  not_done, study.results.trials.size()));
+      notes.push_back(fmt::format("{}: not done, and without a part: {} of {}", study.name,
+                                  not_done, Counted(std::ssize(study.results.trials), "trial")));
     }
   }
   std::ranges::copy(AreaNotes(all), std::back_inserter(notes));

@@ -22,9 +22,9 @@ struct GlbMaterial {
 // Triangles of one material.
 struct GlbPart {
   GlbMaterial material;
-  std::vector<Vec3> points, normals;                      // mm, LPS; one normal a point
-  std::vector<Vec2> uv = {};                              // one a point, v upwards, or none
-  std::vector<std::array<std::uint8_t, 3>> colours = {};  // sRGB, one a point, or none: each is
+  std::vector<Vec3> points, normals;                      // mm, LPS; one normal per point
+  std::vector<Vec2> uv = {};                              // one per point, v upwards, or none
+  std::vector<std::array<std::uint8_t, 3>> colours = {};  // sRGB, one per point, or none: each is
                                                           // multiplied with the material's
   std::vector<Triangle> triangles;
 };

@@ -74,7 +74,8 @@ TEST(StudyComparison, ADifferenceIsTheMeanOverSubjectsThatBothHave) {
   EXPECT_EQ(pair.better, better);
   EXPECT_EQ(pair.better + pair.worse, 7);
   EXPECT_TRUE(pair.same_label);
-  EXPECT_THAT(comparison.notes, Contains(HasSubstr("a: 2 subjects are not in all the studies")));
+  EXPECT_THAT(comparison.notes,
+              Contains(HasSubstr("a: left out, for they are not in all the studies: 2 subjects")));
 }
 
 TEST(StudyComparison, OfAStudyAndItsCopyNothingDiffersAndOrderTurnsTheSign) {
