@@ -4,8 +4,12 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <memory>
+#include <numeric>
+#include <string>
 #include <type_traits>
+#include <vector>
 
 #include "surfaces/base/error.h"
 
@@ -18,9 +22,9 @@ CREATE TABLE axis (position INTEGER PRIMARY KEY, path TEXT NOT NULL UNIQUE) STRI
 CREATE TABLE trial (id TEXT PRIMARY KEY, position INTEGER NOT NULL, subject TEXT NOT NULL,
   status TEXT NOT NULL, reason TEXT NOT NULL) STRICT;
 CREATE TABLE setting (trial TEXT NOT NULL REFERENCES trial, axis INTEGER NOT NULL REFERENCES axis,
-  value TEXT NOT NULL, PRIMARY KEY (trial, axis)) STRICT;
+  value TEXT NOT NULL, PRIMARY KEY (trial, axis)) STRICT, WITHOUT ROWID;
 CREATE TABLE metric (trial TEXT NOT NULL REFERENCES trial, name TEXT NOT NULL,
-  value REAL NOT NULL, PRIMARY KEY (trial, name)) STRICT;
+  value REAL NOT NULL, PRIMARY KEY (trial, name)) STRICT, WITHOUT ROWID;
 CREATE TABLE tag (word TEXT NOT NULL) STRICT;
 )sql";
 
@@ -68,7 +72,7 @@ class Inserter {
     statement_.reset(made);
   }
 
-  // Texts and numbers in the order of the table's columns.
+  // Texts and numbers in the order of the table's columns; they live until it returns.
   template <class... Values>
   void operator()(const Values&... values) {
     int column = 0;
@@ -80,7 +84,7 @@ class Inserter {
  private:
   void Bind(int column, const std::string& text) {
     database_.Check(sqlite3_bind_text(statement_.get(), column, text.data(),
-                                      static_cast<int>(text.size()), SQLITE_TRANSIENT));
+                                      static_cast<int>(text.size()), SQLITE_STATIC));
   }
   template <class Number>
   requires std::is_arithmetic_v<Number>
@@ -97,6 +101,15 @@ class Inserter {
   std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement_{nullptr, &sqlite3_finalize};
 };
 
+// A table grows fastest in the order of its key.
+std::vector<std::size_t> OrderById(const std::vector<TrialRow>& trials) {
+  std::vector<std::size_t> order(trials.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {},
+                           [&](std::size_t n) -> const std::string& { return trials[n].id; });
+  return order;
+}
+
 void AddRows(const StudyResults& results, const Database& database) {
   Inserter study(database, "study", 3), axis(database, "axis", 2), trial(database, "trial", 5),
       setting(database, "setting", 3), metric(database, "metric", 3), tag(database, "tag", 1);
@@ -110,6 +123,9 @@ void AddRows(const StudyResults& results, const Database& database) {
   for (std::size_t n = 0; n < results.trials.size(); ++n) {
     const TrialRow& row = results.trials[n];
     trial(row.id, n, row.subject, row.status, row.reason);
+  }
+  for (const std::size_t n : OrderById(results.trials)) {
+    const TrialRow& row = results.trials[n];
     for (std::size_t k = 0; k < row.values.size(); ++k) {
       setting(row.id, k, row.values[k]);
     }
