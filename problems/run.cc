@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <filesystem>
 #include <memory>
 
 #include "fitting/plan/fit_faults.h"
@@ -17,6 +17,12 @@
 
 namespace semblance {
 namespace {
+
+using Files = std::vector<std::filesystem::path>;
+
+void Append(const Files& more, Files& files) {
+  files.insert(files.end(), more.begin(), more.end());
+}
 
 bool TakesPublishedDeviations(const Experiment& experiment, const Case& subject) {
   return experiment.tissue.depths == DepthSource::kTable &&
@@ -112,6 +118,17 @@ std::shared_ptr<const BustModel> GivenBust(const Experiment& experiment, StageCa
   return *model ? std::shared_ptr<const BustModel>(model, &**model) : nullptr;
 }
 
+Bust BustOf(const BustModel& model, const MadeFace& made, const TriMesh& seedable,
+            const RunContext& context) {
+  return PoseBust({model, made.fitted.fit.surface, made.placed.face.site_uv, seedable}, context);
+}
+
+// Where a template's features hide how far a face is off; none of a prior's, which knows of nose,
+// mouth and eyes, and so does its sigma.
+std::vector<Sphere> SigmaMasks(const MadeFace& made) {
+  return made.prior ? std::vector<Sphere>() : TemplateMasks(made.placed.face);
+}
+
 }  // namespace
 
 std::vector<std::string> RunResult::Faults() const {
@@ -140,18 +157,16 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const auto skull = MakeSkullStage(experiment, shared, step, context);
   const DepthStage& bone = *skull->depth_stage;
   Case subject = bone.subject;
-  std::vector<BoneOrigin> origin = step("observed bone", [&] {
-    return OriginOfShell(bone.shell, subject.skull, subject.origin, context.threads);
-  });
   const auto generic =
       step("make template", [&] { return GenericFace(experiment.face_template, shared); });
-  std::ranges::copy(TemplateFiles(experiment.face_template), std::back_inserter(subject.inputs));
-  const auto prior = GivenPrior(experiment, *generic, shared, context);
-  std::ranges::copy(prior ? PriorFiles(experiment.prior) : std::vector<std::filesystem::path>(),
-                    std::back_inserter(subject.inputs));
-  const TriMesh seedable = SeedableFace(experiment, subject, skull->implicit.dense);
-  const FaceInput input{experiment, *generic, prior.get(), subject, seedable, bone.shell};
-  MadeFace made = step("fit", [&] { return MakeFace(input, context); });
+  const auto prior =
+      step("load prior", [&] { return GivenPrior(experiment, *generic, shared, context); });
+  Append(TemplateFiles(experiment.face_template), subject.inputs);
+  Append(prior ? PriorFiles(experiment.prior) : Files(), subject.inputs);
+  const TriMesh seedable = SeedableFace(experiment, skull->cuts, skull->implicit.dense, subject);
+  MadeFace made = step("fit", [&] {
+    return MakeFace({experiment, *generic, prior.get(), subject, seedable, bone.shell}, context);
+  });
   std::optional<HSplineSurface> before_edits = EditByHand(experiment, made.fitted, subject);
   CheckFinite(made.fitted.fit.surface);
   Tessellation face =
@@ -160,24 +175,18 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
     return UncertaintyOf(experiment, bone, prior.get(), made, face, subject, context);
   });
   std::optional<TruthComparison> truth = step("measure", [&] {
-    // A prior knows of nose, mouth and eyes, and so does its sigma.
-    const std::vector<Sphere> masks =
-        made.prior ? std::vector<Sphere>() : TemplateMasks(made.placed.face);
-    return Measure(experiment, *skull, face.mesh, uncertainty, masks, shared, context);
+    return Measure(experiment, *skull, face.mesh, uncertainty, SigmaMasks(made), shared, context);
   });
-  std::vector<FeatureDistortion> features =
-      MeasureFeatures(made.placed.face, made.fitted.fit.surface);
+  Append(bust_model ? BustFiles(experiment.bust) : Files(), subject.inputs);
   std::optional<Bust> bust;
   if (bust_model) {
-    std::ranges::copy(BustFiles(experiment.bust), std::back_inserter(subject.inputs));
-    bust = step("bust", [&] {
-      return PoseBust({*bust_model, made.fitted.fit.surface, made.placed.face.site_uv, seedable},
-                      context);
-    });
+    bust = step("bust", [&] { return BustOf(*bust_model, made, seedable, context); });
   }
+  std::vector<FeatureDistortion> features =
+      MeasureFeatures(made.placed.face, made.fitted.fit.surface);
   return {.subject = std::move(subject),
           .shell = bone.shell,
-          .origin = std::move(origin),
+          .origin = skull->origin,
           .depth = bone.depth,
           .implicit = skull->implicit,
           .face_from_template = made.placed.face_from_template,

@@ -201,6 +201,64 @@ void CheckFilesNamed(const Experiment& experiment) {
   }
 }
 
+// The subject with its dowels on bone, which have no depth yet.
+Case CaseOf(const SubjectData& data, const Experiment& experiment, const MeshQuery& query) {
+  const bool measured = !std::holds_alternative<PhantomOptions>(experiment.subject);
+  Case subject{.name = data.landmarks.subject,
+               .skull = data.skull,
+               .origin = data.origin,
+               .skin = data.skin,
+               .dowels_on_bone = {},
+               .open_dowels = {},
+               .expected_on_bone = {},
+               .network = {},
+               .points = {},
+               .basis = {},
+               .notes = data.notes,
+               .inputs = data.inputs};
+  if (measured) {
+    Append(subject.notes, CheckLandmarks(data, query, experiment.landmarks));
+  }
+  subject.dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks);
+  for (const Landmark& landmark : data.landmarks.landmarks) {
+    subject.points[landmark.site] = {landmark.point[0], landmark.point[1], landmark.point[2]};
+  }
+  return subject;
+}
+
+// Before some of the dowels are left out, what all of them say of the subject's axes is kept.
+void GiveDepths(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
+                Case& subject) {
+  const TissueOptions tissue = WithSiteDepths(experiment, data.landmarks);
+  const std::vector<std::string> on_depths =
+      FillDepths(tissue, data.landmarks, subject.dowels_on_bone);
+  subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
+  Append(subject.notes, UsesAllAsGiven(experiment.landmarks)
+                            ? on_depths
+                            : UseSome(data, experiment.landmarks, tissue, query, subject));
+}
+
+void LayNetwork(const NetworkPlan& plan, Case& subject) {
+  subject.network = BuildNetwork(plan, subject.dowels_on_bone);
+  if (subject.network.areas.empty()) {
+    throw InputError(fmt::format(
+        "{}: no area of the dowel network has all its three dowels; more landmarks are needed",
+        subject.name));
+  }
+  NoteDroppedAreas(subject);
+  Append(subject.notes, JoinNetwork(plan, subject.dowels_on_bone, subject.network));
+}
+
+void AppendInputs(const Experiment& experiment, Case& subject) {
+  subject.inputs.push_back(experiment.network);
+  Append(subject.inputs, TablesOf(ExpectedTissue(experiment).value_or(experiment.tissue)));
+  if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
+    subject.inputs.push_back(map->file);
+    subject.inputs.push_back(map->mesh);
+    std::erase(subject.inputs, std::filesystem::path());
+  }
+}
+
 }  // namespace
 
 SubjectData LoadSubject(const Subject& subject, const RunContext& context) {
@@ -217,51 +275,12 @@ std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOpt
 Case MakeCase(const SubjectData& data, const Experiment& experiment) {
   CheckFilesNamed(experiment);
   const MeshQuery query(data.skull);
-  const bool measured = !std::holds_alternative<PhantomOptions>(experiment.subject);
-  const std::vector<std::string> remarks =
-      measured ? CheckLandmarks(data, query, experiment.landmarks) : std::vector<std::string>();
-  Case subject{
-      .name = data.landmarks.subject,
-      .skull = data.skull,
-      .origin = data.origin,
-      .skin = data.skin,
-      .dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks),
-      .open_dowels = {},
-      .expected_on_bone = {},
-      .network = {},
-      .points = {},
-      .basis = {},
-      .notes = data.notes,
-      .inputs = data.inputs};
-  Append(subject.notes, remarks);
+  Case subject = CaseOf(data, experiment, query);
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
-  const TissueOptions tissue = WithSiteDepths(experiment, data.landmarks);
-  const std::vector<std::string> on_depths =
-      FillDepths(tissue, data.landmarks, subject.dowels_on_bone);
-  for (const Landmark& landmark : data.landmarks.landmarks) {
-    subject.points[landmark.site] = {landmark.point[0], landmark.point[1], landmark.point[2]};
-  }
-  subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
-  const bool all = UsesAllAsGiven(experiment.landmarks);
-  Append(subject.notes,
-         all ? on_depths : UseSome(data, experiment.landmarks, tissue, query, subject));
+  GiveDepths(data, experiment, query, subject);
   InsertDowels(experiment, data, query, subject);
-  const NetworkPlan plan = PlanFor(experiment, data.landmarks);
-  subject.network = BuildNetwork(plan, subject.dowels_on_bone);
-  if (subject.network.areas.empty()) {
-    throw InputError(fmt::format(
-        "{}: no area of the dowel network has all its three dowels; more landmarks are needed",
-        subject.name));
-  }
-  NoteDroppedAreas(subject);
-  Append(subject.notes, JoinNetwork(plan, subject.dowels_on_bone, subject.network));
-  subject.inputs.push_back(experiment.network);
-  Append(subject.inputs, TablesOf(ExpectedTissue(experiment).value_or(experiment.tissue)));
-  if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
-    subject.inputs.push_back(map->file);
-    subject.inputs.push_back(map->mesh);
-    std::erase(subject.inputs, std::filesystem::path());
-  }
+  LayNetwork(PlanFor(experiment, data.landmarks), subject);
+  AppendInputs(experiment, subject);
   return subject;
 }
 

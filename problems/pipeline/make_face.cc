@@ -15,7 +15,6 @@
 #include "problems/prior/prior_target.h"
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/hspline_project.h"
-#include "surfaces/mesh/cut_planes.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -361,15 +360,15 @@ std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
   });
 }
 
-TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh& implicit) {
-  const std::vector<CutPlane> planes = FindCutPlanes(subject.skull);
-  for (const CutPlane& plane : planes) {
+TriMesh SeedableFace(const Experiment& experiment, std::span<const CutPlane> cuts,
+                     const TriMesh& implicit, Case& subject) {
+  for (const CutPlane& plane : cuts) {
     subject.notes.push_back(
         fmt::format("the skull is cut off at {}: no seeds within {:.0f} mm of there, and the face "
                     "beyond it is the template's",
                     InWords(plane), experiment.cut_margin_mm));
   }
-  return WithinScan(implicit, planes, experiment.cut_margin_mm);
+  return WithinScan(implicit, cuts, experiment.cut_margin_mm);
 }
 
 MadeFace MakeFace(const FaceInput& in, const RunContext& context) {

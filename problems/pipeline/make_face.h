@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "fitting/fit.h"
 #include "fitting/problem/seeding.h"
@@ -13,6 +14,7 @@
 #include "problems/pipeline/stage_cache.h"
 #include "problems/pipeline/uncertainty.h"
 #include "problems/prior/prior_surface.h"
+#include "surfaces/mesh/cut_planes.h"
 
 namespace semblance {
 
@@ -59,9 +61,10 @@ std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
                                               const TemplateFace& generic, StageCache& cache,
                                               const RunContext& context);
 
-// What of the implicit face may be seeded: near a plane where the scan ends, its surface is the
-// rim and the lid of the shell, not a face. Notes each such plane with the subject.
-TriMesh SeedableFace(const Experiment& experiment, Case& subject, const TriMesh& implicit);
+// What of the implicit face may be seeded. cuts: the planes where the scan ends; near one its
+// surface is the rim and the lid of the shell, not a face. Notes each such plane with the subject.
+TriMesh SeedableFace(const Experiment& experiment, std::span<const CutPlane> cuts,
+                     const TriMesh& implicit, Case& subject);
 
 // Brings the generic face to the dowels and makes the subject's face of it, as experiment.face
 // says. Throws InputError as Fit and EstimateShape do; Cancelled.

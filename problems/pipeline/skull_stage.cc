@@ -2,13 +2,13 @@
 #include "problems/pipeline/skull_stage.h"
 
 #include <algorithm>
+#include <span>
 #include <string>
 
 #include "problems/pipeline/dowel_projection.h"
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/pipeline/implicit_cache.h"
 #include "problems/pipeline/stage_key.h"
-#include "surfaces/mesh/cut_planes.h"
 
 namespace semblance {
 namespace {
@@ -67,10 +67,10 @@ namespace {
 
 // The shell's depths, none on the lid that closes it where the scan was cut off: for a face that is
 // to end there.
-std::vector<double> DepthsToTheEnds(const DepthStage& stage) {
+std::vector<double> DepthsToTheEnds(const DepthStage& stage, std::span<const CutPlane> cuts) {
   constexpr double kLid_mm = 1;
   std::vector<double> depth_mm = stage.depth.depth_mm;
-  for (const CutPlane& plane : FindCutPlanes(stage.subject.skull)) {
+  for (const CutPlane& plane : cuts) {
     for (std::size_t v = 0; v < depth_mm.size(); ++v) {
       depth_mm[v] = plane.Beyond_mm(stage.shell.points[v]) > -kLid_mm ? kNaN : depth_mm[v];
     }
@@ -84,13 +84,18 @@ std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache
                                                  StepClock& step, const RunContext& context) {
   return cache.Get<SkullStage>(StageKey("skull stage", e.implicit) + KeyOfDepth(e), [&] {
     auto depth = MakeDepthStage(e, cache, step, context);
-    ImplicitFace implicit = step("implicit face", [&] {
-      return CachedImplicitFace(
-          depth->shell,
-          e.implicit.ends == FaceEnds::kOpen ? DepthsToTheEnds(*depth) : depth->depth.depth_mm,
-          e.implicit, cache.disk(), context);
+    const TriMesh& skull = depth->subject.skull;
+    std::vector<BoneOrigin> origin = step("observed bone", [&] {
+      return OriginOfShell(depth->shell, skull, depth->subject.origin, context.threads);
     });
-    return SkullStage{std::move(depth), std::move(implicit)};
+    std::vector<CutPlane> cuts = FindCutPlanes(skull);
+    ImplicitFace implicit = step("implicit face", [&] {
+      return CachedImplicitFace(depth->shell,
+                                e.implicit.ends == FaceEnds::kOpen ? DepthsToTheEnds(*depth, cuts)
+                                                                   : depth->depth.depth_mm,
+                                e.implicit, cache.disk(), context);
+    });
+    return SkullStage{std::move(depth), std::move(origin), std::move(cuts), std::move(implicit)};
   });
 }
 

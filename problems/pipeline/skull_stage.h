@@ -4,10 +4,13 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/pipeline/step_clock.h"
+#include "problems/preparation/bone_origin.h"
+#include "surfaces/mesh/cut_planes.h"
 
 namespace semblance {
 
@@ -31,6 +34,8 @@ std::shared_ptr<const DepthStage> MakeDepthStage(const Experiment& experiment, S
 
 struct SkullStage {
   std::shared_ptr<const DepthStage> depth_stage;
+  std::vector<BoneOrigin> origin;  // of the shell's triangles
+  std::vector<CutPlane> cuts;      // where the subject's skull is cut off
   ImplicitFace implicit;
 };
 
