@@ -56,7 +56,7 @@ const std::map<std::string, Layers> kRooms = {
       {kHall}}},
     {"problems",
      {{"config", "ct", "output", "thinning"},
-      {"edits", "page", "pictures", "subject", "view"},
+      {"edits", "page", "pictures", "search", "subject", "view"},
       {"landmark_files", "preparation"},
       {"face_template"},
       {"bust", "metrics", "prior"},

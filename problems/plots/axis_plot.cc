@@ -123,12 +123,15 @@ std::string AxisPlotSvg(std::vector<AxisLine> lines, const std::string& x_label,
                                x_label + (logarithmic ? " (logarithmic)" : ""), "middle");
   for (std::size_t n = 0; n < lines.size(); ++n) {
     const char* colour = svg::kColours[n % svg::kColours.size()];
-    text += Polyline(lines[n], x, y, n);
+    if (lines[n].is_joined) {
+      text += Polyline(lines[n], x, y, n);
+    }
     for (const AxisPoint& p : lines[n].points) {
       text += svg::Dot(x.At(p.x), y.At(p.y), 5, p.name, colour);
     }
     const double at = kBottom + 68 + 22 * static_cast<double>(n);
-    text += svg::Line(kLeft, at, kLeft + 26, at, colour, 3) +
+    text += (lines[n].is_joined ? svg::Line(kLeft, at, kLeft + 26, at, colour, 3)
+                                : svg::Dot(kLeft + 13, at, 5, "", colour)) +
             svg::Text(kLeft + 34, at + 5, svg::Shortened(lines[n].label), "start");
   }
   if (left_out > 0) {

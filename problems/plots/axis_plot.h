@@ -16,6 +16,7 @@ struct AxisPoint {
 struct AxisLine {
   std::string label;
   std::vector<AxisPoint> points;
+  bool is_joined = true;  // else its points alone
 };
 
 // x is spread by its logarithm where all x are above 0 and the largest is over 20 times the

@@ -17,6 +17,7 @@
 #include "problems/program/exit_code.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_submit.h"
+#include "problems/study_report/search_report.h"
 #include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_report.h"
 
@@ -73,6 +74,12 @@ int PrintPlan(const StudyPlan& plan, const std::string& only) {
   if (!only.empty()) {
     fmt::print("of these {} where {}\n", std::ranges::count(chosen, true), only);
   }
+  if (plan.search) {
+    fmt::print(
+        "then a search: treatments for {} full runs, each on {} subjects; which they are depends "
+        "on what those before gave\n",
+        plan.search->options.budget, plan.search->subjects.size());
+  }
   return kDone;
 }
 
@@ -85,6 +92,9 @@ int PrintStudyState(const StudyResults& results, const fs::path& root) {
     }
   }
   fmt::print("{}", RankingText(results));
+  if (const auto search = ReadSearchResults(root, results)) {
+    fmt::print("{}", SearchText(results, *search));
+  }
   fmt::print("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
              results.trials.size(), results.Count("unusable"), results.Count("failed"),
              results.Count("missing"));
@@ -160,6 +170,11 @@ int StudyCommand(const StudyArguments& a) {
         "semblance merge\n",
         options.shard, options.shards, summary.trials, summary.skipped, summary.done,
         summary.failed);
+    if (summary.waits) {
+      fmt::print(
+          "the search waits for the other shards of this generation; when theirs are in the "
+          "folder, call every shard again for the next\n");
+    }
     return kDone;
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
@@ -203,7 +218,12 @@ int SubmitCommand(const StudyArguments& a) {
   options.program = fs::read_symlink("/proc/self/exe");
   options.study = a.files.at(0);
   options.folder = a.out.empty() ? "out/" + options.study.stem().string() : a.out;
-  ReadStudy(options.study);  // its faults are said here, not by every node
+  if (ReadStudy(options.study).search) {  // its faults are said here, not by every node
+    throw InputError(fmt::format(
+        "{}: a search goes on from what it has found, so an array of jobs cannot do it; submit "
+        "`semblance study` with --jobs as one job",
+        options.study.string()));
+  }
   fmt::print("{}", SubmitScript(options));
   std::fflush(stdout);
   SubmitStudy(options);

@@ -11,6 +11,7 @@
 //     zip: {fit.features: [restore, free], title: [a, b]}              # side by side
 //     list: [{seeds.level: 1}, {seeds.level: 2, rounds: 2}]            # by hand
 //     sample: {method: lhs, n: 20, random_seed: 1, ranges: {seeds.weight: [0.1, 1.0]}}
+//     search: {method: bayes, budget: 30, ranges: {seeds.weight: {low: 0.1, high: 1.0}}}
 //     tags: [paper, 2026]              # words that people find it by
 //     metric: face.rms_mm              # that the report ranks by; lower is better
 //     keep: summary
@@ -18,7 +19,8 @@
 //     identify: {others: [{name: c, set: {subject.random_seed: 3}}]}   # for job: identify
 //
 // Each of grid, zip, list and sample gives rows; a trial is a subject with one row of each. A value
-// is any part of an experiment, be it a number or a whole strategy.
+// is any part of an experiment, be it a number or a whole strategy. A search, instead of them,
+// finds its rows as it goes: which is next depends on what those before gave.
 #pragma once
 
 #include <array>
@@ -31,6 +33,8 @@
 
 #include "problems/config/config_errors.h"
 #include "problems/config/config_tree.h"
+#include "problems/search/search_method.h"
+#include "problems/search/unit_samples.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {
@@ -48,11 +52,6 @@ enum class StudyJob { kFace, kDepth, kIdentify };
 constexpr auto EnumNames(StudyJob) {
   return std::to_array<std::string_view>({"face", "depth", "identify"});
 }
-
-// lhs: one point in each of n equal slices of each axis (McKay et al. 1979); sobol: the first n
-// points of the sequence after its origin.
-enum class SampleMethod { kLhs, kSobol };
-constexpr auto EnumNames(SampleMethod) { return std::to_array<std::string_view>({"lhs", "sobol"}); }
 
 struct StudySubject {
   std::string name;            // unique in the study
@@ -136,6 +135,82 @@ void CheckValue(Report& report, const StudySamples& o) {
   }
 }
 
+// Which end of a metric a search is for.
+enum class Better { kLower, kHigher };
+constexpr auto EnumNames(Better) { return std::to_array<std::string_view>({"lower", "higher"}); }
+
+struct SearchedNumber {
+  ConfigNode low, high;  // as they are written, because 1 and 5 ask for whole numbers and 1.0 not
+  bool log = false;
+};
+template <class Visitor>
+void Fields(Visitor& visit, SearchedNumber& o) {
+  visit(FieldInfo{.name = "low",
+                  .doc = "lowest number; where both ends are written without a point, only whole "
+                         "numbers are tried"},
+        o.low);
+  visit(FieldInfo{.name = "high", .doc = "highest number"}, o.high);
+  visit(FieldInfo{.name = "log",
+                  .doc = "spread by the logarithm, for what counts by its factor, as weights and "
+                         "tolerances do; both ends must be above 0"},
+        o.log);
+}
+
+struct StudySearch {
+  SearchMethod method = BayesSearch{};  // the least runs where a treatment costs minutes
+  int budget = 0;                       // must be given
+  std::uint64_t random_seed = 1;
+  std::string metric;  // empty: the study's
+  Better better = Better::kLower;
+  ConfigMap<SearchedNumber> ranges;
+  OptionAxes choices;
+  std::vector<StudySubject> held_out;  // empty: what is found is as good as it looks to itself
+};
+template <class Visitor>
+void Fields(Visitor& visit, StudySearch& o) {
+  visit(FieldInfo{.name = "method",
+                  .doc = "bayes: a Gaussian process, for few and costly treatments; cmaes: a cloud "
+                         "that moves, for a hundred or more over numbers; halving: many short "
+                         "runs, the best of them longer; random: what a search must beat"},
+        o.method);
+  visit(FieldInfo{.name = "budget",
+                  .min = 1,
+                  .max = 100000,
+                  .doc = "treatments to try, each on all subjects; short runs of halving count by "
+                         "their length; must be given"},
+        o.budget);
+  visit(FieldInfo{.name = "random_seed", .doc = "of whatever the method draws"}, o.random_seed);
+  visit(FieldInfo{.name = "metric",
+                  .doc = "a number of result.json by its path, whose mean over subjects is "
+                         "searched; the report ranks by it; left out, the study's metric"},
+        o.metric);
+  visit(FieldInfo{.name = "better", .doc = "which values of the metric are better"}, o.better);
+  visit(FieldInfo{.name = "ranges",
+                  .doc = "numbers by option path, as in {seeds.weight: {low: 0.1, high: 10.0, log: "
+                         "true}}"},
+        o.ranges);
+  visit(FieldInfo{.name = "choices",
+                  .min = 2,
+                  .doc = "by option path, values without an order: words, or whole strategies"},
+        o.choices);
+  visit(FieldInfo{.name = "held_out",
+                  .doc = "subjects that the search never sees; at its end the best treatment and "
+                         "the base, as it stands, are run on them and compared: name, base, set "
+                         "and optional as of a subject"},
+        o.held_out);
+}
+template <class Report>
+void CheckValue(Report& report, const StudySearch& o) {
+  if (o.budget == 0) {
+    report("budget", "the number of treatments is missing; write it as in budget: 30");
+  }
+  if (o.ranges.entries.empty() && o.choices.entries.empty()) {
+    report("ranges",
+           "there is nothing to search; give ranges or choices, as in {seeds.weight: {low: 0.1, "
+           "high: 1.0}}");
+  }
+}
+
 struct StudyFile {
   std::string title = "untitled";
   std::filesystem::path base;  // must be given: a study varies an experiment that runs by itself
@@ -145,6 +220,7 @@ struct StudyFile {
   OptionAxes zip;
   std::vector<OptionValues> list;
   std::optional<StudySamples> sample;
+  std::optional<StudySearch> search;  // instead of grid, zip, list and sample
   std::vector<std::string> tags;
   std::string metric = "face.rms_mm";
   TrialFiles keep = TrialFiles::kSummary;  // the files of a run are some 30 MB, of a summary 10 kB
@@ -170,6 +246,10 @@ void Fields(Visitor& visit, StudyFile& o) {
         o.zip);
   visit(FieldInfo{.name = "list", .min = 1, .doc = "rows by hand: values by option path"}, o.list);
   visit(FieldInfo{.name = "sample", .doc = "rows of numbers drawn from ranges"}, o.sample);
+  visit(FieldInfo{.name = "search",
+                  .doc = "instead of grid, zip, list and sample: treatments that are chosen by "
+                         "what those before gave, to find the best"},
+        o.search);
   visit(FieldInfo{.name = "tags",
                   .doc = "words of one's own that the study is found by; they stand in its report "
                          "and in results.sqlite"},
@@ -193,6 +273,15 @@ template <class Report>
 void CheckValue(Report& report, const StudyFile& o) {
   if (o.identify && o.job != StudyJob::kIdentify) {
     report("identify", "is for a study of that job only; set job: identify, or take it out");
+  }
+  const bool has_rows =
+      !o.grid.entries.empty() || !o.zip.entries.empty() || !o.list.empty() || o.sample.has_value();
+  if (o.search && has_rows) {
+    report("search",
+           "chooses the treatments itself; take out grid, zip, list and sample, or the search");
+  }
+  if (o.search && o.job == StudyJob::kIdentify && !o.search->held_out.empty()) {
+    report("search", "held_out: job: identify has one gallery for all; take held_out out");
   }
 }
 

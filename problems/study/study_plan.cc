@@ -5,9 +5,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include "problems/config/config_reader.h"
 #include "problems/config/value_filter.h"
@@ -22,14 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A subject of the study, with the experiment that its trials vary.
-struct SubjectTree {
-  std::string name;
-  ConfigNode tree;
-  bool optional = false;
-  std::vector<std::string> tags = {};
-};
-
 // The experiments' trees that a study file names and edits. Faults go to `errors`.
 class SubjectReader {
  public:
@@ -38,19 +30,23 @@ class SubjectReader {
       : study_(study), tree_(tree), defaults_(defaults), errors_(errors) {}
 
   struct All {
-    std::vector<SubjectTree> subjects, others;
+    std::vector<SubjectTree> subjects, others, held_out;
   };
 
   All Read() const {
     const ConfigNode base = ReadBase();
-    All all{.subjects = ReadList(study_.subjects, "subjects", base), .others = {}};
+    All all{.subjects = ReadList(study_.subjects, "subjects", base), .others = {}, .held_out = {}};
     if (study_.subjects.empty()) {
       all.subjects.push_back({"base", base});
       Apply(study_.set, all.subjects.back().tree);
     }
     if (study_.identify) {
       all.others = ReadList(study_.identify->others, "identify.others", base);
-      RequireOtherNames(all);
+      RequireOtherNames(all.subjects, all.others, "identify.others");
+    }
+    if (study_.search) {
+      all.held_out = ReadList(study_.search->held_out, "search.held_out", base);
+      RequireOtherNames(all.subjects, all.held_out, "search.held_out");
     }
     return all;
   }
@@ -73,13 +69,13 @@ class SubjectReader {
     return trees;
   }
 
-  void RequireOtherNames(const All& all) const {
-    for (std::size_t n = 0; n < all.others.size(); ++n) {
-      if (std::ranges::find(all.subjects, all.others[n].name, &SubjectTree::name) !=
-          all.subjects.end()) {
-        Fail(JoinPath("identify.others", n),
-             fmt::format("'{}' is a subject too, and so in the gallery already; take one out",
-                         all.others[n].name));
+  void RequireOtherNames(const std::vector<SubjectTree>& subjects,
+                         const std::vector<SubjectTree>& others,
+                         const std::string& list_path) const {
+    for (std::size_t n = 0; n < others.size(); ++n) {
+      if (std::ranges::find(subjects, others[n].name, &SubjectTree::name) != subjects.end()) {
+        Fail(JoinPath(list_path, n),
+             fmt::format("'{}' is one of the subjects already; take one out", others[n].name));
       }
     }
   }
@@ -130,34 +126,6 @@ class SubjectReader {
   ConfigErrors& errors_;
 };
 
-// Faults of many trials: they share most, and each is told once.
-class TrialFaults {
- public:
-  void Add(const std::string& line) {
-    if (std::find(lines_.begin(), lines_.end(), line) == lines_.end()) {
-      lines_.push_back(line);
-    }
-  }
-  void Add(const ConfigErrors& errors) {
-    try {
-      errors.ThrowIfAny();
-    } catch (const ConfigError& error) {
-      std::istringstream lines(error.what());
-      for (std::string line; std::getline(lines, line);) {
-        Add(line);
-      }
-    }
-  }
-  void ThrowIfAny() const {
-    if (!lines_.empty()) {
-      throw ConfigError(fmt::format("{}", fmt::join(lines_, "\n")));
-    }
-  }
-
- private:
-  std::vector<std::string> lines_;
-};
-
 // The option paths that the rows set, in the order in which they occur.
 std::vector<std::string> AxesOf(const std::vector<StudyRow>& rows) {
   std::vector<std::string> axes;
@@ -171,43 +139,6 @@ std::vector<std::string> AxesOf(const std::vector<StudyRow>& rows) {
   return axes;
 }
 
-// A value in short: a bare strategy by its name, one with options with them behind it.
-std::string Label(const ConfigNode& value) {
-  const ConfigNode* type = value.IsMap() ? value.Find("type") : nullptr;
-  if (!type) {
-    return value.IsScalar() ? value.text : ToFlowYaml(value);
-  }
-  std::string label = type->text;
-  for (const ConfigNode::Entry& entry : value.entries) {
-    if (entry.key != "type") {
-      label += fmt::format(" {}={}", entry.key, Label(entry.value));
-    }
-  }
-  return label;
-}
-
-StudyTrial MakeTrial(const SubjectTree& subject, const StudyRow& row,
-                     const std::vector<std::string>& axes, const ConfigNode& defaults,
-                     TrialFaults& faults) {
-  ConfigErrors errors;
-  ConfigNode tree = subject.tree;
-  StudyTrial trial{"", subject.name, std::vector<std::string>(axes.size()), {}, subject.tags};
-  for (const OptionSetting& setting : row) {
-    ApplySetting(setting, defaults, tree, errors);
-    const auto axis = std::find(axes.begin(), axes.end(), setting.key);
-    trial.values[static_cast<std::size_t>(axis - axes.begin())] = Label(setting.value);
-  }
-  trial.experiment = ReadConfigTree<Experiment>(tree, errors);
-  faults.Add(errors);
-  if (!trial.experiment.alternatives.empty()) {
-    faults.Add(fmt::format(
-        "{}: alternatives: they are for a run; a study varies by its axes. Write `alternatives: "
-        "[]` in what it sets",
-        subject.name));
-  }
-  return trial;
-}
-
 std::set<std::string> MissingFiles(const std::vector<StudyTrial>& trials) {
   std::set<std::string> missing;
   for (const StudyTrial& trial : trials) {
@@ -219,40 +150,6 @@ std::set<std::string> MissingFiles(const std::vector<StudyTrial>& trials) {
   }
   return missing;
 }
-
-// The hash of a resolved experiment, each input file in it by its content.
-class ExperimentHash {
- public:
-  std::string operator()(const Experiment& experiment) {
-    std::string text = WriteConfig(experiment);
-    for (const fs::path& file : InputFilesOf(experiment)) {
-      const std::string name = file.string(), hash = "sha256:" + HashOf(file);
-      for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at)) {
-        text.replace(at, name.size(), hash);
-      }
-    }
-    return Sha256OfText(text).substr(0, kIdDigits);
-  }
-  static constexpr std::size_t kIdDigits = 12;
-
- private:
-  std::string HashOf(const fs::path& file) {
-    auto& hash = file_hashes_[file.string()];
-    return hash = hash.empty() ? NewHashOf(file) : hash;
-  }
-  // Of a folder (a DICOM series): that of the hashes of its files.
-  static std::string NewHashOf(const fs::path& file) {
-    if (!fs::is_directory(file)) {
-      return Sha256OfFile(file);
-    }
-    std::string all;
-    for (const fs::path& part : VolumeFiles(file)) {
-      all += Sha256OfFile(part);
-    }
-    return Sha256OfText(all);
-  }
-  std::map<std::string, std::string> file_hashes_;
-};
 
 // What the results of a study's trials rest on beside their experiments; empty for job: face.
 std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
@@ -270,15 +167,12 @@ std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
 // Gives each trial its id; two of one id are a fault.
 void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
   ExperimentHash hash;
-  const std::string common = CommonPart(plan, hash);
+  plan.common = CommonPart(plan, hash);
   std::map<std::string, std::size_t> first;
   std::string ids;
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     StudyTrial& trial = plan.trials[n];
-    trial.id = hash(trial.experiment);
-    if (plan.job != StudyJob::kFace) {
-      trial.id = Sha256OfText(trial.id + common).substr(0, ExperimentHash::kIdDigits);
-    }
+    trial.id = TrialId(trial.experiment, plan.common, hash);
     ids += trial.id;
     const auto [it, is_new] = first.emplace(trial.id, n);
     if (!is_new) {
@@ -287,7 +181,12 @@ void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
           file.string(), it->second + 1, n + 1, trial.subject, fmt::join(trial.values, ", ")));
     }
   }
-  ids += common;
+  ids += plan.common;
+  if (plan.search) {
+    StudySearch how = plan.search->options;
+    how.held_out.clear();  // their experiments are among the ids
+    ids += WriteConfig(how);
+  }
   plan.hash = Sha256OfText(ids).substr(0, ExperimentHash::kIdDigits);
 }
 
@@ -327,11 +226,62 @@ void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& pl
   }
 }
 
+bool SearchHasMetric(const StudyFile& study) {
+  return study.search && !study.search->metric.empty();
+}
+
+std::string MetricOf(const StudyFile& study) {
+  return SearchHasMetric(study) ? study.search->metric : study.metric;
+}
+
 void CheckMetric(const StudyFile& study, const ConfigNode& tree, ConfigErrors& errors) {
-  if (const std::string complaint = ComplaintAboutMetric(study.metric, study.job);
+  const char* const path = SearchHasMetric(study) ? "search.metric" : "metric";
+  if (const std::string complaint = ComplaintAboutMetric(MetricOf(study), study.job);
       !complaint.empty()) {
-    errors.Add(PlaceOf(tree, "metric"), "metric", complaint);
+    errors.Add(PlaceOf(tree, path), path, complaint);
   }
+  if (SearchHasMetric(study) && tree.Find("metric") && study.metric != study.search->metric) {
+    errors.Add(
+        PlaceOf(tree, path), path,
+        fmt::format("the study's metric is '{}'; a study has one: take one out", study.metric));
+  }
+}
+
+// The subjects of which the plan has trials.
+std::vector<SubjectTree> LeftOf(const std::vector<SubjectTree>& subjects, const StudyPlan& plan) {
+  std::vector<SubjectTree> left;
+  std::ranges::copy_if(subjects, std::back_inserter(left), [&](const SubjectTree& subject) {
+    return std::ranges::find(plan.trials, subject.name, &StudyTrial::subject) != plan.trials.end();
+  });
+  return left;
+}
+
+// The base as it stands, on all subjects; and whether what the search can make of it can be read.
+void AddSearch(const fs::path& file, SearchPlan search, const std::vector<SubjectTree>& subjects,
+               const std::vector<SubjectTree>& held_out, StudyPlan& plan, TrialFaults& faults) {
+  const std::vector<StudyRow> base(1);
+  for (const SubjectTree& subject : subjects) {
+    AddTrials(file, subject, base, search.defaults, plan, faults);
+  }
+  const std::size_t first_held_out = plan.trials.size();
+  for (const SubjectTree& subject : held_out) {
+    AddTrials(file, subject, base, search.defaults, plan, faults);
+  }
+  for (std::size_t n = first_held_out; n < plan.trials.size(); ++n) {
+    plan.trials[n].aside = true;
+  }
+  search.subjects = LeftOf(subjects, plan);
+  search.held_out = LeftOf(held_out, plan);
+  if (!search.subjects.empty()) {
+    StudyPlan unused{.axes = plan.axes};
+    AddTrials(file, search.subjects[0], RowsToCheck(search), search.defaults, unused, faults);
+    if (const std::string complaint =
+            ComplaintAboutShortRuns(search, plan.job, plan.trials[0].experiment);
+        !complaint.empty()) {
+      faults.Add(fmt::format("{}: search.method: {}", file.string(), complaint));
+    }
+  }
+  plan.search = std::make_shared<const SearchPlan>(std::move(search));
 }
 
 bool HasSkin(const StudyTrial& trial) {
@@ -365,20 +315,29 @@ StudyPlan ReadStudy(const fs::path& file) {
   CheckMetric(study, tree, errors);
   TrialFaults faults;
   ConfigErrors of_bases;
-  const auto [subjects, others] = SubjectReader(study, tree, defaults, of_bases).Read();
+  const auto [subjects, others, held_out] = SubjectReader(study, tree, defaults, of_bases).Read();
   const std::vector<StudyRow> rows = StudyRows(study, errors);
+  SearchPlan search;
+  if (study.search) {
+    search = MakeSearchPlan(*study.search, tree, errors);
+    search.defaults = defaults;
+  }
   faults.Add(errors);
   faults.Add(of_bases);
-  if (of_bases.size() > 0) {  // the trials would repeat what is wrong with their base
-    faults.ThrowIfAny();
+  if (of_bases.size() > 0 || (study.search && errors.size() > 0)) {
+    faults.ThrowIfAny();  // the trials would repeat what is wrong with their base and axes
   }
 
   StudyPlan plan{
-      .title = study.title, .metric = study.metric, .keep = study.keep, .job = study.job};
+      .title = study.title, .metric = MetricOf(study), .keep = study.keep, .job = study.job};
   plan.tags = study.tags;
-  plan.axes = AxesOf(rows);
-  for (const SubjectTree& subject : subjects) {
-    AddTrials(file, subject, rows, defaults, plan, faults);
+  plan.axes = study.search ? search.axes : AxesOf(rows);
+  if (study.search) {
+    AddSearch(file, std::move(search), subjects, held_out, plan, faults);
+  } else {
+    for (const SubjectTree& subject : subjects) {
+      AddTrials(file, subject, rows, defaults, plan, faults);
+    }
   }
   if (study.job == StudyJob::kIdentify) {
     plan.identify = study.identify.value_or(IdentifyOptions{});

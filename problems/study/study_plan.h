@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A study (study_file.h) as a plan: the table of its trials. It is expanded and checked as a whole
-// before anything runs.
+// before anything runs; of a search, whatever its axes can make of the base is checked.
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "problems/pipeline/experiment.h"
-#include "problems/study/study_file.h"
+#include "problems/study/search_plan.h"
+#include "problems/study/study_trial.h"
 
 namespace semblance {
-
-struct StudyTrial {
-  std::string id;       // 12 hex digits of the hash of the resolved experiment, its input files by
-                        // content: the same on every machine; with the job where it is not `face`,
-                        // and the gallery where there is one
-  std::string subject;  // its name in the study
-  std::vector<std::string> values;  // one per axis, as short text; empty where the row has none
-  Experiment experiment;
-  std::vector<std::string> tags = {};  // of its subject
-};
 
 // A person of the gallery (`job: identify`), as the experiment that has the true skin.
 struct GalleryEntry {
   std::string name;
   Experiment experiment;
+};
+
+// A treatment that a search asked for.
+struct SearchStep {
+  int generation = 0;
+  double cost = 1;                  // in full runs
+  std::vector<std::string> values;  // one per axis
+  std::vector<std::string> trials;  // ids: one per subject; another step's, or the base's, where it
+                                    // is the same experiment
 };
 
 struct StudyPlan {
@@ -40,6 +40,14 @@ struct StudyPlan {
   std::string hash = {};                   // of all ids, in order
   IdentifyOptions identify = {};           // of that job
   std::vector<GalleryEntry> gallery = {};  // the subjects that are left, then the others
+  std::string common = {};                 // what the ids of all trials hold (TrialId)
+
+  // Of a study that searches. Its `trials` are those of the base as it stands, on all subjects and
+  // on those held out; a run adds the others as it goes (search_run.h), and their steps.
+  std::shared_ptr<const SearchPlan> search = nullptr;
+  std::vector<SearchStep> steps = {};
+  int best_step = -1;         // once the search has ended; -1: none had a value
+  bool search_ended = false;  // its budget is spent
 };
 
 // Throws IoError if the file cannot be read; ConfigError with all faults, each once and at its

@@ -3,7 +3,6 @@
 // other.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "problems/config/config_errors.h"
@@ -22,9 +21,5 @@ std::vector<StudyRow> StudyRows(const StudyFile& study, ConfigErrors& errors);
 // an error at its place.
 void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, ConfigNode& tree,
                   ConfigErrors& errors);
-
-// n points of [0,1]^dimensions. random_seed: of kLhs.
-std::vector<std::vector<double>> UnitSamples(SampleMethod method, int n, int dimensions,
-                                             std::uint64_t random_seed);
 
 }  // namespace semblance

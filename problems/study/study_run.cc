@@ -12,6 +12,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <thread>
 
@@ -23,6 +24,7 @@
 #include "problems/report/timing_json.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"
+#include "problems/study/search_run.h"
 #include "problems/study/study_tables.h"
 #include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
@@ -92,9 +94,12 @@ class StudyRunner {
         context_(context),
         cache_(4 * options.jobs + 6, CacheOnDisk(options)) {}
 
-  StudySummary Run() {
+  // The trials of this shard from `first` on, those before having been run.
+  void Run(std::size_t first) {
     const std::vector<bool> chosen = TrialsThat(plan_, options_.only);
-    for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
+    queue_.clear();
+    next_ = ended_ = 0;
+    for (std::size_t n = first; n < plan_.trials.size(); ++n) {
       if (static_cast<int>(n % options_.shards) == options_.shard && chosen[n]) {
         Queue(plan_.trials[n]);
       }
@@ -122,8 +127,8 @@ class StudyRunner {
     }
     context_.ThrowIfStopped();
     summary_.shared_made = cache_.made();
-    return summary_;
   }
+  const StudySummary& summary() const { return summary_; }
 
  private:
   void Queue(const StudyTrial& trial) {
@@ -350,6 +355,25 @@ class StudyRunner {
   StudySummary summary_;
 };
 
+// A search as plan.json has it: how it goes, and what it has asked for so far.
+Json SearchJson(const StudyPlan& plan) {
+  const StudySearch& search = plan.search->options;
+  Json json = {{"method", ToFlowYaml(ConfigTreeOf(search.method))},
+               {"budget", search.budget},
+               {"random_seed", search.random_seed},
+               {"better", EnumNames(search.better)[static_cast<std::size_t>(search.better)]},
+               {"ended", plan.search_ended},
+               {"best", plan.best_step},
+               {"steps", Json::array()}};
+  for (const SearchStep& step : plan.steps) {
+    json["steps"].push_back({{"generation", step.generation},
+                             {"cost", step.cost},
+                             {"values", step.values},
+                             {"trials", step.trials}});
+  }
+  return json;
+}
+
 // plan.json as text.
 std::string PlanJson(const StudyPlan& plan) {
   Json json = {{"title", plan.title}, {"hash", plan.hash},       {"metric", plan.metric},
@@ -358,34 +382,73 @@ std::string PlanJson(const StudyPlan& plan) {
   for (const StudyTrial& trial : plan.trials) {
     json["trials"].push_back(
         {{"id", trial.id}, {"subject", trial.subject}, {"values", trial.values}});
+    if (trial.aside) {
+      json["trials"].back()["aside"] = true;
+    }
+  }
+  if (plan.search) {
+    json["search"] = SearchJson(plan);
   }
   return json.dump(1) + "\n";
 }
 
-bool Contains(const StudyPlan& plan, const std::string& id) {
-  return std::ranges::find(plan.trials, id, &StudyTrial::id) != plan.trials.end();
+// The trials of an earlier plan that are none of this one.
+int CountLeftOver(const PlanThere& there, const StudyPlan& plan) {
+  std::set<std::string> ids;
+  for (const StudyTrial& trial : plan.trials) {
+    ids.insert(trial.id);
+  }
+  return static_cast<int>(
+      std::ranges::count_if(there.ids, [&](const std::string& id) { return !ids.contains(id); }));
+}
+
+bool IsAnyMissing(const StudyPlan& plan, std::size_t first, const fs::path& folder) {
+  return std::any_of(plan.trials.begin() + static_cast<std::ptrdiff_t>(first), plan.trials.end(),
+                     [&](const StudyTrial& trial) { return !StatusOf(folder, trial.id); });
+}
+
+// Of two shards of a search, one may have come further.
+bool HasMoreTrials(const fs::path& folder, const fs::path& other) {
+  return ReadPlanThere(folder).ids.size() > ReadPlanThere(other).ids.size();
 }
 
 }  // namespace
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {
+  if (plan.search && !options.only.empty()) {
+    throw InputError(fmt::format(
+        "--only {}: a search decides itself which trials are run; take it out", options.only));
+  }
   TrialsThat(plan, options.only);  // what is wrong with it is said before anything is written
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
   const PlanThere there = ReadPlanThere(folder);
-  const auto left_over =
-      std::ranges::count_if(there.ids, [&](const std::string& id) { return !Contains(plan, id); });
   const bool changed = !there.hash.empty() && there.hash != plan.hash;
-  if (changed && left_over == static_cast<std::ptrdiff_t>(there.ids.size())) {
+  if (changed && CountLeftOver(there, plan) == static_cast<int>(there.ids.size())) {
     throw IoError(
         fmt::format("{}: the folder holds another study (plan {}, this is {}), of which no trial "
                     "is one of this; choose another --out",
                     folder.string(), there.hash, plan.hash));
   }
-  output.Write("plan.json", PlanJson(plan));
-  StudySummary summary = StudyRunner(plan, folder, options, context).Run();
+  StudyPlan grown = plan;
+  StudyRunner runner(grown, folder, options, context);
+  bool ended = true;
+  if (plan.search) {
+    ended = RunSearch(grown, folder, [&](std::size_t first) {
+      if (IsAnyMissing(grown, first, folder)) {
+        output.Write("plan.json", PlanJson(grown));
+      }
+      runner.Run(first);
+    });
+  }
+  output.Write("plan.json", PlanJson(grown));
+  if (!plan.search) {
+    runner.Run(0);
+  }
+  StudySummary summary = runner.summary();
+  summary.waits = !ended;
   summary.changed = changed;
-  summary.left_over = static_cast<int>(left_over);
+  summary.left_over = CountLeftOver(there, grown);
   return summary;
 }
 
@@ -398,7 +461,9 @@ std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<
                                 other.string()));
     }
     OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
-    output.Write("plan.json", ReadFileBytes(other / "plan.json"));
+    if (!HasMoreTrials(folder, other)) {
+      output.Write("plan.json", ReadFileBytes(other / "plan.json"));
+    }
     if (!fs::exists(other / "trials")) {
       continue;
     }

@@ -150,10 +150,13 @@ StudyResults ReadStudyResults(const fs::path& folder) {
       row.id = trial.at("id");
       row.subject = trial.at("subject");
       row.values = trial.at("values").get<std::vector<std::string>>();
+      row.aside = trial.value("aside", false);
       ReadTrial(folder, row);
       results.trials.push_back(std::move(row));
     }
     results.tags = plan.value("tags", std::vector<std::string>());
+    results.higher_is_better =
+        plan.contains("search") && plan["search"].at("better").get<std::string>() == "higher";
   } catch (const nlohmann::json::exception&) {
     throw IoError(fmt::format(
         "{}: not the plan of a study, or of a part of it only; run the study again, which writes "
@@ -213,6 +216,9 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
   std::map<std::vector<std::string>, std::size_t> index;
   for (std::size_t n = 0; n < results.trials.size(); ++n) {
     const TrialRow& row = results.trials[n];
+    if (row.aside) {
+      continue;
+    }
     const auto [it, is_new] = index.try_emplace(row.values, treatments.size());
     if (is_new) {
       treatments.push_back({row.values, TreatmentLabel(results.axes, row.values), {}, {}});

@@ -20,9 +20,11 @@ double MeanOf(const Treatment& treatment) {
   return treatment.by_subject.empty() ? kNaN : sum / count;
 }
 
-std::vector<Treatment> Ranked(std::vector<Treatment> treatments) {
-  std::ranges::stable_sort(treatments, [](const Treatment& a, const Treatment& b) {
-    const double x = MeanOf(a), y = MeanOf(b);
+std::vector<Treatment> Ranked(const StudyResults& results) {
+  std::vector<Treatment> treatments = Treatments(results, results.metric);
+  const double sign = results.higher_is_better ? -1 : 1;
+  std::ranges::stable_sort(treatments, [&](const Treatment& a, const Treatment& b) {
+    const double x = sign * MeanOf(a), y = sign * MeanOf(b);
     return std::isfinite(x) && (!std::isfinite(y) || x < y);
   });
   return treatments;
@@ -42,7 +44,7 @@ double MeanSeconds(const StudyResults& results, const Treatment& treatment) {
 
 std::string RankingText(const StudyResults& results) {
   constexpr std::size_t kMost = 20;
-  std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
+  std::vector<Treatment> ranked = Ranked(results);
   std::erase_if(ranked, [](const Treatment& t) { return t.by_subject.empty(); });
   if (ranked.empty()) {
     return {};

@@ -12,8 +12,8 @@ namespace semblance {
 // The metric's mean over subjects; NaN without one.
 double MeanOf(const Treatment& treatment);
 
-// Best mean first; those without values last.
-std::vector<Treatment> Ranked(std::vector<Treatment> treatments);
+// The treatments by the study's metric, best mean first; those without values last.
+std::vector<Treatment> Ranked(const StudyResults& results);
 
 // The mean wall time of the treatment's trials, of those that say it; NaN if none does. Work that
 // another trial did for one is not in it.

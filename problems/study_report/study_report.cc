@@ -15,6 +15,7 @@
 #include "problems/study/results_sqlite.h"
 #include "problems/study/trial_folder.h"
 #include "problems/study_report/identify_report.h"
+#include "problems/study_report/search_report.h"
 #include "problems/study_report/study_charts.h"
 #include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_subtables.h"
@@ -72,7 +73,7 @@ std::vector<double> Differences(const Treatment& treatment, const Treatment& bes
   return differences;
 }
 
-ReportTable PairsTable(const std::vector<Treatment>& ranked) {
+ReportTable PairsTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportTable table{
       fmt::format("Each treatment less the best ({}), paired by subject", ranked[0].label),
       {"treatment", "pairs", "mean difference", "95 % interval", "worse in", "Wilcoxon p",
@@ -85,7 +86,8 @@ ReportTable PairsTable(const std::vector<Treatment>& ranked) {
     const WilcoxonResult w = Wilcoxon(d);
     const bool enough = s.n >= kLeastSubjects && std::isfinite(w.p);
     p.push_back(enough ? w.p : 1);
-    const auto worse = std::count_if(d.begin(), d.end(), [](double x) { return x > 0; });
+    const auto worse = std::ranges::count_if(
+        d, [&](double x) { return results.higher_is_better ? x < 0 : x > 0; });
     table.rows.push_back({ranked[n].label, std::to_string(s.n), TableNumber(s.mean),
                           IntervalText(s.mean_95), fmt::format("{} of {}", worse, s.n),
                           enough ? fmt::format("{:.4f}{}", w.p, w.exact ? "" : " (normal)") : "",
@@ -100,13 +102,15 @@ ReportTable PairsTable(const std::vector<Treatment>& ranked) {
 }
 
 // The subjects that all treatments have, as a table for Friedman's test.
-std::vector<std::vector<double>> CompleteTable(const std::vector<Treatment>& treatments) {
+// Less is better in it.
+std::vector<std::vector<double>> CompleteTable(const StudyResults& results,
+                                               const std::vector<Treatment>& treatments) {
   std::vector<std::vector<double>> rows;
   for (const auto& [subject, value] : treatments[0].by_subject) {
     std::vector<double> row;
     for (const Treatment& treatment : treatments) {
       if (const auto it = treatment.by_subject.find(subject); it != treatment.by_subject.end()) {
-        row.push_back(it->second);
+        row.push_back(results.higher_is_better ? -it->second : it->second);
       }
     }
     if (row.size() == treatments.size()) {
@@ -139,9 +143,9 @@ std::string FriedmanWords(const FriedmanResult& f) {
 }
 
 // Of two treatments or more.
-ReportSection RankSection(const std::vector<Treatment>& ranked) {
+ReportSection RankSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportSection section{.heading = "Do the treatments differ?"};
-  const auto rows = CompleteTable(ranked);
+  const auto rows = CompleteTable(results, ranked);
   if (static_cast<int>(rows.size()) < kLeastSubjects) {
     section.paragraphs = {fmt::format(
         "{} {} a value for all {} treatments. That is too few for a test: at least {} "
@@ -307,7 +311,7 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
   }
   std::vector<SceneText> scenes;
   for (const std::string& subject : subjects) {
-    for (const Treatment& treatment : Ranked(Treatments(results, results.metric))) {
+    for (const Treatment& treatment : Ranked(results)) {
       for (const std::size_t n : treatment.trials) {
         const TrialRow& row = results.trials[n];
         const std::filesystem::path file = root / "trials" / row.id / "scene.json";
@@ -324,7 +328,7 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
 // The depth maps that the trials left, best treatment first.
 std::vector<ReportImage> DepthMaps(const StudyResults& results, const std::filesystem::path& root) {
   std::vector<ReportImage> maps;
-  for (const Treatment& treatment : Ranked(Treatments(results, results.metric))) {
+  for (const Treatment& treatment : Ranked(results)) {
     for (const std::size_t n : treatment.trials) {
       const TrialRow& row = results.trials[n];
       const std::filesystem::path file = root / "trials" / row.id / "depth.png";
@@ -367,7 +371,7 @@ ReportSection TreatmentsSection(const StudyResults& results, const std::vector<T
   ReportSection section{.heading = "Treatments"};
   section.tables = {RankingTable(results, ranked)};
   if (ranked.size() > 1) {
-    section.tables.push_back(PairsTable(ranked));
+    section.tables.push_back(PairsTable(results, ranked));
     section.images = {{CumulativePlotSvg(Boxes(ranked), WordsOfMetric(results.metric)),
                        "Share of subjects below each value.",
                        "cumulative distribution of the metric, one line per treatment"}};
@@ -386,7 +390,7 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
   }
   std::vector<ReportSection> sections = {TreatmentsSection(results, ranked)};
   if (ranked.size() > 1) {
-    sections.push_back(RankSection(ranked));
+    sections.push_back(RankSection(results, ranked));
   }
   sections.push_back({.heading = "Along each axis", .images = AxisPlots(results, ranked)});
   sections.push_back({.heading = "Subject by subject", .images = SubjectMap(results, ranked)});
@@ -420,7 +424,7 @@ std::vector<std::string> Notes(const StudyResults& results) {
 std::string ReportOf(const StudyResults& results, const std::filesystem::path& root) {
   const SceneCollection scenes = Scenes(results, root);
   const std::vector<ReportImage> maps = DepthMaps(results, root);
-  const std::vector<Treatment> ranked = Ranked(Treatments(results, results.metric));
+  const std::vector<Treatment> ranked = Ranked(results);
   Report report;
   report.title = results.title;
   report.subtitle = fmt::format(
@@ -433,6 +437,9 @@ std::string ReportOf(const StudyResults& results, const std::filesystem::path& r
                            "box plot of the metric, one row per treatment"}};
   }
   report.sections = MetricSections(results, ranked, maps);
+  if (const auto search = ReadSearchResults(root, results)) {
+    report.sections.insert(report.sections.begin(), SearchSection(results, *search));
+  }
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
   report.notes = Notes(results);

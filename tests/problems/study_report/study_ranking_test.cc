@@ -65,7 +65,7 @@ TEST(StudyRanking, ALongRankingIsCutAndSaid) {
 
 TEST(StudyCharts, OnlyAxesOfNumbersArePlotted) {
   const StudyResults results = Results();
-  const auto plots = AxisPlots(results, Ranked(Treatments(results, results.metric)));
+  const auto plots = AxisPlots(results, Ranked(results));
   ASSERT_THAT(plots, SizeIs(1));
   EXPECT_THAT(plots[0].alt, HasSubstr("weight"));
   EXPECT_THAT(plots[0].bytes, HasSubstr("<title>b, 1: 1.5</title>"));
@@ -74,7 +74,7 @@ TEST(StudyCharts, OnlyAxesOfNumbersArePlotted) {
 
 TEST(StudyCharts, EachCellOfTheMapLeadsToItsTrial) {
   const StudyResults results = Results();
-  const auto ranked = Ranked(Treatments(results, results.metric));
+  const auto ranked = Ranked(results);
   const auto map = SubjectMap(results, ranked);
   ASSERT_THAT(map, SizeIs(1));
   EXPECT_THAT(map[0].bytes, HasSubstr("<a href=\"#t-s2b10\">"));
