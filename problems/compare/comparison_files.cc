@@ -5,7 +5,11 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
+#include "problems/plots/svg_plot.h"
+#include "problems/report/plain_names.h"
 #include "problems/report/report.h"
 #include "surfaces/base/csv.h"
 
@@ -23,8 +27,9 @@ std::string IntervalText(const Interval& interval) {
 }
 
 ReportTable TreatmentTable(const StudyComparison& comparison) {
-  ReportTable table{fmt::format("{} over the {} subjects of all studies; lower is better",
-                                comparison.metric, comparison.subjects.size()),
+  ReportTable table{fmt::format("{} over {} that all studies have; lower is better",
+                                WordsOfMetric(comparison.metric),
+                                Counted(std::ssize(comparison.subjects), "subject")),
                     {"study", "treatment", "subjects", "mean", "sd", "95 % of the mean"},
                     {}};
   for (const ComparedTreatment& t : comparison.treatments) {
@@ -38,30 +43,47 @@ ReportTable TreatmentTable(const StudyComparison& comparison) {
 ReportTable PairTable(const StudyComparison& comparison) {
   ReportTable table{
       "Each treatment of the later studies less its reference, over the subjects that both have",
-      {"treatment", "reference", "subjects", "mean difference", "95 % of it", "better of",
-       "worse of", "p (Wilcoxon, Holm)"},
+      {"treatment", "reference", "subjects", "mean difference", "95 % interval", "worse in",
+       "p, Holm"},
       {}};
   for (const TreatmentPair& pair : comparison.pairs) {
-    table.rows.push_back({Called(pair.other), Called(pair.reference),
-                          std::to_string(pair.difference.n), TableNumber(pair.difference.mean),
-                          IntervalText(pair.difference.mean_95), std::to_string(pair.better),
-                          std::to_string(pair.worse), TableNumber(pair.p_holm)});
+    table.rows.push_back(
+        {Called(pair.other), Called(pair.reference), std::to_string(pair.difference.n),
+         TableNumber(pair.difference.mean), IntervalText(pair.difference.mean_95),
+         fmt::format("{} of {}", pair.worse, pair.difference.n), TableNumber(pair.p_holm)});
   }
   return table;
 }
 
+ReportImage BoxesOf(const StudyComparison& comparison) {
+  std::vector<BoxRow> rows;
+  for (const ComparedTreatment& treatment : comparison.treatments) {
+    BoxRow row{Called(treatment), {}, {}};
+    for (const auto& [subject, value] : treatment.by_subject) {
+      row.values.push_back(value);
+      row.names.push_back(subject);
+    }
+    rows.push_back(std::move(row));
+  }
+  return {BoxPlotSvg(rows, WordsOfMetric(comparison.metric)),
+          "One dot per subject; box: quartiles and median.",
+          "box plot of the metric, one row per treatment of each study"};
+}
+
 Report ReportOf(const StudyComparison& comparison) {
   Report report{.title = fmt::format("{} compared", fmt::join(comparison.studies, ", ")),
-                .subtitle = fmt::format("{}, paired by subject", comparison.metric),
+                .subtitle = fmt::format("{}, paired by subject", WordsOfMetric(comparison.metric)),
                 .notes = comparison.notes,
-                .main_images = {},
+                .main_images = {BoxesOf(comparison)},
                 .tiles = {},
                 .sections = {},
                 .footer = fmt::format("semblance {}", SEMBLANCE_VERSION)};
   report.sections.push_back(
       {.heading = "Differences",
-       .paragraphs = {"A treatment's reference is the one of the same name in the first study, "
-                      "else the best of the first study. Below six subjects there is no test."},
+       .paragraphs =
+           {"A treatment's reference is the one of the same name in the first study, "
+            "else the best of the first study. p is of Wilcoxon's signed ranks; below six "
+            "subjects there is no test."},
        .tables = {PairTable(comparison)}});
   report.sections.push_back({.heading = "Treatments", .tables = {TreatmentTable(comparison)}});
   return report;

@@ -45,7 +45,7 @@ std::vector<std::string> NamesOf(const std::vector<fs::path>& folders) {
 std::set<std::string> SubjectsOf(const NamedStudy& study, const std::string& metric) {
   std::set<std::string> subjects;
   for (const TrialRow& row : study.results.trials) {
-    if (row.status == "done" && row.metrics.contains(metric)) {
+    if (row.status == "done" && !row.aside && row.metrics.contains(metric)) {
       subjects.insert(row.subject);
     }
   }
@@ -56,6 +56,17 @@ std::set<std::string> SubjectsOf(const NamedStudy& study, const std::string& met
         study.name, metric));
   }
   return subjects;
+}
+
+void RequireLowerIsBetter(std::span<const NamedStudy> studies, const std::string& metric) {
+  for (const NamedStudy& study : studies) {
+    if (study.results.higher_is_better && study.results.metric == metric) {
+      throw InputError(fmt::format(
+          "{}: its search took higher values of '{}' as better, and studies are compared by what "
+          "is better lower; name another number with --metric",
+          study.name, metric));
+    }
+  }
 }
 
 std::vector<std::string> CommonSubjects(std::span<const NamedStudy> studies,
@@ -188,6 +199,7 @@ StudyComparison CompareStudies(std::span<const NamedStudy> studies, const std::s
                              .treatments = {},
                              .pairs = {},
                              .notes = {}};
+  RequireLowerIsBetter(studies, comparison.metric);
   comparison.subjects = CommonSubjects(studies, comparison.metric);
   const std::vector<ComparedTreatment> first =
       TreatmentsOf(studies.front(), comparison.metric, comparison.subjects);

@@ -52,7 +52,7 @@ struct StudyComparison {
 // metric: lower is better; empty: that of the first study. A treatment of a later study is paired
 // with the one of the same label in the first, else with the best of the first. The unit is the
 // subject, by its name. Throws InputError for fewer than two studies, if no subject is in all of
-// them, or if a study has no number of that name.
+// them, if a study has no number of that name, or if its search took higher values as better.
 StudyComparison CompareStudies(std::span<const NamedStudy> studies, const std::string& metric);
 
 }  // namespace semblance
