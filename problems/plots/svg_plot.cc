@@ -51,13 +51,16 @@ class Axis {
       svg += Line(At(value), top, At(value), bottom, "#dfe3e8", 1);
       svg += Text(At(value), bottom + 20, fmt::format("{:.6g}", value), "middle");
     }
-    // Under the axis; what is too long for that, across the plot.
-    const double room = kWidth - kRight - left_, middle = left_ + room / 2;
-    return svg +
-           Text(svg::WidthOf(label) > room ? kWidth / 2 : middle, bottom + 44, label, "middle");
+    return svg + Text(MiddleOf(label), bottom + 44, label, "middle");
   }
 
  private:
+  // That of the axis, unless the label then ran out of the picture.
+  double MiddleOf(const std::string& label) const {
+    const double middle = (left_ + kWidth - kRight) / 2;
+    return std::max(kWidth / 2, std::min(middle, kWidth - svg::WidthOf(label) / 2));
+  }
+
   double left_, low_ = 0, high_ = 1, step_ = 1;
 };
 

@@ -138,9 +138,10 @@ double Spent(const SearchResults& search) {
 
 std::string Summary(const StudyResults& results, const SearchResults& search) {
   return fmt::format(
-      "{}: {} of {} full runs spent on {}{}; {} values of {} are better. The base as it stands has "
+      "{}: {:.4g} of {} full runs spent on {}{}; {} values of {} are better. The base as it stands "
+      "has "
       "{}.",
-      search.method, TableNumber(Spent(search)), search.budget,
+      search.method, Spent(search), search.budget,
       Counted(std::ssize(search.treatments), "treatment"),
       search.ended ? "" : ", and the search has not ended",
       search.higher_is_better ? "higher" : "lower", WordsOfMetric(results.metric),
@@ -176,7 +177,7 @@ ReportTable ImprovementsTable(const SearchResults& search) {
                     {}};
   for (const std::size_t n : search.improvements) {
     const SearchedTreatment& t = search.treatments[n];
-    table.rows.push_back({t.label, TableNumber(t.spent), TableNumber(t.value)});
+    table.rows.push_back({t.label, fmt::format("{:.4g}", t.spent), TableNumber(t.value)});
   }
   return table;
 }
