@@ -452,8 +452,14 @@ SolverOutcome SpaceSolve::Reweigh(double least_move) {
                [](const Term& term) { return !IsOfPoints(term); });
   PointTerm& points = std::get<PointTerm>(terms.emplace_back(PointTerm{}));
   SolverOutcome outcome{.termination = "no_convergence"};
+  std::vector<double> factors;
   while (outcome.usable && outcome.iterations < kMostReweightings) {
-    const std::vector<double> factors = FactorsOf(squares_);
+    // The problem of the last time would only creep on where the points determine nothing.
+    const std::vector<double> before = std::exchange(factors, FactorsOf(squares_));
+    if (factors == before) {
+      outcome.termination = "convergence";
+      break;
+    }
     view.observations.clear();
     for (std::size_t k = 0; k < given.size(); ++k) {
       if (factors[k] > 0) {

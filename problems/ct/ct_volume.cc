@@ -10,15 +10,35 @@
 
 namespace semblance {
 
+void CheckVolumeClaim(const VolumeClaim& claim, const std::string& where) {
+  constexpr double kMostPacked = 5000;  // bytes out of one; gzip's most is 1032
+  const auto& [x, y, z] = claim.counts;
+  const std::string voxels = fmt::format("{:.10g} x {:.10g} x {:.10g} voxels", x, y, z);
+  if (!(std::min({x, y, z}) >= 1)) {
+    throw InputError(fmt::format("{}: {} are no volume", where, voxels));
+  }
+  const double count = x * y * z;
+  if (!(count * sizeof(std::int16_t) <= kLargestVolume_bytes)) {
+    throw InputError(fmt::format(
+        "{}: {} are {:.3g} GB; at most {:.3g} GB are read: crop the volume or resample it", where,
+        voxels, count * sizeof(std::int16_t) / 1e9, kLargestVolume_bytes / 1e9));
+  }
+  if (count * claim.bytes_per_voxel > kMostPacked * claim.file_bytes) {
+    throw IoError(fmt::format("{}: a file of {} bytes cannot hold {}; copy or export it again",
+                              where, claim.file_bytes, voxels));
+  }
+}
+
 void CheckVolume(const CtVolume& volume, const std::string& where) {
   if (std::min({volume.columns, volume.rows, volume.slices}) < 2) {
     throw InputError(fmt::format("{}: {} x {} x {} voxels are no volume; it needs 2 each way",
                                  where, volume.columns, volume.rows, volume.slices));
   }
   const Vec3& s = volume.spacing_mm;
-  if (!s.allFinite() || !(s.minCoeff() > 0)) {
-    throw InputError(fmt::format("{}: a spacing of {} x {} x {} mm is not usable; each must be > 0",
-                                 where, s.x(), s.y(), s.z()));
+  if (!s.allFinite() || s.minCoeff() < kLeastSpacing_mm || s.maxCoeff() > kMostSpacing_mm) {
+    throw InputError(
+        fmt::format("{}: a spacing of {} x {} x {} mm is not usable; each must be {} to {} mm",
+                    where, s.x(), s.y(), s.z(), kLeastSpacing_mm, kMostSpacing_mm));
   }
   constexpr double kFlattest = 0.1;  // volume of the cell of unit steps; 1 if they are square
   if (!volume.origin.allFinite() || !(volume.axes.determinant() > kFlattest)) {

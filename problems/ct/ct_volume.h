@@ -2,6 +2,7 @@
 // A volume of CT (in Hounsfield units) or MR, and where its voxels are.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -40,8 +41,25 @@ struct CtVolume {
 // border.
 double SampleHu(const CtVolume& volume, const Vec3& world);
 
+// What is read at most, as it lies in memory, and between which voxels.
+inline constexpr double kLargestVolume_bytes = 8e9;
+inline constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20;
+
+// What a header claims, before memory is taken for it.
+struct VolumeClaim {
+  std::array<double, 3> counts;  // of voxels along each axis
+  double bytes_per_voxel = 2;    // in the file, unpacked
+  double file_bytes = kNaN;      // that have to hold them, packed or not; NaN: not known
+};
+
+// Throws InputError, naming `where`, for fewer than one voxel along an axis, more than
+// kLargestVolume_bytes (with 2 bytes per voxel, as we keep them), or more than a file of that size
+// can hold however it is packed.
+void CheckVolumeClaim(const VolumeClaim& claim, const std::string& where);
+
 // Throws InputError, naming `where`, unless the volume is at least 2 voxels each way, its spacing
-// is positive and finite, its axes are right-handed, and there is one value per voxel.
+// is from kLeastSpacing_mm to kMostSpacing_mm, its axes are right-handed, and there is one value
+// per voxel.
 void CheckVolume(const CtVolume& volume, const std::string& where);
 
 }  // namespace semblance

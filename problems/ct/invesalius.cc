@@ -20,6 +20,7 @@ namespace semblance {
 namespace {
 
 constexpr int kMostVoxelsASide = 4096;
+constexpr std::size_t kMostPlistBytes = 1 << 20;
 
 struct ArchiveCloser {
   void operator()(archive* a) const { archive_read_free(a); }
@@ -48,7 +49,8 @@ Archive OpenArchive(const std::string& name) {
   return a;
 }
 
-std::string ReadData(archive* a, const std::string& name) {
+// most: bytes that are wanted; of more, one more is read, and the rest is not looked at.
+std::string ReadData(archive* a, const std::string& name, std::size_t most) {
   std::string bytes;
   std::array<char, 1 << 16> block;
   for (;;) {
@@ -60,11 +62,15 @@ std::string ReadData(archive* a, const std::string& name) {
       return bytes;
     }
     bytes.append(block.data(), static_cast<std::size_t>(got));
+    if (bytes.size() > most) {
+      bytes.resize(most + 1);
+      return bytes;
+    }
   }
 }
 
-// The bytes of the first entry with this file name, whatever its folder.
-std::string ReadEntry(const std::string& name, const std::string& wanted) {
+// The bytes of the first entry with this file name, whatever its folder, as ReadData gives them.
+std::string ReadEntry(const std::string& name, const std::string& wanted, std::size_t most) {
   const Archive a = OpenArchive(name);
   archive_entry* entry = nullptr;
   for (;;) {
@@ -77,7 +83,7 @@ std::string ReadEntry(const std::string& name, const std::string& wanted) {
     }
     const char* path = archive_entry_pathname(entry);
     if (path && std::filesystem::path(path).filename() == wanted) {
-      return ReadData(a.get(), name);
+      return ReadData(a.get(), name, most);
     }
   }
 }
@@ -151,14 +157,26 @@ Header ParseHeader(const std::string& plist, const std::string& name) {
 
 CtVolume ReadInvesalius(const std::filesystem::path& path) {
   const std::string name = path.string();
-  Header header = ParseHeader(ReadEntry(name, "main.plist"), name);
-  const std::string bytes = ReadEntry(name, header.matrix_file);
+  const std::string plist = ReadEntry(name, "main.plist", kMostPlistBytes);
+  if (plist.size() > kMostPlistBytes) {
+    throw InputError(fmt::format("{}: main.plist is larger than {} bytes", name, kMostPlistBytes));
+  }
+  Header header = ParseHeader(plist, name);
   CtVolume volume = std::move(header.volume);
   const std::size_t voxels = volume.Index(0, 0, volume.slices);
-  if (bytes.size() != voxels * sizeof(std::int16_t)) {
+  CheckVolumeClaim(
+      {.counts = {static_cast<double>(volume.columns), static_cast<double>(volume.rows),
+                  static_cast<double>(volume.slices)},
+       .file_bytes = static_cast<double>(std::filesystem::file_size(path))},
+      name);
+  const std::size_t needed = voxels * sizeof(std::int16_t);
+  const std::string bytes = ReadEntry(name, header.matrix_file, needed);
+  if (bytes.size() != needed) {
     throw IoError(fmt::format("{}: '{}' has {} bytes; {} x {} x {} voxels of int16 need {}", name,
-                              header.matrix_file, bytes.size(), volume.slices, volume.rows,
-                              volume.columns, voxels * sizeof(std::int16_t)));
+                              header.matrix_file,
+                              bytes.size() > needed ? fmt::format("more than {}", needed)
+                                                    : fmt::format("{}", bytes.size()),
+                              volume.slices, volume.rows, volume.columns, needed));
   }
   static_assert(std::endian::native == std::endian::little);  // as the file is
   volume.values.resize(voxels);

@@ -135,8 +135,23 @@ Reader ReaderOf(VolumeFormat format) {
   }
 }
 
+// Before memory is taken for the voxels. Those of a detached header lie in another file.
+void CheckClaim(const itk::ImageIOBase& io, const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  const bool detached = ending == ".nhdr" || ending == ".mhd" || ending == ".hdr";
+  VolumeClaim claim{
+      .counts = {1, 1, 1},
+      .bytes_per_voxel = static_cast<double>(io.GetComponentSize()),
+      .file_bytes = detached ? kNaN : static_cast<double>(std::filesystem::file_size(file))};
+  for (unsigned axis = 0; axis < std::min(3U, io.GetNumberOfDimensions()); ++axis) {
+    claim.counts[axis] = static_cast<double>(io.GetDimensions(axis));
+  }
+  CheckVolumeClaim(claim, file.string());
+}
+
 // Counts, origin and steps, in LPS and mm as ITK gives them for every format.
-VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::string& where) {
+VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::filesystem::path& file) {
+  const std::string where = file.string();
   const unsigned axes = io.GetNumberOfDimensions();
   for (unsigned axis = 3; axis < axes; ++axis) {
     if (io.GetDimensions(axis) != 1) {
@@ -147,8 +162,13 @@ VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::string& where) {
   if (axes < 3) {
     throw InputError(fmt::format("{}: {} axes; a volume has 3", where, axes));
   }
+  CheckClaim(io, file);
   VoxelArray array;
   for (int axis = 0; axis < 3; ++axis) {
+    if (!(io.GetSpacing(axis) > 0)) {
+      throw InputError(fmt::format("{}: a spacing of {} mm is not usable; each must be > 0", where,
+                                   io.GetSpacing(axis)));
+    }
     array.counts[axis] = static_cast<int>(io.GetDimensions(axis));
     array.origin[axis] = io.GetOrigin(axis);
     const std::vector<double> direction = io.GetDirection(axis);
@@ -228,7 +248,9 @@ std::vector<double> Numbers(const std::string& text, std::size_t expected) {
 
 int Count(const std::string& text, int otherwise) {
   const std::vector<double> number = Numbers(text, 1);
-  return number.empty() ? otherwise : static_cast<int>(number[0]);
+  constexpr double kMost = 1e9;  // also for what no int can hold
+  return number.empty() || !(std::abs(number[0]) <= kMost) ? otherwise
+                                                           : static_cast<int>(number[0]);
 }
 
 DicomHeader HeaderOf(const gdcm::Scanner& scanner, const std::string& file) {
@@ -343,7 +365,7 @@ VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat forma
     }
     reader.io->SetFileName(where);
     reader.io->ReadImageInformation();
-    VoxelArray array = GeometryOf(*reader.io, where);
+    VoxelArray array = GeometryOf(*reader.io, file);
     CheckWhole(file, format, static_cast<std::uintmax_t>(reader.io->GetImageSizeInBytes()));
     array.values.reserve(VoxelCount(array));
     AppendVoxels(*reader.io, VoxelCount(array), array, where);
@@ -384,6 +406,7 @@ void AppendDicomSlice(const DicomHeader& header, VoxelArray& array) {
     const auto io = itk::GDCMImageIO::New();
     io->SetFileName(where);
     io->ReadImageInformation();
+    CheckClaim(*io, header.file);
     AppendVoxels(*io, static_cast<std::size_t>(header.columns) * header.rows, array, where);
   } catch (const itk::ExceptionObject& error) {
     throw IoError(fmt::format("{}: its pixels cannot be read: {}", where, WordsOf(error)));

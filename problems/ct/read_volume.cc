@@ -104,9 +104,13 @@ void Interpolate(const SliceStack& stack, std::size_t slice, VoxelArray& array) 
 }
 
 // All slices of the stack, in its order; what is missing is interpolated.
-void ReadSlices(const DicomSeries& series, const SliceStack& stack, const RunContext& context,
-                VoxelArray& array) {
+void ReadSlices(const DicomSeries& series, const SliceStack& stack, const std::string& where,
+                const RunContext& context, VoxelArray& array) {
   const std::size_t size = static_cast<std::size_t>(array.counts[0]) * array.counts[1];
+  CheckVolumeClaim(
+      {.counts = {static_cast<double>(array.counts[0]), static_cast<double>(array.counts[1]),
+                  static_cast<double>(stack.slices.size())}},
+      where);
   array.values.reserve(size * stack.slices.size());
   for (std::size_t k = 0; k < stack.slices.size(); ++k) {
     context.ThrowIfStopped();
@@ -160,7 +164,7 @@ VolumeReading ReadSeries(const DicomSeries& series, const ReadVolumeOptions& opt
   array.origin = stack.origin;
   array.steps << first.spacing_mm->x() * *first.along_columns,
       first.spacing_mm->y() * *first.along_rows, stack.step;
-  ReadSlices(series, stack, context, array);
+  ReadSlices(series, stack, where, context, array);
   reading.modality = first.modality == "MR"   ? Modality::kMr
                      : first.modality == "CT" ? Modality::kCt
                                               : Modality::kUnknown;

@@ -107,25 +107,22 @@ void CheckChord(const AutoOr<double>& chord_mm, std::span<const Vec3> positions)
   }
 }
 
-Tessellation TessellateAsFineAsCanBe(const HSplineSurface& surface, double chord_mm, int threads) {
-  constexpr int kTries = 12;
-  for (int k = 0; k < kTries; ++k, chord_mm *= 2) {
-    try {
-      return TessellateToChord(surface, chord_mm, threads);
-    } catch (const InputError&) {
-      continue;  // too many triangles
-    }
+// `chord_mm`, or as much more as keeps the triangles within a million or so.
+double AffordableChord(const HSplineSurface& surface, double chord_mm) {
+  constexpr double kMostCells = 500'000;
+  while (std::isfinite(chord_mm) && CellsToChord(surface, chord_mm) > kMostCells) {
+    chord_mm *= 2;
   }
-  return TessellateToChord(surface, chord_mm, threads);
+  return chord_mm;
 }
 
 double ExtentOf(const HSplineSurface& surface) { return DiagonalOf(surface.Net(0).vertices); }
 
 std::string SurfacePly(const HSplineSurface& surface, const AutoOr<double>& chord_mm, int threads) {
   constexpr double kChords = 5000;
-  Tessellation tessellation =
-      chord_mm.automatic ? TessellateAsFineAsCanBe(surface, ExtentOf(surface) / kChords, threads)
-                         : TessellateToChord(surface, chord_mm, threads);
+  const double chord = chord_mm.automatic ? AffordableChord(surface, ExtentOf(surface) / kChords)
+                                          : static_cast<double>(chord_mm);
+  Tessellation tessellation = TessellateToChord(surface, chord, threads);
   return EncodeMesh(tessellation.mesh, ".ply", {std::move(tessellation.normals), {}, {}});
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -15,7 +16,7 @@
 namespace semblance {
 namespace {
 
-constexpr std::size_t kMostCells = 10'000'000;
+constexpr double kMostCells = 1e7;
 constexpr int kDeepest = 16;  // below level 0; halves of its cells are the lattice of the vertices
 
 using Cell = PatchId;  // of any depth, deeper than the finest level too
@@ -41,9 +42,41 @@ double ChordBound(const HSplineSurface& surface, const Cell& cell) {
   return std::ldexp((uu + 2 * uv + vv) / 8, -2 * finer);
 }
 
+std::array<Cell, 4> ChildrenOf(const Cell& c) {
+  return {Cell{c.level + 1, 2 * c.i, 2 * c.j}, Cell{c.level + 1, 2 * c.i + 1, 2 * c.j},
+          Cell{c.level + 1, 2 * c.i, 2 * c.j + 1}, Cell{c.level + 1, 2 * c.i + 1, 2 * c.j + 1}};
+}
+
+[[noreturn]] void TooFine(double chord_mm) {
+  throw InputError(fmt::format(
+      "tessellation: a chord error of {} mm needs too many triangles; allow more", chord_mm));
+}
+
+// Into how many cells a cell is split for its own sake; infinite where they would be too small.
+// Beyond the finest level each split quarters the bound, so they need not be made to be counted.
+double CellsWithin(const HSplineSurface& surface, const Cell& cell, double chord_mm) {
+  const double bound = ChordBound(surface, cell);
+  if (bound <= chord_mm) {
+    return 1;
+  }
+  if (cell.level >= surface.shape().max_level) {
+    const double splits = std::ceil(std::log2(bound / chord_mm) / 2);
+    return cell.level + splits > kDeepest ? std::numeric_limits<double>::infinity()
+                                          : std::ldexp(1, 2 * static_cast<int>(splits));
+  }
+  double count = 0;
+  for (const Cell& child : ChildrenOf(cell)) {
+    count += CellsWithin(surface, child, chord_mm);
+  }
+  return count;
+}
+
 class Quadtree {
  public:
   Quadtree(const HSplineSurface& surface, double chord_mm) : surface_(surface) {
+    if (!(CellsToChord(surface, chord_mm) <= kMostCells)) {
+      TooFine(chord_mm);
+    }
     const HSplineShape& shape = surface.shape();
     const PatchTree patches(surface);
     for (const PatchId& leaf : patches.leaves()) {
@@ -75,18 +108,12 @@ class Quadtree {
       cells_.insert(cell);
       return;
     }
-    if (cell.level == kDeepest || cells_.size() >= kMostCells) {
-      throw InputError(fmt::format(
-          "tessellation: a chord error of {} mm needs too many triangles; allow more", chord_mm));
+    if (cell.level == kDeepest) {
+      TooFine(chord_mm);
     }
-    for (const Cell& child : Children(cell)) {
+    for (const Cell& child : ChildrenOf(cell)) {
       SplitToChord(child, chord_mm);
     }
-  }
-
-  static std::array<Cell, 4> Children(const Cell& c) {
-    return {Cell{c.level + 1, 2 * c.i, 2 * c.j}, Cell{c.level + 1, 2 * c.i + 1, 2 * c.j},
-            Cell{c.level + 1, 2 * c.i, 2 * c.j + 1}, Cell{c.level + 1, 2 * c.i + 1, 2 * c.j + 1}};
   }
 
   // Splits the cell that covers `fine` until it is coarser by at most one level.
@@ -94,7 +121,7 @@ class Quadtree {
     for (int up = 2; up <= fine.level; ++up) {
       const Cell cell{fine.level - up, fine.i >> up, fine.j >> up};
       if (cells_.erase(cell) > 0) {
-        for (const Cell& child : Children(cell)) {
+        for (const Cell& child : ChildrenOf(cell)) {
           cells_.insert(child);
           open.push_back(child);
         }
@@ -185,6 +212,15 @@ class Triangulation {
 };
 
 }  // namespace
+
+double CellsToChord(const HSplineSurface& surface, double chord_mm) {
+  double count = 0;
+  const PatchTree patches(surface);
+  for (const PatchId& leaf : patches.leaves()) {
+    count += CellsWithin(surface, leaf, chord_mm);
+  }
+  return count;
+}
 
 Tessellation TessellateToChord(const HSplineSurface& surface, double chord_mm, int threads) {
   if (!(chord_mm > 0) || !std::isfinite(chord_mm)) {

@@ -11,7 +11,13 @@ namespace semblance {
 // whose neighbours differ by one level at most and share all their vertices: watertight, also
 // across the seam. Vertices lie on the surface; normals are zero where the surface has none. No
 // byte depends on `threads` (>= 1). Throws InputError for a chord that is not positive and finite,
-// or so small that more than ten million cells would be needed.
+// or so small that more than ten million cells would be needed; these are counted before any is
+// made.
 Tessellation TessellateToChord(const HSplineSurface& surface, double chord_mm, int threads = 1);
+
+// How many cells, of two triangles or a few more, keep the chord (> 0): a lower bound, as
+// neighbours may have to be split too. Infinite where cells would be smaller than a double can
+// tell.
+double CellsToChord(const HSplineSurface& surface, double chord_mm);
 
 }  // namespace semblance

@@ -141,5 +141,23 @@ TEST(AutoWeight, WrongInputIsNamed) {
   EXPECT_EQ(message({PointTerm{.loss = RobustLoss::kHuber}, smooth}), "");
 }
 
+// No point is further off than the loss is wide, so its weights never change; many unknowns are
+// held by nothing but a tiny smoothness, along which steps could creep on for ever.
+TEST(AutoWeight, ALossThatMeetsNoOutlierIsSolvedOnce) {
+  const FitTarget target = Scattered(FrankePoint, 100, 0, 9);
+  const SmoothnessTerm smooth{.weight = AutoOr<double>::Auto()};
+  const auto fit = [&](RobustLoss loss) {
+    return Fit(PlainStart(kShape), target, {},
+               {.plan = ListedPlan{.schedule = {{0, 1}}},
+                .terms = {PointTerm{.loss = loss}, smooth},
+                .solver = Solver::kCeres},
+               {});
+  };
+  const FitResult with = fit(RobustLoss::kHuber), without = fit(RobustLoss::kNone);
+  EXPECT_EQ(with.levels[0].termination, "convergence");
+  EXPECT_EQ(with.levels[0].iterations, 1);
+  EXPECT_NEAR(with.point_rms_mm, without.point_rms_mm, 1e-9);
+}
+
 }  // namespace
 }  // namespace semblance

@@ -59,10 +59,27 @@ TEST(CtVolume, WhatIsNoVolumeIsToldSo) {
     return WordsOf<InputError>([&] { CheckVolume(volume, "x"); });
   };
   EXPECT_THAT(words([](CtVolume& v) { v.slices = 1; }), HasSubstr("needs 2 each way"));
-  EXPECT_THAT(words([](CtVolume& v) { v.spacing_mm.y() = 0; }), HasSubstr("each must be > 0"));
+  for (const double spacing : {0.0, -1.0, 0.005, 20.5, kNaN, 1e300}) {
+    EXPECT_THAT(words([&](CtVolume& v) { v.spacing_mm.y() = spacing; }),
+                HasSubstr("each must be 0.01 to 20 mm"));
+  }
   EXPECT_THAT(words([](CtVolume& v) { v.axes.col(1) = v.axes.col(0); }),
               HasSubstr("three different directions"));
   EXPECT_THAT(words([](CtVolume& v) { v.values.pop_back(); }), HasSubstr("do not fill"));
+}
+
+TEST(CtVolume, AClaimIsJudgedBeforeMemoryIsTaken) {
+  const auto words = [](const VolumeClaim& claim) {
+    return WordsOf<Error>([&] { CheckVolumeClaim(claim, "x"); });
+  };
+  EXPECT_NO_THROW(CheckVolumeClaim({.counts = {512, 512, 600}, .file_bytes = 1e6}, "x"));
+  EXPECT_NO_THROW(CheckVolumeClaim({.counts = {2000, 2000, 1000}}, "x"));
+  EXPECT_THAT(words({.counts = {2000, 2000, 1001}}), HasSubstr("at most 8 GB are read"));
+  EXPECT_THAT(words({.counts = {1e9, 1e9, 1e9}}), HasSubstr("1000000000 x 1000000000 x 1000000000 voxels"));
+  EXPECT_THAT(words({.counts = {1e300, 1e300, 1e300}}), HasSubstr("at most 8 GB"));
+  EXPECT_THAT(words({.counts = {kNaN, 2, 2}}), HasSubstr("no volume"));
+  EXPECT_THAT(words({.counts = {0, 512, 512}}), HasSubstr("no volume"));
+  EXPECT_THAT(words({.counts = {512, 512, 100}, .file_bytes = 1000}), HasSubstr("cannot hold"));
 }
 
 }  // namespace

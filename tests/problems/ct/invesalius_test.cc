@@ -88,6 +88,17 @@ TEST(Invesalius, EachFaultIsNamed) {
   EXPECT_THAT(words({{"main.plist", plist}}), HasSubstr("no entry 'matrix.dat'"));
   EXPECT_THAT(words({{"main.plist", plist}, {"matrix.dat", Values().substr(2)}}),
               AllOf(HasSubstr("46 bytes"), HasSubstr("need 48")));
+  EXPECT_THAT(words({{"main.plist", plist}, {"matrix.dat", Values() + Values()}}),
+              HasSubstr("more than 48 bytes"));
+  EXPECT_THAT(words({{"main.plist", plist + std::string(2'000'000, ' ')}}),
+              HasSubstr("main.plist is larger than"));
+  const std::string most = "<integer>4096</integer>";
+  EXPECT_THAT(words({{"main.plist", Plist("int16", most + most + most)}, {"matrix.dat", Values()}}),
+              HasSubstr("at most 8 GB are read"));
+  const std::string large = "<integer>500</integer>";
+  EXPECT_THAT(
+      words({{"main.plist", Plist("int16", large + large + large)}, {"matrix.dat", Values()}}),
+      HasSubstr("cannot hold 500 x 500 x 500 voxels"));
   EXPECT_THAT(words({{"main.plist", Plist("uint8", kShape)}, {"matrix.dat", Values()}}),
               HasSubstr("only int16 is read"));
   EXPECT_THAT(words({{"main.plist", Plist("int16", "<integer>4</integer>")}}),

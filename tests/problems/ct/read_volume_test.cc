@@ -320,6 +320,41 @@ TEST_F(ReadVolumeTest, WhatIsNoVolumeIsOneClearError) {
   EXPECT_THAT(Words("text.nii", {.series = "1"}), HasSubstr("are for folders of DICOM"));
 }
 
+// Headers that claim what no file holds: refused before memory is taken for it.
+TEST_F(ReadVolumeTest, ClaimsBeyondTheFileAreRefusedAtOnce) {
+  const auto mha = [&](const char* spacing, const char* sizes, const char* compressed) {
+    WriteFileAtomically(
+        folder_ / "x.mha",
+        fmt::format("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = "
+                    "False\nCompressedData = {}\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 "
+                    "0\nElementSpacing = {}\nDimSize = {}\nElementType = "
+                    "MET_SHORT\nElementDataFile = LOCAL\nabcdefgh",
+                    compressed, spacing, sizes));
+    return WordsOf<Error>([&] { Read("x.mha"); });
+  };
+  const auto nrrd = [&](const char* sizes, const char* encoding) {
+    WriteFileAtomically(
+        folder_ / "x.nrrd",
+        fmt::format("NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: "
+                    "{}\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nkinds: domain domain "
+                    "domain\nendian: little\nencoding: {}\nspace origin: (0,0,0)\n\nabcdefgh",
+                    sizes, encoding));
+    return WordsOf<Error>([&] { Read("x.nrrd"); });
+  };
+  for (const char* compressed : {"False", "True"}) {
+    EXPECT_THAT(mha("1 1 1", "1500 1500 1500", compressed), HasSubstr("cannot hold"));
+    EXPECT_THAT(mha("1 1 1", "2000000000 2000000000 2000000000", compressed),
+                HasSubstr("at most 8 GB are read"));
+    EXPECT_THAT(mha("-1 1 1", "20 20 20", compressed), HasSubstr("x.mha: "));
+    EXPECT_THAT(mha("1 1 1", "-20 20 20", compressed), HasSubstr("x.mha: "));
+  }
+  for (const char* encoding : {"raw", "gzip"}) {
+    EXPECT_THAT(nrrd("1500 1500 1500", encoding), HasSubstr("cannot hold"));
+    EXPECT_THAT(nrrd("200000 200000 2000", encoding), HasSubstr("at most 8 GB are read"));
+    EXPECT_THAT(nrrd("-20 20 20", encoding), HasSubstr("x.nrrd: "));
+  }
+}
+
 TEST_F(ReadVolumeTest, FilesCutShortAreOneClearError) {
   const auto cut = [&](const char* name) {
     const std::string bytes = ReadFileBytes(folder_ / name);

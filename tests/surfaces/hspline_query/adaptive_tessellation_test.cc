@@ -99,6 +99,24 @@ TEST(AdaptiveTessellation, DetailCostsTrianglesOnlyWhereItIs) {
   EXPECT_LT(TessellateToChord(surface, 0.1).mesh.triangles.size(), smooth + 2000);
 }
 
+// Neighbours that are split too come on top; a cell has two triangles or, beside finer ones, up to
+// eight.
+TEST_P(ChordLaws, CellsAreCountedBeforeTheyAreMade) {
+  const HSplineSurface surface = RandomSurface(GetParam(), 4);
+  double before = 0;
+  for (const double chord : {10.0, 1.0, 0.1, 0.02}) {
+    const double cells = CellsToChord(surface, chord);
+    const auto triangles =
+        static_cast<double>(TessellateToChord(surface, chord).mesh.triangles.size());
+    EXPECT_GE(triangles, 2 * cells);
+    EXPECT_LE(triangles, 16 * cells);
+    EXPECT_GE(cells, before);
+    before = cells;
+  }
+  EXPECT_GT(CellsToChord(surface, 1e-9), 1e7);
+  EXPECT_THROW(TessellateToChord(surface, 1e-9), InputError);
+}
+
 TEST(AdaptiveTessellation, ChordsThatCannotBeAreRefused) {
   const HSplineSurface surface = testing::SmoothSurface({.max_level = 1}, 1);
   EXPECT_THROW(TessellateToChord(surface, 0), InputError);
