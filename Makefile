@@ -8,7 +8,7 @@ BUILD        := $(if $(filter sanitize debug quick,$(PRESET)),build-$(PRESET),bu
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build deb demo demo-phantom test bench faults sanitize format check headers tidy configs clean
+.PHONY: all setup configure build deb demo demo-phantom test bench faults pairwise sanitize format check headers tidy configs clean
 
 all: build
 
@@ -62,6 +62,12 @@ bench: build
 COUNT        ?= 100
 faults: build
 	@tests/faults/faults.sh $(BUILD)/problems/semblance configs $(COUNT)
+
+# All pairs of options, each run on the smallest phantom or a few points, or refused at once (docs/reliability.md).
+PAIRS        ?= 1000000
+pairwise: build
+	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --cases $(PAIRS)
+	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --cases $(PAIRS)
 
 # The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:

@@ -95,6 +95,25 @@ void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& fault
   }
 }
 
+// A prior that is asked but names no files.
+void CheckPriorFiles(const PriorSource& source, std::vector<OptionFault>& faults) {
+  const auto need = [&](const char* field, const std::filesystem::path& file, const char* remedy) {
+    if (file.empty()) {
+      faults.push_back(
+          {fmt::format("prior.{}", field), fmt::format("no file is named; {}", remedy)});
+    }
+  };
+  if (const auto* modes = std::get_if<ModesPrior>(&source)) {
+    constexpr const char* kAll = "a prior of type modes needs mean, modes, sites and features";
+    need("mean", modes->mean, kAll);
+    need("modes", modes->modes, kAll);
+    need("sites", modes->sites, kAll);
+    need("features", modes->features, kAll);
+  } else if (const auto* hspline = std::get_if<HSplinePrior>(&source)) {
+    need("modes", hspline->modes, "`semblance prior` makes one");
+  }
+}
+
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
@@ -121,6 +140,9 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back({"face",
                       "it asks the prior 'ict', which is one of `template: ict`; take that "
                       "template, a prior of yours, or `face: fit`"});
+  }
+  if (asks) {
+    CheckPriorFiles(experiment.prior, faults);
   }
   if (asks && experiment.uncertainty.samples > 0) {
     faults.push_back({"uncertainty.samples",

@@ -75,7 +75,8 @@ TEST(CtVolume, AClaimIsJudgedBeforeMemoryIsTaken) {
   EXPECT_NO_THROW(CheckVolumeClaim({.counts = {512, 512, 600}, .file_bytes = 1e6}, "x"));
   EXPECT_NO_THROW(CheckVolumeClaim({.counts = {2000, 2000, 1000}}, "x"));
   EXPECT_THAT(words({.counts = {2000, 2000, 1001}}), HasSubstr("at most 8 GB are read"));
-  EXPECT_THAT(words({.counts = {1e9, 1e9, 1e9}}), HasSubstr("1000000000 x 1000000000 x 1000000000 voxels"));
+  EXPECT_THAT(words({.counts = {1e9, 1e9, 1e9}}),
+              HasSubstr("1000000000 x 1000000000 x 1000000000 voxels"));
   EXPECT_THAT(words({.counts = {1e300, 1e300, 1e300}}), HasSubstr("at most 8 GB"));
   EXPECT_THAT(words({.counts = {kNaN, 2, 2}}), HasSubstr("no volume"));
   EXPECT_THAT(words({.counts = {0, 512, 512}}), HasSubstr("no volume"));

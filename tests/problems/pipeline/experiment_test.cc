@@ -52,6 +52,14 @@ TEST(Experiment, TheWayToTheFaceFollowsTemplateAndPrior) {
   EXPECT_THAT(Faults("uncertainty: {samples: 2}\n"), HasSubstr("uncertainty.samples: faces are"));
 }
 
+// What a trial would refuse only after its skull was filled.
+TEST(Experiment, APriorThatIsAskedNamesItsFiles) {
+  EXPECT_THAT(Faults("prior: hspline\n"), HasSubstr("prior.modes: no file is named"));
+  EXPECT_THAT(Faults("prior: modes\n"),
+              AllOf(HasSubstr("prior.mean: no file"), HasSubstr("prior.features: no file")));
+  EXPECT_NO_THROW(ReadConfigText<Experiment>("prior: hspline\nface: fit\n", "a.yaml"));
+}
+
 TEST(Experiment, TheDefaultsFitTogether) { EXPECT_THAT(FaultsBetween(Experiment{}), IsEmpty()); }
 
 TEST(Experiment, AStepAtALevelThatTheFaceLacksIsToldAtItsLine) {

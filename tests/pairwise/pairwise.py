@@ -1,0 +1,313 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Options in pairs: what `check` lets pass, the program can do.
+
+usage: pairwise.py PROGRAM CONFIGS [--kind experiment|fit] [--cases N] [--seed N] [--keep FOLDER]
+
+Cases are made from the schema of the options: every pair of choices (words, variants, booleans, terms) that can stand
+together is in one of them, and every number is at each end of its range in one. A case is run on the smallest phantom
+(or on 120 points of a height field) with one thread. What may come of it:
+
+    refused   by `check`, at once, with exit code 2. The option that it names is then left out, until what is left
+              passes; a pair that is refused with all else at its default counts as refused.
+    done      exit code 0; every number of the result is finite
+    said      exit code 1, and why
+    SHORT     anything else: refused only after `check` let it pass, a crash, a number that is not finite, over ten
+              times the median of the processor time
+
+Prints a table, and each case that fell short with its configuration; ends with 1 if there is one. --cases: the first so
+many, which cover the most.
+"""
+import argparse
+import json
+import math
+import os
+import pathlib
+import random
+import re
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+from option_space import CoveringArray, OptionSpace
+
+LIMIT_S = 60  # of processor time; a case that needs more is killed
+
+
+def experiment_space(schema, folder):
+    steps = [{"level": 0}, {"level": 1, "fraction": 0.5}]
+    return OptionSpace(
+        schema,
+        lists={
+            "first_fit": [[], steps[:1]],
+            "fit.plan[listed].schedule": [steps[:1], steps],
+            "fit.plan[until].schedule": [steps],
+            "interp[auto].schemes": [["mean", "nearest"], ["kriging", "barycentric"], ["surface_matern"], ["harmonic"]],
+            "region.exclude": [[], [{"site": "zy_r", "radius_mm": 20}]],
+            "tissue.set_mm": [{}, {"g": 5}],
+            "sites": [{}, {"mine": {"near": ["n", "rhi"], "depth": 4}}],
+            "rules.points": [{}],
+            "alternatives": [[]],
+        },
+        # More rings, vertices, levels, rounds and draws are more work in proportion, which is what they ask for.
+        work={
+            "subject[phantom].rings": [16, 20], "implicit.resolution": [8, 24], "patches_u": [4, 8], "patches_v": [4, 8],
+            "template[formula].max_level": [0, 2], "fit.plan[adaptive].finest": [0, 2], "fit.plan[auto].finest": [0, 2],
+            "fit.plan[coarse_to_fine].finest": [0, 1], "seeds.level": [0, 2], "uncertainty.samples": [0, 3],
+            ".sweeps": [0, 2], ".max_passes": [1, 3], "rounds": [1, 3], "estimate.rounds": [3, 5], ".surface_points": [0, 300],
+            "field.centres": [0, 40], "prior[ict].count": [1, 60], "edge_mm": [2, 20], "alpha_mm": [10, 200],
+            "edges.tolerance": [1e-6, 0.5], "random_seed": [0, 7],
+        },
+        beside={
+            ("face", "prior"): [("template", "ict")],
+            ("face", "prior_then_fit"): [("template", "ict")],
+            ("bust", "ict"): [("template", "ict")],
+            ("fit.terms#0", "prior_shape"): [("face", "prior_then_fit")],
+            ("fit.terms#1", "prior_shape"): [("face", "prior_then_fit")],
+        },
+        files={
+            ("tissue.depths", "table"): {("tissue", "table"): str(folder["configs"] / "tables/rhine_caucasoid.yaml")},
+            ("interp", "depth_map"): {("interp", "file"): str(folder["first"] / "depth.ply")},
+            ("subject", "files"): {("subject", "skull"): str(folder["first"] / "depth.ply"),
+                                   ("subject", "skin"): str(folder["first"] / "face.ply"),
+                                   ("subject", "landmarks"): str(folder["first"] / "landmarks.csv")},
+            ("landmarks.keep", "names"): {("landmarks", "keep", "sites"): ["g", "n", "rhi", "go_l", "go_r", "zy_l", "zy_r"]},
+            ("template", "file"): {("template", "surface"): str(folder["first"] / "face.hspline.json")},
+        },
+        defaults={"template": "formula", "fill": "none", "tissue.depths": "measured", "implicit.emitter": "flat"})
+
+
+def fit_space(schema, folder):
+    steps = [{"level": 0}, {"level": 1, "fraction": 0.5}]
+    return OptionSpace(
+        schema,
+        lists={"fit.plan[listed].schedule": [steps[:1], steps], "fit.plan[until].schedule": [steps]},
+        work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 3], ".sweeps": [0, 2], ".max_passes": [1, 3],
+              "rounds": [1, 3], "chord_mm": [0.01, 1000], "fit.plan[auto].finest": [0, 3]},
+        beside={}, files={}, defaults={"parameters": "given"})
+
+
+BASE = {
+    "experiment": """base: {configs}/phantom.yaml
+subject: {{type: phantom, rings: 16}}
+implicit: {{resolution: 16, target_triangles: 400}}
+template: {{type: formula, max_level: 1, patches_u: 6, patches_v: 6}}
+seeds: {{level: 0}}
+first_fit: []
+fit: {{plan: {{type: listed, schedule: [{{level: 0}}, {{level: 1}}]}}}}
+""",
+    "fit": "patches_u: 4\npatches_v: 4\nparameters: given\nfit: {{plan: {{type: auto, finest: 2}}}}\n",
+}
+LIST_DEFAULTS = {"experiment": {"fit.terms": [{"type": "points"}, {"type": "smoothness"}, {"type": "membrane"}]},
+                 "fit": {"fit.terms": [{"type": "points"}, {"type": "smoothness", "weight": "auto"}]}}
+
+
+def call(command, folder, limit_s=LIMIT_S):
+    """exit code (negative: a signal), what was printed, processor seconds"""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+
+    def limits():
+        resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 1))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    done = subprocess.run(command, cwd=folder, preexec_fn=limits, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, errors="replace")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return done.returncode, done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def numbers_that_are_none(json_value, path=""):
+    """Where a result holds null, or a number that is not finite."""
+    if isinstance(json_value, dict):
+        return [p for k, v in json_value.items() for p in numbers_that_are_none(v, f"{path}.{k}")]
+    if isinstance(json_value, list):
+        return [p for v in json_value for p in numbers_that_are_none(v, path)]
+    is_none = isinstance(json_value, float) and not math.isfinite(json_value)
+    return [path] if is_none else []
+
+
+class Runner:
+    def __init__(self, program, configs, kind, folder):
+        self.program, self.configs, self.kind = str(program), configs, kind
+        self.folder = pathlib.Path(folder)
+        (self.folder / "base.yaml").write_text(BASE[kind].format(configs=configs))
+        (self.folder / "study.yaml").write_text("title: one\nbase: case.yaml\nmetric: face.rms_mm\n")
+
+    def prepare(self):
+        """Files that some choices name: of a first run, and points."""
+        first = self.folder / "first"
+        if self.kind == "fit":
+            draw = random.Random(3)
+            rows = ["x,y,z,u,v"]
+            for _ in range(120):
+                u, v = draw.random(), draw.random()
+                rows.append(f"{u:.6f},{v:.6f},{math.sin(3 * u) * v + draw.gauss(0, 0.01):.6f},{u:.6f},{v:.6f}")
+            (self.folder / "points.csv").write_text("\n".join(rows) + "\n")
+            return {"configs": self.configs, "first": first}
+        code, said, _ = call([self.program, "run", "base.yaml", "--out", "first", "--quiet"], self.folder)
+        if code != 0:
+            sys.exit(f"the first run ends with {code}: {said}")
+        rows = (first / "dowels.csv").read_text().splitlines()
+        table = ["site,x_mm,y_mm,z_mm,normal_x,normal_y,normal_z,depth_along_normal_mm"]
+        table += [",".join(row.split(",")[:8]) for row in rows[1:]]
+        (first / "landmarks.csv").write_text("\n".join(table) + "\n")
+        return {"configs": self.configs, "first": first}
+
+    def write(self, tree):
+        (self.folder / "case.yaml").write_text(json.dumps({"base": "base.yaml", **tree}) + "\n")
+
+    def check(self):
+        """exit code, what was said, the paths that it names"""
+        code, said, _ = call([self.program, "check", "case.yaml"], self.folder)
+        paths = re.findall(r"^\S*case\.yaml:\d+:\d+: ([\w.\[\]]+):", said, re.M)
+        return code, said, paths + re.findall(r"^(?:\S*\.yaml:\d+:\d+: )?([a-z_]+[\w.\[\]]*): ", said, re.M)
+
+    def run(self):
+        """"done", "said" or "SHORT", what was said, processor seconds"""
+        subprocess.run(["rm", "-rf", "out"], cwd=self.folder, check=True)
+        if self.kind == "fit":
+            command = [self.program, "fit", "points.csv", "case.yaml", "--out", "out", "--quiet", "--threads", "1"]
+            result = self.folder / "out" / "result.json"
+        else:
+            command = [self.program, "study", "study.yaml", "--out", "out", "--quiet"]
+        code, said, cpu_s = call(command, self.folder)
+        if self.kind != "fit":
+            trials = list((self.folder / "out").glob("trials/*/trial.json"))
+            result = trials[0] if trials else self.folder / "none"
+        if code not in (0, 1):
+            return "SHORT", f"exit code {code}: {said}", cpu_s
+        if not result.exists():
+            return "SHORT", f"exit code {code}, no result: {said}", cpu_s
+        trial = json.loads(result.read_text())
+        if trial.get("status") == "failed":
+            return "SHORT", f"failed in the trial: {trial.get('reason', trial.get('error', said))}", cpu_s
+        holes = numbers_that_are_none(trial)
+        usable = trial.get("usable", trial.get("status") in (None, "done", "ok"))
+        if usable and holes:
+            return "SHORT", f"no number: {', '.join(holes[:5])}", cpu_s
+        return ("done" if usable else "said"), said, cpu_s
+
+
+class Search:
+    def __init__(self, runner, space, seed):
+        self.runner, self.space = runner, space
+        self.array = CoveringArray(space, seed)
+        self.random = random.Random(seed + 1)
+        self.refusals, self.refused_pairs, self.results, self.words = 0, set(), [], {}
+
+    def repaired(self, case, pair):
+        """The case without what `check` refuses; None where the pair itself is refused. `pair` stays."""
+        held = set(self.space.closure(dict(pair)) if pair else {})
+        while True:
+            self.runner.write(self.space.tree(case, LIST_DEFAULTS[self.runner.kind]))
+            code, said, paths = self.runner.check()
+            if code == 0:
+                return case
+            if code != 2 or not said.strip():
+                self.results.append(("SHORT", case, f"check ends with {code}: {said}", 0))
+                return None
+            self.refusals += 1
+            loose = [n for n in case if n not in held]
+            if not loose:
+                self.words[pair] = said.strip().splitlines()[0]
+                return None
+            named = [n for n in loose if any(self.is_at(n, p) for p in paths)]
+            case = self.space.without(case, {self.random.choice(named or loose)})
+            case = {**case, **{n: v for n, v in self.space.closure(dict(pair)).items()}} if pair else case
+
+    def is_at(self, name, path):
+        own = ".".join(str(k) for k in self.space.by_name[name].path)
+        plain = re.sub(r"\[\d+\]", "", path)
+        return own == plain or own.startswith(plain + ".") or plain.startswith(own + ".")
+
+    def try_case(self, case, pair):
+        case, ends = self.array.with_ends(case, 2)
+        case = self.repaired(case, pair)
+        self.array.ends += [e for e in ends if case is None or e[0].name not in case]
+        if case is None:
+            self.refused_pairs.add(pair)
+            self.array.left.discard(pair)
+            return
+        self.array.left -= self.array.pairs_of(case)
+        self.results.append((*self.run(case),))
+
+    def run(self, case):
+        verdict, said, cpu_s = self.runner.run()
+        return verdict, case, said, cpu_s
+
+    def pairs(self, most):
+        while len(self.results) < most:
+            pair = self.array.next_pair()
+            if pair is None:
+                return
+            self.try_case(self.array.case_for(pair), pair)
+            self.tell()
+
+    def lone_ends(self, most):
+        """Numbers at an end that no case has held: each alone, which must be refused or done."""
+        for factor, value in list(self.array.ends):
+            if len(self.results) >= most:
+                return
+            case = self.space.closure({factor.name: value})
+            case = self.repaired(case, ((factor.name, value),))
+            if case is None:
+                self.refused_pairs.add(((factor.name, value),))
+            else:
+                self.results.append(self.run(case))
+            self.array.ends.remove((factor, value))
+            self.tell()
+
+    def tell(self):
+        if sys.stderr.isatty() or len(self.results) % 50 == 0:
+            print(f"{len(self.results)} cases, {len(self.array.left)} of {self.array.total} pairs left", file=sys.stderr)
+
+
+def slow(results):
+    median = statistics.median([r[3] for r in results if r[0] != "SHORT"] or [1])
+    return median, [("SHORT", case, f"{cpu_s:.1f} s, over ten times the median of {median:.2f} s", cpu_s)
+                    for verdict, case, _, cpu_s in results if verdict != "SHORT" and cpu_s > 10 * median]
+
+
+def main():
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("program", type=pathlib.Path)
+    arguments.add_argument("configs", type=pathlib.Path)
+    arguments.add_argument("--kind", choices=["experiment", "fit"], default="experiment")
+    arguments.add_argument("--cases", type=int, default=10**9)
+    arguments.add_argument("--seed", type=int, default=1)
+    arguments.add_argument("--keep", type=pathlib.Path, help="folder for the cases that fell short")
+    given = arguments.parse_args()
+    start = time.monotonic()
+    program, configs = given.program.resolve(), given.configs.resolve()
+    schema = json.loads(subprocess.run([program, "options", given.kind, "--schema"], capture_output=True, check=True).stdout)
+    with tempfile.TemporaryDirectory() as folder:
+        runner = Runner(program, configs, given.kind, folder)
+        files = runner.prepare()
+        space = (fit_space if given.kind == "fit" else experiment_space)(schema, files)
+        search = Search(runner, space, given.seed)
+        search.pairs(given.cases)
+        search.lone_ends(given.cases)
+    median, late = slow(search.results)
+    short = [r for r in search.results if r[0] == "SHORT"] + late
+    count = lambda verdict: sum(r[0] == verdict for r in search.results)
+    print(f"{given.kind}: {len(space.choices)} choices in {search.array.total} pairs, {len(space.ends)} ends of numbers")
+    print(f"  cases run               {len(search.results):6d}   ({search.refusals} more were refused by check at once)")
+    print(f"  done, finite, usable    {count('done'):6d}")
+    print(f"  not usable, said why    {count('said'):6d}")
+    print(f"  pairs refused by rules  {len(search.refused_pairs):6d}   left uncovered {len(search.array.left)}, ends {len(search.array.ends)}")
+    print(f"  median of a case        {median:6.2f} s of processor; all in {time.monotonic() - start:.0f} s")
+    print(f"  fell short              {len(short):6d}")
+    for n, (_, case, said, _) in enumerate(short):
+        tree = {"base": "base.yaml", **space.tree(case, LIST_DEFAULTS[given.kind])}
+        print(f"\n{said.strip()[:600]}\n  {json.dumps(tree)}")
+        if given.keep:
+            given.keep.mkdir(parents=True, exist_ok=True)
+            (given.keep / f"{given.kind}{n:03d}.yaml").write_text(f"# {said.strip().splitlines()[0][:200]}\n{json.dumps(tree)}\n")
+    return 1 if short else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
