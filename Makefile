@@ -8,7 +8,7 @@ BUILD        := $(if $(filter sanitize debug quick,$(PRESET)),build-$(PRESET),bu
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build deb demo demo-phantom test bench faults pairwise sanitize format check headers tidy configs clean
+.PHONY: all setup configure build deb demo demo-phantom test bench faults pairwise fuzz sanitize format check headers tidy configs clean
 
 all: build
 
@@ -69,6 +69,14 @@ pairwise: build
 	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --cases $(PAIRS)
 	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --cases $(PAIRS)
 
+# Each reader under libFuzzer with ASan and UBSan for so many minutes; needs clang and its runtime (docs/reliability.md).
+MINUTES      ?= 10
+FUZZERS       = mesh_reader_fuzz config_fuzz text_reader_fuzz invesalius_fuzz
+fuzz:
+	@CXX=clang++ cmake -G Ninja -B build-fuzz -DSEMBLANCE_FUZZ=ON > /dev/null
+	@cmake --build build-fuzz --target $(FUZZERS)
+	@tests/fuzz/fuzz.sh build-fuzz/tests/fuzz $(MINUTES) $(FUZZERS)
+
 # The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:
 	@$(MAKE) --no-print-directory test PRESET=sanitize
@@ -97,4 +105,4 @@ configs: build
 	@$(BUILD)/problems/semblance check --without-inputs configs/heads/*.yaml configs/demo_phantom/*.yaml
 
 clean:
-	@rm -rf build build-debug build-sanitize build-quick build-tidy
+	@rm -rf build build-debug build-sanitize build-quick build-tidy build-fuzz

@@ -292,7 +292,8 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
     return fail("expected the path of a file");
   }
   const std::filesystem::path base_file = (file.parent_path() / base.text).lexically_normal();
-  const auto canonical = std::filesystem::weakly_canonical(base_file);
+  std::error_code none;  // of a name that is too long, and the like: it will not be read either
+  const auto canonical = std::filesystem::weakly_canonical(base_file, none);
   if (std::find(loading.chain.begin(), loading.chain.end(), canonical) != loading.chain.end()) {
     return fail(fmt::format("'{}' would be its own base", base.text));
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
@@ -103,6 +104,8 @@ Json PointJson(const Landmark& landmark, std::size_t number) {
 LandmarkFile ParseMarkupsJson(std::string_view text, std::string_view file) {
   try {
     return FromJson(json_parts::ParseWithoutRepeats(text));
+  } catch (const nlohmann::json::exception& error) {
+    throw IoError(fmt::format("{}: {}", file, JsonFault(error)));
   } catch (const IoError& error) {
     throw IoError(fmt::format("{}: {}", file, error.what()));
   }

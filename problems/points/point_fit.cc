@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
@@ -37,13 +38,30 @@ std::string_view NameOf(ParameterSource source) {
   return EnumNames(source)[static_cast<std::size_t>(source)];
 }
 
-void CheckClosure(ParameterSource source, Closure closure) {
+// Empty if they go together.
+std::string ClosureFault(ParameterSource source, Closure closure) {
   if (source == ParameterSource::kCylinder && closure == Closure::kOpen) {
-    throw InputError("closure: parameters on a cylinder go round; write closure: periodic_u");
+    return "parameters on a cylinder go round; write closure: periodic_u";
   }
   if (source == ParameterSource::kPlane && closure == Closure::kPeriodicU) {
-    throw InputError("closure: parameters on a plane do not go round; write closure: open");
+    return "parameters on a plane do not go round; write closure: open";
   }
+  return "";
+}
+
+void CheckClosure(ParameterSource source, Closure closure) {
+  if (const std::string fault = ClosureFault(source, closure); !fault.empty()) {
+    throw InputError("closure: " + fault);
+  }
+}
+
+// What the parameters will be; nothing where that follows from the points.
+std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
+  return std::holds_alternative<PlaneParameters>(parameters)
+             ? std::optional(ParameterSource::kPlane)
+         : std::holds_alternative<CylinderParameters>(parameters)
+             ? std::optional(ParameterSource::kCylinder)
+             : std::nullopt;
 }
 
 Json VerticesJson(const HSplineSurface& surface) {
@@ -136,8 +154,36 @@ void WriteResiduals(ResidualFile kind, const FitResult& fit, OutputFolder& folde
 
 }  // namespace
 
+namespace {
+
+// What points of a file have not; empty for a term that they have all for.
+std::string_view WhatIsMissing(const Term& term) {
+  return std::holds_alternative<LandmarkTerm>(term)         ? "standard landmarks"
+         : std::holds_alternative<PriorShapeTerm>(term)     ? "a prior's face"
+         : std::holds_alternative<NonPenetrationTerm>(term) ? "bone"
+         : std::holds_alternative<SpringTerm>(term)         ? "bone"
+                                                            : "";
+}
+
+}  // namespace
+
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
   std::vector<OptionFault> faults;
+  if (const auto source = SourceAsked(options.parameters)) {
+    if (std::string fault = ClosureFault(*source, options.closure); !fault.empty()) {
+      faults.push_back({"closure", std::move(fault)});
+    }
+  }
+  for (std::size_t k = 0; k < options.fit.terms.size(); ++k) {
+    const Term& term = options.fit.terms[k];
+    if (const std::string_view missing = WhatIsMissing(term);
+        !missing.empty() && WeightOf(term) > 0) {
+      faults.push_back({fmt::format("fit.terms[{}]", k),
+                        fmt::format("the term '{}' looks at {}, and points of a file have none; "
+                                    "leave it out",
+                                    TermName(term), missing)});
+    }
+  }
   for (const FitFault& fault : FaultsOf(options.fit, ShapeOf(options).max_level)) {
     faults.push_back({"fit." + fault.path, fault.what});
   }

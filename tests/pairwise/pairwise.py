@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Options in pairs: what `check` lets pass, the program can do.
 
-usage: pairwise.py PROGRAM CONFIGS [--kind experiment|fit] [--cases N] [--seed N] [--keep FOLDER]
+usage: pairwise.py PROGRAM CONFIGS [--kind experiment|fit] [--cases N] [--minutes M] [--seed N] [--keep FOLDER]
 
 Cases are made from the schema of the options: every pair of choices (words, variants, booleans, terms) that can stand
 together is in one of them, and every number is at each end of its range in one. A case is run on the smallest phantom
@@ -214,9 +214,16 @@ class Search:
             if not loose:
                 self.words[pair] = said.strip().splitlines()[0]
                 return None
-            named = [n for n in loose if any(self.is_at(n, p) for p in paths)]
-            case = self.space.without(case, {self.random.choice(named or loose)})
-            case = {**case, **{n: v for n, v in self.space.closure(dict(pair)).items()}} if pair else case
+            # One choice for each fault that is named; where none of them is loose, the fault is what a held one does with
+            # any of the others: half of those go.
+            dropped = set()
+            for path in set(paths):
+                at = [n for n in loose if self.is_at(n, path)]
+                if at and not dropped & set(at):
+                    dropped.add(self.random.choice(at))
+            if not dropped:
+                dropped = set(self.random.sample(loose, (len(loose) + 1) // 2))
+            case = {**self.space.without(case, dropped), **self.space.closure(dict(pair or {}))}
 
     def is_at(self, name, path):
         own = ".".join(str(k) for k in self.space.by_name[name].path)
@@ -238,18 +245,18 @@ class Search:
         verdict, said, cpu_s = self.runner.run()
         return verdict, case, said, cpu_s
 
-    def pairs(self, most):
-        while len(self.results) < most:
+    def pairs(self, most, until_s):
+        while len(self.results) < most and time.monotonic() < until_s:
             pair = self.array.next_pair()
             if pair is None:
                 return
             self.try_case(self.array.case_for(pair), pair)
             self.tell()
 
-    def lone_ends(self, most):
+    def lone_ends(self, most, until_s):
         """Numbers at an end that no case has held: each alone, which must be refused or done."""
         for factor, value in list(self.array.ends):
-            if len(self.results) >= most:
+            if len(self.results) >= most or time.monotonic() >= until_s:
                 return
             case = self.space.closure({factor.name: value})
             case = self.repaired(case, ((factor.name, value),))
@@ -277,6 +284,7 @@ def main():
     arguments.add_argument("configs", type=pathlib.Path)
     arguments.add_argument("--kind", choices=["experiment", "fit"], default="experiment")
     arguments.add_argument("--cases", type=int, default=10**9)
+    arguments.add_argument("--minutes", type=float, default=1e6, help="no case is begun after so many")
     arguments.add_argument("--seed", type=int, default=1)
     arguments.add_argument("--keep", type=pathlib.Path, help="folder for the cases that fell short")
     given = arguments.parse_args()
@@ -288,8 +296,9 @@ def main():
         files = runner.prepare()
         space = (fit_space if given.kind == "fit" else experiment_space)(schema, files)
         search = Search(runner, space, given.seed)
-        search.pairs(given.cases)
-        search.lone_ends(given.cases)
+        until_s = start + 60 * given.minutes
+        search.pairs(given.cases, until_s)
+        search.lone_ends(given.cases, until_s)
     median, late = slow(search.results)
     short = [r for r in search.results if r[0] == "SHORT"] + late
     count = lambda verdict: sum(r[0] == verdict for r in search.results)

@@ -187,6 +187,10 @@ TEST(Config, AllOfUnicodeIsReadAndTextsOfSeveralLinesAreBlocks) {
   EXPECT_EQ(Read("label: one\n  and two\n").label, "one and two");
 }
 
+TEST(Config, ABaseOfANameThatNoFileCanHaveIsAnErrorLikeOthers) {
+  EXPECT_THAT(ErrorsOf("base: " + std::string(3000, 'a')), HasSubstr("x.yaml:1:7: base: "));
+}
+
 TEST(Config, WhatIsTooDeepOrTooLargeIsRefusedBeforeItIsFollowed) {
   const auto nested = [](std::size_t levels) {
     return "label: " + std::string(levels, '[') + std::string(levels, ']');

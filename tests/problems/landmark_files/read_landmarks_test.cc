@@ -123,6 +123,13 @@ TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {
               HasSubstr("the file says LPS, and RAS was asked for"));
 }
 
+TEST_F(LandmarkReadingTest, WhatIsNoMarkupFileIsNamed) {
+  for (const char* text : {"", "{\"markups\": [", "{}", "[]", "{\"markups\": [3]}",
+                           "{\"markups\": [{\"coordinateSystem\": \"LPS\"}]}"}) {
+    EXPECT_THAT(Fault("a.mrk.json", text), HasSubstr("a.mrk.json: ")) << text;
+  }
+}
+
 TEST_F(LandmarkReadingTest, OldFiducialListsOfSlicer) {
   const std::string head = "# Markups fiducial file version = 4.11\n# CoordinateSystem = {}\n";
   const std::string rows =

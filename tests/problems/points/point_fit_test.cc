@@ -190,6 +190,12 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
               HasSubstr("fit.terms: the adaptive plan has no term 'points'"));
   EXPECT_THAT(read("fit: {terms: [symmetry]}\n"),
               HasSubstr("the auto plan weighs 'points' without a loss"));
+  EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
+  EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
+  for (const char* term : {"landmarks", "prior_shape", "spring", "non_penetration"}) {
+    EXPECT_THAT(read(fmt::format("fit: {{plan: until, terms: [points, {}]}}\n", term)),
+                HasSubstr("and points of a file have none"));
+  }
   EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
 }

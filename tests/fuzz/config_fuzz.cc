@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fuzzes the reader of configurations: what is read can be written and reads back to the same text,
+// anything else is one of our errors.
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "problems/config/config.h"
+#include "surfaces/base/error.h"
+#include "tests/testing/config_samples.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using semblance::testing::Options;
+  try {
+    const std::string_view text(reinterpret_cast<const char*>(data), size);
+    const auto read = semblance::ReadConfigText<Options>(text, "/nowhere/fuzz.yaml");
+    const std::string written = semblance::WriteConfig(read);
+    const auto again = semblance::ReadConfigText<Options>(written, "/nowhere/fuzz.yaml");
+    if (semblance::WriteConfig(again) != written) {
+      std::abort();
+    }
+  } catch (const semblance::Error&) {
+  }
+  return 0;
+}

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Fuzzes the readers of texts and arrays: what is read is finite and can be written and read back,
+// anything else is one of our errors. The first byte tells which reader: c CSV of points, n NPY,
+// h H-spline, f .fcsv, m .mrk.json, p .pp, t point list, l landmark table, v condition on values.
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "problems/config/value_filter.h"
+#include "problems/landmark_files/fcsv.h"
+#include "problems/landmark_files/landmark_table.h"
+#include "problems/landmark_files/markups_json.h"
+#include "problems/landmark_files/picked_points.h"
+#include "problems/points/point_table.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/npy.h"
+#include "surfaces/hspline_files/hspline_json.h"
+
+namespace {
+
+using semblance::LandmarkFile;
+
+void Demand(bool law) {
+  if (!law) {
+    std::abort();
+  }
+}
+
+void ReadPoints(std::string_view bytes) {
+  const semblance::PointTable table = semblance::ParsePointTable(bytes, "fuzz");
+  Demand(!table.positions.empty());
+  for (const semblance::Vec3& p : table.positions) {
+    Demand(p.allFinite());
+  }
+}
+
+void ReadArray(std::string_view bytes) {
+  const semblance::NpyArray array = semblance::ParseNpy(bytes, "fuzz");
+  std::size_t count = 1;
+  for (const std::size_t n : array.shape) {
+    count *= n;
+  }
+  Demand(array.values.size() == count);
+}
+
+void ReadSurface(std::string_view bytes) {
+  const semblance::HSplineSurface surface = semblance::HSplineFromJson(bytes, "fuzz");
+  const std::string text = semblance::HSplineToJson(surface);
+  Demand(semblance::HSplineToJson(semblance::HSplineFromJson(text, "fuzz")) == text);
+}
+
+void Look(const LandmarkFile& file) {
+  for (const semblance::Landmark& landmark : file.landmarks) {
+    for (const double x : landmark.point) {
+      Demand(std::isfinite(x));
+    }
+  }
+}
+
+void ReadTable(std::string_view bytes) {
+  std::vector<std::string> ignored;
+  Look(semblance::ParseLandmarkTable(bytes, "fuzz", ignored));
+}
+
+void ReadCondition(std::string_view bytes) {
+  const std::vector<std::string> names = {"subject", "interp", "implicit.resolution"};
+  const semblance::ValueFilter filter(bytes, names);
+  filter.Holds({{"subject", "a"}, {"interp", "kriging"}, {"implicit.resolution", "40"}});
+}
+
+void Read(char kind, std::string_view bytes) {
+  switch (kind) {
+    case 'c':
+      return ReadPoints(bytes);
+    case 'n':
+      return ReadArray(bytes);
+    case 'h':
+      return ReadSurface(bytes);
+    case 'f':
+      return Look(semblance::ParseFcsv(bytes, "fuzz"));
+    case 'm':
+      return Look(semblance::ParseMarkupsJson(bytes, "fuzz"));
+    case 'p':
+      return Look(semblance::ParseMeshLabPoints(bytes, "fuzz"));
+    case 't':
+      return Look(semblance::ParsePointList(bytes, "fuzz"));
+    case 'l':
+      return ReadTable(bytes);
+    default:
+      return ReadCondition(bytes);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) {
+    return 0;
+  }
+  try {
+    Read(static_cast<char>(data[0]), {reinterpret_cast<const char*>(data) + 1, size - 1});
+  } catch (const semblance::Error&) {
+  }
+  return 0;
+}
