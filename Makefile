@@ -8,7 +8,7 @@ BUILD        := $(if $(filter sanitize debug quick,$(PRESET)),build-$(PRESET),bu
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build deb demo demo-phantom test bench faults pairwise fuzz sanitize format check headers tidy configs clean
+.PHONY: all setup configure build deb demo demo-phantom test bench faults pairwise fuzz sanitize format check headers tidy configs clean site
 
 all: build
 
@@ -29,6 +29,11 @@ build: configure
 deb: build
 	@cd $(BUILD) && cpack > packages.log || { cat packages.log; exit 1; }
 	@ls $(BUILD)/packages/*.deb
+
+# The documents as static pages, in out/site.
+site: PACKAGES = python3 python3-markdown-it
+site: setup
+	@/usr/bin/python3 docs/site.py out/site
 
 # The program alone, in the way that builds fastest from nothing: the tests would double the time.
 demo: PACKAGES = $(RUN_PACKAGES)
