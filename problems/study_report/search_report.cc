@@ -173,11 +173,12 @@ std::vector<AxisLine> CurvesOf(const SearchResults& search) {
 
 ReportTable ImprovementsTable(const SearchResults& search) {
   ReportTable table{"Each full run that was better than all before",
-                    {"treatment", "full runs spent", "value"},
+                    {"treatment", "full runs spent", "value", "less the base"},
                     {}};
   for (const std::size_t n : search.improvements) {
     const SearchedTreatment& t = search.treatments[n];
-    table.rows.push_back({t.label, fmt::format("{:.4g}", t.spent), TableNumber(t.value)});
+    table.rows.push_back({t.label, fmt::format("{:.4g}", t.spent), TableNumber(t.value),
+                          TableNumber(t.value - search.base)});
   }
   return table;
 }
