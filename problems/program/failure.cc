@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "problems/config/terminal_text.h"
 #include "problems/program/exit_code.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -39,9 +40,8 @@ std::string ShortLine(std::string_view line) {
     text = fmt::format("{} [... {} bytes left out ...] {}", line.substr(0, begin), end - begin,
                        line.substr(end));
   }
-  std::ranges::replace_if(
-      text, [](unsigned char c) { return c < 0x20 || c == 0x7F; }, '?');
-  return text;
+  std::ranges::replace(text, '\n', '?');
+  return ForTerminal(text);
 }
 
 std::string WordsOf(const std::filesystem::filesystem_error& error) {

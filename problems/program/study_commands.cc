@@ -10,9 +10,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "problems/compare/comparison_files.h"
+#include "problems/config/terminal_text.h"
 #include "problems/output/staged_folder.h"
 #include "problems/program/exit_code.h"
 #include "problems/study/study_run.h"
@@ -61,21 +63,26 @@ void SetShard(const std::string& text, StudyRunOptions& options) {
   }
 }
 
+// Names of subjects, axes and studies come from files.
+template <class... Values>
+void Tell(fmt::format_string<Values...> words, Values&&... values) {
+  fmt::print("{}", ForTerminal(fmt::format(words, std::forward<Values>(values)...)));
+}
+
 int PrintPlan(const StudyPlan& plan, const std::string& only) {
   const std::vector<bool> chosen = TrialsThat(plan, only);
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     const StudyTrial& trial = plan.trials[n];
     if (chosen[n]) {
-      fmt::print("{} {} | {}\n", trial.id, trial.subject, fmt::join(trial.values, " | "));
+      Tell("{} {} | {}\n", trial.id, trial.subject, fmt::join(trial.values, " | "));
     }
   }
-  fmt::print("plan {}: {} trials over {}\n", plan.hash, plan.trials.size(),
-             fmt::join(plan.axes, ", "));
+  Tell("plan {}: {} trials over {}\n", plan.hash, plan.trials.size(), fmt::join(plan.axes, ", "));
   if (!only.empty()) {
-    fmt::print("of these {} where {}\n", std::ranges::count(chosen, true), only);
+    Tell("of these {} where {}\n", std::ranges::count(chosen, true), only);
   }
   if (plan.search) {
-    fmt::print(
+    Tell(
         "then a search: treatments for {} full runs, each on {} subjects; which they are depends "
         "on what those before gave\n",
         plan.search->options.budget, plan.search->subjects.size());
@@ -87,21 +94,21 @@ int PrintPlan(const StudyPlan& plan, const std::string& only) {
 int PrintStudyState(const StudyResults& results, const fs::path& root) {
   for (const TrialRow& row : results.trials) {
     if (row.status == "failed" || row.status == "missing") {
-      fmt::print("{}: {} {} | {}{}{}\n", row.status, row.id, row.subject,
-                 fmt::join(row.values, " | "), row.reason.empty() ? "" : ": ", row.reason);
+      Tell("{}: {} {} | {}{}{}\n", row.status, row.id, row.subject, fmt::join(row.values, " | "),
+           row.reason.empty() ? "" : ": ", row.reason);
     }
   }
-  fmt::print("{}", RankingText(results));
+  Tell("{}", RankingText(results));
   if (const auto search = ReadSearchResults(root, results)) {
-    fmt::print("{}", SearchText(results, *search));
+    Tell("{}", SearchText(results, *search));
   }
-  fmt::print("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
-             results.trials.size(), results.Count("unusable"), results.Count("failed"),
-             results.Count("missing"));
+  Tell("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
+       results.trials.size(), results.Count("unusable"), results.Count("failed"),
+       results.Count("missing"));
   if (fs::exists(root / "report.html")) {
-    fmt::print("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
+    Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
   } else {
-    fmt::print("no report yet; semblance merge {} makes one of what is there\n", root.string());
+    Tell("no report yet; semblance merge {} makes one of what is there\n", root.string());
   }
   return results.Count("done") == static_cast<int>(results.trials.size()) ? kDone : kNotUsable;
 }
@@ -115,19 +122,19 @@ int PrintPartState(const StudyResults& results, const std::vector<bool>& asked,
     count += asked[n] ? 1 : 0;
     done += asked[n] && row.status == "done" ? 1 : 0;
     if (asked[n] && row.status != "done") {
-      fmt::print("{}: {} {} | {}: {}\n", row.status, row.id, row.subject,
-                 fmt::join(row.values, " | "), row.reason);
+      Tell("{}: {} {} | {}: {}\n", row.status, row.id, row.subject, fmt::join(row.values, " | "),
+           row.reason);
     }
   }
-  fmt::print("{} of the {} trials asked for done; of all {} of the study {} are missing\n", done,
-             count, results.trials.size(), results.Count("missing"));
-  fmt::print("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
+  Tell("{} of the {} trials asked for done; of all {} of the study {} are missing\n", done, count,
+       results.trials.size(), results.Count("missing"));
+  Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
   return done == count ? kDone : kNotUsable;
 }
 
 void TellChange(const StudySummary& summary, const fs::path& root) {
   if (summary.changed) {
-    fmt::print(
+    Tell(
         "note: the study has changed since {} was written: {} of its trials were there already; {} "
         "of the earlier plan are no longer in it, and stay in trials/\n",
         root.string(), summary.skipped, summary.left_over);
@@ -151,7 +158,7 @@ int StudyCommand(const StudyArguments& a) {
                                           : Rerun::kNothing;
   const StudyPlan plan = ReadStudy(file);
   for (const std::string& note : plan.notes) {
-    fmt::print("note: {}\n", note);
+    Tell("note: {}\n", note);
   }
   if (plan_only) {
     return PrintPlan(plan, options.only);
@@ -165,7 +172,7 @@ int StudyCommand(const StudyArguments& a) {
   const StudySummary summary = RunStudy(plan, root, options, context);
   TellChange(summary, root);
   if (options.shards > 1) {
-    fmt::print(
+    Tell(
         "shard {} of {}: {} trials, {} already there, {} done, {} failed; gather with "
         "semblance merge\n",
         options.shard, options.shards, summary.trials, summary.skipped, summary.done,
@@ -186,7 +193,7 @@ int StudyCommand(const StudyArguments& a) {
 int MergeCommand(const StudyArguments& a) {
   const fs::path root = a.files.at(0);
   for (const std::string& line : GatherTrials(root, {a.files.begin() + 1, a.files.end()})) {
-    fmt::print(stderr, "semblance: {}\n", line);
+    fmt::print(stderr, "semblance: {}\n", ForTerminal(line));
   }
   if (!fs::exists(root / "plan.json")) {
     throw IoError(fmt::format("{}: no folder of a study; it has no plan.json", root.string()));
@@ -203,12 +210,12 @@ int StatusCommand(const StudyArguments& a) {
 int CompareCommand(const StudyArguments& a) {
   const StudyComparison comparison =
       CompareStudies(ReadStudies({a.files.begin(), a.files.end()}), a.metric);
-  fmt::print("{}", ComparisonText(comparison));
+  Tell("{}", ComparisonText(comparison));
   if (!a.out.empty()) {
     StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
     WriteComparison(comparison, folder.Files());
     folder.Publish();
-    fmt::print("report: {}\n", (folder.Root() / "report.html").string());
+    Tell("report: {}\n", (folder.Root() / "report.html").string());
   }
   return kDone;
 }

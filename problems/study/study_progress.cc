@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "problems/config/terminal_text.h"
+
 namespace semblance {
 namespace {
 
@@ -56,7 +58,7 @@ void StudyProgress::operator()(const StudyEta& eta, const std::string& trial) {
   is_over_ = is_last;
   if (eta.failed > failed_) {
     failed_ = eta.failed;
-    Put(stream_, fmt::format("{}{}\n", is_terminal_ ? kClearLine : "", trial));
+    Put(stream_, fmt::format("{}{}\n", is_terminal_ ? kClearLine : "", ForTerminal(trial)));
   }
   if (is_terminal_) {
     Put(stream_,

@@ -15,7 +15,7 @@ mkdir -p found
 # Seeds for a target. Those of text_reader_fuzz begin with the letter of their reader.
 seeds() {
   case $1 in
-    config_fuzz) cp "$source"/configs/*.yaml "$source"/configs/*/*.yaml "$broken"/*.yaml corpus/config_fuzz ;;
+    config_fuzz) cp "$source"/configs/*.yaml "$source"/configs/*/*.yaml "$broken"/*.yaml corpus/config_fuzz 2> /dev/null ;;
     mesh_reader_fuzz | invesalius_fuzz)
       for f in "$broken"/*; do [ "$(stat -c %s "$f")" -lt 20000 ] && cp "$f" "corpus/$1"; done ;;
     text_reader_fuzz)
