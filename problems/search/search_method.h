@@ -3,6 +3,7 @@
 // worth.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string_view>
 #include <variant>
