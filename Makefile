@@ -31,7 +31,7 @@ deb: build
 	@ls $(BUILD)/packages/*.deb
 
 # The documents as static pages, in out/site.
-site: PACKAGES = python3 python3-markdown-it
+site: PACKAGES = $(shell grep -E '^python3(-markdown-it)? ' .ci/packages.txt | sed 's/#.*//')
 site: setup
 	@/usr/bin/python3 docs/site.py out/site
 
