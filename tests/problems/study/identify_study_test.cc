@@ -58,7 +58,8 @@ TEST_F(IdentifyStudy, WhatIsWrongIsSaidAtItsPlace) {
     }
     return "no error";
   };
-  EXPECT_THAT(fault("identify: {others: [{name: a}]}\n"), HasSubstr("'a' is a subject too"));
+  EXPECT_THAT(fault("identify: {others: [{name: a}]}\n"),
+              HasSubstr("'a' is one of the subjects already"));
   EXPECT_THAT(fault("identify: {others: [{set: {}}]}\n"), HasSubstr("has no name"));
   EXPECT_THAT(fault("identify: {ceiling_cell_mm: -1}\n"), HasSubstr("ceiling_cell_mm"));
   WriteFileAtomically(folder_ / "study.yaml",
