@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
+#include "problems/search/best_first.h"
 #include "problems/search/unit_samples.h"
 
 namespace semblance {
@@ -54,10 +54,9 @@ void Append(KnownCosts& known, const Eigen::VectorXd& code, double cost) {
 }
 
 // The columns of the three least costs.
-std::vector<Eigen::Index> BestOf(const KnownCosts& known) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(known.costs.size()));
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, {}, [&](Eigen::Index i) { return known.costs[i]; });
+std::vector<std::size_t> BestOf(const KnownCosts& known) {
+  std::vector<std::size_t> order =
+      BestFirst({known.costs.data(), static_cast<std::size_t>(known.costs.size())});
   order.resize(std::min<std::size_t>(order.size(), 3));
   return order;
 }
@@ -123,10 +122,11 @@ std::vector<SearchPoint> BayesSearcher::Candidates(const KnownCosts& known) {
   for (int n = 0; n < kEverywhere; ++n) {
     candidates.push_back(RandomPoint(space_, random_));
   }
-  for (const Eigen::Index best : BestOf(known)) {
+  for (const std::size_t best : BestOf(known)) {
     for (const double distance : kDistances) {
       for (int n = 0; n < kAround; ++n) {
-        candidates.push_back(Decode(space_, Near(known.codes.col(best), distance, random_)));
+        candidates.push_back(Decode(
+            space_, Near(known.codes.col(static_cast<Eigen::Index>(best)), distance, random_)));
       }
     }
   }

@@ -4,24 +4,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <utility>
 
+#include "problems/search/best_first.h"
+
 namespace semblance {
-namespace {
-
-// Best first; those that have no cost last, in the order in which they were asked for.
-std::vector<std::size_t> OrderOf(std::span<const double> costs) {
-  std::vector<std::size_t> order(costs.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) {
-    return std::isfinite(costs[i]) ? costs[i] : std::numeric_limits<double>::infinity();
-  });
-  return order;
-}
-
-}  // namespace
 
 CmaEsSearcher::CmaEsSearcher(const CmaEsSearch& options, SearchSpace space,
                              const SearchBudget& budget)
@@ -69,7 +56,7 @@ void CmaEsSearcher::Tell(std::span<const double> costs) {
   if (static_cast<int>(costs.size()) < lambda_) {
     return;
   }
-  const std::vector<std::size_t> order = OrderOf(costs);
+  const std::vector<std::size_t> order = BestFirst(costs);
   Eigen::VectorXd step = Eigen::VectorXd::Zero(mean_.size());
   for (Eigen::Index i = 0; i < weights_.size(); ++i) {
     step += weights_[i] * steps_[order[static_cast<std::size_t>(i)]];

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <utility>
+
+#include "problems/search/best_first.h"
 
 namespace semblance {
 namespace {
@@ -46,11 +46,7 @@ void HalvingSearcher::Tell(std::span<const double> costs) {
     points_.clear();
     return;
   }
-  std::vector<std::size_t> order(points_.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::ranges::stable_sort(order, {}, [&](std::size_t i) {
-    return std::isfinite(costs[i]) ? costs[i] : std::numeric_limits<double>::infinity();
-  });
+  std::vector<std::size_t> order = BestFirst(costs);
   order.resize(static_cast<std::size_t>(Promoted(static_cast<int>(order.size()), options_.eta)));
   std::vector<SearchPoint> promoted;
   for (const std::size_t i : order) {

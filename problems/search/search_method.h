@@ -93,7 +93,7 @@ void Fields(Visitor& visit, HalvingSearch& o) {
                   .doc = "what a run is shortened by on each rung but the last, cheapest first, by "
                          "option path, as in [{implicit.resolution: 30}, {implicit.resolution: "
                          "50}]; left out, the fit's own steps: eta times fewer steps of a "
-                         "schedule, passes, or levels a rung"},
+                         "schedule, passes, or levels per rung"},
         o.short_runs);
 }
 template <class Report>

@@ -20,7 +20,7 @@ struct KnownCosts {
 
 // Matern 5/2 with a length for each axis, a constant mean and a nugget.
 struct SurrogateHyper {
-  Eigen::VectorXd log_lengths;  // one an axis
+  Eigen::VectorXd log_lengths;  // one per axis
   double log_nugget = 0;        // of its share of the process's variance
 };
 
