@@ -6,8 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <map>
-#include <regex>
 #include <set>
 
 #include "problems/study/study_run.h"
@@ -16,6 +14,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
+#include "tests/testing/study_files.h"
 
 namespace semblance {
 namespace {
@@ -25,6 +24,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::ScratchFolder;
+using testing::StudyFiles;
 using testing::WordsOf;
 
 const std::string kBase = fmt::format(
@@ -49,19 +49,6 @@ class SearchRunTest : public ::testing::Test {
   std::string Faults(const std::string& text) {
     return WordsOf<ConfigError>([&] { Plan(text); });
   }
-  std::map<std::string, std::string> Tables(const fs::path& root) {
-    OutputFolder output(root, WhenNotEmpty::kReplaceFiles);
-    WriteStudyTables(output);
-    std::map<std::string, std::string> files;
-    for (const auto& entry : fs::recursive_directory_iterator(root)) {
-      if (entry.is_regular_file() && entry.path().filename() != "timing.json") {
-        files[fs::relative(entry.path(), root).generic_string()] = ReadFileBytes(entry.path());
-      }
-    }
-    static const std::regex kSeconds("(data-head=\"(mean )?seconds\">)[^<]*<");
-    files["report.html"] = std::regex_replace(files["report.html"], kSeconds, "$1<");
-    return files;
-  }
   static SearchResults Results(const fs::path& root) {
     return ReadSearchResults(root, ReadStudyResults(root)).value();
   }
@@ -72,14 +59,14 @@ class SearchRunTest : public ::testing::Test {
 TEST_F(SearchRunTest, SameBytesForAnyJobsShardsAndInterruptions) {
   const StudyPlan plan = Plan(kBayes);
   RunStudy(plan, folder_ / "one", {}, {});
-  const auto one = Tables(folder_ / "one");
+  const auto one = StudyFiles(folder_ / "one");
   const SearchResults found = Results(folder_ / "one");
   EXPECT_TRUE(found.ended);
   EXPECT_EQ(found.treatments.size(), 6u);
   EXPECT_THAT(one.at("report.html"), HasSubstr("best so far"));
 
   RunStudy(plan, folder_ / "two", {.jobs = 2}, {});
-  EXPECT_EQ(Tables(folder_ / "two"), one);
+  EXPECT_EQ(StudyFiles(folder_ / "two"), one);
 
   // Each shard goes as far as it can without the other.
   int calls = 0;
@@ -88,7 +75,7 @@ TEST_F(SearchRunTest, SameBytesForAnyJobsShardsAndInterruptions) {
   }
   EXPECT_GT(calls, 2);
   EXPECT_LT(calls, 20);
-  EXPECT_EQ(Tables(folder_ / "shards"), one);
+  EXPECT_EQ(StudyFiles(folder_ / "shards"), one);
 
   // As if killed: of a search that has ended some trials are gone or cut short, its plan too.
   const StudyResults results = ReadStudyResults(folder_ / "one");
@@ -98,7 +85,7 @@ TEST_F(SearchRunTest, SameBytesForAnyJobsShardsAndInterruptions) {
   WriteFileAtomically(folder_ / "one" / "trials" / results.trials[6].id / "trial.json", "{\"id\"");
   fs::remove(folder_ / "one" / "plan.json");
   EXPECT_EQ(RunStudy(plan, folder_ / "one", {}, {}).done, 3);
-  EXPECT_EQ(Tables(folder_ / "one"), one);
+  EXPECT_EQ(StudyFiles(folder_ / "one"), one);
 }
 
 TEST_F(SearchRunTest, ALargerBudgetGoesOn) {
@@ -112,7 +99,7 @@ TEST_F(SearchRunTest, ALargerBudgetGoesOn) {
   EXPECT_EQ(on.done, 2 * 2);
   EXPECT_EQ(on.left_over, 0);
   RunStudy(Plan(with_budget(5)), folder_ / "new", {}, {});
-  EXPECT_EQ(Tables(folder_ / "run"), Tables(folder_ / "new"));
+  EXPECT_EQ(StudyFiles(folder_ / "run"), StudyFiles(folder_ / "new"));
 }
 
 TEST_F(SearchRunTest, TheBestIsTheBestOfWhatWasTriedEitherWayRound) {

@@ -4,8 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <map>
-#include <regex>
 #include <string>
 
 #include "problems/config/config.h"
@@ -16,6 +14,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
+#include "tests/testing/study_files.h"
 
 namespace semblance {
 namespace {
@@ -24,6 +23,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ScratchFolder;
+using testing::StudyFiles;
 using testing::WordsOf;
 
 const std::string kBase = fmt::format(
@@ -40,20 +40,6 @@ class StudyTest : public ::testing::Test {
     return file;
   }
   StudyPlan Plan(const std::string& text) { return ReadStudy(Write(kBase + text)); }
-  // The tables of a finished folder; the trials' timing and the seconds in the report apart.
-  std::map<std::string, std::string> Tables(const fs::path& root) {
-    OutputFolder output(root, WhenNotEmpty::kReplaceFiles);
-    WriteStudyTables(output);
-    std::map<std::string, std::string> files;
-    for (const auto& entry : fs::recursive_directory_iterator(root)) {
-      if (entry.is_regular_file() && entry.path().filename() != "timing.json") {
-        files[fs::relative(entry.path(), root).generic_string()] = ReadFileBytes(entry.path());
-      }
-    }
-    static const std::regex kSeconds("(data-head=\"(mean )?seconds\">)[^<]*<");
-    files["report.html"] = std::regex_replace(files["report.html"], kSeconds, "$1<");
-    return files;
-  }
 
   ScratchFolder folder_;
 };
@@ -67,17 +53,17 @@ const char* const kSmall =
 TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
   const StudyPlan plan = Plan(kSmall);
   RunStudy(plan, folder_ / "one", {}, {});
-  const auto one = Tables(folder_ / "one");
+  const auto one = StudyFiles(folder_ / "one");
   EXPECT_THAT(one.at("trials.csv"), HasSubstr(",implicit_face.rms_mm,"));
 
   RunStudy(plan, folder_ / "two", {.jobs = 2}, {});
-  EXPECT_EQ(Tables(folder_ / "two"), one);
+  EXPECT_EQ(StudyFiles(folder_ / "two"), one);
 
   for (int shard = 0; shard < 3; ++shard) {
     RunStudy(plan, folder_ / fmt::format("shard{}", shard), {.shard = shard, .shards = 3}, {});
   }
   GatherTrials(folder_ / "merged", {folder_ / "shard2", folder_ / "shard0", folder_ / "shard1"});
-  EXPECT_EQ(Tables(folder_ / "merged"), one);
+  EXPECT_EQ(StudyFiles(folder_ / "merged"), one);
 
   // As if killed: one trial is gone, one is cut short.
   fs::remove_all(folder_ / "one" / "trials" / plan.trials[0].id);
@@ -85,7 +71,7 @@ TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
   const StudySummary again = RunStudy(plan, folder_ / "one", {}, {});
   EXPECT_EQ(again.skipped, 2);
   EXPECT_EQ(again.done, 2);
-  EXPECT_EQ(Tables(folder_ / "one"), one);
+  EXPECT_EQ(StudyFiles(folder_ / "one"), one);
 }
 
 // A study whose file has changed is, trial for trial and table for table, the study that was never
@@ -104,8 +90,8 @@ TEST_F(StudyTest, AChangedStudyKeepsTheTrialsThatItStillHasAndEndsAsIfItHadBeenS
   EXPECT_EQ(on.left_over, 3);
   const StudySummary anew = RunStudy(changed, folder_ / "new", {}, {});
   EXPECT_FALSE(anew.changed);
-  auto run = Tables(folder_ / "run");
-  for (const auto& [name, bytes] : Tables(folder_ / "new")) {
+  auto run = StudyFiles(folder_ / "run");
+  for (const auto& [name, bytes] : StudyFiles(folder_ / "new")) {
     EXPECT_EQ(run.at(name), bytes) << name;
   }
   EXPECT_EQ(RunStudy(changed, folder_ / "run", {}, {}).skipped, 4);
@@ -132,7 +118,7 @@ TEST_F(StudyTest, OnlyWhatIsAskedForRunsAndTheRestFollowsLater) {
             2);
   EXPECT_EQ(RunStudy(plan, folder_ / "run", {}, {}).done, 2);
   RunStudy(plan, folder_ / "whole", {}, {});
-  EXPECT_EQ(Tables(folder_ / "run"), Tables(folder_ / "whole"));
+  EXPECT_EQ(StudyFiles(folder_ / "run"), StudyFiles(folder_ / "whole"));
   EXPECT_THAT(
       WordsOf<InputError>([&] { RunStudy(plan, folder_ / "none", {.only = "subject = x"}, {}); }),
       HasSubstr("none of the 4 trials is so"));
@@ -165,7 +151,7 @@ TEST_F(StudyTest, TheMetricsOfARunAreKnownBeforeIt) {
 
 TEST_F(StudyTest, UnlikeAreasAreSaid) {
   RunStudy(Plan("grid: {region.extent: [face, network]}\n"), folder_ / "unlike", {}, {});
-  EXPECT_THAT(Tables(folder_ / "unlike").at("report.html"),
+  EXPECT_THAT(StudyFiles(folder_ / "unlike").at("report.html"),
               HasSubstr("were not measured on the same area (face.area_cm2"));
   RunStudy(Plan("grid: {landmarks.keep: [all, {type: spread, n: 12}]}\n"), folder_ / "alike", {},
            {});
@@ -178,7 +164,7 @@ TEST_F(StudyTest, AFailedTrialIsARowWithItsReason) {
   const StudySummary summary = RunStudy(plan, folder_ / "run", {}, {});
   EXPECT_EQ(summary.failed, 1);
   EXPECT_EQ(summary.done, 1);
-  const auto files = Tables(folder_ / "run");
+  const auto files = StudyFiles(folder_ / "run");
   EXPECT_THAT(files.at("trials.csv"), HasSubstr("failed,\"landmarks of phantom 1"));
   EXPECT_THAT(files.at("report.html"), HasSubstr("max_distance_mm"));
   EXPECT_EQ(RunStudy(plan, folder_ / "run", {}, {}).skipped, 2);
@@ -197,7 +183,7 @@ TEST_F(StudyTest, WhatIsMissingIsCountedAndSaid) {
 
 TEST_F(StudyTest, OfOneTreatmentNoDifferenceIsAsked) {
   RunStudy(Plan("grid: {landmarks.max_distance_mm: [50]}\n"), folder_ / "run", {}, {});
-  const std::string report = Tables(folder_ / "run").at("report.html");
+  const std::string report = StudyFiles(folder_ / "run").at("report.html");
   EXPECT_THAT(report, HasSubstr("Behind the metric"));
   EXPECT_THAT(report, Not(HasSubstr("Do the treatments differ?")));
 }
