@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "problems/search/best_first.h"
@@ -28,7 +29,7 @@ Eigen::VectorXd Near(const Eigen::VectorXd& code, double distance, Random& rando
 // The worst finite one, or 0, in place of each that is not.
 Eigen::VectorXd WithoutGaps(const std::vector<double>& costs) {
   Eigen::VectorXd all = Eigen::Map<const Eigen::VectorXd>(costs.data(), std::ssize(costs));
-  double worst = -INFINITY;
+  double worst = -std::numeric_limits<double>::infinity();
   for (const double cost : costs) {
     worst = std::isfinite(cost) ? std::max(worst, cost) : worst;
   }
