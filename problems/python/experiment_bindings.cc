@@ -57,7 +57,7 @@ py::dict RunConfig(const std::string& config, const py::dict& set,
     }
   }
   py::dict answer;
-  answer["result"] = FromJson(ResultJson(experiment, *result));
+  answer["result"] = FromJson(ResultJson(experiment, *result).dump());
   answer["surface"] = result->fit.surface;
   answer["faults"] = result->Faults();
   return answer;

@@ -304,7 +304,7 @@ std::string ManifestJson(Json provenance, const OutputFolder& folder) {
 
 }  // namespace
 
-std::string ResultJson(const Experiment& experiment, const RunResult& result) {
+Json ResultJson(const Experiment& experiment, const RunResult& result) {
   Json json = {{"title", experiment.title},
                {"subject", result.subject.name},
                {"usable", result.usable()},
@@ -330,7 +330,7 @@ std::string ResultJson(const Experiment& experiment, const RunResult& result) {
   for (const std::string& note : result.implicit.notes) {
     json["notes"].push_back(note);
   }
-  return json.dump(2) + "\n";
+  return json;
 }
 
 void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,
@@ -338,7 +338,7 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
   context.Report("write");
   std::filesystem::remove(folder.Root() / "manifest.json");  // of a run that is written over
   folder.Write("resolved.yaml", WriteConfig(experiment));
-  folder.Write("result.json", ResultJson(experiment, result));
+  folder.Write("result.json", ResultJson(experiment, result).dump(2) + "\n");
   folder.Write("dowels.csv", DowelsCsv(result));
   folder.Write("seeds.csv", SeedsCsv(result));
   WriteMeshes(result, folder, context);

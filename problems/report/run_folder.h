@@ -2,6 +2,7 @@
 // What a run leaves in its folder.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "problems/output/files.h"
@@ -17,7 +18,8 @@ namespace semblance {
 void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,
               const RunContext& context);
 
-// result.json: the metrics and counts; null where there is no number.
-std::string ResultJson(const Experiment& experiment, const RunResult& result);
+// result.json: the metrics and counts; null, or NaN that is written as null, where there is no
+// number.
+nlohmann::ordered_json ResultJson(const Experiment& experiment, const RunResult& result);
 
 }  // namespace semblance

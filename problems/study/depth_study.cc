@@ -175,7 +175,7 @@ DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context
   return result;
 }
 
-std::string DepthResultJson(const Experiment& experiment, const DepthResult& result) {
+Json DepthResultJson(const Experiment& experiment, const DepthResult& result) {
   Json json = {{"title", experiment.title},
                {"subject", result.stage->subject.name},
                {"usable", result.usable()},
@@ -190,7 +190,7 @@ std::string DepthResultJson(const Experiment& experiment, const DepthResult& res
     json["cross_validation"][kind] = CrossValidationToJson(left_out);
   }
   json["notes"] = result.stage->subject.notes;
-  return json.dump(2) + "\n";
+  return json;
 }
 
 std::string LeftOutCsv(const DepthResult& result) {
@@ -246,7 +246,7 @@ std::string DepthPicture(const DepthResult& result, const std::string& title, in
 void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputFolder& folder,
                 const RunContext& context) {
   folder.Write("resolved.yaml", WriteConfig(experiment));
-  folder.Write("result.json", DepthResultJson(experiment, result));
+  folder.Write("result.json", DepthResultJson(experiment, result).dump(2) + "\n");
   folder.Write("left_out.csv", LeftOutCsv(result));
   folder.Write("depth.ply", DepthPly(result));
   folder.Write("tips.ply", TipsPly(result));

@@ -168,14 +168,14 @@ IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryE
   return result;
 }
 
-std::string IdentifyResultJson(const Experiment& experiment, const IdentifyResult& result) {
-  Json json = Json::parse(ResultJson(experiment, result.run));
+Json IdentifyResultJson(const Experiment& experiment, const IdentifyResult& result) {
+  Json json = ResultJson(experiment, result.run);
   Json identify = {{"gallery", result.gallery}, {"chance_rank", ChanceRank(result.gallery)}};
   identify.update(ProbeJson(result.approximation));
   identify["ceiling"] = ProbeJson(result.ceiling);
   identify["floor"] = ProbeJson(result.floor);
   json["identify"] = identify;
-  return json.dump(2) + "\n";
+  return json;
 }
 
 }  // namespace semblance

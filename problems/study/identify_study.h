@@ -45,6 +45,7 @@ IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryE
 
 // ResultJson of the run with identify{gallery, chance_rank, surface{rank, own_mm, best_other_mm},
 // landmarks{}, ceiling{surface{}, landmarks{}}, floor{}}.
-std::string IdentifyResultJson(const Experiment& experiment, const IdentifyResult& result);
+nlohmann::ordered_json IdentifyResultJson(const Experiment& experiment,
+                                          const IdentifyResult& result);
 
 }  // namespace semblance

@@ -101,7 +101,7 @@ DepthResult EmptyDepth() {
   return result;
 }
 
-std::string EmptyResultJson(StudyJob job) {
+Json EmptyResultJson(StudyJob job) {
   return job == StudyJob::kDepth  ? DepthResultJson(Experiment{}, EmptyDepth())
          : job == StudyJob::kFace ? ResultJson(Experiment{}, EmptyRun())
                                   : IdentifyResultJson(Experiment{}, {.run = EmptyRun()});
@@ -120,7 +120,7 @@ bool IsOfOneSubject(const std::string& metric) {
 
 std::set<std::string> MetricsOf(StudyJob job) {
   std::set<std::string> names;
-  AddNames(Json::parse(EmptyResultJson(job)), "", names);
+  AddNames(EmptyResultJson(job), "", names);
   return names;
 }
 

@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "problems/inputs/input_files.h"
+#include "problems/output/file_hashes.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
@@ -50,13 +51,12 @@ Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
 }
 
 // What identifies how a trial came about. Inputs by name and content: folders differ by machine.
-void AppendProvenance(const StudyTrial& trial, Json& json) {
+void AppendProvenance(const StudyTrial& trial, FileHashes& hashes, Json& json) {
   std::string config = WriteConfig(trial.experiment);
   json["inputs"] = Json::array();
   for (const fs::path& file : InputFilesOf(trial.experiment)) {
     for (const fs::path& part : fs::is_directory(file) ? VolumeFiles(file) : std::vector{file}) {
-      json["inputs"].push_back(
-          {{"file", part.filename().string()}, {"sha256", Sha256OfFile(part)}});
+      json["inputs"].push_back({{"file", part.filename().string()}, {"sha256", hashes.Of(part)}});
     }
     for (std::size_t at = config.find(file.string()); at != config.npos;
          at = config.find(file.string(), at)) {
@@ -219,7 +219,7 @@ class StudyRunner {
     } catch (const std::exception& error) {
       Fail(error.what(), json);
     }
-    AppendProvenance(trial, json);
+    AppendProvenance(trial, input_hashes_, json);
     OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
     write(output);
     std::vector<std::string> names = output.Written();
@@ -265,7 +265,7 @@ class StudyRunner {
     auto result = std::make_shared<const RunResult>(
         semblance::Run(AsLookedAt(trial.experiment), Quiet(), &cache_));
     SetStatus(result->Faults(), json);
-    json["result"] = Json::parse(ResultJson(trial.experiment, *result));
+    json["result"] = ResultJson(trial.experiment, *result);
     return FilesOfRun(trial, result, ThreadCpu_s() - cpu_before_s);
   }
 
@@ -279,7 +279,7 @@ class StudyRunner {
         AsLookedAt(trial.experiment), plan_.gallery,
         static_cast<std::size_t>(own - plan_.gallery.begin()), plan_.identify, Quiet(), cache_));
     SetStatus(result->run.Faults(), json);
-    json["result"] = Json::parse(IdentifyResultJson(trial.experiment, *result));
+    json["result"] = IdentifyResultJson(trial.experiment, *result);
     return FilesOfRun(trial, {result, &result->run}, ThreadCpu_s() - cpu_before_s);
   }
 
@@ -301,7 +301,7 @@ class StudyRunner {
     auto result =
         std::make_shared<const DepthResult>(MeasureDepth(trial.experiment, Quiet(), &cache_));
     SetStatus(result->Faults(), json);
-    json["result"] = Json::parse(DepthResultJson(trial.experiment, *result));
+    json["result"] = DepthResultJson(trial.experiment, *result);
     const double cpu_s = ThreadCpu_s() - cpu_before_s;
     return [this, &trial, result, cpu_s](OutputFolder& output) {
       if (plan_.keep == TrialFiles::kRun) {
@@ -345,6 +345,7 @@ class StudyRunner {
   const StudyRunOptions& options_;
   const RunContext& context_;
   StageCache cache_;
+  FileHashes input_hashes_;
   std::vector<const StudyTrial*> queue_;
   std::atomic<std::size_t> next_ = 0;
   std::atomic<bool> broken_flag_ = false;

@@ -9,13 +9,18 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <ranges>
 #include <set>
+#include <thread>
+#include <utility>
 
 #include "problems/study/trial_folder.h"
+#include "problems/study/trial_numbers.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
+#include "surfaces/base/parallel.h"
 
 namespace semblance {
 namespace {
@@ -23,45 +28,17 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// All numbers of an object by dotted path; lists are left out.
-void Flatten(const Json& json, const std::string& path, std::map<std::string, double>& out) {
-  if (json.is_number()) {
-    out[path] = json.get<double>();
-  } else if (json.is_object()) {
-    for (const auto& [key, value] : json.items()) {
-      Flatten(value, path.empty() ? key : fmt::format("{}.{}", path, key), out);
-    }
-  }
-}
-
-// A list of numbers; none where there is no list.
-std::vector<double> NumbersAt(const Json& result, const char* pointer) {
-  const Json list = result.value(Json::json_pointer(pointer), Json());
-  std::vector<double> numbers;
-  for (const Json& value : list.is_array() ? list : Json::array()) {
-    numbers.push_back(value.is_number() ? value.get<double>() : kNaN);
-  }
-  return numbers;
-}
-
 // What is drawn as a curve, where it is there.
-void ReadCurves(const Json& result, TrialRow& row) {
-  row.quantiles_mm = NumbersAt(result, "/face/quantiles_mm");
-  row.depth_coverage = NumbersAt(result, "/depth_truth/along_direction/coverage");
-  row.left_out_coverage = NumbersAt(result, "/cross_validation/landmark/coverage");
-  row.depth_pit = NumbersAt(result, "/depth_truth/along_direction/scores/all/pit");
-  row.left_out_pit = NumbersAt(result, "/cross_validation/landmark/scores/scheme/pit");
-  const Json levels = result.value(Json::json_pointer("/fit/levels"), Json());
-  for (const Json& level : levels.is_array() ? levels : Json::array()) {
-    const auto number = [&](const char* name) {
-      return level.is_object() && level.contains(name) && level[name].is_number()
-                 ? level[name].get<double>()
-                 : kNaN;
-    };
-    if (row.step_rms_mm.empty()) {
-      row.step_rms_mm.push_back(number("rms_before_mm"));
-    }
-    row.step_rms_mm.push_back(number("rms_after_mm"));
+void TakeCurves(std::map<std::string, std::vector<double>>& lists, TrialRow& row) {
+  row.quantiles_mm = std::move(lists["face.quantiles_mm"]);
+  row.depth_coverage = std::move(lists["depth_truth.along_direction.coverage"]);
+  row.left_out_coverage = std::move(lists["cross_validation.landmark.coverage"]);
+  row.depth_pit = std::move(lists["depth_truth.along_direction.scores.all.pit"]);
+  row.left_out_pit = std::move(lists["cross_validation.landmark.scores.scheme.pit"]);
+  const std::vector<double>& before = lists["fit.levels.rms_before_mm"];
+  row.step_rms_mm = std::move(lists["fit.levels.rms_after_mm"]);
+  if (!before.empty()) {
+    row.step_rms_mm.insert(row.step_rms_mm.begin(), before.front());
   }
 }
 
@@ -77,19 +54,34 @@ double WallSeconds(const fs::path& file) {
              : kNaN;
 }
 
+// Nothing where the file is not there or is no whole trial.json.
+std::optional<TrialNumbers> NumbersIn(const fs::path& file) {
+  std::error_code ignored;
+  try {
+    return fs::exists(file, ignored) ? ReadTrialNumbers(ReadFileBytes(file)) : std::nullopt;
+  } catch (const IoError&) {
+    return std::nullopt;
+  }
+}
+
 void ReadTrial(const fs::path& folder, TrialRow& row) {
   row.status = "missing";
-  const std::optional<Json> json = ReadTrialFile(folder, row.id);
-  if (!json) {
+  std::optional<TrialNumbers> trial = NumbersIn(TrialFolder(folder, row.id) / "trial.json");
+  if (!trial || trial->id != row.id) {
     return;
   }
-  row.status = json->value("status", "failed");
-  row.reason = json->value("reason", "");
+  row.status = std::move(trial->status);
+  row.reason = std::move(trial->reason);
   row.wall_s = WallSeconds(TrialFolder(folder, row.id) / "timing.json");
-  if (json->contains("result") && (*json)["result"].is_object()) {
-    Flatten((*json)["result"], "", row.metrics);
-    ReadCurves((*json)["result"], row);
-  }
+  row.metrics = std::move(trial->metrics);
+  TakeCurves(trial->lists, row);
+}
+
+// All of them, side by side: a study's trials are many, and reading them is most of its tables.
+void ReadTrials(const fs::path& folder, std::vector<TrialRow>& rows) {
+  constexpr std::size_t kBlock = 4;
+  ParallelFor(rows.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())),
+              kBlock, [&](std::size_t n) { ReadTrial(folder, rows[n]); });
 }
 
 std::map<std::string, double> BySubject(const StudyResults& results, const Treatment& treatment,
@@ -108,8 +100,9 @@ std::map<std::string, double> BySubject(const StudyResults& results, const Treat
 std::set<std::string> MetricsOf(const StudyResults& results) {
   std::set<std::string> metrics;
   for (const TrialRow& row : results.trials) {
-    for (const auto& [metric, value] : row.metrics) {
-      metrics.insert(metric);
+    const auto names = std::views::keys(row.metrics);
+    if (!std::ranges::includes(metrics, names)) {  // most trials have the same
+      metrics.insert(names.begin(), names.end());
     }
   }
   return metrics;
@@ -151,9 +144,9 @@ StudyResults ReadStudyResults(const fs::path& folder) {
       row.subject = trial.at("subject");
       row.values = trial.at("values").get<std::vector<std::string>>();
       row.aside = trial.value("aside", false);
-      ReadTrial(folder, row);
       results.trials.push_back(std::move(row));
     }
+    ReadTrials(folder, results.trials);
     results.tags = plan.value("tags", std::vector<std::string>());
     results.higher_is_better =
         plan.contains("search") && plan["search"].at("better").get<std::string>() == "higher";

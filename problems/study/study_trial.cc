@@ -31,18 +31,6 @@ std::string Label(const ConfigNode& value) {
   return label;
 }
 
-// Of a folder (a DICOM series): that of the hashes of its files.
-std::string ContentHash(const fs::path& file) {
-  if (!fs::is_directory(file)) {
-    return Sha256OfFile(file);
-  }
-  std::string all;
-  for (const fs::path& part : VolumeFiles(file)) {
-    all += Sha256OfFile(part);
-  }
-  return Sha256OfText(all);
-}
-
 }  // namespace
 
 void TrialFaults::Add(const std::string& line) {
@@ -101,9 +89,16 @@ std::string ExperimentHash::operator()(const Experiment& experiment) {
   return Sha256OfText(text).substr(0, kIdDigits);
 }
 
+// Of a folder (a DICOM series): that of the hashes of its files.
 std::string ExperimentHash::HashOf(const fs::path& file) {
-  auto& hash = file_hashes_[file.string()];
-  return hash = hash.empty() ? ContentHash(file) : hash;
+  if (!fs::is_directory(file)) {
+    return files_.Of(file);
+  }
+  std::string all;
+  for (const fs::path& part : VolumeFiles(file)) {
+    all += files_.Of(part);
+  }
+  return Sha256OfText(all);
 }
 
 std::string TrialId(const Experiment& experiment, const std::string& common, ExperimentHash& hash) {

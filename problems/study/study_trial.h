@@ -3,10 +3,10 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <string>
 #include <vector>
 
+#include "problems/output/file_hashes.h"
 #include "problems/pipeline/experiment.h"
 #include "problems/study/study_rows.h"
 
@@ -56,7 +56,7 @@ class ExperimentHash {
 
  private:
   std::string HashOf(const std::filesystem::path& file);
-  std::map<std::string, std::string> file_hashes_;
+  FileHashes files_;
 };
 
 // `common`: what the results of the study's trials rest on beside their experiments; empty for

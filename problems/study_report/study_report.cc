@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@
 #include "problems/study_report/study_charts.h"
 #include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_subtables.h"
+#include "surfaces/base/parallel.h"
 
 namespace semblance {
 namespace {
@@ -301,7 +304,8 @@ std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
 }
 
 // Of each subject in turn all treatments, the best first, so that the view compares them there.
-SceneCollection Scenes(const StudyResults& results, const std::filesystem::path& root) {
+SceneCollection Scenes(const StudyResults& results, const std::vector<Treatment>& ranked,
+                       const std::filesystem::path& root) {
   constexpr std::size_t kLimit_bytes = 12'000'000;
   std::vector<std::string> subjects;
   for (const TrialRow& row : results.trials) {
@@ -311,7 +315,7 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
   }
   std::vector<SceneText> scenes;
   for (const std::string& subject : subjects) {
-    for (const Treatment& treatment : Ranked(results)) {
+    for (const Treatment& treatment : ranked) {
       for (const std::size_t n : treatment.trials) {
         const TrialRow& row = results.trials[n];
         const std::filesystem::path file = root / "trials" / row.id / "scene.json";
@@ -326,9 +330,11 @@ SceneCollection Scenes(const StudyResults& results, const std::filesystem::path&
 }
 
 // The depth maps that the trials left, best treatment first.
-std::vector<ReportImage> DepthMaps(const StudyResults& results, const std::filesystem::path& root) {
+std::vector<ReportImage> DepthMaps(const StudyResults& results,
+                                   const std::vector<Treatment>& ranked,
+                                   const std::filesystem::path& root) {
   std::vector<ReportImage> maps;
-  for (const Treatment& treatment : Ranked(results)) {
+  for (const Treatment& treatment : ranked) {
     for (const std::size_t n : treatment.trials) {
       const TrialRow& row = results.trials[n];
       const std::filesystem::path file = root / "trials" / row.id / "depth.png";
@@ -422,9 +428,9 @@ std::vector<std::string> Notes(const StudyResults& results) {
 }
 
 std::string ReportOf(const StudyResults& results, const std::filesystem::path& root) {
-  const SceneCollection scenes = Scenes(results, root);
-  const std::vector<ReportImage> maps = DepthMaps(results, root);
   const std::vector<Treatment> ranked = Ranked(results);
+  const SceneCollection scenes = Scenes(results, ranked, root);
+  const std::vector<ReportImage> maps = DepthMaps(results, ranked, root);
   Report report;
   report.title = results.title;
   report.subtitle = fmt::format(
@@ -452,10 +458,22 @@ std::string ReportOf(const StudyResults& results, const std::filesystem::path& r
 
 StudyResults WriteStudyTables(OutputFolder& folder) {
   StudyResults results = ReadStudyResults(folder.Root());
-  folder.Write("trials.csv", TrialsCsv(results));
-  folder.Write("summary.csv", SummaryCsv(results));
-  folder.Write("results.sqlite", ResultsSqlite(results));
-  folder.Write("report.html", ReportOf(results, folder.Root()));
+  struct Table {
+    const char* name;
+    std::function<std::string()> text_of;
+    std::string text = "";
+  };
+  std::array tables = {
+      Table{"trials.csv", [&] { return TrialsCsv(results); }},
+      Table{"summary.csv", [&] { return SummaryCsv(results); }},
+      Table{"results.sqlite", [&] { return ResultsSqlite(results); }},
+      Table{"report.html", [&] { return ReportOf(results, folder.Root()); }},
+  };
+  ParallelFor(tables.size(), static_cast<int>(tables.size()), 1,
+              [&](std::size_t n) { tables[n].text = tables[n].text_of(); });
+  for (const Table& table : tables) {
+    folder.Write(table.name, table.text);
+  }
   return results;
 }
 

@@ -37,17 +37,15 @@ double Square(double x) { return x * x; }
 ReportTable TableOf(const StudyResults& results, const std::vector<Treatment>& ranked,
                     const std::string& caption, const std::vector<Column>& columns) {
   ReportTable table{caption, {"treatment"}, {}};
-  std::set<std::string> known;
-  for (const TrialRow& row : results.trials) {
-    for (const auto& [metric, value] : row.metrics) {
-      known.insert(metric);
-    }
-  }
+  const auto is_known = [&](const std::string& metric) {
+    return std::ranges::any_of(results.trials,
+                               [&](const TrialRow& row) { return row.metrics.contains(metric); });
+  };
   for (const Treatment& treatment : ranked) {
     table.rows.push_back({treatment.label});
   }
   for (const Column& column : columns) {
-    if (known.contains(column.metric)) {
+    if (is_known(column.metric)) {
       table.header.push_back(column.head);
       for (std::size_t n = 0; n < ranked.size(); ++n) {
         table.rows[n].push_back(TableNumber(MeanOf(results, ranked[n], column.metric, Itself)));

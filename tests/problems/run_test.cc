@@ -106,7 +106,7 @@ TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
   for (const double off : result.prior->tip_residual_mm) {
     EXPECT_LT(std::abs(off), 6);
   }
-  EXPECT_THAT(ResultJson(experiment, result), HasSubstr("coefficients_rms"));
+  EXPECT_THAT(ResultJson(experiment, result).dump(), HasSubstr("coefficients_rms"));
 }
 
 TEST(Run, AFaceOfAPriorNeedsOne) {

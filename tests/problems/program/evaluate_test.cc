@@ -71,7 +71,7 @@ TEST_F(EvaluateFace, SaysWhatTheRunSaysToTheBit) {
   const auto experiment = ReadConfig<Experiment>(folder_ / "e.yaml");
   const RunResult run = semblance::Run(experiment, {});
   WriteHSpline(folder_ / "face.hspline.json", run.fit.surface);
-  const auto told = nlohmann::ordered_json::parse(ResultJson(experiment, run)).at("face");
+  const auto told = ResultJson(experiment, run).at("face");
   const auto by_config = nlohmann::ordered_json::parse(Evaluate(OfRun(), {}).dump());
   EXPECT_EQ(by_config, told);
   EXPECT_GT(told.at("scored_skin").at("masked_cm2"), 5);

@@ -121,7 +121,7 @@ TEST(DepthStudy, ASideLeftOutSaysWhereTheSchemeAnswersAndWhereTheRule) {
 TEST(DepthStudy, AutoSaysWhatItTook) {
   const Experiment experiment = SmallPhantom({"interp=auto"});
   const DepthResult result = MeasureDepth(experiment, {});
-  const Json shares = Json::parse(DepthResultJson(experiment, result)).at("depth").at("shares");
+  const Json shares = DepthResultJson(experiment, result).at("depth").at("shares");
   double sum = 0;
   for (const auto& [scheme, weight] : shares.items()) {
     sum += weight.get<double>();
@@ -155,7 +155,7 @@ TEST(DepthStudy, LeavesOutLandmarksSidesAndParts) {
 TEST(DepthStudy, JsonHasEveryNumberByItsPath) {
   const Experiment experiment = SmallPhantom({"interp=kriging"});
   const DepthResult result = MeasureDepth(experiment, {});
-  const Json json = Json::parse(DepthResultJson(experiment, result));
+  const Json json = DepthResultJson(experiment, result);
   EXPECT_EQ(json.at("usable"), true);
   for (const char* path :
        {"/depth/assigned", "/depth_truth/along_direction/rms_mm", "/depth_truth/closest/p95_mm",

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/output/file_hashes.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "problems/output/manifest.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+TEST(FileHashes, AreThoseOfTheFileAsItIsNow) {
+  const testing::ScratchFolder folder;
+  const auto file = folder / "skull.ply";
+  FileHashes hashes;
+  EXPECT_THROW(hashes.Of(file), IoError);
+  for (const char* text : {"one", "two", "three"}) {
+    WriteFileAtomically(file, text);
+    // The clock of a file system may be coarse: each version has a time of its own.
+    std::filesystem::last_write_time(
+        file, std::filesystem::file_time_type::clock::now() + std::chrono::hours(text[1]));
+    for (int times = 0; times < 2; ++times) {
+      EXPECT_EQ(hashes.Of(file), Sha256OfText(text));
+    }
+  }
+}
+
+// What is the same by size and time is not read again.
+TEST(FileHashes, AreKept) {
+  const testing::ScratchFolder folder;
+  const auto file = folder / "skull.ply";
+  WriteFileAtomically(file, "one");
+  const auto changed = std::filesystem::last_write_time(file);
+  FileHashes hashes;
+  hashes.Of(file);
+  WriteFileAtomically(file, "two");
+  std::filesystem::last_write_time(file, changed);
+  EXPECT_EQ(hashes.Of(file), Sha256OfText("one"));
+}
+
+}  // namespace
+}  // namespace semblance
