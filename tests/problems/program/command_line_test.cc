@@ -183,10 +183,8 @@ TEST_F(CommandLine, CheckFindsSidesThatAreSwapped) {
   }
 }
 
+// What they name is opened by `make configs`.
 TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
-  if (!fs::exists("/usr/share/doc/invesalius-examples/examples/Cranium.inv3")) {
-    GTEST_SKIP() << "Debian's invesalius-examples is not here, and check looks at the subjects";
-  }
   std::string files;
   for (const std::string& folder : {kConfigs, kConfigs + "/fit", kConfigs + "/studies"}) {
     for (const auto& entry : fs::directory_iterator(folder)) {
@@ -194,7 +192,7 @@ TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
     }
   }
   EXPECT_THAT(files, HasSubstr("franke.yaml"));
-  const Outcome outcome = Call("check" + files);
+  const Outcome outcome = Call("check --without-inputs" + files);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
 }
 

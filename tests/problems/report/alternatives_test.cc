@@ -26,10 +26,11 @@ using ::testing::ThrowsMessage;
 const fs::path kConfigs = fs::path(SEMBLANCE_SOURCE_DIR) / "configs";
 
 Experiment SmallPhantom(std::vector<std::string> overrides) {
-  overrides.insert(overrides.begin(),
-                   {"subject.rings=40", "implicit.resolution=48", "template=formula",
-                    "tissue={depths: table, table: " +
-                        (kConfigs / "tables/rhine_caucasoid.yaml").string() + "}"});
+  overrides.insert(
+      overrides.begin(),
+      {"subject.rings=24", "implicit.resolution=24", "template=formula", "uncertainty.sigma=false",
+       "tissue={depths: table, table: " + (kConfigs / "tables/rhine_caucasoid.yaml").string() +
+           "}"});
   return ReadConfig<Experiment>(kConfigs / "phantom.yaml", overrides);
 }
 
