@@ -42,14 +42,17 @@ demo: configure
 	@cmake --build --preset quick --target semblance
 	@build-quick/problems/semblance run configs/demo.yaml --out $(DEMO_OUT) --force
 
-# A whole head that is made up: its CT as DICOM, skull and skin of it, its face, the score. The folder is that of the configuration.
+# A whole head that is made up and lacks a cheek bone: its CT as DICOM, skull and skin of it, landmarks proposed (and how far off), the cheek
+# mirrored, its face and head, the score. The folder is that of the configuration.
 demo-phantom: PACKAGES = $(RUN_PACKAGES)
 demo-phantom: PRESET = quick
 demo-phantom: PHANTOM = out/demo-phantom
 demo-phantom: configure
 	@cmake --build --preset quick --target semblance
-	@build-quick/problems/semblance phantom --out $(PHANTOM)/head --force
+	@build-quick/problems/semblance phantom --out $(PHANTOM)/head --lost zy_r --force
 	@build-quick/problems/semblance import-ct $(PHANTOM)/head/ct --out $(PHANTOM)/import --force
+	@build-quick/problems/semblance landmarks propose $(PHANTOM)/import/skull.ply --out $(PHANTOM)/proposed.yaml \
+	  --compare $(PHANTOM)/head/landmarks.yaml --force
 	@build-quick/problems/semblance run configs/demo_phantom/head.yaml --out $(PHANTOM)/run --force
 
 test: build

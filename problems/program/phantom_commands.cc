@@ -44,15 +44,18 @@ int WritePhantom(const PhantomArguments& a) {
   const Phantom phantom = MakePhantom(a.phantom);
   const CtVolume volume = VoxelisePhantom(phantom, a.ct);
   WriteSlices(volume, a.phantom.random_seed, folder);
-  folder.Write("landmarks.yaml",
-               EncodeLandmarks(PhantomLandmarks(phantom, a.phantom.random_seed), "landmarks.yaml"));
+  LandmarkFile landmarks = PhantomLandmarks(phantom, a.phantom.random_seed);
+  std::erase_if(landmarks.landmarks, [&](const Landmark& l) {
+    return IsLost({l.point[0], l.point[1], l.point[2]}, phantom, a.ct.defect);
+  });
+  folder.Write("landmarks.yaml", EncodeLandmarks(landmarks, "landmarks.yaml"));
   folder.Write("true_skin.ply", EncodeMesh(phantom.face, ".ply"));
   fmt::print(
       "ct: {} DICOM slices of {} x {} voxels, {} x {} x {} mm\n"
       "landmarks.yaml: {} sites, with their true depths\n"
       "true_skin.ply: {} triangles\n",
       volume.slices, volume.columns, volume.rows, a.ct.pixel_mm, a.ct.pixel_mm, a.ct.slice_mm,
-      phantom.sites.size(), phantom.face.triangles.size());
+      landmarks.landmarks.size(), phantom.face.triangles.size());
   fmt::print("next: semblance import-ct {}\n", (folder.Root() / "ct").string());
   return kDone;
 }
@@ -68,6 +71,11 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
       ->capture_default_str();
   command.add_option("--slice-mm", a.ct.slice_mm, "between slices")
       ->check(CLI::Range(0.3, 10.0))
+      ->capture_default_str();
+  command.add_option("--lost", a.ct.defect.site,
+                     "the skull lacks its bone around this site; sites there are in no file");
+  command.add_option("--lost-radius-mm", a.ct.defect.radius_mm, "how far around it")
+      ->check(CLI::Range(1.0, 60.0))
       ->capture_default_str();
   command.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");

@@ -97,11 +97,25 @@ bool InHolder(const Vec3& p, const Box3& head, const PhantomCtOptions& options) 
 
 }  // namespace
 
+bool IsLost(const Vec3& point, const Phantom& phantom, const BoneDefect& defect) {
+  if (defect.site.empty()) {
+    return false;
+  }
+  const auto site = std::ranges::find(phantom.sites, defect.site, &PhantomSite::site);
+  if (site == phantom.sites.end()) {
+    throw InputError(
+        fmt::format("phantom: the head has no site '{}' to lose bone at; docs/sites.md lists them",
+                    defect.site));
+  }
+  return (point - site->base).norm() < defect.radius_mm;
+}
+
 CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options) {
   if (!(options.pixel_mm > 0) || !(options.slice_mm > 0)) {
     throw InputError(fmt::format("phantom: voxels of {} x {} mm are not usable; each must be > 0",
                                  options.pixel_mm, options.slice_mm));
   }
+  IsLost(phantom.centre, phantom, options.defect);  // an unknown site is told before any work
   const Box3 head = Bounds(phantom.face);
   const MeshQuery skin(phantom.face), bone(phantom.skull);
   const MeshQuery inner(InnerTable(phantom, options.bone_mm));
@@ -114,9 +128,11 @@ CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options
     const std::vector<double> in_bone = RowCoverage(bone, volume, row, slice);
     const std::vector<double> in_brain = RowCoverage(inner, volume, row, slice);
     for (int i = 0; i < volume.columns; ++i) {
-      const double hu = kAirHu + in_skin[i] * (kTissueHu - kAirHu) +
-                        (in_bone[i] - in_brain[i]) * (kBoneHu - kTissueHu);
-      const bool holder = InHolder(volume.World(i, row, slice), head, options);
+      const Vec3 at = volume.World(i, row, slice);
+      const double bone_here = IsLost(at, phantom, options.defect) ? 0 : in_bone[i] - in_brain[i];
+      const double hu =
+          kAirHu + in_skin[i] * (kTissueHu - kAirHu) + bone_here * (kBoneHu - kTissueHu);
+      const bool holder = InHolder(at, head, options);
       volume.values[volume.Index(i, row, slice)] =
           static_cast<std::int16_t>(std::lround(holder ? kPlasticHu : hu));
     }

@@ -43,6 +43,33 @@ TEST(PhantomCt, ThreadsChangeNothing) {
             VoxelisePhantom(phantom, {.pixel_mm = 6, .slice_mm = 6, .threads = 3}).values);
 }
 
+TEST(PhantomCt, BoneIsLostInABallAndNowhereElse) {
+  const Phantom phantom = MakePhantom({.rings = 30});
+  const BoneDefect defect = {.site = "zy_r", .radius_mm = 20};
+  const CtVolume whole = VoxelisePhantom(phantom, {.pixel_mm = 3, .slice_mm = 3}),
+                 volume =
+                     VoxelisePhantom(phantom, {.pixel_mm = 3, .slice_mm = 3, .defect = defect});
+  int lost = 0;
+  for (int k = 0; k < volume.slices; ++k) {
+    for (int j = 0; j < volume.rows; ++j) {
+      for (int i = 0; i < volume.columns; ++i) {
+        const auto before = whole.values[whole.Index(i, j, k)],
+                   now = volume.values[volume.Index(i, j, k)];
+        const bool is_lost = IsLost(volume.World(i, j, k), phantom, defect);
+        EXPECT_TRUE(is_lost ? now <= 40 : now == before);
+        lost += is_lost && before > 600 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(lost, 50);
+}
+
+TEST(PhantomCt, ASiteThatIsNotThereCannotBeLost) {
+  EXPECT_THAT(testing::WordsOf<InputError>(
+                  [] { VoxelisePhantom(MakePhantom({.rings = 8}), {.defect = {.site = "zy"}}); }),
+              HasSubstr("no site 'zy'"));
+}
+
 TEST(PhantomCt, SpacingsAreChecked) {
   EXPECT_THAT(testing::WordsOf<InputError>(
                   [] { VoxelisePhantom(MakePhantom({.rings = 8}), {.pixel_mm = 0}); }),
