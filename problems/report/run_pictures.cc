@@ -115,18 +115,6 @@ void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
              "pictures/error_implicit.png", threads);
 }
 
-Colour OriginColour(BoneOrigin origin) {
-  switch (origin) {
-    case BoneOrigin::kObserved:
-      return HexColour(0xe3dac9);
-    case BoneOrigin::kMirrored:
-      return HexColour(0x2f7fc1);
-    case BoneOrigin::kInferred:
-      break;
-  }
-  return HexColour(0xe0a030);
-}
-
 SceneObject ByOrigin(SceneObject object, const RunResult& result, int threads) {
   for (const BoneOrigin origin : OriginUnder(object.mesh, result.shell, result.origin, threads)) {
     object.vertex_colours.push_back(OriginColour(origin));
@@ -151,6 +139,18 @@ void WriteOrigin(const RunResult& result, OutputFolder& folder, int threads) {
 }
 
 }  // namespace
+
+Colour OriginColour(BoneOrigin origin) {
+  switch (origin) {
+    case BoneOrigin::kObserved:
+      return HexColour(0xe3dac9);
+    case BoneOrigin::kMirrored:
+      return HexColour(0x2f7fc1);
+    case BoneOrigin::kInferred:
+      break;
+  }
+  return HexColour(0xe0a030);
+}
 
 Scene HeadScene(const RunResult& result) {
   if (!result.bust) {

@@ -7,6 +7,7 @@
 #include "problems/output/files.h"
 #include "problems/pictures/colour_map.h"
 #include "problems/pictures/render.h"
+#include "problems/preparation/bone_origin.h"
 #include "problems/run.h"
 
 namespace semblance {
@@ -14,6 +15,7 @@ namespace semblance {
 ColourMap DepthColours();  // 0 to 25 mm
 ColourMap ErrorColours();  // -8 to 8 mm
 ColourMap SigmaColours();  // 0 to 6 mm
+Colour OriginColour(BoneOrigin origin);
 
 // Signed distance of each vertex to the true skin, positive outside it; NaN where the nearest skin
 // is not scored. result.truth must be there.

@@ -74,6 +74,7 @@ class SceneWriter {
 
   std::string Write() {
     Mesh("skull", "Skull", view_.skull, "#e8dcc4");
+    Origin();
     Dowels();
     Depth();
     Face("implicit", "First face (implicit)", view_.implicit, "#d9b38c");
@@ -101,6 +102,30 @@ class SceneWriter {
   void Mesh(const char* id, const char* label, const TriMesh& mesh, const char* colour) {
     layers_.push_back(
         {{"id", id}, {"label", label}, {"colour", colour}, {"mesh", blobs_.AddMesh(mesh)}});
+  }
+
+  // The bone in the colours of pictures/origin.png (mirrored blue, inferred yellow), where any of
+  // it was not observed.
+  void Origin() {
+    const auto part = [&](BoneOrigin origin) {
+      std::vector<bool> keep;
+      for (const BoneOrigin of_triangle : result_.origin) {
+        keep.push_back(of_triangle == origin);
+      }
+      return ForView(Submesh(result_.shell, keep));
+    };
+    const auto [observed, mirrored, inferred] = AreaByOrigin_cm2(result_.shell, result_.origin);
+    if (mirrored + inferred == 0) {
+      return;
+    }
+    Mesh("origin", "Bone by origin", part(BoneOrigin::kObserved),
+         HexText(OriginColour(BoneOrigin::kObserved)).c_str());
+    for (const BoneOrigin origin : {BoneOrigin::kMirrored, BoneOrigin::kInferred}) {
+      if (TriMesh mesh = part(origin); !mesh.triangles.empty()) {
+        layers_.back()["parts"].push_back(
+            {{"colour", HexText(OriginColour(origin))}, {"mesh", blobs_.AddMesh(mesh)}});
+      }
+    }
   }
 
   void Face(const char* id, const char* label, const TriMesh& mesh, const char* colour) {

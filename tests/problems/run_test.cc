@@ -306,6 +306,11 @@ TEST(Run, MirroredBoneIsToldDrawnAndKeptToTheFace) {
   EXPECT_THAT(result.at("notes").dump(), HasSubstr("im_l"));
   EXPECT_TRUE(files.contains("pictures/origin.png") && files.contains("pictures/origin_face.png"));
   EXPECT_THAT(files.at("report.html"), HasSubstr("What of the bone was seen"));
+  const auto layers = nlohmann::json::parse(files.at("scene.json")).at("layers");
+  const auto origin =
+      std::ranges::find_if(layers, [](const auto& l) { return l["id"] == "origin"; });
+  ASSERT_NE(origin, layers.end());
+  EXPECT_GE(origin->at("parts").size(), 1u);  // mirrored bone in its own colour
   for (const char* mesh : {"face.ply", "implicit.ply", "depth.ply"}) {
     EXPECT_THAT(files.at(mesh).substr(0, 1000), HasSubstr("scalar_origin")) << mesh;
   }
