@@ -427,4 +427,33 @@ std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSerie
   return bytes.str();
 }
 
+void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
+                      VolumeFormat format) {
+  SilenceLibraries();
+  const itk::ImageIOBase::Pointer io = ReaderOf(format).io;
+  const std::array<int, 3> counts = {volume.columns, volume.rows, volume.slices};
+  itk::ImageIORegion region(3);
+  io->SetNumberOfDimensions(3);
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const Vec3 step = volume.axes.col(axis);
+    io->SetDimensions(axis, counts[axis]);
+    io->SetOrigin(axis, volume.origin[axis]);
+    io->SetSpacing(axis, volume.spacing_mm[axis]);
+    io->SetDirection(axis, std::vector<double>{step.x(), step.y(), step.z()});
+    region.SetIndex(axis, 0);
+    region.SetSize(axis, counts[axis]);
+  }
+  io->SetIORegion(region);
+  io->SetPixelType(itk::IOPixelEnum::SCALAR);
+  io->SetNumberOfComponents(1);
+  io->SetComponentType(itk::IOComponentEnum::SHORT);
+  io->SetUseCompression(true);
+  io->SetFileName(file.string());
+  try {
+    io->Write(volume.values.data());
+  } catch (const itk::ExceptionObject& error) {
+    throw IoError(fmt::format("{}: cannot be written: {}", file.string(), WordsOf(error)));
+  }
+}
+
 }  // namespace semblance

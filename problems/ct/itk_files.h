@@ -49,4 +49,9 @@ struct DicomSeriesNames {
 // The bytes of a DICOM file (CT image, 16 bit, uncompressed) with one slice of the volume.
 std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSeriesNames& names);
 
+// The volume (16 bit, with its place in space) in one file whose name's ending is of the format.
+// Throws IoError if it cannot be written.
+void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
+                      VolumeFormat format);
+
 }  // namespace semblance

@@ -29,6 +29,10 @@ std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& fil
 
 void AppendDicomSlice(const DicomHeader& header, VoxelArray&) { ThrowNoItk(header.file.string()); }
 
+void WriteImageVolume(const CtVolume&, const std::filesystem::path& file, VolumeFormat) {
+  ThrowNoItk(file.string());
+}
+
 std::string EncodeDicomSlice(const CtVolume&, int, const DicomSeriesNames&) {
   ThrowNoItk("DICOM files");
 }

@@ -40,16 +40,6 @@ std::string LowerCaseName(const fs::path& path) {
   return name;
 }
 
-std::optional<VolumeFormat> FormatOf(const fs::path& path) {
-  const std::string name = LowerCaseName(path);
-  for (const Ending& ending : kEndings) {
-    if (name.ends_with(ending.ending)) {
-      return ending.format;
-    }
-  }
-  return std::nullopt;
-}
-
 // Notes on values that int16 does not hold; throws if they cannot be grey values of a scanner.
 void CheckValues(const VoxelArray& array, const std::string& where,
                  std::vector<std::string>& notes) {
@@ -198,7 +188,7 @@ VolumeReading ReadFile(const fs::path& path) {
     NoteGeometry(reading.volume, reading.notes);
     return reading;
   }
-  const std::optional<VolumeFormat> format = FormatOf(path);
+  const std::optional<VolumeFormat> format = VolumeFormatOf(path);
   if (!format) {
     throw InputError(fmt::format(
         "{}: not a kind of volume that is read; it may be a folder of DICOM files (of a single "
@@ -209,6 +199,16 @@ VolumeReading ReadFile(const fs::path& path) {
 }
 
 }  // namespace
+
+std::optional<VolumeFormat> VolumeFormatOf(const fs::path& path) {
+  const std::string name = LowerCaseName(path);
+  for (const Ending& ending : kEndings) {
+    if (name.ends_with(ending.ending)) {
+      return ending.format;
+    }
+  }
+  return std::nullopt;
+}
 
 std::vector<fs::path> VolumeFiles(const fs::path& path) {
   if (!fs::is_directory(path)) {

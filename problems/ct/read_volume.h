@@ -3,10 +3,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "problems/ct/ct_volume.h"
+#include "problems/ct/itk_files.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {
@@ -32,6 +34,9 @@ struct VolumeReading {
 // several could be meant.
 VolumeReading ReadVolume(const std::filesystem::path& path, const ReadVolumeOptions& options,
                          const RunContext& context);
+
+// Of a file with a whole volume, by its name's ending; nothing for other endings.
+std::optional<VolumeFormat> VolumeFormatOf(const std::filesystem::path& file);
 
 // The files that ReadVolume looks at: the path itself, or what is in the folder, sorted.
 std::vector<std::filesystem::path> VolumeFiles(const std::filesystem::path& path);

@@ -7,15 +7,18 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "problems/ct/itk_files.h"
+#include "problems/ct/read_volume.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/output/files.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/phantom_ct.h"
 #include "problems/subject/phantom_landmarks.h"
+#include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
@@ -24,6 +27,7 @@ namespace {
 // What the user typed.
 struct PhantomArguments {
   std::string out;
+  std::string volume;  // the CT in one file too; empty: not
   PhantomOptions phantom;
   PhantomCtOptions ct;
   bool force = false;
@@ -39,7 +43,27 @@ void WriteSlices(const CtVolume& volume, std::uint64_t random_seed, OutputFolder
   }
 }
 
+// Nothing where no file is asked for.
+std::optional<VolumeFormat> FormatOfVolume(const std::string& name) {
+  const auto format = VolumeFormatOf(name);
+  if (!name.empty() && (!format || name.find('/') != name.npos || name.starts_with('.'))) {
+    throw InputError(fmt::format(
+        "--volume {}: not a plain name that ends in .nii, .nii.gz, .nrrd or .mha", name));
+  }
+  return format;
+}
+
+// Whole or not at all: written under another name, then renamed.
+void WriteOneFile(const CtVolume& volume, const std::string& name, VolumeFormat format,
+                  OutputFolder& folder) {
+  const std::filesystem::path part = folder.Root() / ("part-" + name);
+  WriteImageVolume(volume, part, format);
+  std::filesystem::rename(part, folder.Root() / name);
+  fmt::print("{}: the CT in one file\n", name);
+}
+
 int WritePhantom(const PhantomArguments& a) {
+  const std::optional<VolumeFormat> format = FormatOfVolume(a.volume);
   OutputFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
   const Phantom phantom = MakePhantom(a.phantom);
   const CtVolume volume = VoxelisePhantom(phantom, a.ct);
@@ -56,6 +80,9 @@ int WritePhantom(const PhantomArguments& a) {
       "true_skin.ply: {} triangles\n",
       volume.slices, volume.columns, volume.rows, a.ct.pixel_mm, a.ct.pixel_mm, a.ct.slice_mm,
       landmarks.landmarks.size(), phantom.face.triangles.size());
+  if (format) {
+    WriteOneFile(volume, a.volume, *format, folder);
+  }
   fmt::print("next: semblance import-ct {}\n", (folder.Root() / "ct").string());
   return kDone;
 }
@@ -77,6 +104,9 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
   command.add_option("--lost-radius-mm", a.ct.defect.radius_mm, "how far around it")
       ->check(CLI::Range(1.0, 60.0))
       ->capture_default_str();
+  command.add_option("--volume", a.volume,
+                     "the CT in one file too: NIfTI, NRRD or MetaImage by the name's ending, e.g. "
+                     "head.nii.gz");
   command.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");
 }

@@ -370,6 +370,16 @@ TEST_F(ReadVolumeTest, FilesCutShortAreOneClearError) {
 }
 
 // What the program writes itself.
+TEST_F(ReadVolumeTest, AWrittenVolumeIsReadBackWithItsPlace) {
+  for (const char* name : {"head.nii.gz", "head.nrrd", "head.mha"}) {
+    WriteImageVolume(head_.volume, folder_ / name, VolumeFormatOf(name).value());
+    ExpectTheHead(Read(name));
+  }
+  EXPECT_FALSE(VolumeFormatOf("head.dcm"));
+  EXPECT_THROW(WriteImageVolume(head_.volume, folder_ / "no/head.nrrd", VolumeFormat::kNrrd),
+               IoError);
+}
+
 TEST_F(ReadVolumeTest, EncodedSlicesAreReadBack) {
   fs::create_directories(folder_ / "ct");
   const DicomSeriesNames names{.patient = "P", .description = "d", .number = 4};
