@@ -101,6 +101,59 @@ std::vector<Term> WithSmoothness(std::span<const Term> terms, double weight) {
   return all;
 }
 
+LevelSummary SummaryOf(const NestedRound& round) {
+  return {.level = round.finest,
+          .fraction = 1,
+          .terms = {},
+          .iterations = round.steps,
+          .free_vertices = round.vertices,
+          .auto_weight = round.weight,
+          .solver = "conjugate gradients",
+          .termination = "convergence",
+          .usable = true};
+}
+
+// The auto plan without any other term. Only the surface as it ends is measured.
+FitResult FitAlone(const HSplineSurface& start, const ScatteredPoints& points,
+                   const FitOptions& options, const RunContext& context) {
+  NestedFitResult fit = FitNested(start, points, std::get<AutoPlan>(options.plan), context);
+  FitResult result{.surface = std::move(fit.surface),
+                   .uv = {points.uv.begin(), points.uv.end()},
+                   .residual_mm = std::move(fit.residual_mm),
+                   .point_rms_mm = fit.rms_mm,
+                   .dowel_rms_mm = fit.rms_mm,
+                   .restored_features = 0,
+                   .automatic = std::move(fit.report),
+                   .usable = std::isfinite(fit.rms_mm)};
+  for (const NestedRound& round : result.automatic->rounds) {
+    result.levels.push_back(SummaryOf(round));
+  }
+  result.levels.back().rms_after_mm = fit.rms_mm;
+  return result;
+}
+
+bool IsAlone(const FitOptions& options) {
+  return std::holds_alternative<AutoPlan>(options.plan) && options.solver == Solver::kFastest;
+}
+
+// The points of a target as columns.
+class PointColumns {
+ public:
+  explicit PointColumns(const FitTarget& target) {
+    for (const FitPoint& p : target.points) {
+      positions_.push_back(p.position);
+      uv_.push_back(p.uv);
+      weights_.push_back(p.weight);
+    }
+  }
+  ScatteredPoints Points() const { return {positions_, uv_, weights_}; }
+
+ private:
+  std::vector<Vec3> positions_;
+  std::vector<Vec2> uv_;
+  std::vector<double> weights_;
+};
+
 // A fit by any plan.
 class Fitter {
  public:
@@ -219,19 +272,19 @@ class Fitter {
     }});
   }
 
-  void Follow(const AutoPlan& plan) {
+  // With Ceres; without, nothing is to be driven (FitAlone).
+  void Follow(const AutoPlan&) {
     const ControlNet start = result_.surface.Net(0);
-    NestedFitResult fit = FitNested(result_.surface, driver_.target(), plan, context_);
-    result_.surface = std::move(fit.surface);
-    result_.automatic = std::move(fit.report);
-    for (const NestedRound& round : result_.automatic->rounds) {
-      driver_.Solve({.solve = [&](std::span<const Term>) { return SummaryOf(round); }});
+    const PointColumns points(driver_.target());
+    FitResult alone = FitAlone(result_.surface, points.Points(), options_, context_);
+    result_.surface = std::move(alone.surface);
+    result_.automatic = std::move(alone.automatic);
+    for (const LevelSummary& level : alone.levels) {
+      driver_.Solve({.solve = [&](std::span<const Term>) { return level; }});
     }
-    if (options_.solver == Solver::kCeres) {
-      driver_.Solve({.solve = [&](std::span<const Term> terms) {
-        return SettleByCeres(terms, HSplineSurface(result_.surface.shape(), start));
-      }});
-    }
+    driver_.Solve({.solve = [&](std::span<const Term> terms) {
+      return SettleByCeres(terms, HSplineSurface(result_.surface.shape(), start));
+    }});
   }
 
   // The minimum of all terms in the space that the auto plan has found, with its smoothness and
@@ -251,22 +304,6 @@ class Fitter {
     result_.surface = all.Surface();
     summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
     return summary;
-  }
-
-  // Only the surface as it ended is there to be measured.
-  LevelSummary SummaryOf(const NestedRound& round) const {
-    const bool last = &round == &result_.automatic->rounds.back();
-    return {
-        .level = round.finest,
-        .fraction = 1,
-        .terms = {},
-        .rms_after_mm = last ? PointRms(result_.surface, driver_.target(), context_.threads) : kNaN,
-        .iterations = round.steps,
-        .free_vertices = round.vertices,
-        .auto_weight = round.weight,
-        .solver = "conjugate gradients",
-        .termination = "convergence",
-        .usable = true};
   }
 
   void SeePoints(SpaceSolve& all) const {
@@ -301,6 +338,9 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context) {
   CheckFit(start, rest, target, features, options);
+  if (IsAlone(options)) {
+    return FitAlone(start, PointColumns(target).Points(), options, context);
+  }
   return Fitter(start, rest, target, features, options, context).Run();
 }
 
@@ -308,6 +348,15 @@ FitResult Fit(const HSplineSurface& start, const FitTarget& target,
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context) {
   return Fit(start, start, target, features, options, context);
+}
+
+FitResult Fit(const HSplineSurface& start, const ScatteredPoints& points, const FitOptions& options,
+              const RunContext& context) {
+  if (!IsAlone(options)) {
+    return Fit(start, TargetOf(points.positions, points.uv, points.weights), {}, options, context);
+  }
+  CheckFit(start, points, options);
+  return FitAlone(start, points, options, context);
 }
 
 }  // namespace semblance

@@ -31,5 +31,8 @@ FitResult Fit(const HSplineSurface& start, const FitTarget& target,
 FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context);
+// Scattered points alone. By the auto plan with the solver `fastest` no copy of them is made.
+FitResult Fit(const HSplineSurface& start, const ScatteredPoints& points, const FitOptions& options,
+              const RunContext& context);
 
 }  // namespace semblance

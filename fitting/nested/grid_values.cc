@@ -2,6 +2,9 @@
 #include "fitting/nested/grid_values.h"
 
 #include <algorithm>
+#include <new>
+
+#include "surfaces/base/simd.h"
 
 namespace semblance {
 namespace {
@@ -10,21 +13,43 @@ namespace {
 // an even one lies between two (RefineRow).
 constexpr double kBeside = 0.125, kOn = 0.75, kBetween = 0.5;
 
-// The columns of the finer level over the rows of the coarser one.
-using HalfRefined = std::vector<double>;
-
 int Wrapped(int i, int columns) { return ((i % columns) + columns) % columns; }
 
-void RefineRowOf(const double* coarse, int columns, double* fine) {
-  for (int i = 0; i < columns; ++i) {
-    const double* const c = coarse + (i + 1) / 2;
-    fine[i] = i % 2 != 0 ? kBeside * (c[-1] + c[1]) + kOn * c[0] : kBetween * (c[0] + c[1]);
+// A row of the finer level across, between or on rows of the coarser one.
+struct RowWay {
+  const double* coarse;  // column 0 of row (j + 1) / 2
+  std::ptrdiff_t stride;
+  bool on;
+};
+
+SEMBLANCE_WIDE void CombineRows(const RowWay& way, int first, int count, double* across) {
+  const double *const c = way.coarse + first, *const before = c - way.stride,
+                      *const after = c + way.stride;
+  if (way.on) {
+    for (int k = 0; k < count; ++k) {
+      across[k] = kBeside * (before[k] + after[k]) + kOn * c[k];
+    }
+  } else {
+    for (int k = 0; k < count; ++k) {
+      across[k] = kBetween * (c[k] + after[k]);
+    }
   }
 }
 
-void RestrictRowOf(const double* fine, int columns, double* coarse) {
-  for (int i = 0; i < columns; ++i) {
-    double* const c = coarse + (i + 1) / 2;
+// across: from coarse column 0 on; odd fine columns lie on one, even ones between two.
+SEMBLANCE_WIDE void RefineAlong(const double* across, int begin, int end, double* fine) {
+  const int odd = begin / 2, even = (begin + 1) / 2;  // 2 k + 1, 2 k
+  for (int k = odd; 2 * k + 1 < end; ++k) {
+    fine[2 * k + 1] += kBeside * (across[k] + across[k + 2]) + kOn * across[k + 1];
+  }
+  for (int k = even; 2 * k < end; ++k) {
+    fine[2 * k] += kBetween * (across[k] + across[k + 1]);
+  }
+}
+
+SEMBLANCE_WIDE void RestrictAlong(const double* fine, int begin, int end, double* across) {
+  for (int i = begin; i < end; ++i) {
+    double* const c = across + (i + 1) / 2;
     if (i % 2 != 0) {
       c[-1] += kBeside * fine[i];
       c[0] += kOn * fine[i];
@@ -36,86 +61,156 @@ void RestrictRowOf(const double* fine, int columns, double* coarse) {
   }
 }
 
+SEMBLANCE_WIDE void SpreadRow(const double* across, int count, bool on, std::ptrdiff_t stride,
+                              double* coarse) {
+  double *const before = coarse - stride, *const after = coarse + stride;
+  if (on) {
+    for (int k = 0; k < count; ++k) {
+      before[k] += kBeside * across[k];
+      coarse[k] += kOn * across[k];
+      after[k] += kBeside * across[k];
+    }
+  } else {
+    for (int k = 0; k < count; ++k) {
+      coarse[k] += kBetween * across[k];
+      after[k] += kBetween * across[k];
+    }
+  }
+}
+
+// Where runs of a finer level begin and end, without what the last block has beyond the row.
+struct Columns {
+  int begin, end;
+  int FirstCoarse() const { return (begin + 1) / 2 - (begin % 2 != 0 ? 1 : 0); }
+  int LastCoarse() const { return end / 2 + 1; }
+};
+
+Columns ColumnsOf(const GridRun& run, const GridLayout& layout) {
+  return {run.begin, std::min(run.begin + run.size(), layout.grid.Columns())};
+}
+
 }  // namespace
 
-void GridValues::FillHalo() {
-  if (!layout_.grid.periodic_u) {
-    return;
-  }
-  const int columns = layout_.grid.Columns();
-  for (int c = 0; c < channels_; ++c) {
-    for (int j = 0; j < layout_.grid.Rows(); ++j) {
-      double* const row = Row(c, j);
-      for (int k = 1; k <= GridLayout::kHalo; ++k) {
-        row[-k] = row[Wrapped(-k, columns)];
-        row[columns - 1 + k] = row[Wrapped(k - 1, columns)];
-      }
-    }
-  }
-}
-
-void GridValues::FoldHalo() {
-  const int columns = layout_.grid.Columns();
-  for (int c = 0; c < channels_; ++c) {
-    for (int j = 0; j < layout_.grid.Rows(); ++j) {
-      double* const row = Row(c, j);
-      for (int k = 1; k <= GridLayout::kHalo; ++k) {
-        if (layout_.grid.periodic_u) {
-          row[Wrapped(-k, columns)] += row[-k];
-          row[Wrapped(k - 1, columns)] += row[columns - 1 + k];
-        }
-        row[-k] = row[columns - 1 + k] = 0;
-      }
-    }
-  }
-}
-
-void AddRefined(const GridValues& coarser, GridValues& finer) {
-  const PatchGrid &from = coarser.layout().grid, &to = finer.layout().grid;
-  const int columns = to.Columns();
-  HalfRefined half(static_cast<std::size_t>(from.Rows()) * columns);
-  const auto row_of = [&](int j) { return half.data() + static_cast<std::size_t>(j) * columns; };
-  for (int c = 0; c < coarser.channels(); ++c) {
-    for (int j = 0; j < from.Rows(); ++j) {
-      RefineRowOf(coarser.Row(c, j), columns, row_of(j));
-    }
-    for (int j = 0; j < to.Rows(); ++j) {
-      double* const out = finer.Row(c, j);
-      const double* const on = row_of((j + 1) / 2);
-      for (int i = 0; i < columns; ++i) {
-        out[i] += j % 2 != 0 ? kBeside * (on[i - columns] + on[i + columns]) + kOn * on[i]
-                             : kBetween * (on[i] + on[i + columns]);
-      }
-    }
-  }
-}
-
-void AddRestricted(const GridValues& finer, GridValues& coarser) {
-  const PatchGrid &from = finer.layout().grid, &to = coarser.layout().grid;
-  const int columns = from.Columns();
-  HalfRefined half(static_cast<std::size_t>(to.Rows()) * columns);
-  const auto row_of = [&](int j) { return half.data() + static_cast<std::size_t>(j) * columns; };
-  for (int c = 0; c < coarser.channels(); ++c) {
-    std::fill(half.begin(), half.end(), 0.0);
-    for (int j = 0; j < from.Rows(); ++j) {
-      const double* const in = finer.Row(c, j);
-      double* const on = row_of((j + 1) / 2);
-      for (int i = 0; i < columns; ++i) {
-        if (j % 2 != 0) {
-          on[i - columns] += kBeside * in[i];
-          on[i] += kOn * in[i];
-          on[i + columns] += kBeside * in[i];
-        } else {
-          on[i] += kBetween * in[i];
-          on[i + columns] += kBetween * in[i];
+GridRuns RunsAround(const GridLayout& layout, const std::vector<char>& patches) {
+  const int columns = layout.grid.Columns(), last = layout.grid.patches_v - 1;
+  GridRuns runs;
+  std::vector<char> wanted(columns);
+  for (int row = 0; row < layout.grid.Rows(); ++row) {
+    std::fill(wanted.begin(), wanted.end(), 0);
+    for (int j = std::max(row - 3, 0); j <= std::min(row, last); ++j) {
+      const char* const there = patches.data() + layout.Patch(0, j);
+      for (int i = 0; i < layout.grid.patches_u; ++i) {
+        for (int a = 0; there[i] != 0 && a < 4; ++a) {
+          wanted[(i + a) % columns] = 1;
         }
       }
     }
-    for (int j = 0; j < to.Rows(); ++j) {
-      RestrictRowOf(row_of(j), columns, coarser.Row(c, j));
+    for (int i = 0; i < columns; ++i) {
+      if (wanted[i] == 0) {
+        continue;
+      }
+      const bool joins =
+          !runs.empty() && runs.back().row == row && i < runs.back().begin + runs.back().size();
+      const bool follows =
+          !runs.empty() && runs.back().row == row && i == runs.back().begin + runs.back().size();
+      if (follows) {
+        ++runs.back().blocks;
+      } else if (!joins) {
+        runs.push_back({.at = layout.At(i, row), .row = row, .begin = i, .blocks = 1});
+      }
     }
   }
-  coarser.FoldHalo();
+  return runs;
+}
+
+GridValues::GridValues(const GridLayout& layout, int channels)
+    : layout_(layout), channels_(channels) {
+  const std::size_t count = Start(channels) + GridLayout::kHalo * layout_.Stride();
+  values_.reset(static_cast<double*>(std::calloc(count, sizeof(double))));
+  if (!values_) {
+    throw std::bad_alloc();
+  }
+}
+
+void GridValues::Clear(const GridRuns& runs) {
+  for (int c = 0; c < channels_; ++c) {
+    for (const GridRun& run : runs) {
+      std::fill_n(Channel(c) + run.at, run.size(), 0.0);
+    }
+  }
+}
+
+void GridValues::FillRow(double* row) const {
+  const int columns = layout_.grid.Columns();
+  for (int k = 1; k <= GridLayout::kHalo; ++k) {
+    row[-k] = row[Wrapped(-k, columns)];
+    row[columns - 1 + k] = row[Wrapped(k - 1, columns)];
+  }
+}
+
+void GridValues::FoldRow(double* row) const {
+  const int columns = layout_.grid.Columns();
+  for (int k = 1; k <= GridLayout::kHalo; ++k) {
+    if (layout_.grid.periodic_u) {
+      row[Wrapped(-k, columns)] += row[-k];
+      row[Wrapped(k - 1, columns)] += row[columns - 1 + k];
+    }
+    row[-k] = row[columns - 1 + k] = 0;
+  }
+}
+
+void GridValues::FillHalo(const GridRuns& runs) {
+  for (int c = 0; layout_.grid.periodic_u && c < channels_; ++c) {
+    int done = -1;
+    for (const GridRun& run : runs) {
+      if (run.row != done) {
+        FillRow(Row(c, run.row));
+        done = run.row;
+      }
+    }
+  }
+}
+
+void GridValues::FoldHalo(const GridRuns& runs) {
+  const int rows = layout_.grid.Rows();
+  for (int c = 0; c < channels_; ++c) {
+    int next = 0;
+    for (const GridRun& run : runs) {
+      for (next = std::max(next, run.row); next <= std::min(run.row + 3, rows - 1); ++next) {
+        FoldRow(Row(c, next));
+      }
+    }
+  }
+}
+
+void AddRefined(const GridValues& coarser, const GridRuns& runs, GridValues& finer) {
+  std::vector<double> across(coarser.layout().Stride() + 2);
+  for (int c = 0; c < coarser.channels(); ++c) {
+    for (const GridRun& run : runs) {
+      const Columns columns = ColumnsOf(run, finer.layout());
+      const int first = columns.FirstCoarse(), count = columns.LastCoarse() - first + 1;
+      CombineRows({.coarse = coarser.Row(c, (run.row + 1) / 2),
+                   .stride = static_cast<std::ptrdiff_t>(coarser.layout().Stride()),
+                   .on = run.row % 2 != 0},
+                  first, count, across.data() + first);
+      RefineAlong(across.data(), columns.begin, columns.end, finer.Row(c, run.row));
+    }
+  }
+}
+
+void AddRestricted(const GridValues& finer, const GridRuns& runs, GridValues& coarser) {
+  std::vector<double> across(coarser.layout().Stride() + 2);
+  for (int c = 0; c < coarser.channels(); ++c) {
+    for (const GridRun& run : runs) {
+      const Columns columns = ColumnsOf(run, finer.layout());
+      const int first = columns.FirstCoarse(), count = columns.LastCoarse() - first + 1;
+      std::fill_n(across.begin() + first, count, 0.0);
+      RestrictAlong(finer.Row(c, run.row), columns.begin, columns.end, across.data());
+      SpreadRow(across.data() + first, count, run.row % 2 != 0,
+                static_cast<std::ptrdiff_t>(coarser.layout().Stride()),
+                coarser.Row(c, (run.row + 1) / 2) + first);
+    }
+  }
 }
 
 }  // namespace semblance

@@ -86,16 +86,50 @@ double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t>
   return std::sqrt(*middle / std::pow(1 - 2 / (9 * freedom), 3));
 }
 
-double NeighbourCorrelation(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                            std::span<const NestedSolve::Residual> residuals) {
+namespace {
+
+// Of the residuals n and n + 1 for which counts(n).
+template <class Counts>
+PairCorrelation Correlation(std::span<const NestedResidual> residuals, const Counts& counts) {
   double together = 0, squares = 0;
-  for (std::size_t n = 0; n + 1 < indices.size(); ++n) {
-    for (int c = 0; c < points.channels; ++c) {
-      together += residuals[n].along[c] * residuals[n + 1].along[c];
+  PairCorrelation pairs;
+  for (std::size_t n = 0; n + 1 < residuals.size(); ++n) {
+    if (counts(n)) {
+      const NestedResidual &a = residuals[n], &b = residuals[n + 1];
+      for (int c = 0; c < 3; ++c) {
+        together += a.along[c] * b.along[c];
+      }
+      squares += (a.Square() + b.Square()) / 2;
+      ++pairs.count;
     }
-    squares += (residuals[n].Square() + residuals[n + 1].Square()) / 2;
   }
-  return squares > 0 ? together / squares : 0;
+  pairs.value = squares > 0 ? together / squares : 0;
+  return pairs;
+}
+
+}  // namespace
+
+double NeighbourCorrelation(std::span<const NestedResidual> residuals) {
+  return Correlation(residuals, [](std::size_t) { return true; }).value;
+}
+
+PairCorrelation ClosestCorrelation(const NestedPoints& points,
+                                   std::span<const std::uint32_t> indices,
+                                   std::span<const NestedResidual> residuals) {
+  constexpr std::ptrdiff_t kOneIn = 10;
+  std::vector<double> apart;
+  for (std::size_t n = 0; n + 1 < indices.size(); ++n) {
+    const double dx = points.x[indices[n]] - points.x[indices[n + 1]],
+                 dy = points.y[indices[n]] - points.y[indices[n + 1]];
+    apart.push_back(dx * dx + dy * dy);
+  }
+  if (apart.empty()) {
+    return {};
+  }
+  std::vector<double> sorted = apart;
+  const auto tenth = sorted.begin() + std::ssize(sorted) / kOneIn;
+  std::nth_element(sorted.begin(), tenth, sorted.end());
+  return Correlation(residuals, [&](std::size_t n) { return apart[n] <= *tenth; });
 }
 
 }  // namespace semblance

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "fitting/nested/nested_solve.h"
+#include "fitting/nested/leaf_sums.h"
 
 namespace semblance {
 
@@ -18,9 +18,17 @@ enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
 double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
                       NeighbourModel model);
 
-// Sum of e_a . e_b over that of |e|^2, b being next to a along the curve: 0 for errors that do not
-// know of each other.
-double NeighbourCorrelation(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                            std::span<const NestedSolve::Residual> residuals);
+// Of residuals along the curve: the sum of e_a . e_b over that of |e|^2, b being next to a. 0 for
+// errors that do not know of each other.
+double NeighbourCorrelation(std::span<const NestedResidual> residuals);
+
+// The same of that tenth of the pairs whose points are closest to each other in (u,v).
+struct PairCorrelation {
+  double value = 0;
+  std::size_t count = 0;  // pairs: the standard error is 1 / sqrt(count), or less
+};
+PairCorrelation ClosestCorrelation(const NestedPoints& points,
+                                   std::span<const std::uint32_t> indices,
+                                   std::span<const NestedResidual> residuals);
 
 }  // namespace semblance

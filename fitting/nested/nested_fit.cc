@@ -18,7 +18,7 @@
 namespace semblance {
 namespace {
 
-using Residual = NestedSolve::Residual;
+using Residual = NestedResidual;
 using Indices = std::vector<std::uint32_t>;
 
 constexpr int kMostRounds = 24;
@@ -29,6 +29,7 @@ constexpr double kFewNew = 0.005;      // of the vertices: not worth a round
 constexpr double kDense = 1.25;        // points for a patch of the next level
 constexpr double kCheapDense = 0.3;    // the same where all patches together are few
 constexpr std::size_t kCheap = 50000;  // points
+constexpr double kSure = 1;            // standard errors of a correlation
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("fit: plan auto: " + what); }
 
@@ -47,8 +48,8 @@ int FinestByDensity(const NestedPoints& points, const GridLayout& level0, int fi
     layout = layout.Finer();
     std::size_t occupied = 0, last = layout.Patches();
     for (std::size_t k = 0; k < points.size(); ++k) {
-      const NestedPlace place = PlaceOn(layout.grid, level, points.x[k], points.y[k]);
-      const std::size_t patch = layout.Patch(place.i, place.j);
+      const auto [i, j] = PatchOn(layout.grid, level, points.x[k], points.y[k]);
+      const std::size_t patch = layout.Patch(i, j);
       occupied += patch != last ? 1 : 0;
       last = patch;
     }
@@ -60,15 +61,9 @@ int FinestByDensity(const NestedPoints& points, const GridLayout& level0, int fi
   return finest;
 }
 
-// A cloud of a shape with levels is sorted along a Z-curve.
-HSplineShape WithLevels(HSplineShape shape) {
-  shape.max_level = 1;
-  return shape;
-}
-
 struct Snapshot {
   NestedSpace space;
-  NestedValues solution;
+  NestedSolve::Packed solution;
   double weight = kNaN;
   double held_square = kNaN;
   int round = -1;
@@ -76,13 +71,12 @@ struct Snapshot {
 
 class NestedFitter {
  public:
-  NestedFitter(const HSplineSurface& start, const FitTarget& target, const AutoPlan& plan,
+  NestedFitter(const HSplineSurface& start, const ScatteredPoints& points, const AutoPlan& plan,
                const RunContext& context)
       : start_(start),
         plan_(plan),
         context_(context),
-        cloud_(WithLevels(start.shape()), target),
-        points_(DisplacementsFrom(start, cloud_, context.threads)),
+        points_(DisplacementsFrom(start, points, context.threads)),
         solve_(points_, MeanLengths(start)),
         space_(start.shape()),
         cap_(plan.finest),
@@ -127,16 +121,6 @@ class NestedFitter {
     return indices;
   }
 
-  std::vector<Residual> ResidualsOf(const Indices& indices) const {
-    const NestedValues displacements = solve_.Displacements();
-    std::vector<Residual> residuals;
-    residuals.reserve(indices.size());
-    for (const std::uint32_t k : indices) {
-      residuals.push_back(solve_.ResidualAt(displacements, k));
-    }
-    return residuals;
-  }
-
   // The displacements themselves tell the grossest outliers, which would bend the first surface.
   void BeforeAnyFit() {
     if (plan_.outliers == OutlierRule::kKeep) {
@@ -155,7 +139,7 @@ class NestedFitter {
     Look();
     const Indices fitted = Those([&](std::uint32_t k) { return !IsHeld(k) && outlier_[k] == 0; });
     solve_.Begin(space_, fitted);
-    NestedWeightSearch search(points_, fitted, solve_, least_gain_);
+    NestedWeightSearch search(fitted.size(), solve_, least_gain_);
     if (std::isnan(weight_)) {
       search.Scan();
       search.Climb(4, search.Finish().weight);
@@ -173,7 +157,7 @@ class NestedFitter {
 
   // By the points held out.
   void Judge(const NestedWeight& chosen, int steps) {
-    residuals_ = ResidualsOf(looked_);
+    residuals_ = solve_.ResidualsOf(looked_);
     std::vector<double> squares;
     for (std::size_t n = 0; n < looked_.size(); ++n) {
       if (IsHeld(looked_[n]) && outlier_[looked_[n]] == 0) {
@@ -196,7 +180,7 @@ class NestedFitter {
                               .outliers = outliers_});
     if (!best_ || held * kAsGood < best_->held_square) {
       best_ = Snapshot{.space = space_,
-                       .solution = solve_.solution(),
+                       .solution = solve_.Solution(),
                        .weight = weight_,
                        .held_square = held,
                        .round = static_cast<int>(report_.rounds.size()) - 1};
@@ -237,12 +221,27 @@ class NestedFitter {
     const int level = FinestOfMost();
     const bool cheap = points_.size() < kCheap;
     if ((densified_ && !last_helped) || level < space_.finest() - 1 ||
-        level >= std::min(cap_, cheap ? finest_ + 1 : finest_)) {
+        level >= std::min(cap_, cheap ? finest_ + 1 : finest_) || !ClosestAgree()) {
       return false;
     }
     densified_ = true;
     const double least = cheap ? kCheapDense : kDense;
     return OverlayDense(points_, level, least, space_) > 0;
+  }
+
+  // Detail finer than the points are apart shows in those that chance has put close together, and
+  // noise does not.
+  bool ClosestAgree() const {
+    Indices kept;
+    std::vector<Residual> residuals;
+    for (std::size_t n = 0; n < looked_.size(); ++n) {
+      if (outlier_[looked_[n]] == 0) {
+        kept.push_back(looked_[n]);
+        residuals.push_back(residuals_[n]);
+      }
+    }
+    const PairCorrelation pairs = ClosestCorrelation(points_, kept, residuals);
+    return pairs.value * std::sqrt(static_cast<double>(pairs.count)) > kSure;
   }
 
   // The finest level that most of the domain has.
@@ -263,18 +262,34 @@ class NestedFitter {
     space_ = std::move(best.space);
     looked_.resize(points_.size());
     std::iota(looked_.begin(), looked_.end(), 0u);
-    solve_.SetSolution(std::move(best.solution));
+    solve_.Enter(space_);
+    solve_.SetSolution(best.solution);
     report_.chosen_round = best.round;
     report_.held_out_rms_mm = std::sqrt(best.held_square);
     weight_ = best.weight;
-    solve_.Begin(space_, {});
     DropOutliers(report_.held_out_rms_mm);
     NestedWeight chosen = FitAll();
     if (DropOutliers(std::sqrt(chosen.score))) {
       chosen = FitAll();
     }
     Report(chosen);
-    return {Surface(), std::move(report_)};
+    NestedFitResult result{.surface = Surface(), .report = {}, .residual_mm = {}};
+    Measure(result);
+    result.report = std::move(report_);
+    return result;
+  }
+
+  // In the order of the curve, so that the sum does not depend on that as given.
+  void Measure(NestedFitResult& result) const {
+    double sum = 0, weights = 0;
+    result.residual_mm.resize(points_.size());
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      const double square = residuals_[k].Square();
+      result.residual_mm[points_.given[k]] = std::sqrt(square);
+      sum += points_.weight[k] * square;
+      weights += points_.weight[k];
+    }
+    result.rms_mm = std::sqrt(sum / weights);
   }
 
   // Whether others than before are outliers.
@@ -283,14 +298,14 @@ class NestedFitter {
       return false;
     }
     const std::vector<char> before = outlier_;
-    FindOutliers(points_, looked_, ResidualsOf(looked_), least_sd_mm, outlier_);
+    FindOutliers(points_, looked_, solve_.ResidualsOf(looked_), least_sd_mm, outlier_);
     return before != outlier_;
   }
 
   NestedWeight FitAll() {
     const Indices fitted = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
     solve_.Begin(space_, fitted);
-    NestedWeightSearch search(points_, fitted, solve_, least_gain_);
+    NestedWeightSearch search(fitted.size(), solve_, least_gain_);
     search.Climb(2, weight_);
     const NestedWeight chosen = search.Finish();
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
@@ -305,7 +320,8 @@ class NestedFitter {
     report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, 0.02));
     report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
     report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
-    report_.neighbour_correlation = NeighbourCorrelation(points_, kept, ResidualsOf(kept));
+    report_.neighbour_correlation = NeighbourCorrelation(solve_.ResidualsOf(kept));
+    residuals_ = solve_.ResidualsOf(looked_);
     for (std::uint32_t k = 0; k < points_.size(); ++k) {
       if (outlier_[k] != 0) {
         report_.outliers.push_back(points_.given[k]);
@@ -323,8 +339,8 @@ class NestedFitter {
   }
 
   // Level by level: an offset is measured from the next coarser surface, in its frame.
-  HSplineSurface Surface() const {
-    const NestedValues displacements = solve_.Displacements();
+  HSplineSurface Surface() {
+    const NestedValues& displacements = solve_.Displacements();
     HSplineShape shape = start_.shape();
     shape.max_level = space_.finest();
     ControlNet net = start_.Net(0);
@@ -368,7 +384,6 @@ class NestedFitter {
   const HSplineSurface& start_;
   const AutoPlan& plan_;
   const RunContext& context_;
-  PointCloud cloud_;
   NestedPoints points_;
   NestedSolve solve_;
   NestedSpace space_;
@@ -383,10 +398,10 @@ class NestedFitter {
   AutoReport report_;
 };
 
-void CheckWeights(const FitTarget& target) {
+void CheckWeights(const ScatteredPoints& points) {
   double sum = 0;
-  for (const FitPoint& point : target.points) {
-    sum += point.weight;
+  for (const double weight : points.weights) {
+    sum += weight;
   }
   if (!std::isfinite(sum)) {
     Fail("the points' weights add up to no finite number; divide them all by the largest");
@@ -395,23 +410,23 @@ void CheckWeights(const FitTarget& target) {
 
 }  // namespace
 
-NestedFitResult FitNested(const HSplineSurface& start, const FitTarget& target,
+NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,
                           const AutoPlan& plan, const RunContext& context) {
   if (!start.Offsets().empty()) {
     Fail("the start has detail of finer levels; start from one without, or take plan adaptive");
   }
-  if (target.points.size() < 16) {
+  if (points.size() < 16) {
     Fail(
         fmt::format("{} points are too few to leave some out; give at least 16, or take another "
                     "plan",
-                    target.points.size()));
+                    points.size()));
   }
-  CheckWeights(target);
+  CheckWeights(points);
   const Vec2 lengths_mm = MeanLengths(start);
   if (!(lengths_mm.allFinite() && lengths_mm.minCoeff() > 0)) {
     Fail("the points have no extent along u or v; give other (u,v)");
   }
-  return NestedFitter(start, target, plan, context).Run();
+  return NestedFitter(start, points, plan, context).Run();
 }
 
 }  // namespace semblance

@@ -43,6 +43,8 @@ struct AutoReport {
 struct NestedFitResult {
   HSplineSurface surface;  // its finest level is the finest that has vertices
   AutoReport report;
+  std::vector<double> residual_mm;  // per point as given: its distance from the surface
+  double rms_mm = kNaN;             // of the distances, weighted
 };
 
 // A tenth of the points is held out. In rounds: the thin-plate weight by generalised
@@ -52,7 +54,7 @@ struct NestedFitResult {
 // fitted again to all points. With many points the first rounds look at some of them.
 //   start: without detail; what it leaves of the points is smoothed, not the surface itself.
 // Throws InputError for a start with detail, without extent, or fewer than 16 points; Cancelled.
-NestedFitResult FitNested(const HSplineSurface& start, const FitTarget& target,
+NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,
                           const AutoPlan& plan, const RunContext& context);
 
 }  // namespace semblance

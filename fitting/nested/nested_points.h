@@ -3,11 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "fitting/nested/grid_values.h"
-#include "fitting/space/point_cloud.h"
+#include "fitting/problem/fit_target.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {
@@ -26,14 +28,21 @@ struct NestedPoints {
   std::size_t size() const { return x.size(); }
 };
 
-NestedPoints DisplacementsFrom(const HSplineSurface& start, const PointCloud& cloud, int threads);
+NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoints& points,
+                               int threads);
 
-// A point's patch on a level, and the weights of its vertices along u and v.
+// A point's patch on a level, by x and y in patches of level 0.
+inline std::array<int, 2> PatchOn(const PatchGrid& grid, int level, double x, double y) {
+  const double scale = 1 << level;
+  return {std::clamp(static_cast<int>(x * scale), 0, grid.patches_u - 1),
+          std::clamp(static_cast<int>(y * scale), 0, grid.patches_v - 1)};
+}
+
+// The same, and the weights of its vertices along u and v.
 struct NestedPlace {
   int i = 0, j = 0;
   std::array<double, 4> along_u, along_v;
 };
-// x, y: in patches of level 0.
 NestedPlace PlaceOn(const PatchGrid& grid, int level, double x, double y);
 
 }  // namespace semblance

@@ -3,37 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "fitting/nested/lanes.h"
 
 namespace semblance {
 namespace {
 
 constexpr int kMostSteps = 300;
 
-// The products of two of four weights, each pair once.
-constexpr int kPairs = 10;
-constexpr std::array<std::array<int, 4>, 4> kPair = {
-    {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}}};
-using Pairs = std::array<double, kPairs>;
-
-Pairs PairsOf(const std::array<double, 4>& weights, double factor) {
-  Pairs pairs;
-  for (int a = 0; a < 4; ++a) {
-    for (int b = a; b < 4; ++b) {
-      pairs[kPair[a][b]] = factor * weights[a] * weights[b];
-    }
-  }
-  return pairs;
-}
-
-Matrix16 GramOf(const std::array<Pairs, kPairs>& sums) {
-  Matrix16 gram;
-  for (int k = 0; k < 16; ++k) {
-    for (int l = 0; l < 16; ++l) {
-      gram(k, l) = sums[kPair[k / 4][l / 4]][kPair[k % 4][l % 4]];
-    }
-  }
-  return gram;
-}
+using Shares = std::vector<std::vector<double>>;  // by level and patch
 
 // Of the squares of a patch's sixteen weights over the patch.
 std::array<double, 16> MeanSquares() {
@@ -64,40 +44,25 @@ void SumUp(const GridLayout& finer, const std::vector<double>& of_finer, double 
   }
 }
 
-double Dot(const GridValues& a, const GridValues& b, int channel) {
-  const double *const x = a.Channel(channel), *const y = b.Channel(channel);
+// vertices^T form vertices.
+SEMBLANCE_WIDE double FormOf(const double* form, const double* vertices) {
+  double sums[16] = {};
+  for (int k = 0; k < 16; ++k) {
+    for (int l = 0; l < 16; ++l) {
+      sums[l] += form[16 * k + l] * vertices[k];
+    }
+  }
   double sum = 0;
-  for (std::size_t k = 0; k < a.layout().Size(); ++k) {
-    sum += x[k] * y[k];
+  for (int l = 0; l < 16; ++l) {
+    sum += sums[l] * vertices[l];
   }
   return sum;
 }
 
-double Dot(const NestedValues& a, const NestedValues& b, int channel) {
-  double sum = 0;
-  for (std::size_t level = 0; level < a.size(); ++level) {
-    sum += Dot(a[level], b[level], channel);
-  }
-  return sum;
-}
-
-// to += factor * x, or to = x + factor * to.
-void AddMultiple(double factor, const NestedValues& x, int channel, NestedValues& to) {
-  for (std::size_t level = 0; level < x.size(); ++level) {
-    const double* const from = x[level].Channel(channel);
-    double* const out = to[level].Channel(channel);
-    for (std::size_t k = 0; k < x[level].layout().Size(); ++k) {
-      out[k] += factor * from[k];
-    }
-  }
-}
-void ContinueFrom(const NestedValues& x, double factor, int channel, NestedValues& to) {
-  for (std::size_t level = 0; level < x.size(); ++level) {
-    const double* const from = x[level].Channel(channel);
-    double* const out = to[level].Channel(channel);
-    for (std::size_t k = 0; k < x[level].layout().Size(); ++k) {
-      out[k] = from[k] + factor * out[k];
-    }
+// Of a patch; the halo must be filled.
+void Gather(const GridValues& values, int channel, int i, int j, std::array<double, 16>& vertices) {
+  for (int b = 0; b < 4; ++b) {
+    std::copy_n(values.Row(channel, j + b) + i, 4, vertices.begin() + 4 * b);
   }
 }
 
@@ -106,295 +71,332 @@ void ContinueFrom(const NestedValues& x, double factor, int channel, NestedValue
 NestedSolve::NestedSolve(const NestedPoints& points, const Vec2& lengths_mm)
     : points_(points), lengths_mm_(lengths_mm) {}
 
-// Of a point's place along the curve, so that it does not depend on the order as given.
-double NestedSolve::Probe(std::uint32_t k) const {
-  std::uint64_t bits = (k + 1) * 0x9E3779B97F4A7C15u;
-  bits = (bits ^ bits >> 29) * 0xBF58476D1CE4E5B9u;
-  return ((bits ^ bits >> 32) & 1) != 0 ? 1 : -1;
-}
-
 NestedValues NestedSolve::Zeros() const {
   NestedValues values;
-  for (int level = 0; level <= space_->finest(); ++level) {
+  for (int level = 0; level <= Finest(); ++level) {
     values.emplace_back((*space_)[level].layout, Channels());
   }
   return values;
 }
 
-void NestedSolve::Begin(const NestedSpace& space, std::vector<std::uint32_t> used) {
+void NestedSolve::Enter(const NestedSpace& space) {
   space_ = &space;
+  for (int level = static_cast<int>(solution_.size()); level <= Finest(); ++level) {
+    solution_.emplace_back(space[level].layout, Channels());
+  }
+  absolute_ = Zeros();
+}
+
+void NestedSolve::Begin(const NestedSpace& space, std::vector<std::uint32_t> used) {
+  Enter(space);
   used_ = std::move(used);
-  levels_.assign(space.finest() + 1, {});
-  for (int level = 0; level <= space.finest(); ++level) {
+  levels_.clear();
+  Shares data_shares;
+  for (int level = 0; level <= Finest(); ++level) {
     const GridLayout& layout = space[level].layout;
-    LevelSystem& system = levels_[level];
-    system.matrix = space[level].leaves ? StencilMatrix(layout) : StencilMatrix();
-    system.data_share.assign(layout.Patches(), 0);
-    system.data_diagonal.assign(layout.Size(), 0);
+    LevelSystem& system = levels_.emplace_back();
+    system.leaves = space.Leaves(level);
+    if (space[level].leaves) {
+      system.matrix = StencilMatrix(layout, RunsAround(layout, system.leaves));
+    }
     system.energy = ThinPlateStiffness(lengths_mm_.x() / layout.grid.patches_u,
                                        lengths_mm_.y() / layout.grid.patches_v) /
                     lengths_mm_.prod();
+    data_shares.emplace_back(layout.Patches(), 0.0);
   }
   right_ = Zeros();
-  weight_ = weight_sum_ = 0;
-  AddPoints();
-  for (int level = space.finest(); level > 0; --level) {
-    AddRestricted(right_[level], right_[level - 1]);
+  direction_ = Zeros();
+  product_ = Zeros();
+  residual_ = Zeros();
+  weight_ = weight_sum_ = square_sum_ = 0;
+  AddPoints(data_shares);
+  for (int level = Finest(); level > 0; --level) {
+    AddRestricted(right_[level], Runs(level), right_[level - 1]);
+    right_[level - 1].FoldHalo(Runs(level - 1));
   }
-  for (int level = 0; level <= space.finest(); ++level) {
-    Mask(level, right_[level]);
-  }
-  ShareWeights();
-  for (int level = static_cast<int>(solution_.size()); level <= space.finest(); ++level) {
-    solution_.emplace_back(space[level].layout, Channels());
-  }
+  MakeDiagonals(std::move(data_shares));
 }
 
-// Points of one leaf follow each other.
-void NestedSolve::AddPoints() {
+// Points of one leaf follow each other. visit(leaf, indices).
+template <class Visit>
+void NestedSolve::ForEachLeaf(std::span<const std::uint32_t> indices, const Visit& visit) const {
   std::size_t begin = 0;
-  while (begin < used_.size()) {
-    const int level = space_->LeafLevel(points_.x[used_[begin]], points_.y[used_[begin]]);
+  while (begin < indices.size()) {
+    const int level = space_->LeafLevel(points_.x[indices[begin]], points_.y[indices[begin]]);
     const PatchGrid& grid = (*space_)[level].layout.grid;
     const auto place = [&](std::size_t k) {
-      return PlaceOn(grid, level, points_.x[used_[k]], points_.y[used_[k]]);
+      return PatchOn(grid, level, points_.x[indices[k]], points_.y[indices[k]]);
     };
-    const NestedPlace first = place(begin);
+    const auto first = place(begin);
     std::size_t end = begin + 1;
-    for (; end < used_.size(); ++end) {
-      const NestedPlace next = place(end);
-      if (next.i != first.i || next.j != first.j) {
-        break;
-      }
+    while (end < indices.size() && place(end) == first) {
+      ++end;
     }
-    AddLeaf(level, first.i, first.j, std::span(used_).subspan(begin, end - begin));
+    visit(LeafPatch{level, first[0], first[1]}, indices.subspan(begin, end - begin));
     begin = end;
   }
 }
 
-void NestedSolve::AddLeaf(int level, int i, int j, std::span<const std::uint32_t> points) {
-  const GridLayout& layout = (*space_)[level].layout;
-  std::array<Pairs, kPairs> sums{};
-  std::array<std::array<double, 16>, 4> right{};
-  double weight = 0;
-  for (const std::uint32_t k : points) {
-    const NestedPlace place = PlaceOn(layout.grid, level, points_.x[k], points_.y[k]);
-    const double w = points_.weight[k];
-    const Pairs u = PairsOf(place.along_u, 1), v = PairsOf(place.along_v, w);
-    for (int r = 0; r < kPairs; ++r) {
-      for (int c = 0; c < kPairs; ++c) {
-        sums[r][c] += v[r] * u[c];
-      }
-    }
+void NestedSolve::AddPoints(Shares& data_shares) {
+  ForEachLeaf(used_, [&](const LeafPatch& leaf, std::span<const std::uint32_t> indices) {
+    const GridLayout& layout = (*space_)[leaf.level].layout;
+    const LeafSums sums = SumsOver(points_, leaf, indices);
+    levels_[leaf.level].matrix.AddPatch(leaf.i, leaf.j, sums.gram);
+    data_shares[leaf.level][layout.Patch(leaf.i, leaf.j)] = sums.weight;
+    weight_sum_ += sums.weight;
+    square_sum_ += sums.squares;
     for (int c = 0; c < Channels(); ++c) {
-      const double value = c < points_.channels ? w * points_.value[c][k] : std::sqrt(w) * Probe(k);
-      for (int m = 0; m < 16; ++m) {
-        right[c][m] += value * place.along_u[m % 4] * place.along_v[m / 4];
-      }
+      Scatter(layout, leaf.i, leaf.j, sums.right[c], 1, right_[leaf.level].Channel(c));
     }
-    weight += w;
-  }
-  levels_[level].matrix.AddPatch(i, j, GramOf(sums));
-  levels_[level].data_share[layout.Patch(i, j)] = weight;
-  weight_sum_ += weight;
-  for (int c = 0; c < Channels(); ++c) {
-    Scatter(layout, i, j, right[c], 1, right_[level].Channel(c));
-  }
+  });
 }
 
-void NestedSolve::ShareWeights() {
+// What each vertex of each level would see of points and energy, were the level alone.
+void NestedSolve::MakeDiagonals(Shares data_shares) {
   static const std::array<double, 16> squares = MeanSquares();
-  const NestedSpace& space = *space_;
-  for (int level = space.finest(); level >= 0; --level) {
+  Shares energy_shares;
+  for (const LevelSystem& system : levels_) {
+    energy_shares.emplace_back(system.leaves.begin(), system.leaves.end());
+  }
+  double data = 0, energy = 0;
+  for (int level = Finest(); level >= 0; --level) {
     LevelSystem& system = levels_[level];
-    const GridLayout& layout = space[level].layout;
-    system.energy_share.assign(layout.Patches(), 0);
-    for (std::size_t p = 0; p < layout.Patches(); ++p) {
-      system.energy_share[p] = space.IsLeaf(level, p) ? 1 : 0;
+    const GridLayout& layout = (*space_)[level].layout;
+    if (level < Finest()) {
+      const GridLayout& finer = (*space_)[level + 1].layout;
+      SumUp(finer, data_shares[level + 1], 1, layout, data_shares[level]);
+      SumUp(finer, energy_shares[level + 1], 0.25, layout, energy_shares[level]);
     }
-    if (level < space.finest()) {
-      const GridLayout& finer = space[level + 1].layout;
-      SumUp(finer, levels_[level + 1].data_share, 1, layout, system.data_share);
-      SumUp(finer, levels_[level + 1].energy_share, 0.25, layout, system.energy_share);
+    system.data_diagonal = GridValues(layout, 1);
+    system.energy_diagonal = GridValues(layout, 1);
+    system.inverse = GridValues(layout, 1);
+    std::array<double, 16> own;
+    for (int k = 0; k < 16; ++k) {
+      own[k] = system.energy(k, k);
     }
     for (int j = 0; j < layout.grid.patches_v; ++j) {
       for (int i = 0; i < layout.grid.patches_u; ++i) {
-        Scatter(layout, i, j, squares, system.data_share[layout.Patch(i, j)],
-                system.data_diagonal.data());
+        const std::size_t patch = layout.Patch(i, j);
+        if ((*space_)[level].there[patch] != 0) {
+          Scatter(layout, i, j, squares, data_shares[level][patch],
+                  system.data_diagonal.Channel(0));
+          Scatter(layout, i, j, own, energy_shares[level][patch],
+                  system.energy_diagonal.Channel(0));
+          data += data_shares[level][patch];
+          energy += energy_shares[level][patch] * system.energy.trace();
+        }
       }
     }
   }
-}
-
-double NestedSolve::EvenWeight() const {
-  double data = 0, energy = 0;
-  for (const LevelSystem& system : levels_) {
-    for (std::size_t p = 0; p < system.data_share.size(); ++p) {
-      energy += system.energy_share[p] * system.energy.trace();
-    }
-    for (const double d : system.data_diagonal) {
-      data += d;
-    }
-  }
-  return data / energy / std::max(weight_sum_, 1e-300);
+  const double each = std::accumulate(squares.begin(), squares.end(), 0.0);
+  even_weight_ = each * data / energy / std::max(weight_sum_, 1e-300);
 }
 
 // The matrix as it stands has the weight of the last call.
 void NestedSolve::SetWeight(double weight) {
   const double more = (weight - weight_) * weight_sum_;
   weight_ = weight;
-  for (int level = 0; level <= space_->finest(); ++level) {
+  for (int level = 0; level <= Finest(); ++level) {
+    LevelSystem& system = levels_[level];
     const GridLayout& layout = (*space_)[level].layout;
-    const Matrix16 form = more * levels_[level].energy;
+    const Matrix16 form = more * system.energy;
     for (int j = 0; (*space_)[level].leaves && j < layout.grid.patches_v; ++j) {
       for (int i = 0; i < layout.grid.patches_u; ++i) {
-        if (space_->IsLeaf(level, layout.Patch(i, j))) {
-          levels_[level].matrix.AddPatch(i, j, form);
+        if (system.leaves[layout.Patch(i, j)] != 0) {
+          system.matrix.AddPatch(i, j, form);
         }
       }
     }
-  }
-  MakeDiagonals();
-}
-
-void NestedSolve::MakeDiagonals() {
-  for (int level = 0; level <= space_->finest(); ++level) {
-    LevelSystem& system = levels_[level];
-    const GridLayout& layout = (*space_)[level].layout;
-    std::array<double, 16> own;
-    for (int k = 0; k < 16; ++k) {
-      own[k] = system.energy(k, k);
-    }
-    system.diagonal = system.data_diagonal;
-    for (int j = 0; j < layout.grid.patches_v; ++j) {
-      for (int i = 0; i < layout.grid.patches_u; ++i) {
-        Scatter(layout, i, j, own, weight_ * weight_sum_ * system.energy_share[layout.Patch(i, j)],
-                system.diagonal.data());
-      }
-    }
+    InvertOn(Runs(level), system.data_diagonal.Channel(0), system.energy_diagonal.Channel(0),
+             weight_ * weight_sum_, (*space_)[level].active.data(), system.inverse.Channel(0));
   }
 }
 
-void NestedSolve::Mask(int level, GridValues& values) const {
-  const std::vector<char>& active = (*space_)[level].active;
-  for (int c = 0; level > 0 && c < values.channels(); ++c) {
-    double* const v = values.Channel(c);
-    for (std::size_t k = 0; k < active.size(); ++k) {
-      v[k] = active[k] != 0 ? v[k] : 0;
-    }
-  }
-}
-
-void NestedSolve::Multiply(const NestedValues& x, NestedValues& product,
-                           NestedValues& absolute) const {
-  for (int level = 0; level <= space_->finest(); ++level) {
-    absolute[level].values() = x[level].values();
-    if (level > 0) {
-      AddRefined(absolute[level - 1], absolute[level]);
-    }
-    absolute[level].FillHalo();
-    product[level].Clear();
-    if (!levels_[level].matrix.empty()) {
-      levels_[level].matrix.AddProduct(absolute[level], product[level]);
-      product[level].FoldHalo();
-    }
-  }
-  for (int level = space_->finest(); level > 0; --level) {
-    AddRestricted(product[level], product[level - 1]);
-    Mask(level, product[level]);
-  }
-}
-
-// Returns the scalar products of the two, per channel.
-std::vector<double> NestedSolve::Divide(const NestedValues& residual, NestedValues& divided) const {
-  for (int level = 0; level <= space_->finest(); ++level) {
-    const std::vector<double>& diagonal = levels_[level].diagonal;
+void NestedSolve::Absolute(const NestedValues& x) {
+  for (int level = 0; level <= Finest(); ++level) {
     for (int c = 0; c < Channels(); ++c) {
-      const double* const r = residual[level].Channel(c);
-      double* const z = divided[level].Channel(c);
-      for (std::size_t k = 0; k < diagonal.size(); ++k) {
-        z[k] = diagonal[k] > 0 ? r[k] / diagonal[k] : 0;
-      }
+      CopyOn(Runs(level), x[level].Channel(c), absolute_[level].Channel(c));
+    }
+    if (level > 0) {
+      AddRefined(absolute_[level - 1], Runs(level), absolute_[level]);
+    }
+    absolute_[level].FillHalo(Runs(level));
+  }
+}
+
+void NestedSolve::Multiply(const NestedValues& x, NestedValues& product) {
+  Absolute(x);
+  for (int level = 0; level <= Finest(); ++level) {
+    product[level].Clear(Runs(level));
+    if (!levels_[level].matrix.empty()) {
+      levels_[level].matrix.AddProduct(absolute_[level], product[level]);
     }
   }
-  std::vector<double> products;
-  for (int c = 0; c < Channels(); ++c) {
-    products.push_back(Dot(residual, divided, c));
+  for (int level = Finest(); level > 0; --level) {
+    product[level].FoldHalo(Runs(level));
+    AddRestricted(product[level], Runs(level), product[level - 1]);
   }
-  return products;
+  product[0].FoldHalo(Runs(0));
+}
+
+GridStep NestedSolve::StepOf(int level, int channel) {
+  return {.inverse = levels_[level].inverse.Channel(0),
+          .product = product_[level].Channel(channel),
+          .direction = direction_[level].Channel(channel),
+          .residual = residual_[level].Channel(channel),
+          .solution = solution_[level].Channel(channel)};
+}
+
+// Of part(level).
+template <class Part>
+double NestedSolve::Sum(const Part& part) const {
+  double sum = 0;
+  for (int level = 0; level <= Finest(); ++level) {
+    sum += part(level);
+  }
+  return sum;
 }
 
 int NestedSolve::Solve(double least_gain) {
   constexpr double kRounding = 1e-16, kProbe = 1e-3;  // of what there was to gain at first
-  NestedValues residual = right_, divided = Zeros(), product = Zeros(), absolute = Zeros();
-  std::vector<double> enough = Divide(residual, divided);
+  std::array<double, 4> left{}, enough{};
+  Multiply(solution_, product_);
   for (int c = 0; c < Channels(); ++c) {
-    enough[c] *= c < points_.channels ? kRounding : kProbe;
-    enough[c] = c < points_.channels ? std::max(enough[c], least_gain) : enough[c];
+    const bool probe = c == points_.channels;
+    enough[c] = Sum([&](int level) {
+      CopyOn(Runs(level), right_[level].Channel(c), residual_[level].Channel(c));
+      return SquaresOn(Runs(level), StepOf(level, c).inverse, residual_[level].Channel(c));
+    });
+    enough[c] = probe ? kProbe * enough[c] : std::max(kRounding * enough[c], least_gain);
+    left[c] = Sum([&](int level) {
+      const GridStep step = StepOf(level, c);
+      return SubtractOn(Runs(level), step.inverse, step.product, step.residual);
+    });
+    for (int level = 0; level <= Finest(); ++level) {
+      TurnOn(Runs(level), StepOf(level, c), 0);
+    }
   }
-  Multiply(solution_, product, absolute);
-  for (int c = 0; c < Channels(); ++c) {
-    AddMultiple(-1, product, c, residual);
-  }
-  std::vector<double> left = Divide(residual, divided);
-  NestedValues direction = divided;
   int steps = 0;
-  for (; steps < kMostSteps; ++steps) {
-    bool done = true;
+  const auto done = [&] {
+    return std::equal(left.begin(), left.begin() + Channels(), enough.begin(),
+                      [](double is, double should) { return !(is > should); });
+  };
+  for (; steps < kMostSteps && !done(); ++steps) {
+    Multiply(direction_, product_);
     for (int c = 0; c < Channels(); ++c) {
-      done = done && !(left[c] > enough[c]);
-    }
-    if (done) {
-      break;
-    }
-    Multiply(direction, product, absolute);
-    for (int c = 0; c < Channels(); ++c) {
-      const double curvature = Dot(direction, product, c);
+      const double curvature = Sum([&](int level) {
+        return DotOn(Runs(level), direction_[level].Channel(c), product_[level].Channel(c));
+      });
       const double length = curvature > 0 ? left[c] / curvature : 0;
-      AddMultiple(length, direction, c, solution_);
-      AddMultiple(-length, product, c, residual);
+      const double next =
+          Sum([&](int level) { return AdvanceOn(Runs(level), StepOf(level, c), length); });
+      for (int level = 0; level <= Finest(); ++level) {
+        TurnOn(Runs(level), StepOf(level, c), left[c] > 0 ? next / left[c] : 0);
+      }
+      left[c] = next;
     }
-    const std::vector<double> next = Divide(residual, divided);
-    for (int c = 0; c < Channels(); ++c) {
-      ContinueFrom(divided, left[c] > 0 ? next[c] / left[c] : 0, c, direction);
-    }
-    left = next;
   }
   return steps;
 }
 
-double NestedSolve::Trace() const { return Dot(right_, solution_, points_.channels); }
-
-NestedValues NestedSolve::Displacements() const {
-  NestedValues absolute = solution_;
-  for (int level = 0; level <= space_->finest(); ++level) {
-    if (level > 0) {
-      AddRefined(absolute[level - 1], absolute[level]);
-    }
-    absolute[level].FillHalo();
+// At the last solution x: with (N^T W N + w E) x = b - r and b = N^T W v, the sum of w |v - N x|^2
+// is that of w |v|^2, less x . b, less x . r, less w x . E x.
+double NestedSolve::SumOfSquares() {
+  double sum = square_sum_ - weight_ * weight_sum_ * Energy();
+  for (int c = 0; c < points_.channels; ++c) {
+    sum -= Sum([&](int level) {
+      const double* const x = solution_[level].Channel(c);
+      return DotOn(Runs(level), x, right_[level].Channel(c)) +
+             DotOn(Runs(level), x, residual_[level].Channel(c));
+    });
   }
-  return absolute;
+  return sum;
 }
 
-NestedSolve::Residual NestedSolve::ResidualAt(const NestedValues& displacements,
-                                              std::uint32_t k) const {
-  const int level = space_->LeafLevel(points_.x[k], points_.y[k]);
-  const GridValues& values = displacements[level];
-  const NestedPlace place = PlaceOn(values.layout().grid, level, points_.x[k], points_.y[k]);
-  Residual residual;
-  for (int c = 0; c < points_.channels; ++c) {
-    double sum = 0;
-    for (int b = 0; b < 4; ++b) {
-      const double* const row = values.Row(c, place.j + b) + place.i;
-      double along = 0;
-      for (int a = 0; a < 4; ++a) {
-        along += place.along_u[a] * row[a];
+// Of the solution, at weight 1.
+double NestedSolve::Energy() {
+  Absolute(solution_);
+  double sum = 0;
+  std::array<double, 16> vertices;
+  for (int level = 0; level <= Finest(); ++level) {
+    const LevelSystem& system = levels_[level];
+    const GridLayout& layout = (*space_)[level].layout;
+    for (int j = 0; (*space_)[level].leaves && j < layout.grid.patches_v; ++j) {
+      for (int i = 0; i < layout.grid.patches_u; ++i) {
+        for (int c = 0; system.leaves[layout.Patch(i, j)] != 0 && c < points_.channels; ++c) {
+          Gather(absolute_[level], c, i, j, vertices);
+          sum += FormOf(system.energy.data(), vertices.data());
+        }
       }
-      sum += place.along_v[b] * along;
     }
-    residual.along[c] = points_.value[c][k] - sum;
   }
-  return residual;
+  return sum;
+}
+
+// Point by point where too few digits would be left.
+double NestedSolve::MeanSquare() {
+  constexpr double kEnough = 1e-10;
+  double sum = SumOfSquares();
+  if (!(sum > kEnough * square_sum_)) {
+    sum = 0;
+    const std::vector<NestedResidual> residuals = ResidualsOf(used_);
+    for (std::size_t n = 0; n < used_.size(); ++n) {
+      sum += points_.weight[used_[n]] * residuals[n].Square();
+    }
+  }
+  return sum / weight_sum_ / points_.channels;
+}
+
+double NestedSolve::Trace() const {
+  const int c = points_.channels;
+  return Sum([&](int level) {
+    return DotOn(Runs(level), right_[level].Channel(c), solution_[level].Channel(c));
+  });
+}
+
+NestedSolve::Packed NestedSolve::Solution() const {
+  Packed packed;
+  for (int level = 0; level <= Finest(); ++level) {
+    for (int c = 0; c < Channels(); ++c) {
+      for (const GridRun& run : Runs(level)) {
+        const double* const from = solution_[level].Channel(c) + run.at;
+        packed.insert(packed.end(), from, from + run.size());
+      }
+    }
+  }
+  return packed;
+}
+
+void NestedSolve::SetSolution(const Packed& solution) {
+  solution_ = Zeros();
+  auto from = solution.begin();
+  for (int level = 0; level <= Finest(); ++level) {
+    for (int c = 0; c < Channels(); ++c) {
+      for (const GridRun& run : Runs(level)) {
+        std::copy_n(from, run.size(), solution_[level].Channel(c) + run.at);
+        from += run.size();
+      }
+    }
+  }
+}
+
+const NestedValues& NestedSolve::Displacements() {
+  Absolute(solution_);
+  return absolute_;
+}
+
+std::vector<NestedResidual> NestedSolve::ResidualsOf(std::span<const std::uint32_t> indices) {
+  Absolute(solution_);
+  std::vector<NestedResidual> residuals(indices.size());
+  LeafVertices vertices{};
+  ForEachLeaf(indices, [&](const LeafPatch& leaf, std::span<const std::uint32_t> of_leaf) {
+    for (int c = 0; c < points_.channels; ++c) {
+      Gather(absolute_[leaf.level], c, leaf.i, leaf.j, vertices[c]);
+    }
+    ResidualsOver(points_, leaf, vertices, of_leaf,
+                  residuals.data() + (of_leaf.data() - indices.data()));
+  });
+  return residuals;
 }
 
 }  // namespace semblance

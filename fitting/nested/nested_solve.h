@@ -2,11 +2,12 @@
 // The penalised least squares of a nested fit, by conjugate gradients over all levels at once.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "fitting/nested/grid_sums.h"
+#include "fitting/nested/leaf_sums.h"
 #include "fitting/nested/nested_points.h"
 #include "fitting/nested/nested_space.h"
 #include "fitting/nested/stencil_matrix.h"
@@ -22,12 +23,14 @@ using NestedValues = std::vector<GridValues>;  // one per level
 // that the number of steps does not grow with the vertices.
 class NestedSolve {
  public:
-  // lengths_mm: what [0,1] stands for along u and v. probe: with one more channel, a random sign
-  // per point, for the trace. All must outlive the solve.
+  // lengths_mm: what [0,1] stands for along u and v. All must outlive the solve.
   NestedSolve(const NestedPoints& points, const Vec2& lengths_mm);
 
-  // Takes the space as it is linked, and those points whose index is in `used` (ascending). What
-  // was solved for before is kept as the start of the next solve.
+  // Takes the space as it is linked; it must outlive what is asked of it. What was solved for
+  // before is kept as the start of the next solve; the space must hold it.
+  void Enter(const NestedSpace& space);
+  // Enters it, and takes those points whose index is in `used` (ascending). With one more channel,
+  // a random sign per point, for the trace.
   void Begin(const NestedSpace& space, std::vector<std::uint32_t> used);
   // The weight of the thin-plate energy, mm^2 per energy.
   void SetWeight(double weight);
@@ -35,52 +38,55 @@ class NestedSolve {
   // Returns the number of steps.
   int Solve(double least_gain);
 
+  // The mean of w |e|^2 along one axis, of the points that were taken, at the last solution.
+  double MeanSquare();
   // The trace of the influence matrix at the last solution, by one probe (Hutchinson 1990).
   double Trace() const;
   double WeightSum() const { return weight_sum_; }
   // The diagonals' sums over those of the energy at weight 1: where points and energy balance.
-  double EvenWeight() const;
-  const NestedValues& solution() const { return solution_; }
-  void SetSolution(NestedValues values) { solution_ = std::move(values); }
-  // The absolute displacements of every level's vertices, halos filled.
-  NestedValues Displacements() const;
+  double EvenWeight() const { return even_weight_; }
 
-  struct Residual {
-    std::array<double, 3> along{};  // each channel, mm
-    double Square() const {
-      return along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
-    }
-  };
-  // Of point k, on the surface that Displacements gave.
-  Residual ResidualAt(const NestedValues& displacements, std::uint32_t k) const;
-  const NestedSpace& space() const { return *space_; }
+  // The vertices of the space's runs, level by level; for the same space again.
+  using Packed = std::vector<double>;
+  Packed Solution() const;
+  void SetSolution(const Packed& solution);
+
+  // The absolute displacements of every level's vertices, halos filled; until the next call of
+  // anything else.
+  const NestedValues& Displacements();
+  // One per index, which must ascend.
+  std::vector<NestedResidual> ResidualsOf(std::span<const std::uint32_t> indices);
 
  private:
   struct LevelSystem {
-    StencilMatrix matrix;              // of the leaves; empty where there are none
-    std::vector<double> data_share;    // per patch: of the points' weights below it
-    std::vector<double> energy_share;  // per patch: of the leaves below it, in units of one
-    std::vector<double> data_diagonal, diagonal;
+    StencilMatrix matrix;  // of the leaves; empty where there are none
+    std::vector<char> leaves;
     Matrix16 energy;  // of a patch, at weight 1
+    GridValues data_diagonal, energy_diagonal, inverse;
   };
   int Channels() const { return points_.channels + 1; }
-  double Probe(std::uint32_t k) const;
-  void AddPoints();
-  void AddLeaf(int level, int i, int j, std::span<const std::uint32_t> points);
-  void ShareWeights();
-  void MakeDiagonals();
-  void Multiply(const NestedValues& x, NestedValues& product, NestedValues& absolute) const;
-  void Mask(int level, GridValues& values) const;
+  const GridRuns& Runs(int level) const { return (*space_)[level].runs; }
+  int Finest() const { return space_->finest(); }
   NestedValues Zeros() const;
-  std::vector<double> Divide(const NestedValues& residual, NestedValues& divided) const;
+  template <class Visit>
+  void ForEachLeaf(std::span<const std::uint32_t> indices, const Visit& visit) const;
+  void AddPoints(std::vector<std::vector<double>>& data_shares);
+  void MakeDiagonals(std::vector<std::vector<double>> data_shares);
+  void Multiply(const NestedValues& x, NestedValues& product);
+  void Absolute(const NestedValues& x);
+  double Energy();
+  double SumOfSquares();
+  GridStep StepOf(int level, int channel);
+  template <class Part>
+  double Sum(const Part& part) const;
 
   const NestedPoints& points_;
   Vec2 lengths_mm_;
   const NestedSpace* space_ = nullptr;
   std::vector<std::uint32_t> used_;
   std::vector<LevelSystem> levels_;
-  NestedValues right_, solution_;
-  double weight_ = 0, weight_sum_ = 0;
+  NestedValues right_, solution_, absolute_, direction_, product_, residual_;
+  double weight_ = 0, weight_sum_ = 0, square_sum_ = 0, even_weight_ = kNaN;
 };
 
 }  // namespace semblance

@@ -6,14 +6,14 @@
 namespace semblance {
 
 NestedSpace::NestedSpace(const HSplineShape& level0) {
-  levels_.push_back({.layout = {PatchGrid::Of(level0, 0)}, .active = {}, .there = {}, .split = {}});
+  levels_.emplace_back().layout = {PatchGrid::Of(level0, 0)};
   levels_[0].active.assign(levels_[0].layout.Size(), 1);
   Link();
 }
 
 void NestedSpace::AddLevel() {
   const GridLayout layout = levels_.back().layout.Finer();
-  levels_.push_back({.layout = layout, .active = {}, .there = {}, .split = {}});
+  levels_.emplace_back().layout = layout;
   levels_.back().active.assign(layout.Size(), 0);
 }
 
@@ -38,15 +38,33 @@ int NestedSpace::Overlay(int level, int i, int j) {
   return added;
 }
 
-bool NestedSpace::IsReached(int level, int i, int j) const {
+// Each patch of the level before with a child that is split or has an active vertex.
+void NestedSpace::SplitAbove(int level) {
   const NestedLevel& l = levels_[level];
-  const int columns = l.layout.grid.Columns();
-  for (int k = 0; k < 16; ++k) {
-    if (l.active[l.layout.At((i + k % 4) % columns, j + k / 4)] != 0) {
-      return true;
+  const PatchGrid& grid = l.layout.grid;
+  const int columns = grid.Columns();
+  std::vector<char>& split = levels_[level - 1].split;
+  std::vector<char> across(grid.patches_u);  // of a row of vertices: patches that one belongs to
+  for (int row = 0; row < grid.Rows(); ++row) {
+    const char* const active = l.active.data() + l.layout.At(0, row);
+    for (int i = 0; i < grid.patches_u; ++i) {
+      across[i] = 0;
+      for (int a = 0; a < 4; ++a) {
+        across[i] |= active[i + a < columns ? i + a : (i + a) % columns];
+      }
+    }
+    for (int j = std::max(row - 3, 0); j <= std::min(row, grid.patches_v - 1); ++j) {
+      char* const above = split.data() + levels_[level - 1].layout.Patch(0, j / 2);
+      for (int i = 0; i < grid.patches_u; ++i) {
+        above[i / 2] |= across[i];
+      }
     }
   }
-  return false;
+  for (int j = 0; j < grid.patches_v; ++j) {
+    for (int i = 0; i < grid.patches_u; ++i) {
+      split[levels_[level - 1].layout.Patch(i / 2, j / 2)] |= l.split[l.layout.Patch(i, j)];
+    }
+  }
 }
 
 void NestedSpace::Link() {
@@ -55,28 +73,29 @@ void NestedSpace::Link() {
     l.there.assign(l.layout.Patches(), &l == &levels_.front() ? 1 : 0);
   }
   for (int level = finest(); level >= 1; --level) {
-    const GridLayout &layout = levels_[level].layout, &up = levels_[level - 1].layout;
-    for (int j = 0; j < layout.grid.patches_v; ++j) {
-      for (int i = 0; i < layout.grid.patches_u; ++i) {
-        if (levels_[level].split[layout.Patch(i, j)] != 0 || IsReached(level, i, j)) {
-          levels_[level - 1].split[up.Patch(i / 2, j / 2)] = 1;
-        }
-      }
-    }
+    SplitAbove(level);
   }
   for (int level = 0; level <= finest(); ++level) {
     NestedLevel& l = levels_[level];
-    l.leaves = false;
-    for (int j = 0; j < l.layout.grid.patches_v; ++j) {
+    for (int j = 0; level > 0 && j < l.layout.grid.patches_v; ++j) {
       for (int i = 0; i < l.layout.grid.patches_u; ++i) {
-        const std::size_t patch = l.layout.Patch(i, j);
-        if (level > 0) {
-          l.there[patch] = levels_[level - 1].split[levels_[level - 1].layout.Patch(i / 2, j / 2)];
-        }
-        l.leaves = l.leaves || (l.there[patch] != 0 && l.split[patch] == 0);
+        l.there[l.layout.Patch(i, j)] =
+            levels_[level - 1].split[levels_[level - 1].layout.Patch(i / 2, j / 2)];
       }
     }
+    l.leaves = l.there != l.split;
+    l.runs = RunsAround(l.layout, l.there);
   }
+  vertices_ = CountVertices();
+}
+
+std::vector<char> NestedSpace::Leaves(int level) const {
+  const NestedLevel& l = levels_[level];
+  std::vector<char> leaves(l.there.size());
+  for (std::size_t p = 0; p < leaves.size(); ++p) {
+    leaves[p] = l.there[p] != 0 && l.split[p] == 0 ? 1 : 0;
+  }
+  return leaves;
 }
 
 int NestedSpace::LeafLevel(double x, double y) const {
@@ -109,7 +128,7 @@ bool NestedSpace::IsCovered(int level, int i, int j) const {
   return true;
 }
 
-int NestedSpace::Vertices() const {
+int NestedSpace::CountVertices() const {
   int count = 0;
   for (int level = 0; level <= finest(); ++level) {
     const GridLayout& layout = levels_[level].layout;

@@ -15,6 +15,7 @@ struct NestedLevel {
   std::vector<char> there;   // of each patch: its parent is split
   std::vector<char> split;   // of each patch: finer vertices reach into it
   bool leaves = false;       // some patch is there and not split
+  GridRuns runs;             // all vertices of the patches that are there
 };
 
 // Coarse vertices stay unknowns where finer ones cover them: the many ways to write a surface do no
@@ -31,7 +32,9 @@ class NestedSpace {
   // The level whose patch holds the point, in patches of level 0, and is no more split.
   int LeafLevel(double x, double y) const;
   // Vertices that are active and not sums of active ones of the next level.
-  int Vertices() const;
+  int Vertices() const { return vertices_; }
+  // On every level those patches that are there and not split, as GridLayout::Patch has them.
+  std::vector<char> Leaves(int level) const;
   bool IsCovered(int level, int i, int j) const;
 
   // Makes the vertices of the next level on the knots of a patch active, and those beyond a border.
@@ -41,9 +44,11 @@ class NestedSpace {
 
  private:
   void AddLevel();
-  bool IsReached(int level, int i, int j) const;
+  void SplitAbove(int level);
+  int CountVertices() const;
 
   std::vector<NestedLevel> levels_;
+  int vertices_ = 0;
 };
 
 }  // namespace semblance

@@ -18,7 +18,7 @@ constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
 class OutlierSearch {
  public:
   OutlierSearch(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                std::span<const NestedSolve::Residual> residuals, double least_sd_mm)
+                std::span<const NestedResidual> residuals, double least_sd_mm)
       : points_(points), indices_(indices), residuals_(residuals), least_sd_mm_(least_sd_mm) {}
 
   // Of each of the indices.
@@ -110,7 +110,7 @@ class OutlierSearch {
 
   const NestedPoints& points_;
   std::span<const std::uint32_t> indices_;
-  std::span<const NestedSolve::Residual> residuals_;
+  std::span<const NestedResidual> residuals_;
   double least_sd_mm_;
   const std::vector<char>* before_ = nullptr;
   std::array<double, 3> middle_{};
@@ -122,7 +122,7 @@ class OutlierSearch {
 }  // namespace
 
 int FindOutliers(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                 std::span<const NestedSolve::Residual> residuals, double least_sd_mm,
+                 std::span<const NestedResidual> residuals, double least_sd_mm,
                  std::vector<char>& outlier) {
   OutlierSearch search(points, indices, residuals, least_sd_mm);
   std::vector<char> found(indices.size());

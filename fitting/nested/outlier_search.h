@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "fitting/nested/nested_solve.h"
+#include "fitting/nested/leaf_sums.h"
 
 namespace semblance {
 
@@ -17,7 +17,7 @@ namespace semblance {
 // share, is none, and the width falls with the residuals as the surface gets finer. outlier: per
 // point; what stands there when it begins has no vote. Returns how many there are.
 int FindOutliers(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                 std::span<const NestedSolve::Residual> residuals, double least_sd_mm,
+                 std::span<const NestedResidual> residuals, double least_sd_mm,
                  std::vector<char>& outlier);
 
 }  // namespace semblance

@@ -2,82 +2,140 @@
 #include "fitting/nested/stencil_matrix.h"
 
 #include <algorithm>
+#include <utility>
 
-#include "surfaces/base/simd.h"
+#include "fitting/nested/lanes.h"
 
 namespace semblance {
 namespace {
 
-// One diagonal of one row of vertices: x_near and y_near are those of the row itself, x_far and
-// y_far those that the diagonal leads to.
-struct DiagonalRow {
-  const double* entries;
-  const double* x_near;
-  const double* x_far;
-  double* y_near;
-  double* y_far;
-  int count;
+constexpr int kBlock = GridLayout::kBlock;
+
+SEMBLANCE_INLINE void AddEight(const Wider& n, double* to) { PutEight(EightAt(to) + n, to); }
+
+// A run's diagonals, and the channels' numbers from its first vertex on.
+struct RunProduct {
+  const double* entries;  // of the first diagonal at the first vertex
+  std::ptrdiff_t length;  // from diagonal to diagonal
+  std::ptrdiff_t stride;  // from row to row
+  int blocks;
+  const double* x[4];
+  double* y[4];
 };
 
-SEMBLANCE_WIDE void AddMain(const DiagonalRow& row) {
-  const double *const p = row.entries, *const x = row.x_near;
-  double* const y = row.y_near;
-  for (int i = 0; i < row.count; ++i) {
-    y[i] += p[i] * x[i];
+// A vertex's row of the matrix: what stands on and behind it.
+template <int channels>
+SEMBLANCE_INLINE void AddNear(const RunProduct& run, std::ptrdiff_t k) {
+  Wider sum[channels] = {};
+  const double* entries = run.entries + k;
+  for (std::ptrdiff_t dj = 0; dj <= 3; ++dj) {
+    for (std::ptrdiff_t di = dj == 0 ? 0 : -3; di <= 3; ++di, entries += run.length) {
+      const Wider entry = EightAt(entries);
+      for (int c = 0; c < channels; ++c) {
+        sum[c] += entry * EightAt(run.x[c] + k + dj * run.stride + di);
+      }
+    }
+  }
+  for (int c = 0; c < channels; ++c) {
+    AddEight(sum[c], run.y[c] + k);
   }
 }
 
-// Two loops, for the two rows may be one and the same.
-SEMBLANCE_WIDE void AddBoth(const DiagonalRow& row) {
-  const double* const p = row.entries;
-  const double *const near = row.x_near, *const far = row.x_far;
-  double *const to_near = row.y_near, *const to_far = row.y_far;
-  for (int i = 0; i < row.count; ++i) {
-    to_near[i] += p[i] * far[i];
+// Its column: what the run's vertices give to those dj rows on.
+template <int channels>
+SEMBLANCE_INLINE void AddFar(const RunProduct& run, std::ptrdiff_t dj, std::ptrdiff_t k) {
+  Wider sum[channels] = {};
+  const std::ptrdiff_t from = dj == 0 ? 1 : -3;
+  const double* entries = run.entries + (dj == 0 ? 1 : 7 * dj - 3) * run.length + k - from;
+  for (std::ptrdiff_t di = from; di <= 3; ++di, entries += run.length - 1) {
+    const Wider entry = EightAt(entries);
+    for (int c = 0; c < channels; ++c) {
+      sum[c] += entry * EightAt(run.x[c] + k - di);
+    }
   }
-  for (int i = 0; i < row.count; ++i) {
-    to_far[i] += p[i] * near[i];
+  for (int c = 0; c < channels; ++c) {
+    AddEight(sum[c], run.y[c] + k + dj * run.stride);
   }
+}
+
+template <int channels>
+SEMBLANCE_INLINE void AddRun(const RunProduct& run) {
+  for (int block = 0; block < run.blocks; ++block) {
+    AddNear<channels>(run, static_cast<std::ptrdiff_t>(kBlock) * block);
+  }
+  for (std::ptrdiff_t dj = 0; dj <= 3; ++dj) {
+    for (int block = 0; block <= run.blocks; ++block) {
+      AddFar<channels>(run, dj, static_cast<std::ptrdiff_t>(kBlock) * block - (dj == 0 ? 0 : 3));
+    }
+  }
+}
+
+SEMBLANCE_WIDE void AddRunOf1(const RunProduct& run) { AddRun<1>(run); }
+SEMBLANCE_WIDE void AddRunOf2(const RunProduct& run) { AddRun<2>(run); }
+SEMBLANCE_WIDE void AddRunOf3(const RunProduct& run) { AddRun<3>(run); }
+SEMBLANCE_WIDE void AddRunOf4(const RunProduct& run) { AddRun<4>(run); }
+
+using AddRunOf = void (*)(const RunProduct&);
+AddRunOf AddRunFor(int channels) {
+  constexpr AddRunOf kAll[] = {AddRunOf1, AddRunOf2, AddRunOf3, AddRunOf4};
+  return kAll[channels - 1];
 }
 
 }  // namespace
 
+StencilMatrix::StencilMatrix(const GridLayout& layout, GridRuns runs)
+    : layout_(layout), runs_(std::move(runs)) {
+  std::size_t count = 0;
+  for (const GridRun& run : runs_) {
+    while (first_.size() <= static_cast<std::size_t>(run.row)) {
+      first_.push_back(starts_.size());
+    }
+    starts_.push_back(count);
+    count += kDiagonals * Length(run);
+  }
+  first_.resize(layout.grid.Rows() + 1, starts_.size());
+  entries_.assign(count, 0.0);
+}
+
+// The last run of the row that does not begin behind the column.
+std::size_t StencilMatrix::RunWith(int row, int column) const {
+  const auto begin = runs_.begin() + static_cast<std::ptrdiff_t>(first_[row]),
+             end = runs_.begin() + static_cast<std::ptrdiff_t>(first_[row + 1]);
+  const auto behind =
+      std::partition_point(begin, end, [&](const GridRun& run) { return run.begin <= column; });
+  return static_cast<std::size_t>(behind - runs_.begin()) - 1;
+}
+
 void StencilMatrix::AddPatch(int i, int j, const Matrix16& matrix) {
   const int columns = layout_.grid.Columns();
-  for (int k = 0; k < 16; ++k) {
-    const int a = k % 4, b = k / 4, column = (i + a) % columns;
-    Filled& filled = filled_[j + b];
-    filled = filled.end == 0
-                 ? Filled{column, column + 1}
-                 : Filled{std::min(filled.begin, column), std::max(filled.end, column + 1)};
-    for (int l = k; l < 16; ++l) {
-      const std::size_t start = RowStart(j + b, Slot(l % 4 - a, l / 4 - b));
-      diagonals_[start + column] += matrix(k, l);
+  for (int b = 0; b < 4; ++b) {
+    std::size_t run = RunWith(j + b, i);
+    for (int a = 0; a < 4; ++a) {
+      const int column = (i + a) % columns, k = a + 4 * b;
+      run = a > 0 && column == 0 ? RunWith(j + b, column) : run;
+      const std::size_t length = Length(runs_[run]);
+      double* const entries = entries_.data() + starts_[run] + kBefore + column - runs_[run].begin;
+      for (int l = k; l < 16; ++l) {
+        entries[Slot(l % 4 - a, l / 4 - b) * length] += matrix(k, l);
+      }
     }
   }
 }
 
 void StencilMatrix::AddProduct(const GridValues& x, GridValues& y) const {
-  const int rows = layout_.grid.Rows();
-  for (int j = 0; j < rows; ++j) {
-    const auto [begin, end] = filled_[j];
+  const AddRunOf add = AddRunFor(x.channels());
+  for (std::size_t r = 0; r < runs_.size(); ++r) {
+    RunProduct product{.entries = entries_.data() + starts_[r] + kBefore,
+                       .length = static_cast<std::ptrdiff_t>(Length(runs_[r])),
+                       .stride = static_cast<std::ptrdiff_t>(layout_.Stride()),
+                       .blocks = runs_[r].blocks,
+                       .x = {},
+                       .y = {}};
     for (int c = 0; c < x.channels(); ++c) {
-      for (int dj = 0; dj <= 3 && j + dj < rows; ++dj) {
-        for (int di = dj == 0 ? 0 : -3; di <= 3; ++di) {
-          const DiagonalRow row{.entries = diagonals_.data() + RowStart(j, Slot(di, dj)) + begin,
-                                .x_near = x.Row(c, j) + begin,
-                                .x_far = x.Row(c, j + dj) + begin + di,
-                                .y_near = y.Row(c, j) + begin,
-                                .y_far = y.Row(c, j + dj) + begin + di,
-                                .count = end - begin};
-          if (di == 0 && dj == 0) {
-            AddMain(row);
-          } else {
-            AddBoth(row);
-          }
-        }
-      }
+      product.x[c] = x.Channel(c) + runs_[r].at;
+      product.y[c] = y.Channel(c) + runs_[r].at;
     }
+    add(product);
   }
 }
 

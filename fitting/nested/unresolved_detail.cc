@@ -2,7 +2,10 @@
 #include "fitting/nested/unresolved_detail.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "surfaces/base/simd.h"
 
 namespace semblance {
 namespace {
@@ -12,34 +15,126 @@ constexpr double kWorthIt = 1;
 // Of the patches of a much finer level over a patch, how many must show something.
 constexpr double kShare = 0.15;
 
-// Per function of a level: the square of what the residuals sum to, and the sum of their squares.
+// Per function of a level, by GridLayout::At: the square of what the residuals sum to, and the sum
+// of their squares.
 struct Evidence {
   std::vector<double> together, apart;
 };
 
-Evidence EvidenceOn(const NestedPoints& points, const GridLayout& layout, int level,
-                    std::span<const std::uint32_t> indices,
-                    std::span<const NestedSolve::Residual> residuals) {
-  const int columns = layout.grid.Columns();
-  std::vector<std::array<double, 3>> sums(layout.Size(), {0, 0, 0});
-  Evidence evidence{std::vector<double>(layout.Size(), 0), std::vector<double>(layout.Size(), 0)};
-  for (std::size_t n = 0; n < indices.size(); ++n) {
-    const std::uint32_t k = indices[n];
-    const NestedPlace place = PlaceOn(layout.grid, level, points.x[k], points.y[k]);
-    const double weight = points.weight[k], square = weight * weight * residuals[n].Square();
+// Points and what is left of them, in the order of the curve.
+struct EvidencePoints {
+  const NestedPoints& points;
+  std::span<const std::uint32_t> indices;
+  std::span<const NestedResidual> residuals;
+};
+
+// Points begin .. end - 1 of a patch, and where on it they are.
+struct PatchOfPoints {
+  std::size_t begin, end;
+  double scale;
+  int i, j;
+};
+
+// Of a patch's sixteen functions: the sums of w N e along each channel, and last of (w N)^2 |e|^2.
+using PatchSums = double[4][16];
+
+SEMBLANCE_INLINE void WeightsAt(double t, double* weights) {
+  const double s = 1 - t;
+  weights[0] = s * s * s / 6;
+  weights[1] = (4 - 6 * t * t + 3 * t * t * t) / 6;
+  weights[2] = (4 - 6 * s * s + 3 * s * s * s) / 6;
+  weights[3] = t * t * t / 6;
+}
+
+template <int channels>
+SEMBLANCE_INLINE void SumPatch(const EvidencePoints& of, const PatchOfPoints& patch,
+                               PatchSums& sums) {
+  double u[4], v[4], both[16];
+  for (std::size_t n = patch.begin; n < patch.end; ++n) {
+    const std::uint32_t k = of.indices[n];
+    WeightsAt(of.points.x[k] * patch.scale - patch.i, u);
+    WeightsAt(of.points.y[k] * patch.scale - patch.j, v);
+    const double w = of.points.weight[k];
     for (int m = 0; m < 16; ++m) {
-      const std::size_t at = layout.At((place.i + m % 4) % columns, place.j + m / 4);
-      const double value = place.along_u[m % 4] * place.along_v[m / 4];
-      for (int c = 0; c < points.channels; ++c) {
-        sums[at][c] += weight * value * residuals[n].along[c];
+      both[m] = w * u[m % 4] * v[m / 4];
+    }
+    double square = 0;
+    for (int c = 0; c < channels; ++c) {
+      const double e = of.residuals[n].along[c];
+      square += e * e;
+      for (int m = 0; m < 16; ++m) {
+        sums[c][m] += both[m] * e;
       }
-      evidence.apart[at] += value * value * square;
+    }
+    for (int m = 0; m < 16; ++m) {
+      sums[channels][m] += both[m] * both[m] * square;
     }
   }
-  for (std::size_t at = 0; at < sums.size(); ++at) {
-    const auto& s = sums[at];
-    evidence.together[at] = s[0] * s[0] + s[1] * s[1] + s[2] * s[2];
+}
+
+SEMBLANCE_WIDE void SumPatchOf1(const EvidencePoints& of, const PatchOfPoints& patch,
+                                PatchSums& sums) {
+  SumPatch<1>(of, patch, sums);
+}
+SEMBLANCE_WIDE void SumPatchOf2(const EvidencePoints& of, const PatchOfPoints& patch,
+                                PatchSums& sums) {
+  SumPatch<2>(of, patch, sums);
+}
+SEMBLANCE_WIDE void SumPatchOf3(const EvidencePoints& of, const PatchOfPoints& patch,
+                                PatchSums& sums) {
+  SumPatch<3>(of, patch, sums);
+}
+
+// The channels' sums, and last that of squares.
+void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridValues& values) {
+  constexpr void (*kSum[])(const EvidencePoints&, const PatchOfPoints&, PatchSums&) = {
+      SumPatchOf1, SumPatchOf2, SumPatchOf3};
+  const auto patch_of = [&](std::size_t n) {
+    return PatchOn(layout.grid, level, of.points.x[of.indices[n]], of.points.y[of.indices[n]]);
+  };
+  for (std::size_t begin = 0, end = 0; begin < of.indices.size(); begin = end) {
+    const auto [i, j] = patch_of(begin);
+    for (end = begin + 1; end < of.indices.size() && patch_of(end) == std::array{i, j};) {
+      ++end;
+    }
+    alignas(64) PatchSums sums = {};
+    kSum[of.points.channels - 1](of, {begin, end, static_cast<double>(1 << level), i, j}, sums);
+    for (int c = 0; c <= of.points.channels; ++c) {
+      for (int b = 0; b < 4; ++b) {
+        double* const row = values.Row(c, j + b) + i;
+        for (int a = 0; a < 4; ++a) {
+          row[a] += sums[c][a + 4 * b];
+        }
+      }
+    }
   }
+}
+
+// What stands beyond the seam belongs to the columns across it.
+void FoldSeam(GridValues& values) {
+  const PatchGrid& grid = values.layout().grid;
+  for (int c = 0; grid.periodic_u && c < values.channels(); ++c) {
+    for (int j = 0; j < grid.Rows(); ++j) {
+      for (int k = 0; k < GridLayout::kHalo; ++k) {
+        values.Row(c, j)[k % grid.Columns()] += values.Row(c, j)[grid.Columns() + k];
+      }
+    }
+  }
+}
+
+Evidence EvidenceOn(const EvidencePoints& of, const GridLayout& layout, int level) {
+  const int channels = of.points.channels;
+  GridValues values(layout, channels + 1);
+  SumUp(of, layout, level, values);
+  FoldSeam(values);
+  Evidence evidence{std::vector<double>(layout.Size(), 0), {}};
+  for (int c = 0; c < channels; ++c) {
+    const double* const sum = values.Channel(c);
+    for (std::size_t at = 0; at < layout.Size(); ++at) {
+      evidence.together[at] += sum[at] * sum[at];
+    }
+  }
+  evidence.apart.assign(values.Channel(channels), values.Channel(channels) + layout.Size());
   return evidence;
 }
 
@@ -90,13 +185,13 @@ bool SeenBy(const UnresolvedDetail& detail, int finer, const GridLayout& layout,
 
 UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const GridLayout& level0,
                                       int finest, std::span<const std::uint32_t> indices,
-                                      std::span<const NestedSolve::Residual> residuals) {
+                                      std::span<const NestedResidual> residuals) {
   UnresolvedDetail detail;
   detail.seen.resize(1);
   GridLayout coarser = level0;
   for (int level = 1; level <= finest; ++level) {
     const GridLayout layout = coarser.Finer();
-    const Evidence evidence = EvidenceOn(points, layout, level, indices, residuals);
+    const Evidence evidence = EvidenceOn({points, indices, residuals}, layout, level);
     detail.seen.push_back(PatchesSeen(layout, coarser, evidence));
     coarser = layout;
   }
@@ -129,8 +224,8 @@ int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
   const GridLayout layout = space[level].layout;
   std::vector<int> counts(layout.Patches(), 0);
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const NestedPlace place = PlaceOn(layout.grid, level, points.x[k], points.y[k]);
-    ++counts[layout.Patch(place.i, place.j)];
+    const auto [i, j] = PatchOn(layout.grid, level, points.x[k], points.y[k]);
+    ++counts[layout.Patch(i, j)];
   }
   int added = 0;
   for (int j = 0; j < layout.grid.patches_v; ++j) {

@@ -6,7 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "fitting/nested/nested_solve.h"
+#include "fitting/nested/leaf_sums.h"
+#include "fitting/nested/nested_space.h"
 
 namespace semblance {
 
@@ -25,7 +26,7 @@ struct UnresolvedDetail {
 // finest: of the levels that are looked at. indices and residuals: of the points that were fitted.
 UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const GridLayout& level0,
                                       int finest, std::span<const std::uint32_t> indices,
-                                      std::span<const NestedSolve::Residual> residuals);
+                                      std::span<const NestedResidual> residuals);
 
 // Overlays each patch of the space over which a finer level sees detail, one level a time. Returns
 // the number of vertices that became active.

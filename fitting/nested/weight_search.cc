@@ -12,14 +12,12 @@ constexpr double kSmoothest = 100;
 
 }  // namespace
 
-double NestedWeightSearch::MeanSquare() const {
-  const NestedValues displacements = solve_.Displacements();
-  double sum = 0, weights = 0;
-  for (const std::uint32_t k : fitted_) {
-    sum += points_.weight[k] * solve_.ResidualAt(displacements, k).Square();
-    weights += points_.weight[k];
-  }
-  return sum / weights / points_.channels;
+// Of two that predict alike the smoother one, so that rounding chooses nothing.
+bool NestedWeightSearch::IsBetter(const NestedWeight& next) const {
+  constexpr double kAlike = 1e-5;
+  const double smoother = next.weight > best_.weight ? kAlike : -kAlike;
+  return std::isnan(best_.score) ? !std::isnan(next.score)
+                                 : next.score < (1 + smoother) * best_.score;
 }
 
 NestedWeight NestedWeightSearch::Try(double weight) {
@@ -29,18 +27,16 @@ NestedWeight NestedWeightSearch::Try(double weight) {
   }
   solve_.SetWeight(weight);
   steps_ += solve_.Solve(least_gain_);
-  const double mean_square = MeanSquare(), trace = solve_.Trace(),
-               left = 1 - trace / static_cast<double>(fitted_.size());
+  const double mean_square = solve_.MeanSquare(), trace = solve_.Trace(), left = 1 - trace / count_;
   constexpr double kGain = 0.01, kLeast = 0.02;
-  least_gain_ = kGain * mean_square * solve_.WeightSum() / static_cast<double>(fitted_.size()) *
-                std::max(trace, 1.0);
+  least_gain_ = kGain * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
   at->second = {.weight = weight,
                 .score = left > kLeast ? mean_square / (left * left) : kNaN,
                 .degrees_of_freedom = trace,
                 .mean_square = mean_square};
-  if (at->second.score < best_.score || std::isnan(best_.score)) {
+  if (IsBetter(at->second)) {
     best_ = at->second;
-    best_solution_ = solve_.solution();
+    best_solution_ = solve_.Solution();
   }
   return at->second;
 }
@@ -79,7 +75,9 @@ void NestedWeightSearch::ClimbAnew(double factor, double from) {
   const double even = solve_.EvenWeight();
   Climb(factor, from);
   const double before = best_.weight;
-  Try(kRough * even);
+  if (std::abs(std::log(before / (kRough * even))) > std::log(factor)) {
+    Try(kRough * even);
+  }
   if (best_.weight != before) {
     Climb(factor, best_.weight);
   }

@@ -2,9 +2,8 @@
 // The thin-plate weight of a nested fit by generalised cross-validation.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <map>
-#include <span>
 
 #include "fitting/nested/nested_solve.h"
 
@@ -21,10 +20,9 @@ struct NestedWeight {
 // goes on until what is left to gain is a hundredth of what chance does to the solution.
 class NestedWeightSearch {
  public:
-  // fitted: the points that the solve has begun with. least_gain: of the first solve (Solve).
-  NestedWeightSearch(const NestedPoints& points, std::span<const std::uint32_t> fitted,
-                     NestedSolve& solve, double least_gain)
-      : points_(points), fitted_(fitted), solve_(solve), least_gain_(least_gain) {}
+  // count: of the points that the solve has begun with. least_gain: of the first solve (Solve).
+  NestedWeightSearch(std::size_t count, NestedSolve& solve, double least_gain)
+      : count_(static_cast<double>(count)), solve_(solve), least_gain_(least_gain) {}
 
   // From smooth to rough by decades until the score has turned.
   void Scan();
@@ -41,14 +39,13 @@ class NestedWeightSearch {
 
  private:
   NestedWeight Try(double weight);
-  double MeanSquare() const;
+  bool IsBetter(const NestedWeight& next) const;
 
-  const NestedPoints& points_;
-  std::span<const std::uint32_t> fitted_;
+  double count_;
   NestedSolve& solve_;
   std::map<double, NestedWeight> tried_;
   NestedWeight best_;
-  NestedValues best_solution_;
+  NestedSolve::Packed best_solution_;
   double least_gain_;
   int steps_ = 0;
 };

@@ -199,6 +199,25 @@ std::vector<FitFault> FaultsOf(const FitOptions& options, int max_level) {
   return FaultFinder(options, max_level).Take();
 }
 
+namespace {
+
+void CheckOptions(const FitOptions& options, int max_level) {
+  for (const FitFault& fault : FaultsOf(options, max_level)) {
+    Fail(fmt::format("{}: {}", fault.path, fault.what));
+  }
+}
+
+}  // namespace
+
+void CheckFit(const HSplineSurface& start, const ScatteredPoints& points,
+              const FitOptions& options) {
+  if (points.size() == 0) {
+    Fail("there is no point; give some");
+  }
+  CheckPoints(points);
+  CheckOptions(options, start.shape().max_level);
+}
+
 void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
               std::span<const VertexId> features, const FitOptions& options) {
   if (!(start.shape() == rest.shape())) {
@@ -208,9 +227,7 @@ void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
     Fail("the target has no point; give dowels or seed some");
   }
   CheckTarget(target);
-  for (const FitFault& fault : FaultsOf(options, start.shape().max_level)) {
-    Fail(fmt::format("{}: {}", fault.path, fault.what));
-  }
+  CheckOptions(options, start.shape().max_level);
   CheckFeatures(features, start.shape());
   if (std::holds_alternative<AutoPlan>(options.plan) && !features.empty()) {
     Fail("the auto plan knows no features; take plan: adaptive");

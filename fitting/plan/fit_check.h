@@ -26,4 +26,8 @@ std::vector<FitFault> FaultsOf(const FitOptions& options, int max_level);
 void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
               std::span<const VertexId> features, const FitOptions& options);
 
+// The same of scattered points without features.
+void CheckFit(const HSplineSurface& start, const ScatteredPoints& points,
+              const FitOptions& options);
+
 }  // namespace semblance

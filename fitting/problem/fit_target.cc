@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string_view>
 
 #include "surfaces/base/error.h"
 
@@ -13,6 +14,32 @@ namespace {
 bool InDomain(const Vec2& uv) { return (uv.array() >= 0).all() && (uv.array() <= 1).all(); }
 
 bool IsPositive(double value) { return std::isfinite(value) && value > 0; }
+
+void CheckSizes(const ScatteredPoints& p) {
+  if (p.uv.size() != p.size() || (!p.weights.empty() && p.weights.size() != p.size())) {
+    throw InputError(fmt::format(
+        "fit target: {} points with {} pairs (u,v) and {} weights; give (u,v) for each point, and "
+        "a weight for each or for none",
+        p.size(), p.uv.size(), p.weights.size()));
+  }
+}
+
+// `label`: of the point, or nothing.
+void CheckPoint(std::size_t index, std::string_view label, const Vec3& position, const Vec2& uv,
+                double weight) {
+  const auto fail = [&](const std::string& what) {
+    throw InputError(fmt::format("fit target: point {} ('{}'): {}", index, label, what));
+  };
+  if (!position.allFinite()) {
+    fail("its position is not finite; remove it or give three numbers in mm");
+  }
+  if (!InDomain(uv)) {
+    fail(fmt::format("(u,v) = ({}, {}) is outside [0,1] x [0,1]", uv.x(), uv.y()));
+  }
+  if (!IsPositive(weight)) {
+    fail(fmt::format("weight {} is not a positive number", weight));
+  }
+}
 
 void CheckShapePoints(std::span<const ShapePoint> shape) {
   for (std::size_t i = 0; i < shape.size(); ++i) {
@@ -32,12 +59,7 @@ void CheckShapePoints(std::span<const ShapePoint> shape) {
 
 FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
                    std::span<const double> weights) {
-  if (uv.size() != positions.size() || (!weights.empty() && weights.size() != positions.size())) {
-    throw InputError(fmt::format(
-        "fit target: {} points with {} pairs (u,v) and {} weights; give (u,v) for each point, and "
-        "a weight for each or for none",
-        positions.size(), uv.size(), weights.size()));
-  }
+  CheckSizes({positions, uv, weights});
   FitTarget target;
   target.points.reserve(positions.size());
   for (std::size_t k = 0; k < positions.size(); ++k) {
@@ -56,25 +78,23 @@ void CheckTarget(const FitTarget& target) {
   }
   for (std::size_t i = 0; i < target.points.size(); ++i) {
     const FitPoint& p = target.points[i];
-    const auto fail = [&](const std::string& what) {
-      throw InputError(fmt::format("fit target: point {} ('{}'): {}", i, p.label, what));
-    };
-    if (!p.position.allFinite()) {
-      fail("its position is not finite; remove it or give three numbers in mm");
-    }
-    if (!InDomain(p.uv)) {
-      fail(fmt::format("(u,v) = ({}, {}) is outside [0,1] x [0,1]", p.uv.x(), p.uv.y()));
-    }
-    if (!IsPositive(p.weight)) {
-      fail(fmt::format("weight {} is not a positive number", p.weight));
-    }
+    CheckPoint(i, p.label, p.position, p.uv, p.weight);
     if (!target.anchors.empty() && target.anchors[i].foot.allFinite() &&
         !(std::abs(target.anchors[i].direction.norm() - 1) < 1e-6)) {
-      fail(fmt::format("its direction out of the bone has the length {}; give a unit vector",
-                       target.anchors[i].direction.norm()));
+      throw InputError(fmt::format(
+          "fit target: point {} ('{}'): its direction out of the bone has the length {}; give a "
+          "unit vector",
+          i, p.label, target.anchors[i].direction.norm()));
     }
   }
   CheckShapePoints(target.shape);
+}
+
+void CheckPoints(const ScatteredPoints& points) {
+  CheckSizes(points);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    CheckPoint(k, "", points.positions[k], points.uv[k], points.Weight(k));
+  }
 }
 
 }  // namespace semblance

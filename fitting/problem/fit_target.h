@@ -40,6 +40,16 @@ struct FitTarget {
   std::vector<ShapePoint> shape = {};    // where there is a prior
 };
 
+// Scattered points as columns; what they refer to must outlive them.
+struct ScatteredPoints {
+  std::span<const Vec3> positions;       // mm
+  std::span<const Vec2> uv;              // in [0,1] x [0,1], one per point
+  std::span<const double> weights = {};  // > 0, one per point; or none: all 1
+
+  std::size_t size() const { return positions.size(); }
+  double Weight(std::size_t k) const { return weights.empty() ? 1 : weights[k]; }
+};
+
 // Scattered points, without labels. weights: one per point, or none for equal ones. Throws
 // InputError if the sizes differ.
 FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
@@ -50,5 +60,7 @@ FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
 // there are anchors, but not one per point; or for a point of the shape that is not finite, outside
 // the domain, or without a positive sd_mm and share.
 void CheckTarget(const FitTarget& target);
+// The same, and if the numbers of positions, (u,v) and weights differ.
+void CheckPoints(const ScatteredPoints& points);
 
 }  // namespace semblance

@@ -14,14 +14,41 @@ namespace semblance {
 namespace {
 
 // The functions of (u,v) whose sums the surface is taken from.
-Eigen::VectorXd Functions(const HSplineShape& shape, const Vec2& uv) {
-  if (shape.closure == Closure::kOpen) {
+template <Closure closure>
+auto Functions(const Vec2& uv) {
+  if constexpr (closure == Closure::kOpen) {
     return Vec3(1, uv.x(), uv.y());
+  } else {
+    const double angle = 2 * std::numbers::pi * uv.x(), c = std::cos(angle), s = std::sin(angle);
+    Eigen::Matrix<double, 6, 1> f;
+    f << 1, c, s, uv.y(), uv.y() * c, uv.y() * s;
+    return f;
   }
-  const double angle = 2 * std::numbers::pi * uv.x(), c = std::cos(angle), s = std::sin(angle);
-  Eigen::VectorXd f(6);
-  f << 1, c, s, uv.y(), uv.y() * c, uv.y() * s;
-  return f;
+}
+
+template <Closure closure>
+ControlNet NetOf(const HSplineShape& shape, std::span<const Vec3> positions,
+                 std::span<const Vec2> uv) {
+  constexpr int n = decltype(Functions<closure>({}))::RowsAtCompileTime;
+  Eigen::Matrix<double, n, n> normal = Eigen::Matrix<double, n, n>::Zero();
+  Eigen::Matrix<double, n, 3> right = Eigen::Matrix<double, n, 3>::Zero();
+  const Vec3 mean = std::accumulate(positions.begin(), positions.end(), Vec3(Vec3::Zero())) /
+                    static_cast<double>(positions.size());
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    const Eigen::Matrix<double, n, 1> f = Functions<closure>(uv[k]);
+    normal += f * f.transpose();
+    right += f * (positions[k] - mean).transpose();
+  }
+  const Eigen::MatrixXd x =
+      Eigen::MatrixXd(normal).completeOrthogonalDecomposition().solve(Eigen::MatrixXd(right));
+  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      const Vec2 place((i - 1.0) / shape.patches_u, (j - 1.0) / shape.patches_v);
+      net.vertices.push_back(mean + x.transpose() * Functions<closure>(place));
+    }
+  }
+  return net;
 }
 
 }  // namespace
@@ -35,24 +62,9 @@ HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> pos
                     "(u,v) for each",
                     positions.size(), uv.size()));
   }
-  const Eigen::Index n = Functions(shape, Vec2::Zero()).size();
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n), right = Eigen::MatrixXd::Zero(n, 3);
-  const Vec3 mean = std::accumulate(positions.begin(), positions.end(), Vec3(Vec3::Zero())) /
-                    static_cast<double>(positions.size());
-  for (std::size_t k = 0; k < positions.size(); ++k) {
-    const Eigen::VectorXd f = Functions(shape, uv[k]);
-    normal += f * f.transpose();
-    right += f * (positions[k] - mean).transpose();
-  }
-  const Eigen::MatrixXd x = normal.completeOrthogonalDecomposition().solve(right);
-  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
-  for (int j = 0; j < net.rows; ++j) {
-    for (int i = 0; i < net.columns; ++i) {
-      const Vec2 place((i - 1.0) / shape.patches_u, (j - 1.0) / shape.patches_v);
-      net.vertices.push_back(mean + x.transpose() * Functions(shape, place));
-    }
-  }
-  return HSplineSurface(shape, net);
+  return HSplineSurface(shape, shape.closure == Closure::kOpen
+                                   ? NetOf<Closure::kOpen>(shape, positions, uv)
+                                   : NetOf<Closure::kPeriodicU>(shape, positions, uv));
 }
 
 }  // namespace semblance

@@ -82,6 +82,35 @@ void SortTies(const auto& points, std::vector<Key>& keys) {
   }
 }
 
+// Columns, as points one by one.
+class RowsOf {
+ public:
+  explicit RowsOf(const ScatteredPoints& points) : points_(points) {}
+  struct Row {
+    const Vec2& uv;
+    const Vec3& position;
+    double weight;
+  };
+  std::size_t size() const { return points_.size(); }
+  Row operator[](std::size_t k) const {
+    return {points_.uv[k], points_.positions[k], points_.Weight(k)};
+  }
+
+ private:
+  ScatteredPoints points_;
+};
+
+std::vector<Key> SortedKeys(const HSplineShape& shape, const auto& points) {
+  std::vector<Key> keys;
+  keys.reserve(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    keys.push_back(KeyOf(shape, points[k].uv, k));
+  }
+  RadixSort(keys);
+  SortTies(points, keys);
+  return keys;
+}
+
 CloudPoint MakePoint(const HSplineShape& shape, const auto& p) {
   const PatchPoint at = PatchPointAt(shape, 0, p.uv);
   return {.x = at.patch.i + at.s,
@@ -92,15 +121,18 @@ CloudPoint MakePoint(const HSplineShape& shape, const auto& p) {
 
 }  // namespace
 
+std::vector<std::uint32_t> CurveOrder(const HSplineShape& shape, const ScatteredPoints& points) {
+  std::vector<std::uint32_t> order;
+  order.reserve(points.size());
+  for (const Key& key : SortedKeys(shape, RowsOf(points))) {
+    order.push_back(key.index);
+  }
+  return order;
+}
+
 template <class Points>
 void PointCloud::Fill(const Points& given) {
-  std::vector<Key> keys;
-  keys.reserve(given.size());
-  for (std::size_t k = 0; k < given.size(); ++k) {
-    keys.push_back(KeyOf(shape_, given[k].uv, k));
-  }
-  RadixSort(keys);
-  SortTies(given, keys);
+  const std::vector<Key> keys = SortedKeys(shape_, given);
   points_.reserve(keys.size());
   given_.reserve(keys.size());
   const std::size_t patches = static_cast<std::size_t>(shape_.patches_u) * shape_.patches_v;

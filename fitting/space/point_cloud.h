@@ -27,6 +27,10 @@ struct CloudPoint {
   double weight = kNaN;
 };
 
+// The order of points along the curve of PointCloud, as indices; that in which they are given has
+// no effect on what follows what.
+std::vector<std::uint32_t> CurveOrder(const HSplineShape& shape, const ScatteredPoints& points);
+
 // Sorted along a Z-curve through the level-0 patches, so that the points of any patch of any level
 // stand together (of a surface with one level by u, then v), and then by all their values: the
 // order in which they are given has no effect.

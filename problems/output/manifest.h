@@ -3,12 +3,27 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 namespace semblance {
+
+// The SHA-256 of bytes that come in pieces.
+class Sha256 {
+ public:
+  Sha256();
+  void Add(std::string_view bytes);
+  std::string Hex();  // lower-case; once, at the end
+
+ private:
+  struct Free {
+    void operator()(void* state) const;
+  };
+  std::unique_ptr<void, Free> state_;
+};
 
 // Lower-case hexadecimal SHA-256 of a text, or of a file's bytes (IoError if it cannot be read).
 std::string Sha256OfText(std::string_view text);

@@ -9,12 +9,16 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "problems/output/manifest.h"
+#include "problems/points/plain_points.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/npy.h"
@@ -163,9 +167,51 @@ PointTable Parse(const std::string& bytes, const std::filesystem::path& path) {
                   name));
 }
 
+bool IsCsv(const std::filesystem::path& path) {
+  const std::string ending = Lower(path.extension().string());
+  return ending == ".csv" || ending == ".txt";
+}
+
+// Block by block; nothing if the file cannot be read, or is not as plain as that.
+std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path) {
+  constexpr std::size_t kBlock = 1 << 22;
+  std::ifstream stream(path, std::ios::binary);
+  std::string text(kBlock, '\0');
+  std::size_t kept = 0;  // of the last block, the beginning of a line
+  Sha256 sha;
+  std::optional<PlainPoints> points;
+  while (stream) {
+    text.resize(std::max(text.size(), kept + kBlock));
+    stream.read(text.data() + kept, kBlock);
+    const std::string_view all(text.data(), kept + static_cast<std::size_t>(stream.gcount()));
+    sha.Add(all.substr(kept));
+    std::size_t begin = 0;
+    if (!points) {
+      begin = all.find('\n') + 1;
+      if (begin == 0) {
+        return std::nullopt;
+      }
+      points.emplace(PointColumnsOf(all.substr(0, begin - 1), path.string()));
+    }
+    const std::size_t end = stream ? std::max(all.rfind('\n') + 1, begin) : all.size();
+    if (!points->Add(all.substr(begin, end - begin))) {
+      return std::nullopt;
+    }
+    kept = all.size() - end;
+    std::memmove(text.data(), text.data() + end, kept);
+  }
+  if (!points || points->size() == 0) {
+    return std::nullopt;
+  }
+  return PointFile{.points = points->Take(), .sha256 = sha.Hex()};
+}
+
 }  // namespace
 
 PointFile ReadPointFile(const std::filesystem::path& path) {
+  if (auto plain = IsCsv(path) ? ReadPlainCsv(path) : std::nullopt) {
+    return std::move(*plain);
+  }
   const bool piped = path == "-", zipped = Lower(path.extension().string()) == ".gz";
   std::string bytes =
       piped ? std::string(std::istreambuf_iterator<char>(std::cin), {}) : ReadFileBytes(path);

@@ -209,9 +209,8 @@ PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
   PointFit result{.parameters = std::string(NameOf(parameters.source)),
                   .fit = step("fit",
                               [&] {
-                                const FitTarget target =
-                                    TargetOf(table.positions, parameters.uv, table.weights);
-                                return Fit(start, target, {}, options.fit, context);
+                                return Fit(start, {table.positions, parameters.uv, table.weights},
+                                           options.fit, context);
                               }),
                   .times = {}};
   result.times = step.Take();

@@ -8,21 +8,56 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "problems/points/plain_points.h"
 #include "surfaces/base/csv.h"
 
 namespace semblance {
 namespace {
 
-constexpr std::array<std::string_view, 6> kNames = {"x", "y", "z", "u", "v", "weight"};
-constexpr std::size_t kU = 3, kV = 4, kWeight = 5;
+constexpr std::array<std::string_view, kPointColumns> kNames = {"x", "y", "z", "u", "v", "weight"};
 
+// Of the file, by kNames.
+using ColumnPlaces = std::array<std::optional<std::size_t>, kPointColumns>;
+
+// In `places` or not.
+const std::optional<std::size_t>& PlaceOf(const ColumnPlaces& places, PointColumn column) {
+  return places[static_cast<std::size_t>(column)];
+}
+
+ColumnPlaces PlacesIn(const CsvReader& csv) {
+  for (const std::string& column : csv.Columns()) {
+    if (std::find(kNames.begin(), kNames.end(), column) == kNames.end()) {
+      csv.Fail(
+          fmt::format("'{}' is no column; the first line names the columns, which are x, y, z "
+                      "and, if wanted, u, v, weight",
+                      column));
+    }
+  }
+  ColumnPlaces places;
+  for (std::size_t k = 0; k < kNames.size(); ++k) {
+    places[k] = csv.Find(kNames[k]);
+  }
+  for (const std::size_t k : {0, 1, 2}) {
+    if (!places[k]) {
+      csv.Fail(fmt::format("there is no column '{}'; x, y and z are needed", kNames[k]));
+    }
+  }
+  const bool u = PlaceOf(places, PointColumn::kU).has_value();
+  if (u != PlaceOf(places, PointColumn::kV).has_value()) {
+    csv.Fail(fmt::format("the column '{}' stands alone; give u and v, or neither", u ? "u" : "v"));
+  }
+  return places;
+}
+
+// Any table that may be, line by line.
 class PointReader {
  public:
-  PointReader(std::string_view text, std::string_view name) : csv_(text, name) {}
+  PointReader(std::string_view text, std::string_view name)
+      : csv_(text, name), places_(PlacesIn(csv_)) {}
 
   PointTable Read() {
-    CheckColumns();
     while (csv_.NextRow()) {
       ReadPoint();
     }
@@ -33,38 +68,15 @@ class PointReader {
   }
 
  private:
-  void CheckColumns() {
-    for (const std::string& column : csv_.Columns()) {
-      const auto at = std::find(kNames.begin(), kNames.end(), column);
-      if (at == kNames.end()) {
-        csv_.Fail(
-            fmt::format("'{}' is no column; the first line names the columns, which are x, y, z "
-                        "and, if wanted, u, v, weight",
-                        column));
-      }
-    }
-    for (std::size_t k = 0; k < kNames.size(); ++k) {
-      columns_[k] = csv_.Find(kNames[k]);
-    }
-    for (const std::size_t k : {0, 1, 2}) {
-      if (!columns_[k]) {
-        csv_.Fail(fmt::format("there is no column '{}'; x, y and z are needed", kNames[k]));
-      }
-    }
-    if (columns_[kU].has_value() != columns_[kV].has_value()) {
-      csv_.Fail(fmt::format("the column '{}' stands alone; give u and v, or neither",
-                            columns_[kU] ? "u" : "v"));
-    }
-  }
-
   void ReadPoint() {
-    const auto number = [&](std::size_t k) { return csv_.Number(*columns_[k]); };
-    table_.positions.emplace_back(number(0), number(1), number(2));
-    if (columns_[kU]) {
-      table_.uv.emplace_back(number(kU), number(kV));
+    const auto number = [&](PointColumn column) { return csv_.Number(*PlaceOf(places_, column)); };
+    table_.positions.emplace_back(number(PointColumn::kX), number(PointColumn::kY),
+                                  number(PointColumn::kZ));
+    if (PlaceOf(places_, PointColumn::kU)) {
+      table_.uv.emplace_back(number(PointColumn::kU), number(PointColumn::kV));
     }
-    if (columns_[kWeight]) {
-      const double weight = number(kWeight);
+    if (PlaceOf(places_, PointColumn::kWeight)) {
+      const double weight = number(PointColumn::kWeight);
       if (!(weight > 0)) {
         csv_.Fail(fmt::format("the weight is {}; it must be positive", weight));
       }
@@ -73,14 +85,29 @@ class PointReader {
   }
 
   CsvReader csv_;
-  std::array<std::optional<std::size_t>, kNames.size()> columns_;  // of the file, by kNames
+  ColumnPlaces places_;
   PointTable table_;
 };
 
 }  // namespace
 
+std::vector<PointColumn> PointColumnsOf(std::string_view first_line, std::string_view name) {
+  const CsvReader csv(first_line, name);
+  const ColumnPlaces places = PlacesIn(csv);
+  std::vector<PointColumn> columns(csv.Columns().size());
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    if (places[k]) {
+      columns[*places[k]] = static_cast<PointColumn>(k);
+    }
+  }
+  return columns;
+}
+
 PointTable ParsePointTable(std::string_view text, std::string_view name) {
-  return PointReader(text, name).Read();
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  PlainPoints plain(PointColumnsOf(text.substr(0, end), name));
+  const bool is_plain = end < text.size() && plain.Add(text.substr(end + 1)) && plain.size() > 0;
+  return is_plain ? plain.Take() : PointReader(text, name).Read();
 }
 
 }  // namespace semblance

@@ -2,6 +2,7 @@
 // Scattered points in a CSV file.
 #pragma once
 
+#include <cstddef>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +15,11 @@ struct PointTable {
   std::vector<Vec2> uv;         // one per point, or none
   std::vector<double> weights;  // > 0; one per point, or none
 };
+
+enum class PointColumn { kX, kY, kZ, kU, kV, kWeight };
+constexpr std::size_t kPointColumns = 6;
+// What the columns of a table are, by its first line. Throws as ParsePointTable.
+std::vector<PointColumn> PointColumnsOf(std::string_view first_line, std::string_view name);
 
 // The first line names the columns, in any order: x, y and z, and, if wanted, u and v together and
 // weight. Each further line has one decimal number per column, separated by commas. Nothing else is

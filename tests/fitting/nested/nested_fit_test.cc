@@ -33,7 +33,7 @@ NestedFitResult FitAuto(const FitTarget& target, Closure closure = Closure::kOpe
     uv.push_back(p.uv);
   }
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0, .closure = closure};
-  return FitNested(StartSurface(shape, positions, uv), target, plan, {});
+  return FitNested(StartSurface(shape, positions, uv), {positions, uv}, plan, {});
 }
 
 // A height field: noise in z alone.
@@ -192,7 +192,9 @@ TEST(NestedFit, WhatCannotBeFittedIsSaid) {
   EXPECT_THROW(FitAuto(few), InputError);
   HSplineSurface detailed = testing::PlainStart({.patches_u = 8, .patches_v = 8, .max_level = 1});
   detailed.SetOffset({1, 5, 5}, Vec3(0, 0, 1));
-  EXPECT_THROW(FitNested(detailed, Scattered(FrankePoint, 100, 0, 1), {}, {}), InputError);
+  const std::vector<Vec3> positions(100, Vec3::Zero());
+  const std::vector<Vec2> uv(100, Vec2::Constant(0.5));
+  EXPECT_THROW(FitNested(detailed, {positions, uv}, {}, {}), InputError);
 }
 
 }  // namespace

@@ -18,6 +18,16 @@ using testing::HeadPoint;
 using testing::PlainStart;
 using testing::Scattered;
 
+NestedPoints DisplacementsOf(const HSplineSurface& start, const FitTarget& target) {
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    positions.push_back(p.position);
+    uv.push_back(p.uv);
+  }
+  return DisplacementsFrom(start, {positions, uv}, 1);
+}
+
 GridLayout Layout(bool periodic) {
   return {{.patches_u = 8, .patches_v = 5, .periodic_u = periodic}};
 }
@@ -35,6 +45,10 @@ GridValues RandomValues(const GridLayout& layout, std::uint64_t seed) {
   return values;
 }
 
+GridRuns AllOf(const GridLayout& layout) {
+  return RunsAround(layout, std::vector<char>(layout.Patches(), 1));
+}
+
 double Product(const GridValues& a, const GridValues& b) {
   double sum = 0;
   for (int j = 0; j < a.layout().grid.Rows(); ++j) {
@@ -49,10 +63,12 @@ TEST(NestedSolve, RestrictionIsTheTransposeOfRefinement) {
   for (const bool periodic : {false, true}) {
     const GridLayout coarse = Layout(periodic), fine = coarse.Finer();
     GridValues x = RandomValues(coarse, 1), y = RandomValues(fine, 2);
-    x.FillHalo();
+    const GridRuns all = AllOf(fine);
+    x.FillHalo(AllOf(coarse));
     GridValues refined(fine, 2), restricted(coarse, 2);
-    AddRefined(x, refined);
-    AddRestricted(y, restricted);
+    AddRefined(x, all, refined);
+    AddRestricted(y, all, restricted);
+    restricted.FoldHalo(AllOf(coarse));
     EXPECT_NEAR(Product(refined, y), Product(x, restricted), 1e-10);
   }
 }
@@ -68,9 +84,9 @@ TEST(NestedSolve, RefinementIsThatOfTheSurface) {
         net.vertices.emplace_back(x.Row(0, j)[i], x.Row(1, j)[i], 0);
       }
     }
-    x.FillHalo();
+    x.FillHalo(AllOf(coarse));
     GridValues fine(coarse.Finer(), 2);
-    AddRefined(x, fine);
+    AddRefined(x, AllOf(coarse.Finer()), fine);
     const ControlNet expected = Refine(shape, net, 0);
     for (int j = 0; j < expected.rows; ++j) {
       for (int i = 0; i < expected.columns; ++i) {
@@ -87,8 +103,7 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
     const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1, .closure = closure};
     const HSplineSurface start = PlainStart(shape);
     const FitTarget target = Scattered(HeadPoint, 1000, 0.01, 4);
-    const PointCloud cloud(shape, target);
-    const NestedPoints points = DisplacementsFrom(start, cloud, 1);
+    const NestedPoints points = DisplacementsOf(start, target);
     NestedSpace space(shape);
     for (int patch = 0; patch < 64; ++patch) {
       space.Overlay(0, patch % 8, patch / 8);
@@ -106,7 +121,7 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
     const LevelSolution direct =
         FitLevel(ViewOfLevel(start, start, target, 1, {.aim = FitAim::kLevel, .held = {}}), terms,
                  Solver::kFastest);
-    const NestedValues displacements = solve.Displacements();
+    const NestedValues& displacements = solve.Displacements();
     const ControlNet net = start.Net(1);
     for (int j = 0; j < net.rows; ++j) {
       for (int i = 0; i < net.columns; ++i) {
@@ -124,8 +139,7 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
 TEST(NestedSolve, TheTraceIsTheNumberOfVerticesWithoutSmoothness) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1};
   const HSplineSurface start = PlainStart(shape);
-  const PointCloud cloud(shape, Scattered(HeadPoint, 20000, 0, 4));
-  const NestedPoints points = DisplacementsFrom(start, cloud, 1);
+  const NestedPoints points = DisplacementsOf(start, Scattered(HeadPoint, 20000, 0, 4));
   const NestedSpace space(shape);
   NestedSolve solve(points, MeanLengths(start));
   std::vector<std::uint32_t> all(points.size());

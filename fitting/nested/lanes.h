@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Eight numbers in one register, from and to memory.
+#pragma once
+
+#include <cstring>
+
+#include "surfaces/base/simd.h"
+
+namespace semblance {
+
+SEMBLANCE_INLINE Wider EightAt(const double* from) {
+  Wider n;
+  std::memcpy(&n, from, sizeof n);
+  return n;
+}
+SEMBLANCE_INLINE void PutEight(const Wider& n, double* to) { std::memcpy(to, &n, sizeof n); }
+
+// In one order, so that every processor gives the same bits.
+SEMBLANCE_INLINE double SumOfEight(const Wider& n) {
+  return ((n[0] + n[4]) + (n[2] + n[6])) + ((n[1] + n[5]) + (n[3] + n[7]));
+}
+
+}  // namespace semblance

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/nested/leaf_sums.h"
+
+#include <cmath>
+
+#include "surfaces/base/simd.h"
+
+namespace semblance {
+namespace {
+
+// The products of two of four weights, each pair once; the rest are zeros, to fill registers.
+constexpr int kPairs = 10, kRoom = 16;
+constexpr std::array<std::array<int, 4>, 4> kPair = {
+    {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}}};
+using Pairs = double[kPairs][kRoom];
+
+Matrix16 GramOf(const Pairs& sums) {
+  Matrix16 gram;
+  for (int k = 0; k < 16; ++k) {
+    for (int l = 0; l < 16; ++l) {
+      gram(k, l) = sums[kPair[k / 4][l / 4]][kPair[k % 4][l % 4]];
+    }
+  }
+  return gram;
+}
+
+// A leaf's points, and where in it they are.
+struct PointsOfLeaf {
+  const double *x, *y, *weight;
+  const double* value[3];
+  const std::uint32_t* indices;
+  std::size_t count;
+  double scale, first_u, first_v;
+};
+
+PointsOfLeaf Of(const NestedPoints& points, const LeafPatch& leaf,
+                std::span<const std::uint32_t> indices) {
+  return {.x = points.x.data(),
+          .y = points.y.data(),
+          .weight = points.weight.data(),
+          .value = {points.value[0].data(), points.value[1].data(), points.value[2].data()},
+          .indices = indices.data(),
+          .count = indices.size(),
+          .scale = static_cast<double>(1 << leaf.level),
+          .first_u = static_cast<double>(leaf.i),
+          .first_v = static_cast<double>(leaf.j)};
+}
+
+// CubicWeights, in the clones' own instructions.
+SEMBLANCE_INLINE void WeightsAt(double t, double* weights) {
+  const double s = 1 - t;
+  weights[0] = s * s * s / 6;
+  weights[1] = (4 - 6 * t * t + 3 * t * t * t) / 6;
+  weights[2] = (4 - 6 * s * s + 3 * s * s * s) / 6;
+  weights[3] = t * t * t / 6;
+}
+
+SEMBLANCE_INLINE void PairsOf(const double* weights, double factor, double* pairs) {
+  int at = 0;
+  for (int a = 0; a < 4; ++a) {
+    for (int b = a; b < 4; ++b) {
+      pairs[at++] = factor * weights[a] * weights[b];
+    }
+  }
+}
+
+template <int channels>
+SEMBLANCE_INLINE void AddPoints(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+  double pairs_u[kRoom] = {}, pairs_v[kPairs], u[4], v[4], both[16];
+  for (std::size_t n = 0; n < leaf.count; ++n) {
+    const std::uint32_t k = leaf.indices[n];
+    const double w = leaf.weight[k];
+    WeightsAt(leaf.x[k] * leaf.scale - leaf.first_u, u);
+    WeightsAt(leaf.y[k] * leaf.scale - leaf.first_v, v);
+    PairsOf(u, 1, pairs_u);
+    PairsOf(v, w, pairs_v);
+    for (int r = 0; r < kPairs; ++r) {
+      for (int c = 0; c < kRoom; ++c) {
+        sums[r][c] += pairs_v[r] * pairs_u[c];
+      }
+    }
+    for (int m = 0; m < 16; ++m) {
+      both[m] = u[m % 4] * v[m / 4];
+    }
+    for (int c = 0; c <= channels; ++c) {
+      const double value = c < channels ? w * leaf.value[c][k] : std::sqrt(w) * ProbeSign(k);
+      all.squares += c < channels ? value * leaf.value[c][k] : 0;
+      for (int m = 0; m < 16; ++m) {
+        all.right[c][m] += value * both[m];
+      }
+    }
+    all.weight += w;
+  }
+}
+
+SEMBLANCE_WIDE void AddPointsOf1(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+  AddPoints<1>(leaf, sums, all);
+}
+SEMBLANCE_WIDE void AddPointsOf2(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+  AddPoints<2>(leaf, sums, all);
+}
+SEMBLANCE_WIDE void AddPointsOf3(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+  AddPoints<3>(leaf, sums, all);
+}
+
+SEMBLANCE_WIDE void Leave(const PointsOfLeaf& leaf, const LeafVertices& vertices, int channels,
+                          NestedResidual* residuals) {
+  double u[4], v[4];
+  for (std::size_t n = 0; n < leaf.count; ++n) {
+    const std::uint32_t k = leaf.indices[n];
+    WeightsAt(leaf.x[k] * leaf.scale - leaf.first_u, u);
+    WeightsAt(leaf.y[k] * leaf.scale - leaf.first_v, v);
+    for (int c = 0; c < channels; ++c) {
+      double along[4] = {};
+      for (int b = 0; b < 4; ++b) {
+        for (int a = 0; a < 4; ++a) {
+          along[a] += v[b] * vertices[c][a + 4 * b];
+        }
+      }
+      residuals[n].along[c] = leaf.value[c][k] - ((u[0] * along[0] + u[1] * along[1]) +
+                                                  (u[2] * along[2] + u[3] * along[3]));
+    }
+  }
+}
+
+}  // namespace
+
+double ProbeSign(std::uint32_t k) {
+  std::uint64_t bits = (k + 1) * 0x9E3779B97F4A7C15u;
+  bits = (bits ^ bits >> 29) * 0xBF58476D1CE4E5B9u;
+  return ((bits ^ bits >> 32) & 1) != 0 ? 1 : -1;
+}
+
+LeafSums SumsOver(const NestedPoints& points, const LeafPatch& leaf,
+                  std::span<const std::uint32_t> indices) {
+  constexpr void (*kAdd[])(const PointsOfLeaf&, Pairs&, LeafSums&) = {AddPointsOf1, AddPointsOf2,
+                                                                      AddPointsOf3};
+  alignas(64) Pairs pairs = {};
+  LeafSums sums;
+  kAdd[points.channels - 1](Of(points, leaf, indices), pairs, sums);
+  sums.gram = GramOf(pairs);
+  return sums;
+}
+
+void ResidualsOver(const NestedPoints& points, const LeafPatch& leaf, const LeafVertices& vertices,
+                   std::span<const std::uint32_t> indices, NestedResidual* residuals) {
+  Leave(Of(points, leaf, indices), vertices, points.channels, residuals);
+}
+
+}  // namespace semblance
