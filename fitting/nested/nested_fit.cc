@@ -40,21 +40,22 @@ bool IsHeld(std::uint32_t k) {
 }
 
 // The finest level on which a patch with points has more than one of them on the mean.
-int FinestByDensity(const NestedPoints& points, const GridLayout& level0, int finest) {
+int FinestByDensity(const NestedPoints& points, const Indices& indices, const GridLayout& level0,
+                    int finest) {
   constexpr double kPointsPerPatch = 1.3;
   constexpr std::size_t kMostPatchesPerPoint = 4;
   GridLayout layout = level0;
   for (int level = 1; level <= finest; ++level) {
     layout = layout.Finer();
     std::size_t occupied = 0, last = layout.Patches();
-    for (std::size_t k = 0; k < points.size(); ++k) {
+    for (const std::uint32_t k : indices) {
       const auto [i, j] = PatchOn(layout.grid, level, points.x[k], points.y[k]);
       const std::size_t patch = layout.Patch(i, j);
       occupied += patch != last ? 1 : 0;
       last = patch;
     }
-    if (static_cast<double>(points.size()) < kPointsPerPatch * static_cast<double>(occupied) ||
-        layout.Patches() > kMostPatchesPerPoint * points.size()) {
+    if (static_cast<double>(indices.size()) < kPointsPerPatch * static_cast<double>(occupied) ||
+        layout.Patches() > kMostPatchesPerPoint * indices.size()) {
       return level - 1;
     }
   }
@@ -84,7 +85,7 @@ class NestedFitter {
     while ((std::max(start.shape().patches_u, start.shape().patches_v) << cap_) > kMostPatches) {
       --cap_;
     }
-    finest_ = FinestByDensity(points_, space_[0].layout, cap_);
+    finest_ = FinestByDensity(points_, All(), space_[0].layout, cap_);
   }
 
   NestedFitResult Run() {
@@ -108,10 +109,21 @@ class NestedFitter {
     const std::size_t enough =
         std::max(kFewestLooked, kPointsPerVertex * static_cast<std::size_t>(space_.Vertices()));
     const std::size_t every = std::max<std::size_t>(points_.size() / enough, 1);
+    if (every == every_) {
+      return;
+    }
+    every_ = every;
     looked_.clear();
     for (std::size_t k = 0; k < points_.size(); k += every) {
       looked_.push_back(static_cast<std::uint32_t>(k));
     }
+    finest_seen_ = FinestByDensity(points_, looked_, space_[0].layout, finest_);
+  }
+
+  Indices All() const {
+    Indices all(points_.size());
+    std::iota(all.begin(), all.end(), 0u);
+    return all;
   }
 
   template <class Wanted>
@@ -209,7 +221,7 @@ class NestedFitter {
     }
     const int vertices = space_.Vertices();
     const UnresolvedDetail detail =
-        FindUnresolvedDetail(points_, space_[0].layout, finest_, fitted, residuals);
+        FindUnresolvedDetail(points_, space_, finest_seen_, fitted, residuals);
     const int added = OverlayDetail(detail, space_);
     return added > kFewNew * vertices || Densify();
   }
@@ -260,8 +272,7 @@ class NestedFitter {
   NestedFitResult Finish() {
     Snapshot best = std::move(*best_);
     space_ = std::move(best.space);
-    looked_.resize(points_.size());
-    std::iota(looked_.begin(), looked_.end(), 0u);
+    looked_ = All();
     solve_.Enter(space_);
     solve_.SetSolution(best.solution);
     report_.chosen_round = best.round;
@@ -390,6 +401,8 @@ class NestedFitter {
   int cap_;  // level
   std::vector<char> outlier_;
   int finest_ = 0, outliers_ = 0;
+  std::size_t every_ = 0;  // point of the curve is looked at
+  int finest_seen_ = 0;    // level on which those show something
   Indices looked_;
   std::vector<Residual> residuals_;  // of `looked_`
   double weight_ = kNaN, least_gain_ = 0;

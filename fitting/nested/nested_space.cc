@@ -89,6 +89,19 @@ void NestedSpace::Link() {
   vertices_ = CountVertices();
 }
 
+int NestedSpace::FinestWhole() const {
+  int level = 0;
+  const auto whole = [](const NestedLevel& l) {
+    const PatchGrid& grid = l.layout.grid;
+    return std::count(l.active.begin(), l.active.end(), 1) ==
+           static_cast<std::ptrdiff_t>(grid.Columns()) * grid.Rows();
+  };
+  while (level < finest() && whole(levels_[level + 1])) {
+    ++level;
+  }
+  return level;
+}
+
 std::vector<char> NestedSpace::Leaves(int level) const {
   const NestedLevel& l = levels_[level];
   std::vector<char> leaves(l.there.size());

@@ -33,6 +33,8 @@ class NestedSpace {
   int LeafLevel(double x, double y) const;
   // Vertices that are active and not sums of active ones of the next level.
   int Vertices() const { return vertices_; }
+  // The finest level of which, as of those before it, all vertices are active.
+  int FinestWhole() const;
   // On every level those patches that are there and not split, as GridLayout::Patch has them.
   std::vector<char> Leaves(int level) const;
   bool IsCovered(int level, int i, int j) const;

@@ -28,6 +28,10 @@ class OutlierSearch {
     const std::ptrdiff_t count = std::ssize(indices_);
     for (std::ptrdiff_t begin = 0; begin < count; begin += kBlock) {
       const std::ptrdiff_t end = std::min(begin + kBlock, count);
+      if (IsCalm(std::max<std::ptrdiff_t>(begin - kBlock / 2, 0),
+                 std::min(end + kBlock / 2, count))) {
+        continue;
+      }
       Look(std::max<std::ptrdiff_t>(begin - kBlock / 2, 0), std::min(end + kBlock / 2, count));
       for (std::ptrdiff_t k = begin; k < end; ++k) {
         found[k] = Off(k) > far_ && !HasCompany(k) ? 1 : 0;
@@ -59,6 +63,31 @@ class OutlierSearch {
       }
     }
     return Median(values_);
+  }
+
+  // Whether none can be far: a median is no farther from the mean than the standard deviation.
+  bool IsCalm(std::ptrdiff_t begin, std::ptrdiff_t end) const {
+    std::array<double, 3> sum{}, squares{};
+    double largest = 0;
+    char voteless = 0;
+    for (std::ptrdiff_t k = begin; k < end; ++k) {
+      const std::array<double, 3>& e = residuals_[k].along;
+      voteless |= (*before_)[k];
+      for (int c = 0; c < 3; ++c) {
+        sum[c] += e[c];
+        squares[c] += e[c] * e[c];
+      }
+      largest = std::max(largest, residuals_[k].Square());
+    }
+    const auto count = static_cast<double>(end - begin);
+    double middle = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double mean = sum[c] / count,
+                   reach =
+                       std::abs(mean) + std::sqrt(std::max(squares[c] / count - mean * mean, 0.0));
+      middle += reach * reach;
+    }
+    return voteless == 0 && std::sqrt(largest) + std::sqrt(middle) < kFar * least_sd_mm_;
   }
 
   void Look(std::ptrdiff_t begin, std::ptrdiff_t end) {

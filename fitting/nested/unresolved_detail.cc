@@ -138,28 +138,38 @@ Evidence EvidenceOn(const EvidencePoints& of, const GridLayout& layout, int leve
   return evidence;
 }
 
-// Of the functions of a level over patch (i, j) of the level before.
-double Excess(const GridLayout& layout, const Evidence& evidence, int i, int j) {
-  const int columns = layout.grid.Columns(), rows = layout.grid.Rows();
-  double together = 0, apart = 0;
-  for (int b = 2 * j; b <= std::min(2 * j + 4, rows - 1); ++b) {
-    for (int a = 2 * i; a <= 2 * i + 4; ++a) {
-      if (layout.grid.periodic_u || a < columns) {
-        together += evidence.together[layout.At(a % columns, b)];
-        apart += evidence.apart[layout.At(a % columns, b)];
+// Of five columns of a row from 2 i on, for each patch i of the level before.
+void AddWindows(const GridLayout& layout, const std::vector<double>& values, int row,
+                std::vector<double>& sums) {
+  const int columns = layout.grid.Columns();
+  const double* const of_row = values.data() + layout.At(0, row);
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const int first = 2 * static_cast<int>(i);
+    for (int a = first; a <= first + 4; ++a) {
+      if (a < columns) {
+        sums[i] += of_row[a];
+      } else if (layout.grid.periodic_u) {
+        sums[i] += of_row[a - columns];
       }
     }
   }
-  return apart > 0 ? together / apart - 1 : 0;
 }
 
+// By the functions of a level over each patch of the level before.
 std::vector<char> PatchesSeen(const GridLayout& layout, const GridLayout& coarser,
                               const Evidence& evidence) {
   const PatchGrid& grid = coarser.grid;
   std::vector<char> seen(coarser.Patches(), 0);
+  std::vector<double> together(grid.patches_u), apart(grid.patches_u);
   for (int j = 0; j < grid.patches_v; ++j) {
+    std::fill(together.begin(), together.end(), 0.0);
+    std::fill(apart.begin(), apart.end(), 0.0);
+    for (int row = 2 * j; row <= std::min(2 * j + 4, layout.grid.Rows() - 1); ++row) {
+      AddWindows(layout, evidence.together, row, together);
+      AddWindows(layout, evidence.apart, row, apart);
+    }
     for (int i = 0; i < grid.patches_u; ++i) {
-      seen[coarser.Patch(i, j)] = Excess(layout, evidence, i, j) > kWorthIt ? 1 : 0;
+      seen[coarser.Patch(i, j)] = apart[i] > 0 && together[i] / apart[i] - 1 > kWorthIt ? 1 : 0;
     }
   }
   return seen;
@@ -183,16 +193,19 @@ bool SeenBy(const UnresolvedDetail& detail, int finer, const GridLayout& layout,
 
 }  // namespace
 
-UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const GridLayout& level0,
+UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const NestedSpace& space,
                                       int finest, std::span<const std::uint32_t> indices,
                                       std::span<const NestedResidual> residuals) {
-  UnresolvedDetail detail;
+  UnresolvedDetail detail{.seen = {}, .first = space.FinestWhole() + 1};
   detail.seen.resize(1);
-  GridLayout coarser = level0;
+  GridLayout coarser = space[0].layout;
   for (int level = 1; level <= finest; ++level) {
     const GridLayout layout = coarser.Finer();
-    const Evidence evidence = EvidenceOn({points, indices, residuals}, layout, level);
-    detail.seen.push_back(PatchesSeen(layout, coarser, evidence));
+    detail.seen.emplace_back();
+    if (level >= detail.first) {
+      const Evidence evidence = EvidenceOn({points, indices, residuals}, layout, level);
+      detail.seen.back() = PatchesSeen(layout, coarser, evidence);
+    }
     coarser = layout;
   }
   return detail;
@@ -201,7 +214,7 @@ UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const GridLayo
 int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space) {
   int added = 0;
   const int finest = std::min(space.finest(), detail.Finest() - 1);
-  for (int level = 0; level <= finest; ++level) {
+  for (int level = detail.first - 1; level <= finest; ++level) {
     const GridLayout layout = space[level].layout;
     for (int j = 0; j < layout.grid.patches_v; ++j) {
       for (int i = 0; i < layout.grid.patches_u; ++i) {

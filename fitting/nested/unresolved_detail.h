@@ -17,14 +17,16 @@ namespace semblance {
 // as its own standard error gives 1, where taking it is worth just what it costs; and a single
 // gross error gives 0 too, for it agrees with nobody.
 struct UnresolvedDetail {
-  // By level, from 1: per patch of the level before, whether it should be overlaid for what the
-  // functions of this level see.
+  // By level: per patch of the level before, whether it should be overlaid for what the functions
+  // of this level see; nothing of levels that were not looked at.
   std::vector<std::vector<char>> seen;
+  int first = 1;  // that was looked at
   int Finest() const { return static_cast<int>(seen.size()) - 1; }
 };
 
-// finest: of the levels that are looked at. indices and residuals: of the points that were fitted.
-UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const GridLayout& level0,
+// Looks at the levels that the space does not have as a whole, up to `finest`. indices and
+// residuals: of the points that were fitted.
+UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const NestedSpace& space,
                                       int finest, std::span<const std::uint32_t> indices,
                                       std::span<const NestedResidual> residuals);
 

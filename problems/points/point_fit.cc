@@ -145,6 +145,10 @@ std::string SurfacePly(const HSplineSurface& surface, const AutoOr<double>& chor
 }
 
 void WriteResiduals(ResidualFile kind, const FitResult& fit, OutputFolder& folder) {
+  constexpr std::size_t kMostAsText = 100'000;
+  if (kind == ResidualFile::kAuto) {
+    kind = fit.residual_mm.size() <= kMostAsText ? ResidualFile::kCsv : ResidualFile::kPly;
+  }
   if (kind == ResidualFile::kCsv) {
     folder.Write("residuals.csv", ResidualsCsv(fit));
   } else if (kind == ResidualFile::kPly) {

@@ -21,9 +21,9 @@
 namespace semblance {
 
 // What is written of each point.
-enum class ResidualFile { kCsv, kPly, kNone };
+enum class ResidualFile { kAuto, kCsv, kPly, kNone };
 constexpr auto EnumNames(ResidualFile) {
-  return std::to_array<std::string_view>({"csv", "ply", "none"});
+  return std::to_array<std::string_view>({"auto", "csv", "ply", "none"});
 }
 
 struct PointFitOptions {
@@ -37,7 +37,7 @@ struct PointFitOptions {
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);
-  ResidualFile residuals = ResidualFile::kCsv;
+  ResidualFile residuals = ResidualFile::kAuto;
   bool report = true;
 };
 template <class Visitor>
@@ -63,7 +63,8 @@ void Fields(Visitor& visit, PointFitOptions& o) {
       o.chord_mm);
   visit(FieldInfo{.name = "residuals",
                   .doc = "what is written of each point: csv: residuals.csv; ply: residuals.ply, "
-                         "binary, faster and smaller; none: nothing"},
+                         "binary, faster and smaller; none: nothing; auto: csv of up to 100000 "
+                         "points, ply of more"},
         o.residuals);
   visit(FieldInfo{.name = "report",
                   .doc = "whether report.html is written: the surface, the points' distances and "
