@@ -244,16 +244,21 @@ class NestedFitter {
   // Detail finer than the points are apart shows in those that chance has put close together, and
   // noise does not.
   bool ClosestAgree() const {
-    Indices kept;
-    std::vector<Residual> residuals;
+    const Indices kept = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
+    const PairCorrelation pairs = ClosestCorrelation(points_, kept, KeptResiduals());
+    return pairs.value * std::sqrt(static_cast<double>(pairs.count)) > kSure;
+  }
+
+  // Of the points looked at that are no outliers.
+  std::vector<Residual> KeptResiduals() const {
+    std::vector<Residual> kept;
+    kept.reserve(looked_.size());
     for (std::size_t n = 0; n < looked_.size(); ++n) {
       if (outlier_[looked_[n]] == 0) {
-        kept.push_back(looked_[n]);
-        residuals.push_back(residuals_[n]);
+        kept.push_back(residuals_[n]);
       }
     }
-    const PairCorrelation pairs = ClosestCorrelation(points_, kept, residuals);
-    return pairs.value * std::sqrt(static_cast<double>(pairs.count)) > kSure;
+    return kept;
   }
 
   // The finest level that most of the domain has.
@@ -278,6 +283,7 @@ class NestedFitter {
     report_.chosen_round = best.round;
     report_.held_out_rms_mm = std::sqrt(best.held_square);
     weight_ = best.weight;
+    residuals_ = solve_.ResidualsOf(looked_);
     DropOutliers(report_.held_out_rms_mm);
     NestedWeight chosen = FitAll();
     if (DropOutliers(std::sqrt(chosen.score))) {
@@ -309,7 +315,7 @@ class NestedFitter {
       return false;
     }
     const std::vector<char> before = outlier_;
-    FindOutliers(points_, looked_, solve_.ResidualsOf(looked_), least_sd_mm, outlier_);
+    FindOutliers(points_, looked_, residuals_, least_sd_mm, outlier_);
     return before != outlier_;
   }
 
@@ -320,6 +326,7 @@ class NestedFitter {
     search.Climb(2, weight_);
     const NestedWeight chosen = search.Finish();
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
+    residuals_ = solve_.ResidualsOf(looked_);
     return chosen;
   }
 
@@ -331,8 +338,7 @@ class NestedFitter {
     report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, 0.02));
     report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
     report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
-    report_.neighbour_correlation = NeighbourCorrelation(solve_.ResidualsOf(kept));
-    residuals_ = solve_.ResidualsOf(looked_);
+    report_.neighbour_correlation = NeighbourCorrelation(KeptResiduals());
     for (std::uint32_t k = 0; k < points_.size(); ++k) {
       if (outlier_[k] != 0) {
         report_.outliers.push_back(points_.given[k]);

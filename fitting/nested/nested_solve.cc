@@ -258,7 +258,7 @@ double NestedSolve::Sum(const Part& part) const {
 }
 
 int NestedSolve::Solve(double least_gain) {
-  constexpr double kRounding = 1e-16, kProbe = 1e-3;  // of what there was to gain at first
+  constexpr double kRounding = 1e-16, kProbe = 1e-2;  // of what there was to gain at first
   std::array<double, 4> left{}, enough{};
   Multiply(solution_, product_);
   for (int c = 0; c < Channels(); ++c) {

@@ -75,6 +75,18 @@ DistanceQuantiles QuantilesOf(const FitResult& fit) {
           .max_mm = *std::ranges::max_element(known)};
 }
 
+std::vector<Triangle> GridTriangles(int columns, int rows) {
+  std::vector<Triangle> triangles;
+  for (int j = 0; j + 1 < rows; ++j) {
+    for (int i = 0; i + 1 < columns; ++i) {
+      const int a = i + columns * j, b = a + 1, c = a + columns, d = c + 1;
+      triangles.push_back({a, b, d});
+      triangles.push_back({a, d, c});
+    }
+  }
+  return triangles;
+}
+
 FitGrid GridOf(const FitResult& fit, int threads) {
   FitGrid grid{.columns = kGrid, .rows = kGrid, .mesh = {}, .rms_mm = {}};
   std::vector<Vec2> uv;
@@ -84,13 +96,7 @@ FitGrid GridOf(const FitResult& fit, int threads) {
     }
   }
   grid.mesh.points = HSplineBatch(fit.surface).Points(uv, threads);
-  for (int j = 0; j + 1 < grid.rows; ++j) {
-    for (int i = 0; i + 1 < grid.columns; ++i) {
-      const int a = i + grid.columns * j, b = a + 1, c = a + grid.columns, d = c + 1;
-      grid.mesh.triangles.push_back({a, b, d});
-      grid.mesh.triangles.push_back({a, d, c});
-    }
-  }
+  grid.mesh.triangles = GridTriangles(grid.columns, grid.rows);
   AddSquares(fit, grid);
   return grid;
 }

@@ -24,6 +24,8 @@ struct FitGrid {
   std::vector<double> rms_mm;  // of the points around the vertex; NaN: none
 };
 FitGrid GridOf(const FitResult& fit, int threads);
+// Two triangles a cell, of columns x rows vertices, row by row.
+std::vector<Triangle> GridTriangles(int columns, int rows);
 
 // A leaf of the surface's patch tree (patch_tree.h), and the points in it.
 struct FitCell {
