@@ -4,11 +4,11 @@ PACKAGES      = $(shell sed 's/#.*//' .ci/packages.txt)
 RUN_PACKAGES  = $(shell grep -v '# tests' .ci/packages.txt | sed 's/#.*//')
 SUDO         := $(if $(filter 0,$(shell id -u)),,sudo)
 PRESET       ?= release
-BUILD        := $(if $(filter sanitize debug quick,$(PRESET)),build-$(PRESET),build)
+BUILD        := $(if $(filter sanitize debug quick threads coverage,$(PRESET)),build-$(PRESET),build)
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build deb demo demo-phantom test bench faults pairwise fuzz sanitize format check headers tidy configs clean site
+.PHONY: all setup configure build deb demo demo-phantom test bench faults attack same-bytes pairwise pairwise-share fuzz sanitize races coverage format check headers tidy configs clean site
 
 all: build
 
@@ -71,15 +71,34 @@ COUNT        ?= 100
 faults: build
 	@tests/faults/faults.sh $(BUILD)/problems/semblance configs $(COUNT)
 
+# Over 2,000 hostile calls of every command; SEED draws others (docs/reliability.md).
+SEED         ?= 1
+attack: build
+	@python3 -B tests/attack/attack.py $(BUILD)/problems/semblance configs --seed $(SEED) --jobs "$$(nproc)"
+
+# A run, a depth and a fit in many surroundings, and by programs for older processors: the same bytes (docs/reliability.md).
+same-bytes: build
+	@for bits in 256 128; do \
+	  cmake --preset $(PRESET) -B build-$$bits -DSEMBLANCE_WIDEST_BITS=$$bits -DBUILD_TESTING=OFF > /dev/null && \
+	  cmake --build build-$$bits --target semblance || exit 1; done
+	@python3 -B tests/faults/same_bytes.py $(BUILD)/problems/semblance configs --program "no AVX-512"=build-256/problems/semblance \
+	  --program "no AVX"=build-128/problems/semblance
+
 # All pairs of options, each run on the smallest phantom or a few points, or refused at once (docs/reliability.md).
 PAIRS        ?= 1000000
 pairwise: build
 	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --cases $(PAIRS)
 	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --cases $(PAIRS)
 
+# Of these a minute's worth, others every day.
+DAY          := $(shell expr $$(date +%s) / 86400)
+pairwise-share: build
+	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --minutes 0.5 --seed $(DAY)
+	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --minutes 0.5 --seed $(DAY)
+
 # Each reader under libFuzzer with ASan and UBSan for so many minutes; needs clang and its runtime (docs/reliability.md).
 MINUTES      ?= 10
-FUZZERS       = mesh_reader_fuzz config_fuzz text_reader_fuzz invesalius_fuzz
+FUZZERS       = mesh_reader_fuzz config_fuzz text_reader_fuzz invesalius_fuzz volume_fuzz
 fuzz:
 	@CXX=clang++ cmake -G Ninja -B build-fuzz -DSEMBLANCE_FUZZ=ON > /dev/null
 	@cmake --build build-fuzz --target $(FUZZERS)
@@ -88,6 +107,25 @@ fuzz:
 # The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:
 	@$(MAKE) --no-print-directory test PRESET=sanitize
+
+# Those that start threads, with ThreadSanitizer.
+RACES         = parallel_test polygonize_test implicit_face_test depth_direction_test cross_validation_test interpolate_depth_test \
+  face_metrics_test render_test run_test disk_cache_test import_ct_test recentre_test relaxation_test shape_model_test space_solve_test bench_test \
+  http_server_test nested_solve_test study_test
+races: setup
+	@cmake --preset threads > /dev/null
+	@cmake --build --preset threads --target $(RACES)
+	@ctest --preset threads -R "^($$(echo $(RACES) | tr ' ' '|'))\."
+
+# Lines and branches that the tests of what reads files pass; COVERED=. for all tests. Needs gcovr.
+COVERED      ?= mesh_io_test|mesh_readers_test|vtk_xml_test|npy_test|csv_test|json_text_test|hspline_json_test|feature_test|config|value_filter|read_landmarks|landmark_commands|point_table|point_fit|invesalius|ct_volume|read_volume|slice_stack|import|network_file|tissue_table|template_io|edit_script|trial_folder
+READERS       = surfaces/mesh_files/|surfaces/base/(csv|json_text|npy)|surfaces/hspline_files/(hspline_json|json_parts|feature)|problems/config/|problems/ct/(ct_volume|dicom|invesalius|itk|read|slice|voxel_array)|problems/landmark_files/|problems/points/point_(files|table)
+coverage: setup
+	@cmake --preset coverage > /dev/null
+	@cmake --build --preset coverage
+	@ctest --preset coverage -j "$$(nproc)" -R "$(COVERED)" --quiet; \
+	gcovr -r . build-coverage -j "$$(nproc)" --exclude-throw-branches --exclude-unreachable-branches -e tests/ --json build-coverage/coverage.json
+	@python3 tests/coverage.py build-coverage/coverage.json "$(READERS)"
 
 format: setup
 	@git ls-files '*.h' '*.cc' | xargs clang-format -i
@@ -113,4 +151,4 @@ configs: build
 	@$(BUILD)/problems/semblance check --without-inputs configs/heads/*.yaml configs/demo_phantom/*.yaml
 
 clean:
-	@rm -rf build build-debug build-sanitize build-quick build-tidy build-fuzz
+	@rm -rf build build-debug build-sanitize build-quick build-tidy build-fuzz build-threads build-coverage build-256 build-128

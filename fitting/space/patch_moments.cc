@@ -4,16 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include "surfaces/base/simd.h"
 #include "surfaces/hspline/bspline_basis.h"
-
-// Also as code for newer processors, chosen when the program starts; products and sums are never
-// fused (-ffp-contract=off), so both give the same bytes. Not under sanitizers.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__clang__)
-#define SEMBLANCE_KERNEL __attribute__((target_clones("avx2", "default"), noinline))
-#else
-#define SEMBLANCE_KERNEL
-#endif
 
 namespace semblance {
 namespace {
@@ -86,7 +78,7 @@ struct Batch {
   }
 }
 
-SEMBLANCE_KERNEL void Accumulate(const Batch& batch, const Polynomial& p, PatchMoments& sums) {
+SEMBLANCE_WIDE_256 void Accumulate(const Batch& batch, const Polynomial& p, PatchMoments& sums) {
   Vec4 moments[7][2], residual[16];
   __builtin_memcpy(moments, sums.moments, sizeof moments);
   __builtin_memcpy(residual, sums.residual, sizeof residual);
@@ -128,8 +120,8 @@ SEMBLANCE_KERNEL void Accumulate(const Batch& batch, const Polynomial& p, PatchM
   return w[0] * vertices[0] + w[1] * vertices[1] + w[2] * vertices[2] + w[3] * vertices[3];
 }
 
-SEMBLANCE_KERNEL void AccumulateByVertex(const Batch& batch, const PatchId& patch,
-                                         const PatchMatrix& vertices, PatchMoments& sums) {
+SEMBLANCE_WIDE_256 void AccumulateByVertex(const Batch& batch, const PatchId& patch,
+                                           const PatchMatrix& vertices, PatchMoments& sums) {
   Vec4 vertex[16], residual[16];
   for (int k = 0; k < 16; ++k) {
     vertex[k] = Vec4{vertices(k, 0), vertices(k, 1), vertices(k, 2), 0};

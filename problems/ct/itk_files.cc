@@ -17,6 +17,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <iostream>
 #include <limits>
 #include <sstream>
 
@@ -25,13 +26,29 @@
 namespace semblance {
 namespace {
 
-// Both libraries tell their troubles on the terminal too.
+// Both libraries tell their troubles on the terminal too; that of MetaImage has no switch for it.
 void SilenceLibraries() {
   itk::Object::SetGlobalWarningDisplay(false);
   gdcm::Trace::DebugOff();
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
 }
+
+// What is written to std::cerr and std::cout while it lives is thrown away.
+class QuietStreams {
+ public:
+  QuietStreams() : cerr_(std::cerr.rdbuf(&nowhere_)), cout_(std::cout.rdbuf(&nowhere_)) {}
+  ~QuietStreams() {
+    std::cerr.rdbuf(cerr_);
+    std::cout.rdbuf(cout_);
+  }
+  QuietStreams(const QuietStreams&) = delete;
+  QuietStreams& operator=(const QuietStreams&) = delete;
+
+ private:
+  std::stringbuf nowhere_;
+  std::streambuf *cerr_, *cout_;
+};
 
 // Of ITK's words the last sentence, without the address of an object in memory.
 std::string WordsOf(const itk::ExceptionObject& error) {
@@ -177,10 +194,16 @@ VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::filesystem::path& f
   return array;
 }
 
+// The bytes before the voxels: NIfTI's header, or MetaImage's up to the line that says LOCAL.
+std::uintmax_t HeaderBytes(const std::string& head, VolumeFormat format) {
+  constexpr std::uintmax_t kNiftiHeader = 348;
+  return format == VolumeFormat::kNifti ? kNiftiHeader : head.find('\n', head.find("LOCAL")) + 1;
+}
+
 // Neither NIfTI's nor MetaImage's library says that a file ends too early. What can be seen from
 // its size is: of NIfTI, and of a MetaImage that is one file and not compressed.
 void CheckWhole(const std::filesystem::path& file, VolumeFormat format, std::uintmax_t needed) {
-  constexpr std::uintmax_t kHeader = 348, kMostHeader = 1 << 20;
+  constexpr std::uintmax_t kMostHeader = 1 << 20;
   std::uintmax_t has = std::filesystem::file_size(file);
   std::ifstream in(file, std::ios::binary);
   std::string head(std::min<std::uintmax_t>(has, 4096), ' ');
@@ -200,7 +223,7 @@ void CheckWhole(const std::filesystem::path& file, VolumeFormat format, std::uin
   } else if (format == VolumeFormat::kNrrd) {
     return;
   }
-  if (has < needed + (format == VolumeFormat::kNifti ? kHeader : 0) || has > most) {
+  if (has < needed + HeaderBytes(head, format) || has > most) {
     throw IoError(
         fmt::format("{}: the file is cut short: {} bytes of voxels are needed; copy or "
                     "export it again",
@@ -356,6 +379,7 @@ bool HasItk() { return true; }
 
 VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format) {
   SilenceLibraries();
+  const QuietStreams quiet;
   const std::string where = file.string();
   const Reader reader = ReaderOf(format);
   try {

@@ -252,6 +252,12 @@ bool TellFindings(const std::string& file, const CheckFindings& findings) {
   return findings.sound();
 }
 
+// Faults of a configuration stand with their places; all else with the file that was looked at.
+std::string FaultOf(const std::string& file, const std::exception_ptr& thrown) {
+  const std::string words = FailureOf(thrown).words;
+  return words.starts_with(file) ? words : Shortened(fmt::format("{}: {}", file, words));
+}
+
 int CheckCommand(const Arguments& arguments) {
   RunContext context;
   context.threads = arguments.threads;
@@ -260,8 +266,11 @@ int CheckCommand(const Arguments& arguments) {
   for (const std::string& file : arguments.files) {
     try {
       sound = TellFindings(file, CheckConfig(file, arguments, inputs)) && sound;
+    } catch (const ConfigError& error) {
+      fmt::print(stderr, "{}\n", Shortened(error.what()));
+      sound = false;
     } catch (...) {
-      fmt::print(stderr, "{}\n", FailureOf(std::current_exception()).words);
+      fmt::print(stderr, "{}\n", FaultOf(file, std::current_exception()));
       sound = false;
     }
   }

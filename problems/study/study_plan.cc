@@ -311,6 +311,10 @@ StudyPlan ReadStudy(const fs::path& file) {
   ConfigErrors errors;
   ConfigNode tree;
   const StudyFile study = ReadStudyFile(file, tree, errors);
+  if (const std::string complaint = ComplaintAboutSize(study); !complaint.empty()) {
+    errors.Add(tree.place, "", complaint);
+    errors.ThrowIfAny();
+  }
   const ConfigNode defaults = ConfigTreeOf(Experiment{});
   CheckMetric(study, tree, errors);
   TrialFaults faults;

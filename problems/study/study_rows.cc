@@ -118,7 +118,30 @@ std::vector<StudyRow> SampleRows(const std::optional<StudySamples>& samples, Con
   return rows;
 }
 
+// As a number that cannot overflow.
+double TrialCount(const StudyFile& study) {
+  const auto at_least_one = [](const auto& list) {
+    return static_cast<double>(std::max<std::size_t>(list.size(), 1));
+  };
+  double count = at_least_one(study.subjects) * at_least_one(study.list);
+  for (const OptionAxes::Entry& axis : study.grid.entries) {
+    count *= static_cast<double>(axis.value.size());
+  }
+  count *= study.zip.entries.empty() ? 1 : at_least_one(study.zip.entries[0].value);
+  return study.sample ? count * study.sample->n : count;
+}
+
 }  // namespace
+
+std::string ComplaintAboutSize(const StudyFile& study) {
+  const double count = TrialCount(study);
+  return count <= kMostTrials
+             ? ""
+             : fmt::format(
+                   "subjects, grid, zip, list and sample make {:.6g} trials; a study has at most "
+                   "{:.0f}: take values out, or draw some with sample or search",
+                   count, kMostTrials);
+}
 
 std::vector<StudyRow> StudyRows(const StudyFile& study, ConfigErrors& errors) {
   return Product(Product(GridRows(study.grid), ZipRows(study.zip, errors)),

@@ -3,6 +3,7 @@
 // other.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "problems/config/config_errors.h"
@@ -12,6 +13,13 @@ namespace semblance {
 
 using OptionSetting = OptionValues::Entry;
 using StudyRow = std::vector<OptionSetting>;
+
+// A plan holds each of its trials with all options.
+inline constexpr double kMostTrials = 100'000;
+
+// Whether subjects and rows make more trials than that, in words, known before one is made; empty
+// if they do not.
+std::string ComplaintAboutSize(const StudyFile& study);
 
 // The rows of the whole file: every combination of one row of grid, zip, list and sample each; one
 // empty row if there is none of them. Faults go to `errors`.

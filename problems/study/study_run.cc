@@ -408,6 +408,20 @@ bool IsAnyMissing(const StudyPlan& plan, std::size_t first, const fs::path& fold
                      [&](const StudyTrial& trial) { return !StatusOf(folder, trial.id); });
 }
 
+// All that can be wrong with the plans, before anything is written.
+void RequirePlanOf(const fs::path& folder, const std::vector<fs::path>& others) {
+  std::string hash = PlanHashOf(folder);
+  for (const fs::path& other : others) {
+    const std::string own = PlanHashOf(other);
+    if (own.empty() || (!hash.empty() && own != hash)) {
+      throw IoError(fmt::format("{}: no folder of this study (its plan.json is missing or another)",
+                                other.string()));
+    }
+    ReadStudyResults(other);
+    hash = own;
+  }
+}
+
 // Of two shards of a search, one may have come further.
 bool HasMoreTrials(const fs::path& folder, const fs::path& other) {
   return ReadPlanThere(folder).ids.size() > ReadPlanThere(other).ids.size();
@@ -454,13 +468,9 @@ StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const Study
 }
 
 std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
+  RequirePlanOf(folder, others);
   std::vector<std::string> not_taken;
   for (const fs::path& other : others) {
-    const std::string hash = PlanHashOf(other);
-    if (hash.empty() || (!PlanHashOf(folder).empty() && PlanHashOf(folder) != hash)) {
-      throw IoError(fmt::format("{}: no folder of this study (its plan.json is missing or another)",
-                                other.string()));
-    }
     OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
     if (!HasMoreTrials(folder, other)) {
       output.Write("plan.json", ReadFileBytes(other / "plan.json"));

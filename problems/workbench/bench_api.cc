@@ -36,11 +36,14 @@ constexpr const char* kJson = "application/json";
 
 BenchReply JsonReply(std::string body) { return {200, kJson, std::move(body), {}}; }
 
+// Words that quote what was sent may be as long as that.
 BenchReply Refusal(int status, const std::string& words) {
-  return {status,
-          kJson,
-          Json{{"error", words}}.dump(-1, ' ', false, Json::error_handler_t::replace),
-          {}};
+  constexpr std::size_t kMost = 2000;
+  return {
+      status,
+      kJson,
+      Json{{"error", words.substr(0, kMost)}}.dump(-1, ' ', false, Json::error_handler_t::replace),
+      {}};
 }
 
 BenchReply StateReply(const Bench& bench) {
@@ -418,11 +421,13 @@ BenchReply Answer(Bench& bench, const BenchRequest& request) {
   } catch (const Error& error) {
     return Refusal(400, error.what());
   } catch (const nlohmann::json::exception& error) {
-    return Refusal(400, fmt::format("the request cannot be used: {}", error.what()));
+    return Refusal(400, fmt::format("the request cannot be used: {}", JsonFault(error)));
   } catch (const Cancelled&) {
     return Refusal(409, "stopped");
   } catch (const std::bad_alloc&) {
     return Refusal(507, "not enough memory");
+  } catch (const fs::filesystem_error& error) {
+    return Refusal(400, fmt::format("a path: {}", error.code().message()));
   } catch (const std::exception& error) {
     return Refusal(500, fmt::format("the work failed: {}", error.what()));
   }

@@ -7,12 +7,24 @@
 #include <cmath>
 #include <cstring>
 
-// Wider instructions where the processor has them. They round alike: nothing is contracted. Under a
-// sanitizer the choice at load time would run before the sanitizer does.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__)
+// Code for newer processors beside the plain one, chosen when the program starts. All round alike:
+// nothing is contracted (-ffp-contract=off). SEMBLANCE_WIDEST_BITS, a build option, leaves the
+// widest out, for the proof of it (make same-bytes). Under a sanitizer the choice would run before
+// the sanitizer does.
+#ifndef SEMBLANCE_WIDEST_BITS
+#define SEMBLANCE_WIDEST_BITS 512
+#endif
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) &&                           \
+    SEMBLANCE_WIDEST_BITS >= 256
+#define SEMBLANCE_WIDE_256 __attribute__((target_clones("avx2", "default"), noinline))
+#if SEMBLANCE_WIDEST_BITS >= 512
 #define SEMBLANCE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
 #else
+#define SEMBLANCE_WIDE __attribute__((target_clones("avx2", "default")))
+#endif
+#else
+#define SEMBLANCE_WIDE_256
 #define SEMBLANCE_WIDE
 #endif
 

@@ -10,16 +10,7 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
-
-// The kernels also as code for newer processors, chosen when the program starts. Products and sums
-// are never fused (-ffp-contract=off), so all give the same bytes. Not under sanitizers, which do
-// not run so early.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__clang__)
-#define SEMBLANCE_KERNEL __attribute__((target_clones("avx2", "default"), noinline))
-#else
-#define SEMBLANCE_KERNEL
-#endif
+#include "surfaces/base/simd.h"
 
 namespace semblance {
 namespace {
@@ -80,7 +71,7 @@ struct Row {  // along s, of one power of t
   return squares[0] + squares[1] + squares[2];
 }
 
-SEMBLANCE_KERNEL void EvaluatePoints(const Batch& batch) {
+SEMBLANCE_WIDE_256 void EvaluatePoints(const Batch& batch) {
   for (std::size_t k = 0; k < batch.count; ++k) {
     const Polynomial& p = batch.polynomials[batch.leaves[k]];
     const double s = batch.uv[k][0] * p.scale_u - p.first_u,
@@ -92,7 +83,7 @@ SEMBLANCE_KERNEL void EvaluatePoints(const Batch& batch) {
 }
 
 // Returns how many points have no normal.
-SEMBLANCE_KERNEL std::int64_t EvaluateNormals(const Batch& batch) {
+SEMBLANCE_WIDE_256 std::int64_t EvaluateNormals(const Batch& batch) {
   std::int64_t degenerate = 0;
   constexpr double kDegenerate = 1e-12;  // as HSplineSurface::Frame judges
   for (std::size_t k = 0; k < batch.count; ++k) {

@@ -15,7 +15,7 @@ cd "$folder" || exit 1
 ulimit -c 0
 
 job=($kind "$configs/phantom.yaml" --quiet --threads 1 --set subject.rings=24 --set implicit.resolution=16
-     --set seeds.level=0 --set template.max_level=1 --set "fit.plan.schedule=[{level: 0, fraction: 1}]" --set first_fit=[])
+     --set seeds.level=0 --set template.max_level=1 --set "fit.plan.schedule=[{level: 0, fraction: 1}]" --set "first_fit=[]")
 cat > study.yaml <<END
 base: $configs/phantom.yaml
 set: {subject.rings: 24, implicit.resolution: 16, seeds.level: 0, template.max_level: 1, first_fit: [],
@@ -176,6 +176,28 @@ for file in cache/*.bin; do
   done
 done
 tell "damaged cache: the same bytes" $tried $bad
+
+# A clock that somebody sets, and files of another century; the study goes on where a trial is gone.
+if c++ -shared -fPIC -O1 -o clock_jumps.so "$here/clock_jumps.cc" 2> /dev/null; then
+  bad=0 tried=0
+  for century in 1971-01-01 2090-01-01; do
+    rm -rf jumped merged_jumped jumped_cache
+    for _ in 1 2; do
+      LD_PRELOAD=$PWD/clock_jumps.so "$program" study study.yaml --out jumped --cache jumped_cache --cache-limit-mb 1 --quiet > /dev/null 2>&1
+      [ "$(state jumped)" = "$study_state" ] || bad=$((bad + 1))
+      find jumped jumped_cache -exec touch -d $century {} +
+      rm -rf "$(find jumped/trials -mindepth 1 -maxdepth 1 | sort | head -1)"
+      LD_PRELOAD=$PWD/clock_jumps.so "$program" study study.yaml --out jumped --cache jumped_cache --quiet > /dev/null 2>&1
+      [ "$(state jumped)" = "$study_state" ] || bad=$((bad + 1))
+      LD_PRELOAD=$PWD/clock_jumps.so "$program" merge merged_jumped shard0 shard1 > /dev/null 2>&1
+      [ "$(state merged_jumped)" = "$merge_state" ] || bad=$((bad + 1))
+      tried=$((tried + 3))
+    done
+  done
+  tell "a clock that is set: the same bytes" $tried $bad
+else
+  echo "a clock that is set: not tried, as c++ is not here"
+fi
 
 bad=0 tried=0
 for trial in study/trials/*; do

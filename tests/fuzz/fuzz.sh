@@ -18,6 +18,7 @@ seeds() {
     config_fuzz) cp "$source"/configs/*.yaml "$source"/configs/*/*.yaml "$broken"/*.yaml corpus/config_fuzz 2> /dev/null ;;
     mesh_reader_fuzz | invesalius_fuzz)
       for f in "$broken"/*; do [ "$(stat -c %s "$f")" -lt 20000 ] && cp "$f" "corpus/$1"; done ;;
+    volume_fuzz) python3 -B "$source/tests/fuzz/volume_seeds.py" corpus/volume_fuzz ;;
     text_reader_fuzz)
       { printf c; head -20 "$source/configs/fit/points.csv"; } > corpus/$1/points
       printf 'n\x93NUMPY\x01\x00\x46\x00{"descr": "<f8", "fortran_order": False, "shape": (1, 1), }         \n12345678' > corpus/$1/npy
@@ -38,7 +39,9 @@ printf '%-20s %8s %12s %12s %9s\n' target seconds executions 'per second' findin
 for target in "$@"; do
   mkdir -p "corpus/$target"
   seeds "$target"
-  "./$target" "corpus/$target" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
+  # What ITK and GDCM forget when they give up is theirs.
+  [ "$target" = volume_fuzz ] && leaks=0 || leaks=1
+  ASAN_OPTIONS=detect_leaks=$leaks "./$target" "corpus/$target" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
     -artifact_prefix="found/$target-" > "$target.log" 2>&1
   found=$?
   done=$(awk '/stat::number_of_executed_units/ { print $2 }' "$target.log")

@@ -227,3 +227,9 @@ class CoveringArray:
         for end in taken:
             self.ends.remove(end)
         return case, taken
+
+    def give_back(self, pairs, ends):
+        """What a case was to cover and does not."""
+        self.left |= pairs
+        self.queue = sorted(pairs, key=repr) + self.queue
+        self.ends += ends

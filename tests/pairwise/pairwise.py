@@ -35,6 +35,7 @@ import time
 from option_space import CoveringArray, OptionSpace
 
 LIMIT_S = 60  # of processor time; a case that needs more is killed
+BATCH = 48  # cases that one call of check looks at
 
 
 def experiment_space(schema, folder):
@@ -159,11 +160,25 @@ class Runner:
     def write(self, tree):
         (self.folder / "case.yaml").write_text(json.dumps({"base": "base.yaml", **tree}) + "\n")
 
-    def check(self):
-        """exit code, what was said, the paths that it names"""
-        code, said, _ = call([self.program, "check", "case.yaml"], self.folder)
-        paths = re.findall(r"^\S*case\.yaml:\d+:\d+: ([\w.\[\]]+):", said, re.M)
-        return code, said, paths + re.findall(r"^(?:\S*\.yaml:\d+:\d+: )?([a-z_]+[\w.\[\]]*): ", said, re.M)
+    def check(self, trees):
+        """Of each: what is said against it, a line each, empty where nothing is. One process looks at all of them."""
+        folder = self.folder / "cases"
+        subprocess.run(["rm", "-rf", "cases"], cwd=self.folder, check=True)
+        folder.mkdir()
+        names = [f"cases/{n:04d}.yaml" for n in range(len(trees))]
+        for name, tree in zip(names, trees):
+            (self.folder / name).write_text(json.dumps({"base": "../base.yaml", **tree}) + "\n")
+        code, said, _ = call([self.program, "check", *names], self.folder, LIMIT_S + len(names))
+        lines = {name: [] for name in names}
+        for line in said.splitlines():
+            name = line[:len(names[0])]
+            if name in lines and not line.endswith(": no fault found") and ": warning: " not in line:
+                lines[name].append(line)
+        if code not in (0, 2) or (code == 0) != (not any(lines.values())):
+            if len(trees) == 1:
+                return [[f"check ends with {code}: {said}"]]
+            return [self.check([tree])[0] for tree in trees]  # which one it is
+        return list(lines.values())
 
     def run(self):
         """"done", "said" or "SHORT", what was said, processor seconds"""
@@ -196,76 +211,100 @@ class Search:
         self.runner, self.space = runner, space
         self.array = CoveringArray(space, seed)
         self.random = random.Random(seed + 1)
-        self.refusals, self.refused_pairs, self.results, self.words = 0, set(), [], {}
+        self.refusals, self.checks, self.refused_pairs, self.results, self.words = 0, 0, set(), [], {}
 
-    def repaired(self, case, pair):
-        """The case without what `check` refuses; None where the pair itself is refused. `pair` stays."""
-        held = set(self.space.closure(dict(pair)) if pair else {})
-        while True:
-            self.runner.write(self.space.tree(case, LIST_DEFAULTS[self.runner.kind]))
-            code, said, paths = self.runner.check()
-            if code == 0:
-                return case
-            if code != 2 or not said.strip():
-                self.results.append(("SHORT", case, f"check ends with {code}: {said}", 0))
-                return None
-            self.refusals += 1
-            loose = [n for n in case if n not in held]
-            if not loose:
-                self.words[pair] = said.strip().splitlines()[0]
-                return None
-            # One choice for each fault that is named; where none of them is loose, the fault is what a held one does with
-            # any of the others: half of those go.
-            dropped = set()
-            for path in set(paths):
-                at = [n for n in loose if self.is_at(n, path)]
-                if at and not dropped & set(at):
-                    dropped.add(self.random.choice(at))
-            if not dropped:
-                dropped = set(self.random.sample(loose, (len(loose) + 1) // 2))
-            case = {**self.space.without(case, dropped), **self.space.closure(dict(pair or {}))}
+    def loosened(self, case, pair, lines):
+        """The case with less of what `check` said; None where all that is left is the pair, which stays."""
+        held = set(self.space.closure(dict(pair or ())))
+        loose = [n for n in case if n not in held]
+        if not loose:
+            return None
+        # One choice for each fault that is named; where none of them is loose, the fault is what a held one does with
+        # any of the others: half of those go.
+        dropped = set()
+        for path in sorted({found.group(1) for line in lines if (found := re.match(r"\S+\.yaml[:\d]*: ([a-z_][\w.\[\]]*): ", line))}):
+            at = [n for n in loose if self.is_at(n, path)]
+            if at and not dropped & set(at):
+                dropped.add(self.random.choice(at))
+        if not dropped:
+            dropped = set(self.random.sample(loose, (len(loose) + 1) // 2))
+        return {**self.space.without(case, dropped), **self.space.closure(dict(pair or ()))}
+
+    def repaired(self, cases):
+        """Cases with the pair that each stands for, all looked at together: without what `check` refuses, or None."""
+        cases = list(cases)
+        open_ones = list(range(len(cases)))
+        while open_ones:
+            found = self.runner.check([self.space.tree(cases[n][0], LIST_DEFAULTS[self.runner.kind]) for n in open_ones])
+            self.checks += 1
+            still = []
+            for n, lines in zip(open_ones, found):
+                case, pair = cases[n]
+                if not lines:
+                    continue
+                if lines[0].startswith("check ends with"):
+                    self.results.append(("SHORT", case, lines[0], 0))
+                    cases[n] = (None, pair)
+                    continue
+                self.refusals += 1
+                case = self.loosened(case, pair, lines)
+                if case is None:
+                    self.words[pair] = lines[0]
+                else:
+                    still.append(n)
+                cases[n] = (case, pair)
+            open_ones = still
+        return cases
 
     def is_at(self, name, path):
         own = ".".join(str(k) for k in self.space.by_name[name].path)
         plain = re.sub(r"\[\d+\]", "", path)
         return own == plain or own.startswith(plain + ".") or plain.startswith(own + ".")
 
-    def try_case(self, case, pair):
-        case, ends = self.array.with_ends(case, 2)
-        case = self.repaired(case, pair)
-        self.array.ends += [e for e in ends if case is None or e[0].name not in case]
-        if case is None:
-            self.refused_pairs.add(pair)
-            self.array.left.discard(pair)
-            return
-        self.array.left -= self.array.pairs_of(case)
-        self.results.append((*self.run(case),))
-
     def run(self, case):
+        self.runner.write(self.space.tree(case, LIST_DEFAULTS[self.runner.kind]))
         verdict, said, cpu_s = self.runner.run()
-        return verdict, case, said, cpu_s
+        self.results.append((verdict, case, said, cpu_s))
+        self.tell()
+
+    def next_cases(self, count):
+        """Cases for pairs that none has covered: as they are drawn, with two numbers at an end each."""
+        drawn = []
+        while len(drawn) < count and (pair := self.array.next_pair()) is not None:
+            case, ends = self.array.with_ends(self.array.case_for(pair), 2)
+            covered = self.array.pairs_of(case) & self.array.left
+            self.array.left -= covered
+            drawn.append((case, pair, ends, covered))
+        return drawn
 
     def pairs(self, most, until_s):
         while len(self.results) < most and time.monotonic() < until_s:
-            pair = self.array.next_pair()
-            if pair is None:
+            drawn = self.next_cases(min(BATCH, most - len(self.results)))
+            if not drawn:
                 return
-            self.try_case(self.array.case_for(pair), pair)
-            self.tell()
+            settled = self.repaired([(case, pair) for case, pair, _, _ in drawn])
+            for (_, pair, ends, covered), (case, _) in zip(drawn, settled):
+                runs = case is not None and time.monotonic() < until_s
+                lost = covered - (self.array.pairs_of(case) if runs else set())
+                if case is None:
+                    self.refused_pairs.add(pair)
+                    lost.discard(pair)
+                self.array.give_back(lost, [e for e in ends if not runs or case.get(e[0].name) != e[1]])
+                if runs:
+                    self.run(case)
 
     def lone_ends(self, most, until_s):
         """Numbers at an end that no case has held: each alone, which must be refused or done."""
-        for factor, value in list(self.array.ends):
-            if len(self.results) >= most or time.monotonic() >= until_s:
-                return
-            case = self.space.closure({factor.name: value})
-            case = self.repaired(case, ((factor.name, value),))
-            if case is None:
-                self.refused_pairs.add(((factor.name, value),))
-            else:
-                self.results.append(self.run(case))
-            self.array.ends.remove((factor, value))
-            self.tell()
+        while self.array.ends and len(self.results) < most and time.monotonic() < until_s:
+            ends, self.array.ends = self.array.ends[:BATCH], self.array.ends[BATCH:]
+            settled = self.repaired([(self.space.closure({f.name: v}), ((f.name, v),)) for f, v in ends])
+            for end, (case, pair) in zip(ends, settled):
+                if case is None:
+                    self.refused_pairs.add(pair)
+                elif len(self.results) < most and time.monotonic() < until_s:
+                    self.run(case)
+                else:
+                    self.array.ends.append(end)
 
     def tell(self):
         if sys.stderr.isatty() or len(self.results) % 50 == 0:
@@ -303,11 +342,11 @@ def main():
     short = [r for r in search.results if r[0] == "SHORT"] + late
     count = lambda verdict: sum(r[0] == verdict for r in search.results)
     print(f"{given.kind}: {len(space.choices)} choices in {search.array.total} pairs, {len(space.ends)} ends of numbers")
-    print(f"  cases run               {len(search.results):6d}   ({search.refusals} more were refused by check at once)")
+    print(f"  cases run               {len(search.results):6d}   ({search.refusals} more were refused by check at once, in {search.checks} calls)")
     print(f"  done, finite, usable    {count('done'):6d}")
     print(f"  not usable, said why    {count('said'):6d}")
     print(f"  pairs refused by rules  {len(search.refused_pairs):6d}   left uncovered {len(search.array.left)}, ends {len(search.array.ends)}")
-    print(f"  median of a case        {median:6.2f} s of processor; all in {time.monotonic() - start:.0f} s")
+    print(f"  median of a case        {median:6.2f} s of processor; all in {time.monotonic() - start:.0f} s; seed {given.seed}")
     print(f"  fell short              {len(short):6d}")
     for n, (_, case, said, _) in enumerate(short):
         tree = {"base": "base.yaml", **space.tree(case, LIST_DEFAULTS[given.kind])}

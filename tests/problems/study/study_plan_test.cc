@@ -69,6 +69,17 @@ TEST_F(StudyPlanTest, EveryCombinationIsOneTrial) {
                            .hash);
 }
 
+TEST_F(StudyPlanTest, TrialsAreCountedBeforeTheyAreMade) {
+  std::string values = "[1";
+  for (int k = 2; k <= 500; ++k) {
+    values += fmt::format(", {}", k);
+  }
+  EXPECT_THAT(Faults(fmt::format("grid: {{subject.random_seed: {0}], rounds: {0}], "
+                                 "implicit.resolution: {0}], seeds.level: {0}]}}\n",
+                                 values)),
+              HasSubstr("make 6.25e+10 trials; a study has at most 100000"));
+}
+
 TEST_F(StudyPlanTest, SamplesStayInTheirRangesAndFillThem) {
   const StudyPlan plan = Plan(
       "sample: {method: lhs, n: 10, random_seed: 3, ranges: {seeds.weight: [1.0, 2.0], rounds: [1, "
