@@ -17,7 +17,6 @@
 #include <array>
 #include <cmath>
 #include <fstream>
-#include <iostream>
 #include <limits>
 #include <sstream>
 
@@ -26,29 +25,13 @@
 namespace semblance {
 namespace {
 
-// Both libraries tell their troubles on the terminal too; that of MetaImage has no switch for it.
+// Both libraries tell their troubles on the terminal too.
 void SilenceLibraries() {
   itk::Object::SetGlobalWarningDisplay(false);
   gdcm::Trace::DebugOff();
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
 }
-
-// What is written to std::cerr and std::cout while it lives is thrown away.
-class QuietStreams {
- public:
-  QuietStreams() : cerr_(std::cerr.rdbuf(&nowhere_)), cout_(std::cout.rdbuf(&nowhere_)) {}
-  ~QuietStreams() {
-    std::cerr.rdbuf(cerr_);
-    std::cout.rdbuf(cout_);
-  }
-  QuietStreams(const QuietStreams&) = delete;
-  QuietStreams& operator=(const QuietStreams&) = delete;
-
- private:
-  std::stringbuf nowhere_;
-  std::streambuf *cerr_, *cout_;
-};
 
 // Of ITK's words the last sentence, without the address of an object in memory.
 std::string WordsOf(const itk::ExceptionObject& error) {
@@ -379,7 +362,6 @@ bool HasItk() { return true; }
 
 VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format) {
   SilenceLibraries();
-  const QuietStreams quiet;
   const std::string where = file.string();
   const Reader reader = ReaderOf(format);
   try {

@@ -13,8 +13,8 @@
 
 #include "problems/ct/dicom_series.h"
 #include "problems/ct/invesalius.h"
-#include "problems/ct/itk_files.h"
 #include "problems/ct/slice_stack.h"
+#include "problems/ct/volumes_apart.h"
 #include "problems/ct/voxel_array.h"
 #include "surfaces/base/error.h"
 
@@ -93,6 +93,17 @@ void Interpolate(const SliceStack& stack, std::size_t slice, VoxelArray& array) 
   }
 }
 
+// The slices of the stack that are there, in its order.
+std::vector<DicomHeader> PresentSlices(const DicomSeries& series, const SliceStack& stack) {
+  std::vector<DicomHeader> present;
+  for (const int slice : stack.slices) {
+    if (slice >= 0) {
+      present.push_back(series.slices[slice]);
+    }
+  }
+  return present;
+}
+
 // All slices of the stack, in its order; what is missing is interpolated.
 void ReadSlices(const DicomSeries& series, const SliceStack& stack, const std::string& where,
                 const RunContext& context, VoxelArray& array) {
@@ -101,13 +112,15 @@ void ReadSlices(const DicomSeries& series, const SliceStack& stack, const std::s
       {.counts = {static_cast<double>(array.counts[0]), static_cast<double>(array.counts[1]),
                   static_cast<double>(stack.slices.size())}},
       where);
-  array.values.reserve(size * stack.slices.size());
+  const VoxelArray read = ReadSlicesApart(PresentSlices(series, stack), context.stop_token);
+  array.clipped = read.clipped;
+  array.not_finite = read.not_finite;
+  array.values.resize(size * stack.slices.size());
+  auto from = read.values.begin();
   for (std::size_t k = 0; k < stack.slices.size(); ++k) {
-    context.ThrowIfStopped();
     if (stack.slices[k] >= 0) {
-      AppendDicomSlice(series.slices[stack.slices[k]], array);
-    } else {
-      array.values.resize(array.values.size() + size);
+      std::copy_n(from, size, array.values.begin() + static_cast<std::ptrdiff_t>(k * size));
+      from += static_cast<std::ptrdiff_t>(size);
     }
   }
   for (std::size_t k = 0; k < stack.slices.size(); ++k) {
@@ -165,7 +178,7 @@ VolumeReading ReadDicomFolder(const fs::path& folder, const ReadVolumeOptions& o
                               const RunContext& context) {
   const std::string where = folder.string();
   const std::vector<fs::path> files = VolumeFiles(folder);
-  const std::vector<DicomHeader> headers = ScanDicom(files);
+  const std::vector<DicomHeader> headers = ScanDicomApart(files, context.stop_token);
   if (headers.empty()) {
     throw IoError(
         fmt::format("{}: none of the {} files in the folder is DICOM", where, files.size()));
@@ -181,7 +194,7 @@ VolumeReading ReadDicomFolder(const fs::path& folder, const ReadVolumeOptions& o
   return ReadSeries(series, options, context, std::move(reading), where);
 }
 
-VolumeReading ReadFile(const fs::path& path) {
+VolumeReading ReadFile(const fs::path& path, const RunContext& context) {
   const std::string where = path.string();
   if (LowerCaseName(path).ends_with(".inv3")) {
     VolumeReading reading{.volume = ReadInvesalius(path), .modality = Modality::kCt, .notes = {}};
@@ -195,7 +208,7 @@ VolumeReading ReadFile(const fs::path& path) {
         "slice name its folder), .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd or .inv3",
         where));
   }
-  return Finish(ReadImageVolume(path, *format), {}, where);
+  return Finish(ReadImageApart(path, *format, context.stop_token), {}, where);
 }
 
 }  // namespace
@@ -237,7 +250,7 @@ VolumeReading ReadVolume(const fs::path& path, const ReadVolumeOptions& options,
         fmt::format("{}: series and fill_slices are for folders of DICOM files, and this is a file",
                     path.string()));
   }
-  return ReadFile(path);
+  return ReadFile(path, context);
 }
 
 }  // namespace semblance

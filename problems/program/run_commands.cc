@@ -324,10 +324,24 @@ bool IsMr(const Arguments& arguments, const VolumeReading& reading) {
                                       : arguments.modality == "mr";
 }
 
-int ImportCtCommand(const Arguments& arguments) {
-  const std::filesystem::path path = arguments.files.at(0);
+// Writes the meshes; what is wrong with them is said with the volume's name.
+void Import(const Arguments& arguments, const VolumeReading& reading, bool mr, OutputFolder& folder,
+            const RunContext& context) try {
+  if (mr) {
+    const MrSkin import = ImportMrSkin(reading.volume, arguments.mr, context);
+    WriteSkin(import.skin, import.dropped, folder);
+    PrintNotes(import.notes);
+    return;
+  }
   CtImportOptions options = arguments.ct;
   options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
+  WriteImport(ImportCt(reading.volume, options, context), folder);
+} catch (const InputError& error) {
+  throw InputError(fmt::format("{}: {}", arguments.files.at(0), error.what()));
+}
+
+int ImportCtCommand(const Arguments& arguments) {
+  const std::filesystem::path path = arguments.files.at(0);
   const RunContext context = MakeContext(arguments);
   const VolumeReading reading = ReadVolume(path, arguments.reading, context);
   const bool mr = IsMr(arguments, reading);
@@ -336,13 +350,7 @@ int ImportCtCommand(const Arguments& arguments) {
   }
   PrintNotes(reading.notes);
   StagedFolder folder = MakeFolder(arguments, "out/" + VolumeName(path));
-  if (mr) {
-    const MrSkin import = ImportMrSkin(reading.volume, arguments.mr, context);
-    WriteSkin(import.skin, import.dropped, folder.Files());
-    PrintNotes(import.notes);
-  } else {
-    WriteImport(ImportCt(reading.volume, options, context), folder.Files());
-  }
+  Import(arguments, reading, mr, folder.Files(), context);
   folder.Publish();
   const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();
   fmt::print("folder: {}\n", root.string());

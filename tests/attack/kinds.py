@@ -114,7 +114,7 @@ def meshes(world):
         ending = pathlib.Path(good).suffix if draw.random() < 0.92 else draw.choice([".ply", ".obj", ".off", ".stl", ".PLY", "", ".json", ".xyz"])
         name = "hostile" + ending
         words, files, lines = mesh_calls(name, draw)
-        yield Case("meshes", f"{good}: {what}", words, {name: data, **files}, most_lines=lines)
+        yield Case("meshes", f"{good}: {what}", words, {name: data, **files}, most_lines=lines, names=("hostile", "from the skull", "landmark '"))
 
 
 def volumes(world):

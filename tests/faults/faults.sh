@@ -1,7 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Injects faults into the program, and looks whether every one ends with the old bytes or the new ones.
-# usage: faults.sh PROGRAM CONFIGS [COUNT]   COUNT: kills of each kind (100); the seed is $SEED (1).
+# usage: faults.sh PROGRAM CONFIGS [COUNT]   COUNT: kills of run, half of them over an old one, and of study; half as
+# many of merge and of the workbench (100); the seed is $SEED (1).
 # JOB=depth does so with the shorter job (run). Prints a table; ends with 1 if anything fell short.
 set -u
 shopt -s nullglob
@@ -14,12 +15,13 @@ trap 'rm -rf "$folder"' EXIT
 cd "$folder" || exit 1
 ulimit -c 0
 
-job=($kind "$configs/phantom.yaml" --quiet --threads 1 --set subject.rings=24 --set implicit.resolution=16
-     --set seeds.level=0 --set template.max_level=1 --set "fit.plan.schedule=[{level: 0, fraction: 1}]" --set "first_fit=[]")
+job=($kind "$configs/phantom.yaml" --quiet --threads 1 --set subject.rings=16 --set implicit.resolution=16
+     --set implicit.target_triangles=400 --set seeds.level=0 --set template.max_level=1 --set template.patches_u=6
+     --set template.patches_v=6 --set "fit.plan.schedule=[{level: 0, fraction: 1}]" --set "first_fit=[]")
 cat > study.yaml <<END
 base: $configs/phantom.yaml
-set: {subject.rings: 24, implicit.resolution: 16, seeds.level: 0, template.max_level: 1, first_fit: [],
-      fit.plan.schedule: [{level: 0, fraction: 1}]}
+set: {subject.rings: 16, implicit.resolution: 16, implicit.target_triangles: 400, seeds.level: 0, template.max_level: 1,
+      template.patches_u: 6, template.patches_v: 6, first_fit: [], fit.plan.schedule: [{level: 0, fraction: 1}]}
 grid: {interp: [nearest, mean], implicit.resolution: [16, 17, 18]}
 keep: run
 END
@@ -54,8 +56,9 @@ run_time=$(($(now) - start)) run_state=$(state run)
 start=$(now); "$program" study study.yaml --out study --quiet > study.log 2>&1 || { cat study.log; exit 1; }
 study_time=$(($(now) - start)) study_state=$(state study)
 
+half=$((count / 2)) fifth=$((count / 5 + 1))
 bad=0
-for _ in $(seq "$count"); do
+for _ in $(seq $half); do
   interrupt KILL "$(part_of $run_time)" "${job[@]}" --out killed
   s=$(state killed)
   [ "$s" = none ] || [ "$s" = "$run_state" ] || bad=$((bad + 1))
@@ -64,13 +67,13 @@ done
 "$program" "${job[@]}" --out killed > /dev/null 2>&1
 [ "$(state killed)" = "$run_state" ] && [ "$(leftovers .)" = 0 ] || bad=$((bad + 1))
 rm -rf killed
-tell "$kind: kill -9; nothing or all, the next one clears up" "$count" $bad
+tell "$kind: kill -9; nothing or all, the next one clears up" $half $bad
 
 # An old run of another title, written over with --force: each file is the old one or the new one.
 "$program" "${job[@]}" --set title=old --out old > /dev/null 2>&1
 echo mine > old/mine.txt
 bad=0
-for _ in $(seq "$count"); do
+for _ in $(seq $half); do
   rm -rf over; cp -r old over
   interrupt KILL "$(part_of $run_time)" "${job[@]}" --out over --force
   for f in $(cd over && find . -type f ! -name timing.json ! -path './.semblance-part/*'); do
@@ -79,7 +82,7 @@ for _ in $(seq "$count"); do
   [ "$(cat over/mine.txt)" = mine ] || bad=$((bad + 1))
 done
 rm -rf over
-tell "$kind --force: kill -9; each file old or new" "$count" $bad
+tell "$kind --force: kill -9; each file old or new" $half $bad
 
 bad=0 kills=0
 while [ $kills -lt "$count" ]; do
@@ -99,17 +102,17 @@ start=$(now); "$program" merge merged shard0 shard1 > /dev/null 2>&1
 merge_time=$(($(now) - start)) merge_state=$(state merged)
 [ "$merge_state" = "$study_state" ] || short=$((short + 1))
 bad=0
-for _ in $(seq $((count / 2))); do
+for _ in $(seq $half); do
   rm -rf killed
   interrupt KILL "$(part_of $merge_time)" merge killed shard0 shard1
   "$program" merge killed shard0 shard1 > /dev/null 2>&1
   [ "$(state killed)" = "$merge_state" ] && [ "$(leftovers killed)" = 0 ] || bad=$((bad + 1))
 done
 rm -rf killed
-tell "merge: kill -9, merged again; the same bytes" $((count / 2)) $bad
+tell "merge: kill -9, merged again; the same bytes" $half $bad
 
 bad=0
-for _ in $(seq "$count"); do
+for _ in $(seq $fifth); do
   start=$(now)
   after=$(part_of $run_time)
   interrupt TERM "$after" "${job[@]}" --out stopped
@@ -120,7 +123,7 @@ for _ in $(seq "$count"); do
   awk -v t=$took -v a="$after" 'BEGIN { exit !(t / 1e9 - a > 2) }' && bad=$((bad + 1))
   rm -rf stopped
 done
-tell "$kind: SIGTERM; ends within 2 s with nothing or all" "$count" $bad
+tell "$kind: SIGTERM; ends within 2 s with nothing or all" $fifth $bad
 
 bad=0 tried=0
 for blocks in 0 1 2 4 8 16 32 64 128 256 512 1024; do
@@ -149,7 +152,7 @@ for megabytes in $(seq 40 20 400); do
 done
 tell "little memory: done, or said" $tried $bad
 
-bad=0 tried=$((count / 5 + 1))
+bad=0 tried=$((count / 20 + 1))
 for _ in $(seq $tried); do
   "$program" "${job[@]}" --out both > /dev/null 2>&1 & a=$!
   "$program" "${job[@]}" --out both > /dev/null 2>&1 & b=$!
@@ -222,8 +225,8 @@ tell "damaged trial: made again, and not merged" $tried $bad
 echo "base: $configs/phantom.yaml
 subject: {type: phantom, rings: 24}" > bench.yaml
 if command -v python3 > /dev/null; then
-  bad=$(python3 "$here/workbench_kills.py" "$program" bench.yaml $((count / 2)) "${SEED:-1}")
-  tell "workbench: kill -9; nothing that was acknowledged is lost" $((count / 2)) "$bad"
+  bad=$(python3 "$here/workbench_kills.py" "$program" bench.yaml $half "${SEED:-1}")
+  tell "workbench: kill -9; nothing that was acknowledged is lost" $half "$bad"
 else
   echo "workbench: not tried, as python3 is not here"
 fi

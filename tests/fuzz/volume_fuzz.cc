@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Fuzzes the readers of volumes: a volume that is read is sound, anything else is one of our
-// errors. ITK and GDCM come as they are installed, so only their memory, not their branches, is
-// watched. The first byte tells the kind: n NIfTI, z NIfTI gzipped, r NRRD, m MetaImage, d a DICOM
-// slice, which with copies of it makes a series.
+// errors, also where ITK or GDCM, which come as they are installed, end the process that reads it.
+// The first byte tells the kind: n NIfTI, z NIfTI gzipped, r NRRD, m MetaImage, d a DICOM slice,
+// which with copies of it makes a series.
 #include <unistd.h>
 
 #include <cstdint>

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Options in pairs: what `check` lets pass, the program can do.
 
-usage: pairwise.py PROGRAM CONFIGS [--kind experiment|fit] [--cases N] [--minutes M] [--seed N] [--keep FOLDER]
+usage: pairwise.py PROGRAM CONFIGS [--kind experiment|fit] [--cases N] [--minutes M] [--seed N|day] [--keep FOLDER]
 
 Cases are made from the schema of the options: every pair of choices (words, variants, booleans, terms) that can stand
 together is in one of them, and every number is at each end of its range in one. A case is run on the smallest phantom
@@ -26,6 +26,7 @@ import pathlib
 import random
 import re
 import resource
+import shutil
 import statistics
 import subprocess
 import sys
@@ -163,7 +164,7 @@ class Runner:
     def check(self, trees):
         """Of each: what is said against it, a line each, empty where nothing is. One process looks at all of them."""
         folder = self.folder / "cases"
-        subprocess.run(["rm", "-rf", "cases"], cwd=self.folder, check=True)
+        shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
         names = [f"cases/{n:04d}.yaml" for n in range(len(trees))]
         for name, tree in zip(names, trees):
@@ -313,6 +314,8 @@ class Search:
 
 def slow(results):
     median = statistics.median([r[3] for r in results if r[0] != "SHORT"] or [1])
+    if len(results) < 30:
+        median = max(median, 1.0)  # of so few it is a matter of luck
     return median, [("SHORT", case, f"{cpu_s:.1f} s, over ten times the median of {median:.2f} s", cpu_s)
                     for verdict, case, _, cpu_s in results if verdict != "SHORT" and cpu_s > 10 * median]
 
@@ -324,7 +327,8 @@ def main():
     arguments.add_argument("--kind", choices=["experiment", "fit"], default="experiment")
     arguments.add_argument("--cases", type=int, default=10**9)
     arguments.add_argument("--minutes", type=float, default=1e6, help="no case is begun after so many")
-    arguments.add_argument("--seed", type=int, default=1)
+    arguments.add_argument("--seed", type=lambda text: int(time.time() // 86400) if text == "day" else int(text), default=1,
+                           help="a number, or `day` for another one each day")
     arguments.add_argument("--keep", type=pathlib.Path, help="folder for the cases that fell short")
     given = arguments.parse_args()
     start = time.monotonic()

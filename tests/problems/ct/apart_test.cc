@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/ct/apart.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr double kMemory_bytes = 256e6;
+
+std::string Do(const std::function<std::string(const TellFile&)>& work) {
+  return DoApart(work, kMemory_bytes, {});
+}
+
+template <class Thrown>
+std::string WordsWhenDone(const std::function<void()>& work) {
+  try {
+    Do([&](const TellFile& tell) {
+      tell("a.dcm");
+      tell("b.dcm");
+      work();
+      return std::string();
+    });
+  } catch (const Thrown& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+TEST(Apart, WhatTheWorkGivesComesWhole) {
+  const std::string large(3'000'000, 'x');
+  EXPECT_EQ(Do([&](const TellFile&) { return large; }), large);
+  EXPECT_EQ(Do([](const TellFile&) { return std::string(); }), "");
+}
+
+TEST(Apart, NothingElseOfItIsSeen) {
+  int here = 1;
+  ::testing::internal::CaptureStderr();
+  Do([&](const TellFile&) {
+    here = 2;
+    std::fputs("words of a library\n", stderr);
+    std::fflush(stderr);
+    return std::string();
+  });
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(here, 1);
+}
+
+TEST(Apart, OurErrorsStayWhatTheyAre) {
+  EXPECT_EQ(WordsWhenDone<InputError>([] { throw InputError("five axes"); }), "five axes");
+  EXPECT_EQ(WordsWhenDone<IoError>([] { throw IoError("cut short"); }), "cut short");
+}
+
+TEST(Apart, WhateverElseHappensNamesTheFileAtHand) {
+  const std::vector<std::function<void()>> ends = {
+      [] { std::abort(); },
+      [] { ::raise(SIGSEGV); },
+      [] { ::_exit(3); },
+      [] { throw std::runtime_error("of a library"); },
+      [] { throw std::bad_alloc(); },
+  };
+  for (const auto& end : ends) {
+    EXPECT_THAT(WordsWhenDone<IoError>(end),
+                AllOf(StartsWith("b.dcm: "), HasSubstr("copy or export it again")));
+  }
+}
+
+TEST(Apart, MemoryIsLimited) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer's memory has no limit";
+#endif
+  EXPECT_THAT(WordsWhenDone<IoError>([] {
+                std::vector<char> much(static_cast<std::size_t>(4 * kMemory_bytes), 'x');
+                EXPECT_EQ(much.back(), 'x');
+              }),
+              HasSubstr("asks for more memory"));
+}
+
+TEST(Apart, AStopEndsIt) {
+  std::stop_source stop;
+  const std::jthread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    stop.request_stop();
+  });
+  const auto endless = [](const TellFile&) -> std::string {
+    for (;;) {
+      ::pause();
+    }
+  };
+  EXPECT_THROW(DoApart(endless, kMemory_bytes, stop.get_token()), Cancelled);
+}
+
+}  // namespace
+}  // namespace semblance
