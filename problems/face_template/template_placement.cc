@@ -208,6 +208,13 @@ HSplineSurface Warped(const HSplineSurface& surface, const Map& map) {
   return warped;
 }
 
+// Where the generic head lies by the landmarks; what they cannot tell names the head.
+Similarity HeadFromGeneric(const Correspondence& pairs, const std::string& name) try {
+  return pairs.HeadFromGeneric();
+} catch (const InputError& error) {
+  throw InputError(fmt::format("{}: its landmarks: {}", name, error.what()));
+}
+
 }  // namespace
 
 OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const std::string& name,
@@ -218,7 +225,7 @@ OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const
   CheckEnough(landmarks.points, name);
   const Correspondence pairs(landmarks.points);
   CheckHandedness(pairs, name);
-  CheckScale(pairs.HeadFromGeneric().scale, name);
+  CheckScale(HeadFromGeneric(pairs, name).scale, name);
   context.Report("skin", "what is seen from outside");
   outer.skin = Submesh(head, SeenFromOutside(head, context.threads));
   outer.points = OnSkin(landmarks.points, outer.skin, name);

@@ -207,7 +207,7 @@ def landmarks(world):
             (["evaluate", BALL, BALL, "--landmarks", name, *QUIET], {}),
             (["template", BALL, name, "--out", "out", *QUIET], {}),
         ])
-        yield Case("landmarks", f"{good}: {what}", words, {name: data, **files}, most_lines=YAML_LINES, names=("hostile", "landmark '"))
+        yield Case("landmarks", f"{good}: {what}", words, {name: data, **files}, most_lines=YAML_LINES, names=("hostile", "landmark", "no dowel has a tissue depth"))
 
 
 def points(world):

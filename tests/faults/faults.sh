@@ -23,7 +23,7 @@ base: $configs/phantom.yaml
 set: {subject.rings: 16, implicit.resolution: 16, implicit.target_triangles: 400, seeds.level: 0, template.max_level: 1,
       template.patches_u: 6, template.patches_v: 6, first_fit: [], fit.plan.schedule: [{level: 0, fraction: 1}]}
 grid: {interp: [nearest, mean], implicit.resolution: [16, 17, 18]}
-keep: run
+keep: view
 END
 [ "$kind" = depth ] && echo 'job: depth' >> study.yaml
 
@@ -39,16 +39,18 @@ now() { date +%s%N; }
 # A random part of $1 nanoseconds, as seconds.
 part_of() { awk -v t="$1" -v r="$RANDOM" 'BEGIN { printf "%.4f", 1.1 * t / 1e9 * r / 32767 }'; }
 crashed() { [ "$1" -gt 2 ]; }
-# Starts the program and sends signal $1 after $2 s; its exit code is in $code.
+# Starts the program and sends signal $1 after $2 s, if it has not ended by then; its exit code is in $code.
 interrupt() {
   local signal=$1 after=$2
   shift 2
   "$program" "$@" > /dev/null 2>&1 &
   local child=$!
-  sleep "$after"
-  kill "-$signal" $child 2> /dev/null
+  (sleep "$after"; kill "-$signal" $child) 2> /dev/null &
+  local killer=$!
   wait $child 2> /dev/null
   code=$?
+  kill $killer 2> /dev/null
+  wait $killer 2> /dev/null
 }
 
 start=$(now); "$program" "${job[@]}" --out run > run.log 2>&1 || { cat run.log; exit 1; }
@@ -86,7 +88,7 @@ tell "$kind --force: kill -9; each file old or new" $half $bad
 
 bad=0 kills=0
 while [ $kills -lt "$count" ]; do
-  interrupt KILL "$(part_of $study_time)" study study.yaml --out killed --quiet
+  interrupt KILL "$(part_of $((study_time / 3)))" study study.yaml --out killed --quiet
   kills=$((kills + 1))
   if [ "$code" = 0 ] || [ $kills = "$count" ]; then
     "$program" study study.yaml --out killed --quiet > /dev/null 2>&1
@@ -141,7 +143,7 @@ done
 tell "no room for files above a size: $kind and merge" $tried $bad
 
 bad=0 tried=0
-for megabytes in $(seq 40 20 400); do
+for megabytes in $(seq 40 40 400); do
   (ulimit -v $((megabytes * 1024)); exec "$program" "${job[@]}" --out little) > /dev/null 2> little.err
   code=$? s=$(state little)
   # 126, 127: the system could not load the program at all.
@@ -214,7 +216,7 @@ for trial in study/trials/*; do
     tried=$((tried + 1))
   done
   rm -rf damaged; cp -r study damaged
-  printf 'X' >> "damaged/trials/$id/depth.ply"
+  printf 'X' >> "damaged/trials/$id/$(ls "study/trials/$id" | grep -E 'scene.json|depth.p' | head -1)"
   rm -rf gathered; "$program" merge gathered damaged > /dev/null 2>&1
   [ ! -e "gathered/trials/$id" ] || bad=$((bad + 1))
   tried=$((tried + 1))
