@@ -27,6 +27,13 @@ ConfigPlace PlaceAt(const SourcePtr& source, const YAML::Mark& mark) {
   return {source, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1};
 }
 
+// What is left of a text that cannot be read: what is missed in it is missed there.
+ConfigNode EmptyMap(const SourcePtr& source) {
+  ConfigNode map = ConfigNode::Map();
+  map.place = {source, 1, 1};
+  return map;
+}
+
 ConfigPlace EndOf(std::string_view text, const SourcePtr& source) {
   const auto lines = std::count(text.begin(), text.end(), '\n');
   const std::size_t last_break = text.rfind('\n');
@@ -321,7 +328,7 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
     loading.errors.Add(tree.place, "",
                        fmt::format("expected a map of options at the top, found {}",
                                    tree.IsList() ? "a list" : "a scalar"));
-    return ConfigNode::Map();
+    return EmptyMap(tree.place.source);
   }
   const auto entry = std::find_if(tree.entries.begin(), tree.entries.end(),
                                   [](const auto& candidate) { return candidate.key == "base"; });
@@ -367,10 +374,10 @@ ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
   if (text.size() > kLargestConfig_bytes) {
     errors.Add({shared_source, 1, 1}, "",
                fmt::format("{} MB of YAML; at most 16 MB are read", text.size() / 1'000'000));
-    return ConfigNode::Map();
+    return EmptyMap(shared_source);
   }
   if (!RequireReadableBytes(text, shared_source, errors)) {
-    return ConfigNode::Map();
+    return EmptyMap(shared_source);
   }
   std::istringstream stream{std::string(text)};
   TreeBuilder builder(text, shared_source, errors);
@@ -385,7 +392,7 @@ ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
     const bool is_at_end = error.msg.starts_with("end of ");
     errors.Add(is_at_end ? EndOf(text, shared_source) : PlaceAt(shared_source, error.mark), "",
                fmt::format("this is not YAML: {}", error.msg));
-    return ConfigNode::Map();
+    return EmptyMap(shared_source);
   }
   return builder.TakeRoot();
 }

@@ -358,8 +358,10 @@ TEST_F(ReadVolumeTest, ClaimsBeyondTheFileAreRefusedAtOnce) {
 TEST_F(ReadVolumeTest, FilesCutShortAreOneClearError) {
   const auto cut = [&](const char* name) {
     const std::string bytes = ReadFileBytes(folder_ / name);
-    WriteFileAtomically(folder_ / name, bytes.substr(0, bytes.size() / 2));
-    EXPECT_THAT(Words(name), HasSubstr(fmt::format("{}: ", name)));
+    for (const std::size_t missing : {bytes.size() / 2, std::size_t{24}}) {
+      WriteFileAtomically(folder_ / name, bytes.substr(0, bytes.size() - missing));
+      EXPECT_THAT(Words(name), HasSubstr(fmt::format("{}: ", name))) << missing;
+    }
   };
   WriteItk(folder_ / "a.nii", array_, *itk::NiftiImageIO::New());
   WriteItk(folder_ / "a.nrrd", array_, *itk::NrrdImageIO::New());
@@ -367,6 +369,22 @@ TEST_F(ReadVolumeTest, FilesCutShortAreOneClearError) {
   cut("a.nii");
   cut("a.nrrd");
   cut("a.mha");
+}
+
+// GDCM ends its process at some of these, or asks for 4 GB.
+TEST_F(ReadVolumeTest, DamagedSlicesAreOneClearError) {
+  constexpr std::size_t kMark = 132;  // bytes up to the end of "DICM"
+  const DicomSeriesNames names{.patient = "P", .description = "d", .number = 4};
+  const std::string good = EncodeDicomSlice(head_.volume, 0, names);
+  std::string flipped = good;
+  flipped[kMark + 1] = '\x12';
+  for (const std::string& bad : {good.substr(0, kMark + 3), good.substr(0, 600), flipped,
+                                 good.substr(0, 538) + good.substr(1022),
+                                 good.substr(0, kMark) + std::string(500, '\xff')}) {
+    fs::create_directories(folder_ / "ct");
+    WriteFileAtomically(folder_ / "ct/one.dcm", bad, Durability::kUnsynced);
+    EXPECT_THAT(Words("ct"), HasSubstr("ct"));
+  }
 }
 
 // What the program writes itself.
