@@ -19,6 +19,7 @@ Prints a table, and each case that fell short with its configuration; ends with 
 many, which cover the most.
 """
 import argparse
+import itertools
 import json
 import math
 import os
@@ -37,6 +38,7 @@ from option_space import CoveringArray, OptionSpace
 
 LIMIT_S = 60  # of processor time; a case that needs more is killed
 BATCH = 48  # cases that one call of check looks at
+EXCHANGES = 12  # turns in which a choice that is refused may be exchanged for another; then it is left out
 
 
 def experiment_space(schema, folder):
@@ -89,7 +91,7 @@ def fit_space(schema, folder):
         lists={"fit.plan[listed].schedule": [steps[:1], steps], "fit.plan[until].schedule": [steps]},
         work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 3], ".sweeps": [0, 2], ".max_passes": [1, 3],
               "rounds": [1, 3], "chord_mm": [0.01, 1000], "fit.plan[auto].finest": [0, 3]},
-        beside={}, files={}, defaults={"parameters": "given"})
+        beside={}, files={}, defaults={"parameters": "given", "fit.plan": "listed", "fit.solver": "ceres"})
 
 
 BASE = {
@@ -101,10 +103,11 @@ seeds: {{level: 0}}
 first_fit: []
 fit: {{plan: {{type: listed, schedule: [{{level: 0}}, {{level: 1}}]}}}}
 """,
-    "fit": "patches_u: 4\npatches_v: 4\nparameters: given\nfit: {{plan: {{type: auto, finest: 2}}}}\n",
+    "fit": "patches_u: 4\npatches_v: 4\nparameters: given\n"
+           "fit: {{plan: {{type: listed, schedule: [{{level: 0}}, {{level: 1}}]}}, solver: ceres, terms: [points, {{type: smoothness, weight: 1e-4}}]}}\n",
 }
 LIST_DEFAULTS = {"experiment": {"fit.terms": [{"type": "points"}, {"type": "smoothness"}, {"type": "membrane"}]},
-                 "fit": {"fit.terms": [{"type": "points"}, {"type": "smoothness", "weight": "auto"}]}}
+                 "fit": {"fit.terms": [{"type": "points"}, {"type": "smoothness", "weight": 1e-4}]}}
 
 
 def call(command, folder, limit_s=LIMIT_S):
@@ -129,6 +132,11 @@ def numbers_that_are_none(json_value, path=""):
         return [p for v in json_value for p in numbers_that_are_none(v, path)]
     is_none = isinstance(json_value, float) and not math.isfinite(json_value)
     return [path] if is_none else []
+
+
+def yaml(tree):
+    """As JSON, but for the word that stands for a number, which a quote would make a text."""
+    return json.dumps(tree).replace('"auto"', "auto") + "\n"
 
 
 class Runner:
@@ -159,7 +167,7 @@ class Runner:
         return {"configs": self.configs, "first": first}
 
     def write(self, tree):
-        (self.folder / "case.yaml").write_text(json.dumps({"base": "base.yaml", **tree}) + "\n")
+        (self.folder / "case.yaml").write_text(yaml({"base": "base.yaml", **tree}))
 
     def check(self, trees):
         """Of each: what is said against it, a line each, empty where nothing is. One process looks at all of them."""
@@ -168,7 +176,7 @@ class Runner:
         folder.mkdir()
         names = [f"cases/{n:04d}.yaml" for n in range(len(trees))]
         for name, tree in zip(names, trees):
-            (self.folder / name).write_text(json.dumps({"base": "../base.yaml", **tree}) + "\n")
+            (self.folder / name).write_text(yaml({"base": "../base.yaml", **tree}))
         code, said, _ = call([self.program, "check", *names], self.folder, LIMIT_S + len(names))
         lines = {name: [] for name in names}
         for line in said.splitlines():
@@ -212,30 +220,44 @@ class Search:
         self.runner, self.space = runner, space
         self.array = CoveringArray(space, seed)
         self.random = random.Random(seed + 1)
-        self.refusals, self.checks, self.refused_pairs, self.results, self.words = 0, 0, set(), [], {}
+        self.refusals, self.checks, self.refused_pairs, self.judged, self.results, self.words = 0, 0, set(), set(), [], {}
 
-    def loosened(self, case, pair, lines):
-        """The case with less of what `check` said; None where all that is left is the pair, which stays."""
+    def loosened(self, case, pair, lines, exchange):
+        """The case with less of what `check` said, or with other choices where it said so; None where all that is left is
+        the pair, which stays."""
         held = set(self.space.closure(dict(pair or ())))
         loose = [n for n in case if n not in held]
-        if not loose:
+        if not loose and not exchange:
             return None
-        # One choice for each fault that is named; where none of them is loose, the fault is what a held one does with
-        # any of the others: half of those go.
-        dropped = set()
+        # One choice for each fault that is named; where none of them can go, the fault is what a held one does with any of
+        # the others: half of those go.
+        dropped, others = set(), {}
         for path in sorted({found.group(1) for line in lines if (found := re.match(r"\S+\.yaml[:\d]*: ([a-z_][\w.\[\]]*): ", line))}):
-            at = [n for n in loose if self.is_at(n, path)]
-            if at and not dropped & set(at):
+            at = [f.name for f in self.space.choices if f.name not in held and self.is_at(f.name, path) and self.space.exists(f, case)]
+            if exchange and at and self.random.random() < 0.7:
+                name = self.random.choice(at)
+                others[name] = self.random.choice(self.space.by_name[name].values)
+            elif at := [n for n in loose if self.is_at(n, path)]:
                 dropped.add(self.random.choice(at))
-        if not dropped:
+        if exchange and not others:
+            top = [f.name for f in self.space.choices if f.is_variant and f.name not in held and self.space.exists(f, case)]
+            others = {name: self.random.choice(self.space.by_name[name].values) for name in self.random.sample(top, min(2, len(top)))}
+        if not dropped and not others:
+            if not loose:
+                return None
             dropped = set(self.random.sample(loose, (len(loose) + 1) // 2))
-        return {**self.space.without(case, dropped), **self.space.closure(dict(pair or ()))}
+        kept = self.space.without(case, dropped | set(others))
+        for name, value in others.items():
+            kept = self.space.closure({**kept, name: value}) or kept
+        return {**kept, **self.space.closure(dict(pair or ()))}
 
     def repaired(self, cases):
         """Cases with the pair that each stands for, all looked at together: without what `check` refuses, or None."""
         cases = list(cases)
         open_ones = list(range(len(cases)))
-        while open_ones:
+        for turn in itertools.count():
+            if not open_ones:
+                return cases
             found = self.runner.check([self.space.tree(cases[n][0], LIST_DEFAULTS[self.runner.kind]) for n in open_ones])
             self.checks += 1
             still = []
@@ -248,14 +270,13 @@ class Search:
                     cases[n] = (None, pair)
                     continue
                 self.refusals += 1
-                case = self.loosened(case, pair, lines)
+                case = self.loosened(case, pair, lines, turn < EXCHANGES)
                 if case is None:
                     self.words[pair] = lines[0]
                 else:
                     still.append(n)
                 cases[n] = (case, pair)
             open_ones = still
-        return cases
 
     def is_at(self, name, path):
         own = ".".join(str(k) for k in self.space.by_name[name].path)
@@ -293,6 +314,17 @@ class Search:
                 self.array.give_back(lost, [e for e in ends if not runs or case.get(e[0].name) != e[1]])
                 if runs:
                     self.run(case)
+            self.forget_lone({choice for (_, pair, _, _), (case, _) in zip(drawn, settled) if case is None for choice in pair})
+
+    def forget_lone(self, choices):
+        """Of choices that were in a pair that is refused: those that are refused alone, with all their pairs."""
+        new = sorted(choices - self.judged, key=repr)
+        self.judged |= choices
+        for (_, pair), (case, _) in zip([(None, (c,)) for c in new], self.repaired([(self.space.closure(dict([c])), (c,)) for c in new])):
+            if case is None:
+                gone = {p for p in self.array.left if pair[0] in p}
+                self.array.left -= gone
+                self.refused_pairs |= gone
 
     def lone_ends(self, most, until_s):
         """Numbers at an end that no case has held: each alone, which must be refused or done."""
@@ -357,7 +389,7 @@ def main():
         print(f"\n{said.strip()[:600]}\n  {json.dumps(tree)}")
         if given.keep:
             given.keep.mkdir(parents=True, exist_ok=True)
-            (given.keep / f"{given.kind}{n:03d}.yaml").write_text(f"# {said.strip().splitlines()[0][:200]}\n{json.dumps(tree)}\n")
+            (given.keep / f"{given.kind}{n:03d}.yaml").write_text(f"# {said.strip().splitlines()[0][:200]}\n{yaml(tree)}")
     return 1 if short else 0
 
 
