@@ -89,6 +89,18 @@ Report ReportOf(const StudyComparison& comparison) {
   return report;
 }
 
+std::string PairText(const TreatmentPair& pair) {
+  const std::string names = fmt::format("{} less {}", Called(pair.other), Called(pair.reference));
+  if (pair.difference.n == 0) {
+    return fmt::format("{}: no subject was done with both\n", names);
+  }
+  const std::string interval = IntervalText(pair.difference.mean_95);
+  return fmt::format("{}: {:+.3f}{}, better of {} and worse of {} of {} subjects{}\n", names,
+                     pair.difference.mean, interval.empty() ? "" : fmt::format(" ({})", interval),
+                     pair.better, pair.worse, pair.difference.n,
+                     std::isfinite(pair.p_holm) ? fmt::format(", p = {:.3g}", pair.p_holm) : "");
+}
+
 }  // namespace
 
 std::string ComparisonText(const StudyComparison& comparison) {
@@ -98,12 +110,7 @@ std::string ComparisonText(const StudyComparison& comparison) {
     text += fmt::format("  {}: {}\n", Called(t), TableNumber(t.summary.mean));
   }
   for (const TreatmentPair& pair : comparison.pairs) {
-    const std::string interval = IntervalText(pair.difference.mean_95);
-    text += fmt::format("{} less {}: {:+.3f}{}, better of {} and worse of {} of {} subjects{}\n",
-                        Called(pair.other), Called(pair.reference), pair.difference.mean,
-                        interval.empty() ? "" : fmt::format(" ({})", interval), pair.better,
-                        pair.worse, pair.difference.n,
-                        std::isfinite(pair.p_holm) ? fmt::format(", p = {:.3g}", pair.p_holm) : "");
+    text += PairText(pair);
   }
   for (const std::string& note : comparison.notes) {
     text += fmt::format("note: {}\n", note);

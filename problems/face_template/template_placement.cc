@@ -208,11 +208,14 @@ HSplineSurface Warped(const HSplineSurface& surface, const Map& map) {
   return warped;
 }
 
-// Where the generic head lies by the landmarks; what they cannot tell names the head.
-Similarity HeadFromGeneric(const Correspondence& pairs, const std::string& name) try {
-  return pairs.HeadFromGeneric();
+// Of where the landmarks place the generic head. What they leave open names the head too.
+void CheckPlace(const Correspondence& pairs, const std::string& name) try {
+  CheckHandedness(pairs, name);
+  CheckScale(pairs.HeadFromGeneric().scale, name);
 } catch (const InputError& error) {
-  throw InputError(fmt::format("{}: its landmarks: {}", name, error.what()));
+  const std::string words = error.what();
+  throw InputError(words.starts_with(name) ? words
+                                           : fmt::format("{}: its landmarks: {}", name, words));
 }
 
 }  // namespace
@@ -223,9 +226,7 @@ OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const
   OuterHead outer{.skin = {}, .points = {}, .notes = CheckHeadMesh(head, name)};
   std::ranges::copy(landmarks.notes, std::back_inserter(outer.notes));
   CheckEnough(landmarks.points, name);
-  const Correspondence pairs(landmarks.points);
-  CheckHandedness(pairs, name);
-  CheckScale(HeadFromGeneric(pairs, name).scale, name);
+  CheckPlace(Correspondence(landmarks.points), name);
   context.Report("skin", "what is seen from outside");
   outer.skin = Submesh(head, SeenFromOutside(head, context.threads));
   outer.points = OnSkin(landmarks.points, outer.skin, name);

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hostile calls of every command: what may come of them is known, and all else is a finding.
 
-usage: attack.py PROGRAM CONFIGS [--cases N] [--seed N] [--only KIND] [--case ID] [--keep FOLDER] [--words FILE]
+usage: attack.py PROGRAM CONFIGS [--cases N] [--seed N] [--only KIND] [--case ID] [--keep FOLDER] [--words FILE] [--good FOLDER]
 
 Cases are drawn from a seed: the same seed, the same cases. Each is called in a folder of its own, beside good files that
 it may name (seeds.py). A case is a finding where
@@ -16,7 +16,8 @@ it may name (seeds.py). A case is a finding where
     a control character reaches the terminal
 
 Prints a table by kind, and each finding with what repeats it; ends with 1 if there is one. --case: one alone, with all that
-it says; --keep: its folder stays. --words: every different message, to be read by a person.
+it says; --keep: its folder stays. --words: every different message, to be read by a person. --good: a
+folder that keeps the good files for the next call.
 """
 import argparse
 import concurrent.futures
@@ -237,14 +238,20 @@ def main():
     arguments.add_argument("--case")
     arguments.add_argument("--keep", type=pathlib.Path)
     arguments.add_argument("--words", type=pathlib.Path)
+    arguments.add_argument("--good", type=pathlib.Path)
     given = arguments.parse_args()
     start = time.monotonic()
     program, configs = given.program.resolve(), given.configs.resolve()
     with tempfile.TemporaryDirectory(prefix="attack") as scratch:
         root = pathlib.Path(scratch)
         os.chmod(root, 0o755)
-        (root / "seeds").mkdir()
-        seeds.make(program, configs, root / "seeds")
+        if given.good and given.good.exists():
+            shutil.copytree(given.good, root / "seeds", symlinks=True)
+        else:
+            (root / "seeds").mkdir()
+            seeds.make(program, configs, root / "seeds")
+        if given.good and not given.good.exists():
+            shutil.copytree(root / "seeds", given.good, symlinks=True)
         attack = Attack(str(program), root)
         cases = kinds.cases(str(program), root / "seeds", given.seed, given.cases)
         cases = [c for c in cases if given.only in (None, c.kind) and given.case in (None, c.id)]

@@ -422,7 +422,7 @@ CALLS = {
     "run": ["nosuch.yaml"], "depth": ["nosuch.yaml"], "fit": [GOOD + "points.csv", GOOD + "fit.yaml", "--out", "out", "--quiet"],
     "import-ct": [GOOD + "head.nii", "--out", "out", "--quiet"], "check": [GOOD + "fit.yaml"], "options": ["fit"], "evaluate": [BALL, BALL, "--quiet"],
     "report": ["nosuch"], "study": [GOOD + "study.yaml", "--list"], "submit": [GOOD + "study.yaml", "--slurm"], "merge": ["nosuch"],
-    "compare": [GOOD + "study", GOOD + "study"], "status": [GOOD + "study"], "edit": [FACE, GOOD + "edits.yaml", "--out", "out.json"],
+    "compare": [GOOD + "study", GOOD + "shard0"], "status": [GOOD + "study"], "edit": [FACE, GOOD + "edits.yaml", "--out", "out.json"],
     "export": [FACE, "--to", "out.ply", "--chord_mm=5"], "prior": ["a.ply", "b.npy", "--sites", "c.csv", "--features", "d.csv", "--template", "e", "--out", "out"],
     "feature extract": [FACE, "--name", "a", "--library", "out"], "feature apply": [FACE, GOOD + "library/nose.json", "--out", "out.json"],
     "feature blend": [GOOD + "library/nose.json", "--weights", "1", "--name", "a", "--library", "out"],
@@ -459,7 +459,7 @@ def command_lines(world):
     for command, words, names in rows:
         listens = command == "workbench" and "nosuch.ply" not in words
         if not listens and not (command == "workbench" and any(w in ("", ".", "/", "..") for w in words)):
-            yield Case("command lines", command, words, names=names, most_lines=YAML_LINES, outputs=("out",), may_print_anything=command in ("completion", "manual", "options"),
+            yield Case("command lines", command, words, names=(*names, "no such file"), most_lines=YAML_LINES, outputs=("out",), may_print_anything=command in ("completion", "manual", "options"),
                        env={"PATH": "/nonexistent"} if command == "submit" else {})
 
 

@@ -21,6 +21,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::SizeIs;
 using testing::WordsOf;
 
@@ -108,6 +109,18 @@ TEST(StudyComparison, AStrangerIsComparedWithTheBestOfTheFirst) {
       EXPECT_LE(comparison.pairs[0].reference.summary.mean, treatment.summary.mean);
     }
   }
+}
+
+// One trial of each treatment, and of one of them it failed.
+TEST(StudyComparison, ATreatmentThatNoSubjectHasInBothIsSaid) {
+  const NamedStudy a = Study("a", {"x", "y"}, 1, 1);
+  NamedStudy b = a;
+  b.name = "b";
+  b.results.trials[1].status = "failed";
+  b.results.trials[1].metrics.clear();
+  const std::string text = ComparisonText(CompareStudies(std::vector{b, a}, ""));
+  EXPECT_THAT(text, HasSubstr("a: y less b: y: no subject was done with both"));
+  EXPECT_THAT(text, Not(HasSubstr("nan")));
 }
 
 TEST(StudyComparison, BelowSixSubjectsThereIsNoTest) {
