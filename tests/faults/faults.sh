@@ -29,10 +29,11 @@ END
 
 short=0
 tell() { printf '%-58s %5d tried %5d fell short\n' "$1" "$2" "$3"; short=$((short + $3)); }
-# What a folder holds but for times: one hash, or "none".
+# What a folder holds but for times, which a study's report has too: one hash, or "none".
 state() {
   [ -d "$1" ] || { echo none; return; }
-  (cd "$1" && find . -type f ! -name timing.json -print0 | sort -z | xargs -0 sha256sum | sha256sum)
+  (cd "$1" && { find . -type f ! -name timing.json ! -path ./report.html -print0 | sort -z | xargs -0 sha256sum
+    [ ! -f report.html ] || sed 's/\(data-head="mean seconds">\)[0-9.]*/\1/g' report.html | sha256sum; } | sha256sum)
 }
 leftovers() { find "$1" -name '.*semblance-part' -o -name '.*.tmp' | grep -c .; }
 now() { date +%s%N; }
