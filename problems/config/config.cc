@@ -134,6 +134,7 @@ class TreeBuilder : public YAML::EventHandler {
   struct Level {
     ConfigNode node;
     bool is_flow = false;
+    int keys = 0;  // so far, good or not
     bool has_key = false;
     bool is_key_good = false;
     std::string key = {};
@@ -232,6 +233,12 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   void TakeKey(Level& level, const ConfigNode& node) {
+    if (++level.keys > kMostKeys) {
+      YAML::Mark mark;
+      mark.line = node.place.line - 1;
+      mark.column = node.place.column - 1;
+      throw YAML::Exception(mark, fmt::format("more than {} entries in one map", kMostKeys));
+    }
     level.is_key_good = node.IsScalar();
     level.key = node.text;
     level.key_place = node.place;

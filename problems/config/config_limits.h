@@ -8,6 +8,8 @@ namespace semblance {
 
 // Maps and lists within each other, steps of a path, bases of bases.
 inline constexpr std::size_t kDeepestConfig = 64;
+// Of one map; they are looked for one by one.
+inline constexpr int kMostKeys = 10'000;
 inline constexpr std::size_t kLargestConfig_bytes = 16'000'000;
 
 }  // namespace semblance

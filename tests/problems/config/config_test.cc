@@ -200,6 +200,12 @@ TEST(Config, WhatIsTooDeepOrTooLargeIsRefusedBeforeItIsFollowed) {
     EXPECT_THAT(ErrorsOf(nested(levels)),
                 HasSubstr("more than 64 levels of maps and lists within each other"));
   }
+  std::string keys;
+  for (int k = 0; k <= 10'000; ++k) {
+    keys += fmt::format("k{}: 1\n", k);
+  }
+  EXPECT_THAT(ErrorsOf(keys),
+              HasSubstr("x.yaml:10001:1: this is not YAML: more than 10000 entries"));
   EXPECT_THAT(ErrorsOf("# " + std::string(16'000'000, 'x')), HasSubstr("at most 16 MB are read"));
   std::string path = "a";
   for (int k = 0; k < 100000; ++k) {
