@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Files that ITK and its GDCM read and write. The only place where the project knows of them:
 // itk_files.cc where they are installed, itk_files_off.cc, where each of these throws, elsewhere.
+// The readers are called in a process of their own (itk_files_apart.cc).
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +42,20 @@ std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& fil
 
 // Appends the values of one slice of header.columns x header.rows, slope and intercept applied.
 void AppendDicomSlice(const DicomHeader& header, VoxelArray& array);
+
+// The readers in a process of their own: a file that makes ITK or GDCM end its process, or take all
+// memory, is an IoError that names the file. Throw Cancelled soon after a stop is asked for.
+
+// As ReadImageVolume.
+VoxelArray ReadImageApart(const std::filesystem::path& file, VolumeFormat format,
+                          const std::stop_token& stop);
+
+// As ScanDicom.
+std::vector<DicomHeader> ScanDicomApart(const std::vector<std::filesystem::path>& files,
+                                        const std::stop_token& stop);
+
+// The voxels of slices of one size, one behind the other, as AppendDicomSlice appends them.
+VoxelArray ReadSlicesApart(std::span<const DicomHeader> slices, const std::stop_token& stop);
 
 // What is written into the files of a series beside the voxels.
 struct DicomSeriesNames {

@@ -13,8 +13,8 @@
 
 #include "problems/ct/dicom_series.h"
 #include "problems/ct/invesalius.h"
+#include "problems/ct/itk_files.h"
 #include "problems/ct/slice_stack.h"
-#include "problems/ct/volumes_apart.h"
 #include "problems/ct/voxel_array.h"
 #include "surfaces/base/error.h"
 

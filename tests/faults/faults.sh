@@ -3,7 +3,7 @@
 # Injects faults into the program, and looks whether every one ends with the old bytes or the new ones.
 # usage: faults.sh PROGRAM CONFIGS [COUNT]   COUNT: kills of run, half of them over an old one, and of study; half as
 # many of merge and of the workbench (100); the seed is $SEED (1).
-# JOB=depth does so with the shorter job (run). Prints a table; ends with 1 if anything fell short.
+# JOB=depth does so with the shorter job (run), RUNS=0 kills no run. Prints a table; ends with 1 if anything fell short.
 set -u
 shopt -s nullglob
 here=$(dirname "$(realpath "$0")")
@@ -33,7 +33,7 @@ tell() { printf '%-58s %5d tried %5d fell short\n' "$1" "$2" "$3"; short=$((shor
 state() {
   [ -d "$1" ] || { echo none; return; }
   (cd "$1" && { find . -type f ! -name timing.json ! -path ./report.html -print0 | sort -z | xargs -0 sha256sum
-    [ ! -f report.html ] || sed 's/\(data-head="mean seconds">\)[0-9.]*/\1/g' report.html | sha256sum; } | sha256sum)
+    [ ! -f report.html ] || sed 's/\(data-head="\(mean \)\?seconds">\)[0-9.]*/\1/g' report.html | sha256sum; } | sha256sum)
 }
 leftovers() { find "$1" -name '.*semblance-part' -o -name '.*.tmp' | grep -c .; }
 now() { date +%s%N; }
@@ -59,9 +59,9 @@ run_time=$(($(now) - start)) run_state=$(state run)
 start=$(now); "$program" study study.yaml --out study --quiet > study.log 2>&1 || { cat study.log; exit 1; }
 study_time=$(($(now) - start)) study_state=$(state study)
 
-half=$((count / 2)) fifth=$((count / 5 + 1))
+half=$((count / 2)) fifth=$((count / 5 + 1)) half_of_runs=$((${RUNS:-$count} / 2))
 bad=0
-for _ in $(seq $half); do
+for _ in $(seq $half_of_runs); do
   interrupt KILL "$(part_of $run_time)" "${job[@]}" --out killed
   s=$(state killed)
   [ "$s" = none ] || [ "$s" = "$run_state" ] || bad=$((bad + 1))
@@ -70,13 +70,13 @@ done
 "$program" "${job[@]}" --out killed > /dev/null 2>&1
 [ "$(state killed)" = "$run_state" ] && [ "$(leftovers .)" = 0 ] || bad=$((bad + 1))
 rm -rf killed
-tell "$kind: kill -9; nothing or all, the next one clears up" $half $bad
+tell "$kind: kill -9; nothing or all, the next one clears up" $half_of_runs $bad
 
 # An old run of another title, written over with --force: each file is the old one or the new one.
 "$program" "${job[@]}" --set title=old --out old > /dev/null 2>&1
 echo mine > old/mine.txt
 bad=0
-for _ in $(seq $half); do
+for _ in $(seq $half_of_runs); do
   rm -rf over; cp -r old over
   interrupt KILL "$(part_of $run_time)" "${job[@]}" --out over --force
   for f in $(cd over && find . -type f ! -name timing.json ! -path './.semblance-part/*'); do
@@ -85,11 +85,11 @@ for _ in $(seq $half); do
   [ "$(cat over/mine.txt)" = mine ] || bad=$((bad + 1))
 done
 rm -rf over
-tell "$kind --force: kill -9; each file old or new" $half $bad
+tell "$kind --force: kill -9; each file old or new" $half_of_runs $bad
 
 bad=0 kills=0
 while [ $kills -lt "$count" ]; do
-  interrupt KILL "$(part_of $((study_time / 3)))" study study.yaml --out killed --quiet
+  interrupt KILL "$(part_of $study_time)" study study.yaml --out killed --quiet
   kills=$((kills + 1))
   if [ "$code" = 0 ] || [ $kills = "$count" ]; then
     "$program" study study.yaml --out killed --quiet > /dev/null 2>&1
@@ -113,6 +113,16 @@ for _ in $(seq $half); do
 done
 rm -rf killed
 tell "merge: kill -9, merged again; the same bytes" $half $bad
+
+# A workbench while actions are posted: what it had said to be done is there when it is opened again.
+echo "base: $configs/phantom.yaml
+subject: {type: phantom, rings: 24}" > bench.yaml
+if command -v python3 > /dev/null; then
+  bad=$(python3 "$here/workbench_kills.py" "$program" bench.yaml $half "${SEED:-1}")
+  tell "workbench: kill -9; nothing that was acknowledged is lost" $half "$bad"
+else
+  echo "workbench: not tried, as python3 is not here"
+fi
 
 bad=0
 for _ in $(seq $fifth); do
@@ -223,15 +233,5 @@ for trial in study/trials/*; do
   tried=$((tried + 1))
 done
 tell "damaged trial: made again, and not merged" $tried $bad
-
-# A workbench while actions are posted: what it had said to be done is there when it is opened again.
-echo "base: $configs/phantom.yaml
-subject: {type: phantom, rings: 24}" > bench.yaml
-if command -v python3 > /dev/null; then
-  bad=$(python3 "$here/workbench_kills.py" "$program" bench.yaml $half "${SEED:-1}")
-  tell "workbench: kill -9; nothing that was acknowledged is lost" $half "$bad"
-else
-  echo "workbench: not tried, as python3 is not here"
-fi
 
 [ $short = 0 ]

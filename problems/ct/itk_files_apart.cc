@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/volumes_apart.h"
-
+// The readers of itk_files.h in a process of their own.
 #include <algorithm>
 #include <cstring>
 #include <optional>
@@ -9,6 +8,7 @@
 #include <type_traits>
 
 #include "problems/ct/apart.h"
+#include "problems/ct/itk_files.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance {
