@@ -65,7 +65,7 @@ const std::map<std::string, Layers> kRooms = {
       {kHall},
       {"report"},
       {"command_line", "exports", "points", "study", "workbench"},
-      {"compare", "study_report"},
+      {"compare", "serving", "study_report"},
       {"program", "python"}}},
 };
 
@@ -84,7 +84,7 @@ const std::map<std::string, std::string> kLibraryPlaces = {
     {"OpenMesh/", R"(surfaces/mesh_files/mesh_io\.cc)"},
     {"itk", R"(problems/ct/itk_files\.cc)"},
     {"gdcm", R"(problems/ct/itk_files\.cc)"},
-    {"httplib", R"(problems/workbench/http_server\.cc)"},
+    {"httplib", R"(problems/serving/http_server\.cc)"},
     {"pybind11", R"(problems/python/\w+\.(h|cc))"},
 };
 

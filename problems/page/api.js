@@ -26,8 +26,7 @@ export const get = (path, query = {}) => {
 export const post = (path, body) =>
     ask(`api/${path}`, {method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(body)});
 
-export const upload = (file, as) => {
-  const name = file.name.replace(/[^A-Za-z0-9._-]/g, '_').replace(/^\.+/, '');
-  return ask(`api/upload?${new URLSearchParams({as, name})}`,
-             {method: 'POST', headers: {'Content-Type': 'application/octet-stream'}, body: file});
-};
+// Several files that belong together are sent under one batch; nothing is opened by it.
+export const upload = (file, batch, name) =>
+    ask(`api/upload?${new URLSearchParams({batch, name})}`,
+        {method: 'POST', headers: {'Content-Type': 'application/octet-stream'}, body: file});

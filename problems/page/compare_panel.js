@@ -1,51 +1,88 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Variants side by side under one camera: builds of a table, or all depths a standard deviation less and more.
+// Variants side by side under one camera: builds of a table, or all depths a standard deviation less and more. Coarse at
+// once, in full once they are made.
 import {get} from './api.js';
-import {button, check, element} from './dom.js';
-import {say, store} from './store.js';
+import {sizeOf} from './changes.js';
+import {button, check, element, select} from './dom.js';
+import {act, say, store} from './store.js';
 
+const TITLES = {emaciated: 'Emaciated', normal: 'Normal', obese: 'Obese', thinner: '\u2212 1 SD', as_is: 'As chosen', thicker: '+ 1 SD'};
 const SETS = {
-  builds: [['emaciated', 'Emaciated'], ['normal', 'Normal'], ['obese', 'Obese']],
-  deviations: [['thinner', 'All depths \u2212 1 SD'], ['as_is', 'As chosen'], ['thicker', 'All depths + 1 SD']],
+  builds: {text: 'Builds', variants: ['emaciated', 'normal', 'obese'], middle: 'normal'},
+  deviations: {text: '\u00b1 1 standard deviation', variants: ['thinner', 'as_is', 'thicker'], middle: 'as_is'},
+  all: {text: 'All', variants: ['emaciated', 'normal', 'obese', 'thinner', 'as_is', 'thicker'], middle: 'as_is'},
 };
-const MIDDLE = 1;
+const FORMATS = ['.ply', '.obj', '.stl', '.glb', '.off', '.step', '.iges', '.vtu'];
+
+// How far a face lies from the middle one.
+const caption = (title, values) => {
+  if (!values) { return [title]; }
+  const {mean, most} = sizeOf(values);
+  return [title, element('small', {textContent: `mean ${mean.toFixed(1)} mm, at most ${most.toFixed(1)} mm`})];
+};
 
 export function comparePanel({scene}) {
-  let chosen = 'builds', shown = false, asked = 0;
+  let chosen = 'builds', shown = false, asked = 0, drawn = '';
   const colour = element('input', {type: 'checkbox', checked: true, onchange: () => draw()});
-  const buttons = Object.entries({builds: 'Builds', deviations: '\u00b1 1 standard deviation'}).map(([name, text]) =>
+  const buttons = Object.entries(SETS).map(([name, {text}]) =>
       button(text, () => { chosen = name; draw(); }, {dataset: {set: name}}));
-  const status = element('p', {className: 'soft', role: 'status'});
-  const note = element('p', {className: 'bad'});
+  const status = element('p', {className: 'soft', role: 'status'}), kind = element('p', {className: 'compare-kind'});
+  const note = element('p', {className: 'bad'}), make = element('div', {className: 'row'}), save = element('div');
+  const format = select(FORMATS.map((ending) => [ending, ending]), '.ply', () => {});
+  format.setAttribute('aria-label', 'kind of file');
+  const legend = element('div', {className: 'legend-place'}), home = scene.legend.parentElement;
   const root = element('div', {},
-      element('p', {textContent: 'Coarse faces of the same head, side by side. Colours say how far each lies outside (+) or inside (\u2212) the middle one.'}),
-      element('div', {className: 'row'}, ...buttons), check('Colour the difference', colour), note, status,
-      element('small', {className: 'doc', textContent: 'Where a table states no standard deviation, 3 mm is taken, the mean of the T-Table 2023. A pooled table has one build.'}));
+      element('p', {textContent: 'Faces of the same head, side by side under one camera. Colours say how far each lies outside (+) or inside (\u2212) the middle one.'}),
+      element('div', {className: 'row'}, ...buttons), check('Colour the difference', colour), legend, note, kind, make, status, save,
+      element('small', {className: 'doc', textContent: 'Where a table states no standard deviation, 3 mm is taken, the mean of the T-Table 2023. A pooled table has one build. The full faces lie in variants/; semblance run FOLDER/config.yaml --set tissue.build=obese makes the same.'}));
+
+  const missing = () => SETS[chosen].variants.filter((name) => !store.state.variants.includes(name));
+
+  const drawFull = () => {
+    const left = missing(), running = store.state.job.state === 'running' && store.state.job.name === 'variants';
+    kind.textContent = left.length ? 'Coarse faces, from the depths alone.' : 'Full faces.';
+    kind.dataset.kind = left.length ? 'coarse' : 'full';
+    make.replaceChildren(left.length && !running ? button(`Make ${left.length === SETS[chosen].variants.length ? 'them' : `the other ${left.length}`} in full`,
+        () => act('variants', {variants: left}), {className: 'primary', dataset: {make: 'variants'}}) : '');
+    const made = SETS[chosen].variants.filter((name) => store.state.variants.includes(name));
+    save.replaceChildren(made.length ? element('div', {className: 'row'}, 'Save', format, ...made.map((name) => button(TITLES[name], () =>
+        element('a', {href: `api/export?${new URLSearchParams({variant: name, format: format.value})}`, download: ''}).click()))) : '');
+  };
+
+  const show = (faces) => {
+    const {variants, middle} = SETS[chosen];
+    const reference = SemblanceGeometry.geometryOf(faces[variants.indexOf(middle)].mesh);
+    scene.compare(variants.map((name, k) => ({
+      title: TITLES[name], face: faces[k].mesh, dowels: faces[k].dowels, former: name === middle ? null : reference})), {coloured: colour.checked, caption});
+  };
 
   const draw = async () => {
-    const measured = store.state.values.tissue.depths === 'measured';
-    note.textContent = measured ? 'The depths of this head are measured: builds of a table change nothing.' : '';
+    const {tissue} = store.state.values, {variants} = SETS[chosen];
+    note.textContent = tissue.depths === 'measured' && chosen !== 'deviations' ? 'The depths of this head are measured: builds of a table change nothing.' : '';
     const turn = ++asked;
     status.textContent = 'Working \u2026';
     for (const made of buttons) { made.setAttribute('aria-pressed', String(made.dataset.set === chosen)); }
+    drawFull();
+    const from = missing().length ? 'coarse' : 'variant';
+    drawn = keyOf(store.state);
     try {
       const faces = [];
-      for (const [variant] of SETS[chosen]) { faces.push(await get('coarse', {variant})); }
+      for (const variant of variants) { faces.push(await get(from, {variant})); }
       if (turn !== asked || !shown) { return; }
-      const middle = SemblanceGeometry.geometryOf(faces[MIDDLE].mesh);
-      scene.compare(SETS[chosen].map(([, title], k) => ({
-        title, face: faces[k].mesh, dowels: faces[k].dowels, former: colour.checked && k !== MIDDLE ? middle : null})));
+      show(faces);
       status.textContent = '';
       say('');
     } catch (error) {
       status.textContent = '';
-      say(error.message);
+      if (turn === asked && shown) { say(error.message); }
     }
   };
+  // What the pictures depend on.
+  const keyOf = (state) => JSON.stringify([state.revision, chosen, SETS[chosen].variants.filter((name) => !state.variants.includes(name)).length > 0]);
   return {
     element: root,
-    show: () => { shown = true; },
-    state: (state, former) => { if (!former || former.revision !== state.revision) { draw(); } },
-    hide: () => { shown = false; scene.compare([]); }
+    show: () => { shown = true; drawn = ''; legend.append(scene.legend); },
+    state: (state) => { if (keyOf(state) !== drawn) { draw(); } else { drawFull(); } },
+    hide: () => { shown = false; home.append(scene.legend); scene.compare([]); }
   };
 }

@@ -3,7 +3,7 @@
 import {button, element} from './dom.js';
 import {act, refresh, say, store} from './store.js';
 
-const NAMES = {run: 'Full face', propose: 'Proposal'};
+const NAMES = {run: 'Full face', propose: 'Proposal', open: 'Opening', variants: 'Variants'};
 const EVERY_MS = 400;
 
 export class Job {
@@ -39,9 +39,9 @@ export class Job {
       if (job.fraction !== null) { bar.value = job.fraction; }
       parts.push(element('span', {textContent: `${NAMES[job.name]}: ${job.step}, ${Math.round(job.seconds)} s`}), bar,
                  button('Stop', () => act('cancel')));
-    } else if (job.state === 'failed') {
+    } else if (job.state === 'failed' && job.name !== 'open') {  // that is told where it was opened
       parts.push(element('span', {className: 'bad', textContent: `${NAMES[job.name]}: ${job.words}`}));
-    } else if (job.state === 'stopped' && !face.saved) {
+    } else if (job.state === 'stopped' && !face.saved && job.name !== 'open') {
       parts.push(element('span', {textContent: `${NAMES[job.name]}: stopped`}));
     } else if (job.state === 'done' && job.name === 'propose') {
       parts.push(element('span', {textContent: job.words}));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Landmarks: a list of the sites, what the chosen one is, and clicks on the bone.
 import {button, element, field, group, lines, millimetres, select} from './dom.js';
-import {fileChooser} from './skull_panel.js';
+import {chooser} from './opener.js';
 import {act, choose, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
 
 const FORMATS = [['.yaml', 'YAML (Semblance)'], ['.mrk.json', '3D Slicer (.mrk.json)'], ['.fcsv', '3D Slicer (.fcsv)'],
@@ -82,7 +82,7 @@ export function landmarkPanel(bench) {
   const format = select(FORMATS, '.yaml', () => {});
   format.setAttribute('aria-label', 'kind of file');
   const files = element('details', {}, element('summary', {textContent: 'Load and save landmarks'}),
-      fileChooser('Landmarks', 'landmarks', '.yaml,.yml,.json,.fcsv,.pp,.csv,.txt,.asc'),
+      chooser(bench.opener, 'Landmarks', '.yaml,.yml,.json,.fcsv,.pp,.csv,.txt,.asc'),
       element('div', {className: 'row'}, format, button('Save as', () =>
           element('a', {href: `api/landmarks?format=${encodeURIComponent(format.value)}`, download: ''}).click())),
       button('Remove all', () => act('clear_landmarks')));

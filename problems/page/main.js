@@ -10,6 +10,7 @@ import {landmarkPanel} from './landmark_panel.js';
 import {measurePanel} from './measure_panel.js';
 import {sculptPanel} from './sculpt_panel.js';
 import {skullPanel} from './skull_panel.js';
+import {Opener, takeDrops} from './opener.js';
 import {Scene} from './scene.js';
 import {act, begin, choose, onState, say, store} from './store.js';
 
@@ -80,7 +81,7 @@ async function main() {
       textContent: `This browser shows no 3-D pictures (WebGL): ${error.message}. The workbench needs them.`}));
     return;
   }
-  const bench = {scene, faces: new Faces(scene), store};
+  const bench = {scene, faces: new Faces(scene), store, opener: new Opener(byId('opening'))};
   window.semblance = bench;  // for a look from the console, and for tests
   const job = new Job(byId('job'), byId('run'));
   const show = makeTabs(bench);
@@ -92,6 +93,7 @@ async function main() {
   onState((state, former) => bench.faces.state(state, former));
   onState((state) => job.state(state));
   takeKeys(show);
+  takeDrops(bench.opener);
   await begin();
   show(store.state.subject.triangles ? (store.state.landmarks.length ? 'face' : 'landmarks') : 'skull');
 }

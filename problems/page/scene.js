@@ -32,7 +32,9 @@ export class Scene {
     root.append(this.frames);
     this.marks = new THREE.Group();
     this.main.stage.extra.add(this.marks);
-    this.onPick = null;  // ({hit, ray}) => whether it was for somebody
+    this.onPick = null;  // (hitOf, ray, among) of a click
+    this.onDrag = null;  // (event) => {move(event, still), end(), cancel()} for a press that is not the camera's, or null
+    this.attachDrag(this.main);
     this.compass = element('canvas', {className: 'view3d-compass', width: 224, height: 224});
     this.compass.setAttribute('aria-hidden', 'true');
     this.legend = element('div', {className: 'legend'});
@@ -128,6 +130,43 @@ export class Scene {
     });
   }
 
+  // A press that onDrag takes is kept from the camera and from clicks until it is released; Escape and a second finger
+  // take it back.
+  attachDrag({canvas, stage}) {
+    let grip = null, start = null;
+    const over = canvas.parentElement, stop = () => { grip = null; };
+    const moved = (event) => Math.hypot(event.clientX - start.clientX, event.clientY - start.clientY);
+    over.addEventListener('pointerdown', (event) => {
+      if (grip) {
+        grip.cancel();
+        stop();
+      } else if (event.target === canvas && event.button === 0 && !event.shiftKey && this.onDrag && (!this.measure || this.measure.tool === 'none')) {
+        grip = this.onDrag(event);
+        start = {clientX: event.clientX, clientY: event.clientY, id: event.pointerId, still: true};
+        if (!grip) { return; }
+        stage.tip.hidden = true;
+        canvas.setPointerCapture(event.pointerId);
+        canvas.focus({preventScroll: true});
+        event.stopPropagation();
+      }
+    }, {capture: true});
+    over.addEventListener('pointermove', (event) => {
+      if (!grip || event.pointerId !== start.id) { return; }
+      event.stopPropagation();
+      start.still = start.still && moved(event) < 5;
+      grip.move(event, start.still);
+    }, {capture: true});
+    over.addEventListener('pointerup', (event) => {
+      if (!grip || event.pointerId !== start.id) { return; }
+      event.stopPropagation();
+      const ended = grip;
+      stop();
+      ended.end();
+    }, {capture: true});
+    over.addEventListener('pointercancel', () => { if (grip) { grip.cancel(); stop(); } }, {capture: true});
+    document.addEventListener('keydown', (event) => { if (event.key === 'Escape' && grip) { grip.cancel(); stop(); } });
+  }
+
   // Landmarks as balls: [{site, point, colour, hollow, chosen, text}].
   putMarks(marks) {
     this.marks.remove(...this.marks.children);
@@ -156,11 +195,13 @@ export class Scene {
     this.draw();
   }
 
-  // Further canvases beside the main one, for faces to compare: [{title, face, dowels, former}].
-  compare(variants) {
+  // Further canvases beside the main one, for faces to compare: [{title, face, dowels, former}]. caption: of a title and
+  // the differences from `former`, where there is one.
+  compare(variants, {coloured = true, caption = (title) => [title]} = {}) {
     for (const other of this.others) { other.frame.remove(); other.stage.renderer.dispose(); }
     this.others = [];
     this.root.classList.toggle('comparing', variants.length > 0);
+    this.root.classList.toggle('many', variants.length > 3);
     this.main.frame.hidden = variants.length > 0;
     for (const variant of variants) {
       const frame = this.makeFrame(variant.title);
@@ -168,7 +209,9 @@ export class Scene {
       if (this.blobs.skull) { this.put('skull', this.blobs.skull, frame); }
       this.putDowels(variant.dowels, frame);
       this.put('face', variant.face, frame);
-      if (variant.former) { this.colourChange(variant.former, frame); }
+      const values = variant.former && changeBetween(variant.former, this.faceGeometry(frame));
+      frame.head.replaceChildren(...caption(variant.title, values));
+      if (values && coloured) { this.colourChange(variant.former, frame); }
     }
     this.showLegend();
     this.draw();

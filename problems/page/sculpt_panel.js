@@ -1,12 +1,42 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Changing the face by hand: a point of it is held and pulled, at the level that is chosen. Every pull is an edit of
-// control vertices in edits.yaml, which `semblance edit` and `semblance run` replay.
-import {button, check, element, field, group} from './dom.js';
+// Changing the face by hand: a point of it is pressed and dragged, or held and pulled by buttons and keys, at the level
+// that is chosen. Every pull is an edit of control vertices in edits.yaml, which `semblance edit` and `semblance run`
+// replay.
+import {button, check, element, field, group, select} from './dom.js';
 import {get} from './api.js';
+import {PullPreview} from './pull_preview.js';
 import {act, say, store} from './store.js';
 
+const MOST_MM = 60;      // of one drag
+const FACING = 0.35;     // a normal that is seen shorter than this is dragged up and down
+const KEYS = {o: 'out', i: 'in', a: 'left', d: 'right', w: 'up', s: 'down'};
+
+// Millimetres for a pixel of the canvas at a point.
+const pixelSize = (stage, point) => {
+  const {camera} = stage.shared.camera;
+  return 2 * camera.position.distanceTo(point) * Math.tan(camera.fov * Math.PI / 360) / stage.canvas.clientHeight;
+};
+
+// The camera's right and up.
+const viewAxes = (stage) => {
+  const axes = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
+  stage.shared.camera.camera.matrixWorld.extractBasis(...axes);
+  return {right: axes[0], up: axes[1]};
+};
+
+// The pull of a pointer that has gone right and down by pixels.
+const pullOf = (stage, held, mode, right, down) => {
+  const size = pixelSize(stage, held.point), axes = viewAxes(stage);
+  if (mode === 'view') {
+    return axes.right.multiplyScalar(right * size).addScaledVector(axes.up, -down * size).clampLength(0, MOST_MM);
+  }
+  const across = held.normal.dot(axes.right), upwards = held.normal.dot(axes.up), seen = Math.hypot(across, upwards);
+  const by = seen > FACING ? (right * across - down * upwards) * size / (seen * seen) : -down * size;
+  return held.normal.clone().multiplyScalar(Math.max(-MOST_MM, Math.min(MOST_MM, by)));
+};
+
 export function sculptPanel({scene, faces}) {
-  const options = {level: 2, reach: 2, mirror: true};
+  const options = {level: 2, reach: 2, mirror: true}, stage = scene.main.stage;
   let held = null;  // {point, normal} on the face
 
   const words = element('p'), count = element('p', {className: 'soft'});
@@ -15,24 +45,84 @@ export function sculptPanel({scene, faces}) {
   const levelWords = element('output', {textContent: String(options.level)});
   const reach = element('input', {type: 'range', min: 1, max: 6, step: 0.5, value: options.reach, oninput: () => { options.reach = Number(reach.value); }});
   const mirror = element('input', {type: 'checkbox', checked: true, onchange: () => { options.mirror = mirror.checked; }});
-  const distance = element('input', {type: 'number', value: 2, min: -30, max: 30, step: 0.5});
+  const distance = element('input', {type: 'number', value: 2, min: 0.1, max: 30, step: 0.5});
+  const drags = element('input', {type: 'checkbox', checked: true});
+  const mode = select([['normal', 'along the normal'], ['view', 'in the plane of the view']], 'normal', () => {});
+  mode.dataset.control = 'drag-mode';
+  const way = element('p', {className: 'soft', role: 'status'});
   const library = element('div');
-
-  const pull = (by) => act('pull', {at: held.point.toArray(), by: by.toArray(), ...options}).then((done) => {
-    if (done) { hold({point: held.point.clone().add(by), normal: held.normal}); }
-  });
-  const alongNormal = (sign) => held && pull(held.normal.clone().multiplyScalar(sign * Number(distance.value)));
-  const outwards = button('Pull out', () => alongNormal(1)), inwards = button('Push in', () => alongNormal(-1));
 
   const hold = (point) => {
     held = point;
     scene.putArrow(held && held.point, held && held.point.clone().addScaledVector(held.normal, 12));
-    outwards.disabled = inwards.disabled = !held;
+    for (const made of Object.values(ways)) { made.disabled = !held; }
+  };
+  const pull = async (by) => {
+    const done = await act('pull', {at: held.point.toArray(), by: by.toArray(), ...options});
+    if (done && held) { hold({point: held.point.clone().add(by), normal: held.normal}); }
+    return done;
+  };
+  const step = (name) => {
+    if (!held) { return null; }
+    const mm = Number(distance.value), {right, up} = viewAxes(stage);
+    const by = {out: () => held.normal.clone().multiplyScalar(mm), in: () => held.normal.clone().multiplyScalar(-mm),
+                left: () => right.multiplyScalar(-mm), right: () => right.multiplyScalar(mm),
+                up: () => up.multiplyScalar(mm), down: () => up.multiplyScalar(-mm)}[name]();
+    return pull(by);
+  };
+  const wayButton = (name, text, key) => button(text, () => step(name), {disabled: true, title: `${text} (${key.toUpperCase()})`, dataset: {pull: name}});
+  const ways = {out: wayButton('out', 'Pull out', 'o'), in: wayButton('in', 'Push in', 'i'), left: wayButton('left', '\u2190', 'a'),
+                right: wayButton('right', '\u2192', 'd'), up: wayButton('up', '\u2191', 'w'), down: wayButton('down', '\u2193', 's')};
+  for (const [name, text] of [['left', 'pull to the left of the view'], ['right', 'pull to the right of the view'], ['up', 'pull upwards in the view'], ['down', 'pull downwards in the view']]) {
+    ways[name].setAttribute('aria-label', text);
+  }
+
+  const pointAt = (event) => {
+    const hit = stage.hit(event, ['face']);
+    return hit && {point: hit.point.clone(), normal: hit.face.normal.clone().normalize()};
+  };
+  const holdMiddle = () => {
+    const box = stage.canvas.getBoundingClientRect();
+    const found = pointAt({clientX: box.left + box.width / 2, clientY: box.top + box.height / 2});
+    hold(found);
+    way.textContent = found ? 'The point in the middle of the view is held.' : 'The face is not in the middle of the view.';
+  };
+
+  // A press on the face: a grip for Scene.onDrag, or nothing.
+  const grip = (event) => {
+    const found = drags.checked && store.state.face.fresh && faces.kind === 'full' && pointAt(event);
+    if (!found) { return null; }
+    const start = {x: event.clientX, y: event.clientY};
+    let preview = null, by = null;
+    const tell = () => { way.textContent = `${by.length().toFixed(1)} mm`; };
+    return {
+      move: (next, still) => {
+        if (still) { return; }
+        if (!preview) {
+          hold(null);
+          preview = new PullPreview(scene, found.point, options);
+        }
+        by = pullOf(stage, found, mode.value, next.clientX - start.x, next.clientY - start.y);
+        scene.putArrow(found.point, found.point.clone().add(by));
+        preview.show(by);
+        tell();
+      },
+      end: async () => {
+        hold(found);
+        if (!preview) { way.textContent = ''; return; }
+        if (!(by.length() > 0.05) || !await pull(by)) { preview.restore(); }
+        preview.stop();
+      },
+      cancel: () => {
+        if (preview) { preview.restore(); preview.stop(); }
+        way.textContent = 'Nothing was pulled.';
+        hold(null);
+      }
+    };
   };
   const pick = (hitOf) => {
     const hit = hitOf(['face']);
-    if (!hit) { hold(null); return; }
-    hold({point: hit.point, normal: hit.face.normal.clone()});
+    hold(hit ? {point: hit.point, normal: hit.face.normal.clone()} : null);
   };
 
   const drawLibrary = async () => {
@@ -40,6 +130,8 @@ export function sculptPanel({scene, faces}) {
     const {parts, features} = store.files;
     const part = element('select', {}, ...parts.map((name) => element('option', {value: name, textContent: name.replaceAll('_', ' ')})));
     const name = element('input', {type: 'text', placeholder: 'name', maxLength: 60});
+    part.setAttribute('aria-label', 'part of the face');
+    name.setAttribute('aria-label', 'name of the feature');
     const keep = button('Keep', async () => {
       if (await act('keep_feature', {part: part.value, name: name.value.trim()})) { drawLibrary(); }
     });
@@ -51,19 +143,31 @@ export function sculptPanel({scene, faces}) {
   };
 
   const root = element('div', {}, words,
-      group('Hold and pull',
+      group('Pull',
             field('level', element('span', {className: 'row'}, level, levelWords), 'a coarse level moves much of the face, a fine one little'),
-            field('how far around', reach), check('Both sides alike', mirror), field('distance (mm)', distance),
-            element('div', {className: 'row'}, outwards, inwards)),
+            field('how far around', reach), check('Both sides alike', mirror),
+            check('A drag on the face pulls it', drags), field('a drag pulls', mode), way),
+      group('By buttons and keys',
+            button('Hold the point in the middle', holdMiddle, {title: 'H', dataset: {pull: 'hold'}}),
+            field('distance (mm)', distance), element('div', {className: 'row'}, ...Object.values(ways)),
+            element('small', {className: 'doc', textContent: 'H holds the point in the middle of the view, O and I pull it out and push it in, W A S D move it in the plane of the view; Escape lets it go.'})),
       library, count, button('Take all edits back', () => act('clear_edits')));
-  outwards.disabled = inwards.disabled = true;
+
+  document.addEventListener('keydown', (event) => {
+    const types = ['INPUT', 'SELECT', 'TEXTAREA'].includes(event.target.tagName) && event.target.type !== 'range' && event.target.type !== 'checkbox';
+    if (!root.isConnected || types || event.ctrlKey || event.altKey || event.metaKey || !store.state.face.fresh) { return; }
+    const key = event.key.toLowerCase();
+    if (key === 'h') { holdMiddle(); }
+    if (KEYS[key]) { step(KEYS[key]); }
+    if (event.key === 'Escape' && held) { hold(null); }
+  });
 
   const state = (now) => {
     const ready = now.face.fresh;
-    words.textContent = ready ? 'Click on the face to hold a point, then pull it out or push it in. Drag turns the head.'
+    words.textContent = ready ? 'Press a point of the face and drag it; beside the face a drag turns the head. A click holds a point for the buttons.'
                               : 'Sculpting begins on the full face of the present choices: make it first (the button at the top).';
     for (const control of root.querySelectorAll('input, select, fieldset button')) {
-      if (control !== outwards && control !== inwards) { control.disabled = !ready; }
+      if (!Object.values(ways).includes(control)) { control.disabled = !ready; }
     }
     count.textContent = now.edited_vertices ? `${now.edited_vertices} control vertices are edited.` : 'Nothing is edited.';
     if (faces.finest) { level.max = faces.finest; }
@@ -73,8 +177,9 @@ export function sculptPanel({scene, faces}) {
     state,
     show: () => {
       scene.onPick = pick;
+      scene.onDrag = grip;
       drawLibrary().catch((error) => say(error.message)).then(() => state(store.state));
     },
-    hide: () => { scene.onPick = null; hold(null); }
+    hide: () => { scene.onPick = null; scene.onDrag = null; hold(null); }
   };
 }

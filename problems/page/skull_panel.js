@@ -1,52 +1,49 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Opening a head, and whether it lies and measures as a head does.
-import {post, upload} from './api.js';
 import {button, element, field, group, lines, select} from './dom.js';
-import {act, say, take} from './store.js';
+import {chooser} from './opener.js';
+import {act} from './store.js';
 
 const SIZES = ['left to right', 'front to back', 'height'];
+const UNITS = [['mm', 'millimetre', 1], ['cm', 'centimetre', 10], ['in', 'inch', 25.4], ['m', 'metre', 1000]];
+const HEAD_MM = [120, 320];  // the longest side of a skull, whole or in part
 
-const opened = async (answer) => {
-  try {
-    take(await answer);
-    say('');
-  } catch (error) {
-    say(error.message);
-  }
+// The unit in which the file would measure as a head, where the present one does not.
+const unitForeseen = (size_mm, unit) => {
+  const longest = Math.max(...size_mm), fits = (mm) => mm >= HEAD_MM[0] && mm <= HEAD_MM[1];
+  const now = UNITS.find(([name]) => name === unit)[2];
+  return fits(longest) ? null : UNITS.find(([, , factor]) => fits(longest / now * factor)) || null;
 };
 
-// A file of the browser's own choosing, or a path on this machine.
-export const fileChooser = (label, as, accept) => {
-  const file = element('input', {type: 'file', accept, onchange: () => file.files[0] && opened(upload(file.files[0], as))});
-  const path = element('input', {type: 'text', placeholder: 'or a path on this machine', spellcheck: false});
-  const open = button('Open', () => opened(post('open', {as, path: path.value.trim()})));
-  path.addEventListener('keydown', (event) => { if (event.key === 'Enter') { open.click(); } });
-  file.setAttribute('aria-label', label);
-  path.setAttribute('aria-label', `${label}: path`);
-  return element('div', {className: 'chooser'}, element('strong', {textContent: label}), file,
-                 element('div', {className: 'row'}, path, open));
-};
+const nameOf = (path) => path.split('/').pop();
 
-export function skullPanel() {
+function asRead({subject, values}) {
+  const {axes, units} = values.subject, unit = unitForeseen(subject.size_mm, units);
+  return group('As it is read',
+      element('p', {className: 'soft', title: subject.skull, textContent: `${nameOf(subject.skull)}: ${subject.triangles.toLocaleString('en')} triangles`}),
+      element('ul', {className: 'sizes'}, ...subject.size_mm.map((mm, k) => element('li', {},
+          element('span', {textContent: SIZES[k]}), element('strong', {textContent: `${mm.toFixed(mm < 10 ? 2 : 0)} mm`})))),
+      unit ? element('div', {className: 'row hint'}, `It would measure as a head in ${unit[1]}s.`,
+                     button(`Take ${unit[1]}s`, () => act('set', {path: 'subject.units', value: unit[0]}), {className: 'primary'})) : null,
+      element('p', {className: 'soft', textContent: 'A head is about 150 mm wide, 190 mm deep and 200 mm high. Seen with Front, it should look at you, upright; the compass names its sides.'}),
+      field('axes of the file', select([['LPS', 'LPS: +x left, +y back'], ['RAS', 'RAS: +x right, +y front']], axes,
+            (value) => act('set', {path: 'subject.axes', value}))),
+      field('its unit', select(UNITS, units, (value) => act('set', {path: 'subject.units', value}))),
+      subject.skin ? element('div', {className: 'row'}, element('span', {className: 'soft', title: subject.skin, textContent: `Skin: ${nameOf(subject.skin)}`}),
+                             button('Without the skin', () => act('set', {path: 'subject.skin', value: ''}))) : null,
+      lines(subject.faults, 'bad'), lines(subject.notes, 'soft'));
+}
+
+export function skullPanel({scene, opener}) {
   const facts = element('div');
+  const look = (name, turn, rise) => button(name, () => scene.shared.camera && scene.shared.camera.look(turn, rise));
   const root = element('div', {},
-      element('p', {textContent: 'A mesh of the skull, and of the skin where it is known. A CT is opened from the terminal: semblance workbench VOLUME.'}),
-      fileChooser('Skull', 'skull', '.ply,.obj,.stl,.off'), fileChooser('Skin (may be missing)', 'skin', '.ply,.obj,.stl,.off'),
-      facts);
+      element('p', {textContent: 'Drop files anywhere on this page, choose them, or give a path: a mesh of a skull; a CT (all slices together, their folder, or a file); landmarks; a configuration.'}),
+      chooser(opener, 'Open'), facts);
   const state = (now) => {
-    const {subject, values} = now;
-    const size = subject.size_mm || [];
-    facts.replaceChildren(...(subject.triangles ? [group('As it is read',
-        element('p', {className: 'soft', textContent: `${subject.skull}: ${subject.triangles.toLocaleString('en')} triangles`}),
-        element('ul', {className: 'sizes'}, ...size.map((mm, k) => element('li', {},
-            element('span', {textContent: SIZES[k]}), element('strong', {textContent: `${mm.toFixed(mm < 10 ? 2 : 0)} mm`})))),
-        element('p', {className: 'soft', textContent: 'A head is about 150 mm wide, 190 mm deep and 200 mm high. Seen with Front, it should look at you, upright; the compass names its sides.'}),
-        field('axes of the file', select([['LPS', 'LPS: +x left, +y back'], ['RAS', 'RAS: +x right, +y front']], values.subject.axes,
-              (value) => act('set', {path: 'subject.axes', value}))),
-        field('its unit', select([['mm', 'millimetre'], ['cm', 'centimetre'], ['in', 'inch'], ['m', 'metre']], values.subject.units,
-              (value) => act('set', {path: 'subject.units', value}))),
-        lines(subject.faults, 'bad'), lines(subject.notes, 'soft'))] : [
-        element('p', {className: 'soft', textContent: 'No skull is open yet.'})]));
+    facts.replaceChildren(...(now.subject.triangles
+        ? [asRead(now), element('div', {className: 'row'}, look('Front', 0, 0), look('Left', 90, 0), look('Top', 0, 89))]
+        : [element('p', {className: 'soft', textContent: 'No skull is open yet.'})]));
   };
   return {element: root, state};
 }

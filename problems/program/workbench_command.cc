@@ -18,7 +18,7 @@
 
 #include "problems/program/exit_code.h"
 #include "problems/program/stop_signals.h"
-#include "problems/workbench/http_server.h"
+#include "problems/serving/http_server.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

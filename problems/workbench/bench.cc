@@ -2,6 +2,7 @@
 #include "problems/workbench/bench.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <iterator>
@@ -16,6 +17,8 @@
 #include "problems/report/run_folder.h"
 #include "problems/workbench/bench_actions.h"
 #include "problems/workbench/bench_config.h"
+#include "problems/workbench/bench_incoming.h"
+#include "problems/workbench/bench_pull.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/feature.h"
@@ -90,15 +93,17 @@ Bench::Bench(const BenchOptions& options) : options_(options), folder_(options.f
           "{}: it holds the work of a workbench; open it without {}, or give another --out",
           folder_.Root().string(), options.source.string()));
     }
+    DropAllIncoming(folder_.Root());
     history_ = folder_.Read();
   } else {
     folder_.CheckFree();
     const BenchBeginning beginning = BeginBench(options.source, folder_.Root(), context);
-    folder_.Begin(WriteConfig(beginning.experiment), beginning.state);
+    folder_.Begin(StartConfig(beginning.experiment, folder_.Root()), beginning.state);
     history_ = BeginHistory(beginning.state);
   }
   Take(history_, /*keeps_run=*/true);
   FindFormerRun();
+  FindFormerVariants();
 }
 
 Bench::~Bench() { job_.Stop(); }
@@ -158,6 +163,30 @@ void Bench::FindFormerRun() {
   }
 }
 
+// All that the variants' faces depend on.
+std::string Bench::KeyOfVariants() const {
+  return Sha256OfText(present_key_ + EditsText(Now(history_)));
+}
+
+Experiment Bench::ExperimentOfVariant(BenchVariant variant) const {
+  const std::vector<Dowel> dowels =
+      CoarseCase(*subject_, experiment_, Now(history_)).dowels_on_bone;
+  return VariantOf(folder_.ExperimentAsSaved(), variant, dowels, kUsualSd_mm);
+}
+
+bool Bench::HasVariant(BenchVariant variant) const {
+  const auto at = variants_.find(variant);
+  return at != variants_.end() && at->second.key == KeyOfVariants();
+}
+
+void Bench::FindFormerVariants() {
+  if (subject_->bone && fs::exists(folder_.Root() / "variants")) {
+    variants_ = StoredVariants(folder_.Root(), KeyOfVariants(), [this](BenchVariant variant) {
+      return CoarseCase(*subject_, ExperimentOfVariant(variant), Now(history_)).dowels_on_bone;
+    });
+  }
+}
+
 Bench::Snapshot Bench::Look() const {
   const Lock lock(mutex_);
   Snapshot shot{.revision = revision_,
@@ -172,6 +201,12 @@ Bench::Snapshot Bench::Look() const {
     shot.face_revision = face_revision_;
     shot.face_fresh = face_->key == present_key_;
     shot.run_saved = shot.face_fresh && face_->edits == EditsText(Now(history_));
+  }
+  const std::string key = variants_.empty() ? "" : KeyOfVariants();
+  for (const auto& [variant, made] : variants_) {
+    if (made.key == key) {
+      shot.variants.push_back(variant);
+    }
   }
   return shot;
 }
@@ -224,6 +259,20 @@ const RunFace& Bench::FreshFace() const {
   return *face_;
 }
 
+void Bench::CorrectFrame(const std::string& path, const std::string& value) {
+  const Lock lock(mutex_);
+  BenchState state = ChangeSetting(Now(history_), path, value);
+  const FileSubject before = FilesOf(experiment_), after = FilesOf(folder_.ExperimentOf(state));
+  std::vector<std::string> on_bone;
+  for (const auto& [site, check] : checks_.sites) {
+    if (check.from_bone_mm <= experiment_.landmarks.max_distance_mm) {
+      on_bone.push_back(site);
+    }
+  }
+  state = InOtherFrame(std::move(state), on_bone, before, after);
+  Take(Done(history_, "set " + path, std::move(state)));
+}
+
 HSplineSurface Bench::Edited(const RunFace& face) const {
   HSplineSurface surface = face.before_edits;
   ApplyEdits(Now(history_).edits, surface);
@@ -233,14 +282,18 @@ HSplineSurface Bench::Edited(const RunFace& face) const {
 void Bench::PullAt(const Vec3& at, Pull pull) {
   const Lock lock(mutex_);
   const HSplineSurface surface = Edited(FreshFace());
-  const Tessellation face = Tessellate(surface, 2);
-  const MeshPoint nearest = MeshQuery(face.mesh).Closest(at);
-  pull.uv = Vec2::Zero();
-  for (int k = 0; k < 3; ++k) {  // beside the seam of a closed surface the corners' u may jump
-    pull.uv += nearest.weights[k] * face.uv[face.mesh.triangles[nearest.triangle][k]];
-  }
+  pull.uv = HeldParameter(surface, at);
   Take(Done(history_, fmt::format("pulled level {} by {:.1f} mm", pull.level, pull.by_mm.norm()),
             TakeEdits(Now(history_), Pulled(pull, surface, Now(history_).edits))));
+}
+
+std::array<std::vector<Vec3>, 3> Bench::PullMovesAt(const Vec3& at, Pull pull) const {
+  const HSplineSurface surface = [this] {
+    const Lock lock(mutex_);
+    return Edited(FreshFace());
+  }();
+  pull.uv = HeldParameter(surface, at);
+  return PullMoves(surface, pull, kShownQuadsPerPatch);
 }
 
 std::vector<std::string> Bench::PartsOfFace() const {
@@ -322,7 +375,6 @@ BenchFace Bench::Coarse(BenchVariant variant) const {
   }
   BenchFace face = CoarseFace(*subject, experiment, state, models_, Context());
   if (variant != BenchVariant::kAsIs) {
-    constexpr double kUsualSd_mm = 3;  // the mean of tables/t_table_2023.yaml
     face = CoarseFace(*subject, VariantOf(experiment, variant, face.dowels, kUsualSd_mm), state,
                       models_, Context());
   }
@@ -349,6 +401,69 @@ BenchFace Bench::Full() const {
     throw InputError("there is no full run yet");
   }
   return {Edited(*face_), face_->dowels, face_->notes};
+}
+
+BenchFace Bench::FullVariant(BenchVariant variant) const {
+  const Lock lock(mutex_);
+  if (!HasVariant(variant)) {
+    throw InputError(
+        fmt::format("variants: the full face of '{}' is not made yet", NameOf(variant)));
+  }
+  return variants_.at(variant).face;
+}
+
+// The run's own face where that is meant, and is there.
+std::optional<BenchFace> Bench::FaceAsIs(BenchVariant variant) const {
+  const bool is_there = variant == BenchVariant::kAsIs && face_ && face_->key == present_key_;
+  return is_there ? std::optional(BenchFace{Edited(*face_), face_->dowels, face_->notes})
+                  : std::nullopt;
+}
+
+void Bench::MakeVariant(BenchVariant variant, int revision, const RunContext& context) {
+  std::shared_ptr<StageCache> stages;
+  Experiment experiment;
+  std::optional<BenchFace> face;
+  {
+    const Lock lock(mutex_);
+    if (HasVariant(variant)) {
+      return;
+    }
+    stages = run_stages_;
+    experiment = ExperimentOfVariant(variant);
+    face = FaceAsIs(variant);
+  }
+  if (!face) {
+    const RunResult result = semblance::Run(experiment, context, stages.get());
+    face = {result.fit.surface, result.subject.dowels_on_bone, result.subject.notes};
+  }
+  const Lock lock(mutex_);
+  if (revision != revision_) {
+    throw Cancelled();
+  }
+  const VariantFace made{*std::move(face), KeyOfVariants()};
+  StoreVariant(folder_.Root(), variant, made);
+  variants_.insert_or_assign(variant, made);
+}
+
+void Bench::StartVariants(const std::vector<BenchVariant>& variants) {
+  job_.Stop();
+  const Lock lock(mutex_);
+  if (!subject_->bone) {
+    throw InputError("there is no skull yet; open one first");
+  }
+  job_.Start("variants", options_.threads,
+             [this, variants, revision = revision_](const RunContext& context) {
+               for (std::size_t k = 0; k < variants.size(); ++k) {
+                 RunContext inner = context;
+                 inner.on_event = [&, k](Event event) {
+                   event.step = fmt::format("{} ({} of {}), {}", NameOf(variants[k]), k + 1,
+                                            variants.size(), event.step);
+                   context.on_event(event);
+                 };
+                 MakeVariant(variants[k], revision, inner);
+               }
+               return std::string("done");
+             });
 }
 
 RunFace Bench::FinishRun(const Experiment& experiment, const RunContext& context, int revision) {
@@ -416,6 +531,35 @@ std::string Bench::Propose(const RunContext& context) {
     words += ". Made-up heads served as references, which have no orbits, arches or teeth";
   }
   return words;
+}
+
+std::string Bench::Open(const OpenRequest& request, const RunContext& context) {
+  BenchState state;
+  Experiment experiment;
+  int revision = 0;
+  {
+    const Lock lock(mutex_);
+    state = Now(history_);
+    experiment = experiment_;
+    revision = revision_;
+  }
+  std::string words;
+  OpenBrought(request, {folder_, state, experiment}, context, [&](Opened opened) {
+    const Lock lock(mutex_);
+    if (revision != revision_) {
+      throw Cancelled();
+    }
+    words = fmt::format("{}", fmt::join(opened.notes, "; "));
+    Take(Done(history_, opened.what, std::move(opened.state)), /*keeps_run=*/true);
+  });
+  return words;
+}
+
+void Bench::StartOpening(const OpenRequest& request) {
+  job_.Stop();
+  const Lock lock(mutex_);
+  job_.Start("open", options_.threads,
+             [this, request](const RunContext& context) { return Open(request, context); });
 }
 
 void Bench::StartProposal() {

@@ -2,6 +2,7 @@
 // One workbench at work: the folder's states, the head, the faces made of it. Knows no HTTP.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -16,7 +17,9 @@
 #include "problems/workbench/bench_faces.h"
 #include "problems/workbench/bench_folder.h"
 #include "problems/workbench/bench_job.h"
+#include "problems/workbench/bench_open.h"
 #include "problems/workbench/bench_subject.h"
+#include "problems/workbench/bench_variants.h"
 
 namespace semblance {
 
@@ -57,6 +60,7 @@ class Bench {
     bool face_fresh = false;  // and it is of the present state
     bool run_saved = false;   // and run/ holds it, edits and all
     int face_revision = 0;
+    std::vector<BenchVariant> variants = {};  // whose full faces are of the present state
   };
   Snapshot Look() const;
 
@@ -76,6 +80,8 @@ class Bench {
 
   // Pulls the face of the last run at the point of it that is nearest to `at`.
   void PullAt(const Vec3& at, Pull pull);
+  // What such a pull does to each vertex that is shown (bench_pull.h).
+  std::array<std::vector<Vec3>, 3> PullMovesAt(const Vec3& at, Pull pull) const;
 
   // Detail of a part of the face, kept in features/ under a name, or blended in: weight 0 is the
   // run's own, 1 the library's.
@@ -89,10 +95,19 @@ class Bench {
   BenchFace CoarseWith(const BenchSetting& setting) const;
   // Of the last run, with the present edits. Throws InputError where there is none.
   BenchFace Full() const;
+  // As a run of the variant makes it. Throws InputError where it is not made.
+  BenchFace FullVariant(BenchVariant variant) const;
+
+  // Axes or unit of the subject's files, as ChangeSetting takes them. Landmarks that lay on the
+  // bone go along with it; others, which a file may have in the right frame, stay.
+  void CorrectFrame(const std::string& path, const std::string& value);
 
   // In the background.
+  void StartOpening(const OpenRequest& request);
   void StartRun();
   void StartProposal();
+  // Full faces of those variants that are not made yet.
+  void StartVariants(const std::vector<BenchVariant>& variants);
   void CancelJob();
 
  private:
@@ -100,7 +115,14 @@ class Bench {
   void LoadSubjectOf(const Experiment& experiment, const RunContext& context);
   void FindFormerRun();
   RunFace FinishRun(const Experiment& experiment, const RunContext& context, int revision);
+  std::string KeyOfVariants() const;
+  Experiment ExperimentOfVariant(BenchVariant variant) const;
+  void FindFormerVariants();
+  bool HasVariant(BenchVariant variant) const;
+  std::optional<BenchFace> FaceAsIs(BenchVariant variant) const;
+  void MakeVariant(BenchVariant variant, int revision, const RunContext& context);
   std::string Propose(const RunContext& context);
+  std::string Open(const OpenRequest& request, const RunContext& context);
   const RunFace& FreshFace() const;
   HSplineSurface Edited(const RunFace& face) const;
   RunContext Context() const;
@@ -115,6 +137,7 @@ class Bench {
   std::string subject_key_, present_key_;
   int revision_ = 1, subject_revision_ = 1, face_revision_ = 0;
   std::optional<RunFace> face_;
+  VariantFaces variants_;
   mutable StageCache models_{6};  // templates and priors: they come from no file of the folder
   std::shared_ptr<StageCache> run_stages_;  // of one set of landmarks
   BenchJob job_;                            // last: it is stopped first

@@ -186,6 +186,28 @@ BenchState DropSetting(BenchState state, const std::string& path) {
   return state;
 }
 
+BenchState InOtherFrame(BenchState state, const std::vector<std::string>& sites,
+                        const FileSubject& before, const FileSubject& after) {
+  const auto turned = [&](const std::array<double, 3>& v) {
+    const Vec3 now = ToLps(ToLps({v[0], v[1], v[2]}, before.axes), after.axes);
+    return std::array{now.x(), now.y(), now.z()};
+  };
+  const double scale = Millimetres(after.units) / Millimetres(before.units);
+  for (BenchLandmark& landmark : state.landmarks) {
+    if (std::ranges::find(sites, landmark.site) == sites.end()) {
+      continue;
+    }
+    landmark.point = turned(landmark.point);
+    for (double& x : landmark.point) {
+      x *= scale;
+    }
+    if (landmark.normal) {
+      landmark.normal = turned(*landmark.normal);
+    }
+  }
+  return state;
+}
+
 BenchState TakeEdits(BenchState state, EditScript edits) {
   state.edits = std::move(edits);
   return state;

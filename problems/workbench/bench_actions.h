@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "problems/pipeline/experiment.h"
 #include "problems/workbench/bench_state.h"
 #include "surfaces/base/geometry.h"
 
@@ -48,6 +49,10 @@ BenchState ChangeSetting(BenchState state, const std::string& path, const std::s
 
 // The option is again what it was in the file that the workbench began with, and all below it.
 BenchState DropSetting(BenchState state, const std::string& path);
+
+// Landmarks of these sites go along with the subject's files, which are read in another frame now.
+BenchState InOtherFrame(BenchState state, const std::vector<std::string>& sites,
+                        const FileSubject& before, const FileSubject& after);
 
 BenchState TakeEdits(BenchState state, EditScript edits);
 

@@ -50,15 +50,15 @@ ConfigNode Difference(const ConfigNode& tree, const ConfigNode& defaults) {
 }
 
 // Paths are written absolute; in the folder they need not be.
-void MakeRelative(ConfigNode& node, const std::string& folder) {
+void CutFront(ConfigNode& node, const std::string& folder) {
   if (node.IsScalar() && node.text.starts_with(folder)) {
     node.text = node.text.substr(folder.size());
   }
   for (ConfigNode& item : node.items) {
-    MakeRelative(item, folder);
+    CutFront(item, folder);
   }
   for (ConfigNode::Entry& entry : node.entries) {
-    MakeRelative(entry.value, folder);
+    CutFront(entry.value, folder);
   }
 }
 
@@ -67,7 +67,7 @@ void MakeRelative(ConfigNode& node, const std::string& folder) {
 Experiment ExperimentOf(std::string_view start, const fs::path& folder, const BenchState& state) {
   ConfigErrors errors;
   ConfigNode tree =
-      ParseConfigText(start, {.name = (folder / "start.yaml").string(), .folder = folder}, errors);
+      ParseConfigText(start, {.name = (folder / state.start).string(), .folder = folder}, errors);
   const ConfigNode defaults = ConfigTreeOf(Experiment{});
   int order = 1;
   for (const BenchSetting& setting : SettingsOf(state)) {
@@ -81,9 +81,19 @@ Experiment ExperimentOf(std::string_view start, const fs::path& folder, const Be
   return experiment;
 }
 
+void MakeRelative(ConfigNode& tree, const fs::path& folder) {
+  CutFront(tree, (fs::absolute(folder).lexically_normal() / "").string());
+}
+
+std::string StartConfig(const Experiment& experiment, const fs::path& folder) {
+  ConfigNode tree = ConfigTreeOf(experiment);
+  MakeRelative(tree, folder);
+  return ToYaml(tree);
+}
+
 std::string ShortConfig(const Experiment& experiment, const fs::path& folder) {
   ConfigNode tree = Difference(ConfigTreeOf(experiment), ConfigTreeOf(Experiment{}));
-  MakeRelative(tree, (fs::absolute(folder).lexically_normal() / "").string());
+  MakeRelative(tree, folder);
   return "# Made by `semblance workbench`; "
          "`semblance run` takes it. What it does not say is the default.\n" +
          ToYaml(tree);

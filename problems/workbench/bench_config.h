@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "problems/config/config_tree.h"
 #include "problems/pipeline/experiment.h"
 #include "problems/workbench/bench_state.h"
 
@@ -21,6 +22,12 @@ Experiment ExperimentOf(std::string_view start, const std::filesystem::path& fol
 // Only what differs from the defaults, with the paths in `folder` relative to it: the folder may be
 // moved. Reading it in the folder gives the same experiment.
 std::string ShortConfig(const Experiment& experiment, const std::filesystem::path& folder);
+
+// All options, with the paths in `folder` relative to it: for a state to start from.
+std::string StartConfig(const Experiment& experiment, const std::filesystem::path& folder);
+
+// Texts of the tree that are paths in `folder` become relative to it.
+void MakeRelative(ConfigNode& tree, const std::filesystem::path& folder);
 
 // {path of an option: value} as one JSON object in the form of the schema's defaults.
 std::string ExperimentJson(const Experiment& experiment);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/workbench/bench_faces.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -72,6 +74,18 @@ BenchFace CoarseFace(const BenchSubject& subject, const Experiment& given, const
   return {.surface = std::move(made.fitted.fit.surface),
           .dowels = std::move(head.dowels_on_bone),
           .notes = std::move(head.notes)};
+}
+
+std::string_view NameOf(BenchVariant variant) {
+  return EnumNames(variant).at(static_cast<std::size_t>(variant));
+}
+
+BenchVariant VariantCalled(std::string_view name) {
+  const auto* const found = std::ranges::find(kBenchVariants, name, &NameOf);
+  if (found == kBenchVariants.end()) {
+    throw InputError(fmt::format("variant: there is no '{}'", name));
+  }
+  return *found;
 }
 
 Experiment VariantOf(const Experiment& experiment, BenchVariant variant,

@@ -2,7 +2,9 @@
 // The faces that the workbench shows: a coarse one at once, the run's after it.
 #pragma once
 
+#include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "problems/pipeline/case.h"
@@ -31,6 +33,22 @@ BenchFace CoarseFace(const BenchSubject& subject, const Experiment& experiment,
 
 // Of the whole work: what side by side is compared.
 enum class BenchVariant { kAsIs, kEmaciated, kNormal, kObese, kThinner, kThicker };
+inline constexpr std::array kBenchVariants = {BenchVariant::kAsIs,    BenchVariant::kEmaciated,
+                                              BenchVariant::kNormal,  BenchVariant::kObese,
+                                              BenchVariant::kThinner, BenchVariant::kThicker};
+constexpr auto EnumNames(BenchVariant) {
+  return std::to_array<std::string_view>(
+      {"as_is", "emaciated", "normal", "obese", "thinner", "thicker"});
+}
+std::string_view NameOf(BenchVariant variant);
+
+// Throws InputError for a name that is none.
+BenchVariant VariantCalled(std::string_view name);
+
+inline constexpr double kUsualSd_mm = 3;  // where a table states none: the T-Table 2023's mean
+
+// The shown face's quads along each side of a patch of its finest level.
+inline constexpr int kShownQuadsPerPatch = 2;
 
 // The experiment of a variant. kThinner and kThicker: each dowel's depth less or more by its
 // standard deviation, `fallback_sd_mm` where the table states none.

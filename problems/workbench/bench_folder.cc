@@ -53,6 +53,15 @@ std::string EditsText(const BenchState& state) {
   return state.edits.edits.empty() && state.edits.resets.empty() ? "" : WriteConfig(state.edits);
 }
 
+fs::path FreePath(const fs::path& wanted) {
+  fs::path path = wanted;
+  for (int n = 2; fs::exists(path); ++n) {
+    path.replace_filename(
+        fmt::format("{}-{}{}", wanted.stem().string(), n, wanted.extension().string()));
+  }
+  return path;
+}
+
 BenchFolder::BenchFolder(const fs::path& root) : root_(Made(root)) {
   claim_.Take(root_ / kClaim, root_.string());
 }
@@ -61,8 +70,8 @@ bool BenchFolder::HasWork() const { return fs::exists(root_ / kHistory); }
 
 void BenchFolder::CheckFree() const {
   // What a beginning that was cut short may have left.
-  constexpr std::array<std::string_view, 5> kOwn = {kClaim, kStart, "subject", "tables",
-                                                    "networks"};
+  constexpr std::array<std::string_view, 6> kOwn = {kClaim,   kStart,     "subject",
+                                                    "tables", "networks", "incoming"};
   for (const auto& entry : fs::directory_iterator(root_)) {
     const std::string name = entry.path().filename().string();
     if (std::ranges::find(kOwn, name) == kOwn.end()) {
@@ -81,13 +90,17 @@ void BenchFolder::Begin(const std::string& start, const BenchState& state) {
       WriteFileAtomically(path, file.text);
     }
   }
-  start_ = start;
   WriteFileAtomically(root_ / kStart, start);
   Write(BeginHistory(state), ExperimentOf(state));
 }
 
-BenchHistory BenchFolder::Read() {
-  start_ = ReadFileBytes(root_ / kStart);
+std::string BenchFolder::AddStart(const std::string& text) const {
+  const fs::path path = FreePath(root_ / kStart);
+  WriteFileAtomically(path, text);
+  return path.filename().string();
+}
+
+BenchHistory BenchFolder::Read() const {
   const fs::path path = root_ / kHistory;
   return HistoryFromText(ReadFileBytes(path), path.string());
 }
@@ -101,7 +114,11 @@ void BenchFolder::Write(const BenchHistory& history, const Experiment& experimen
 }
 
 Experiment BenchFolder::ExperimentOf(const BenchState& state) const {
-  return semblance::ExperimentOf(start_, root_, state);
+  if (state.start != fs::path(state.start).filename()) {
+    throw IoError(fmt::format("{}: start: '{}' is no file of the folder",
+                              (root_ / kHistory).string(), state.start));
+  }
+  return semblance::ExperimentOf(ReadFileBytes(root_ / state.start), root_, state);
 }
 
 Experiment BenchFolder::ExperimentAsSaved() const {

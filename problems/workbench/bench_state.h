@@ -31,7 +31,7 @@ struct BenchAbsent {
   std::string reason;
 };
 
-// An option that differs from the file that the workbench began with.
+// An option that differs from the state's file of options.
 struct BenchSetting {
   std::string path;   // "tissue.build", as --set takes it
   std::string value;  // in YAML, on one line
@@ -41,6 +41,7 @@ struct BenchState {
   std::string subject;  // whose skull it is
   std::vector<BenchLandmark> landmarks;
   std::vector<BenchAbsent> absent;
+  std::string start = "start.yaml";    // file of the folder: the options that settings change
   std::vector<BenchSetting> settings;  // in the order in which they apply
   EditScript edits;                    // of the face that comes out
 };
@@ -76,7 +77,9 @@ void Fields(Visitor& visit, BenchState& o) {
   visit(FieldInfo{.name = "subject", .doc = "whose skull it is"}, o.subject);
   visit(FieldInfo{.name = "landmarks", .doc = "those that were placed"}, o.landmarks);
   visit(FieldInfo{.name = "absent", .doc = "those that cannot be placed"}, o.absent);
-  visit(FieldInfo{.name = "settings", .doc = "options beside those of start.yaml"}, o.settings);
+  visit(FieldInfo{.name = "start", .doc = "file of the folder: the options to start from"},
+        o.start);
+  visit(FieldInfo{.name = "settings", .doc = "options beside those of start"}, o.settings);
   visit(FieldInfo{.name = "edits", .doc = "made by hand on the face"}, o.edits);
 }
 

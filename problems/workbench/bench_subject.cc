@@ -51,9 +51,9 @@ void Check(const TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
   }
 }
 
-void TakeLandmarksOf(const fs::path& path, BenchBeginning& beginning) {
+void TakeLandmarksOf(const fs::path& path, BenchState& state) {
   if (!path.empty()) {
-    beginning.state = TakeLandmarks(std::move(beginning.state), ReadLandmarks(path).file);
+    state = TakeLandmarks(std::move(state), ReadLandmarks(path).file);
   }
 }
 
@@ -67,36 +67,44 @@ FileSubject WriteMeshes(const TriMesh& skull, const TriMesh& skin, const fs::pat
   return files;
 }
 
-FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchBeginning& beginning,
-                    const RunContext&) {
-  TakeLandmarksOf(subject.landmarks, beginning);
+FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchState& state,
+                    const RunContext&, std::vector<std::string>&) {
+  TakeLandmarksOf(subject.landmarks, state);
   FileSubject files = subject;
   files.landmarks.clear();
   return files;
 }
 
-FileSubject ToFiles(const PhantomOptions& subject, const fs::path& folder,
-                    BenchBeginning& beginning, const RunContext&) {
+FileSubject ToFiles(const PhantomOptions& subject, const fs::path& meshes, BenchState& state,
+                    const RunContext&, std::vector<std::string>&) {
   const Phantom phantom = MakePhantom(subject);
-  beginning.state =
-      TakeLandmarks(std::move(beginning.state), PhantomLandmarks(phantom, subject.random_seed));
-  return WriteMeshes(phantom.skull, phantom.face, folder / "subject");
+  state = TakeLandmarks(std::move(state), PhantomLandmarks(phantom, subject.random_seed));
+  return WriteMeshes(phantom.skull, phantom.face, meshes);
 }
 
-FileSubject ToFiles(const CtSubject& subject, const fs::path& folder, BenchBeginning& beginning,
-                    const RunContext& context) {
+FileSubject ToFiles(const CtSubject& subject, const fs::path& meshes, BenchState& state,
+                    const RunContext& context, std::vector<std::string>& notes) {
   const VolumeReading reading = ReadVolume(subject.volume, subject.read, context);
   if (reading.modality == Modality::kMr) {
     throw InputError(
         fmt::format("{}: an MR shows no bone, and the workbench needs a skull: give a CT, or a "
-                    "mesh of the skull",
+                    "mesh of the skull; the skin of an MR can be opened beside that",
                     subject.volume.string()));
   }
   const CtImport import = ImportCt(reading.volume, subject.import, context);
-  TakeLandmarksOf(subject.landmarks, beginning);
-  FileSubject files = WriteMeshes(import.skull, import.skin, folder / "subject");
+  notes = reading.notes;
+  notes.insert(notes.end(), import.notes.begin(), import.notes.end());
+  TakeLandmarksOf(subject.landmarks, state);
+  FileSubject files = WriteMeshes(import.skull, import.skin, meshes);
   files.mirror = subject.mirror;
   return files;
+}
+
+std::string LowerExtension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
 }
 
 bool IsOneOf(const std::string& extension, std::initializer_list<const char*> extensions) {
@@ -137,30 +145,36 @@ BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& contex
   return subject;
 }
 
-namespace {
-
-// A configuration's own options; of other sources the usual ones.
-void TakeConfig(const fs::path& source, BenchBeginning& beginning) {
-  beginning.experiment = ReadConfig<Experiment>(source);
-  if (!beginning.experiment.edits.empty()) {
-    beginning.state.edits = ReadEditScript(beginning.experiment.edits);
-    beginning.experiment.edits.clear();
-  }
+FileSubject SubjectAsFiles(const Subject& subject, const fs::path& meshes, BenchState& state,
+                           const RunContext& context, std::vector<std::string>& notes) {
+  return std::visit(
+      [&](const auto& given) { return ToFiles(given, meshes, state, context, notes); }, subject);
 }
 
-Subject SubjectIn(const fs::path& source, BenchBeginning& beginning) {
-  std::string extension = source.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return std::tolower(c); });
+BenchBeginning BeginFromConfig(const fs::path& config, const fs::path& meshes,
+                               const RunContext& context) {
+  BenchBeginning beginning{.experiment = ReadConfig<Experiment>(config), .state = {}, .notes = {}};
+  Experiment& experiment = beginning.experiment;
+  if (!experiment.edits.empty()) {
+    beginning.state.edits = ReadEditScript(experiment.edits);
+    experiment.edits.clear();
+  }
+  experiment.subject =
+      SubjectAsFiles(experiment.subject, meshes, beginning.state, context, beginning.notes);
+  if (beginning.state.subject.empty()) {
+    beginning.state.subject = config.stem().string();
+  }
+  return beginning;
+}
+
+namespace {
+
+Subject SubjectIn(const fs::path& source) {
   FileSubject files;
   if (source.empty()) {
     return files;
   }
-  if (IsOneOf(extension, {".yaml", ".yml"})) {
-    TakeConfig(source, beginning);
-    return beginning.experiment.subject;
-  }
-  if (IsOneOf(extension, {".ply", ".obj", ".stl", ".off"})) {
+  if (IsOneOf(LowerExtension(source), {".ply", ".obj", ".stl", ".off"})) {
     files.skull = fs::absolute(source);
     return files;
   }
@@ -173,13 +187,14 @@ Subject SubjectIn(const fs::path& source, BenchBeginning& beginning) {
 
 BenchBeginning BeginBench(const fs::path& source, const fs::path& folder,
                           const RunContext& context) {
-  BenchBeginning beginning{.experiment = UsualExperiment(folder), .state = {}};
-  const Subject subject = SubjectIn(source, beginning);
-  beginning.experiment.subject = std::visit(
-      [&](const auto& given) { return ToFiles(given, folder, beginning, context); }, subject);
-  if (beginning.state.subject.empty()) {
-    beginning.state.subject = source.empty() ? "subject" : source.stem().string();
+  const fs::path meshes = folder / "subject";
+  if (IsOneOf(LowerExtension(source), {".yaml", ".yml"})) {
+    return BeginFromConfig(source, meshes, context);
   }
+  BenchBeginning beginning{.experiment = UsualExperiment(folder), .state = {}, .notes = {}};
+  beginning.experiment.subject =
+      SubjectAsFiles(SubjectIn(source), meshes, beginning.state, context, beginning.notes);
+  beginning.state.subject = source.empty() ? "subject" : source.stem().string();
   return beginning;
 }
 

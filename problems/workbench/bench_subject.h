@@ -31,11 +31,24 @@ struct BenchSubject {
 // Throws IoError or InputError if a file cannot be read at all.
 BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context);
 
+// A subject of any kind as files: phantoms and volumes become meshes in the folder `meshes`, which
+// is made; the subject's landmarks move into `state`; how a volume was read is told in `notes`.
+// Throws as LoadSubject does.
+FileSubject SubjectAsFiles(const Subject& subject, const std::filesystem::path& meshes,
+                           BenchState& state, const RunContext& context,
+                           std::vector<std::string>& notes);
+
 // What a workbench begins with.
 struct BenchBeginning {
   Experiment experiment;  // its subject is of files
   BenchState state;
+  std::vector<std::string> notes;  // how a volume was read
 };
+
+// A configuration with its subject, landmarks and edits; meshes as above. Throws ConfigError, and
+// as LoadSubject does.
+BenchBeginning BeginFromConfig(const std::filesystem::path& config,
+                               const std::filesystem::path& meshes, const RunContext& context);
 
 // source: empty (nothing yet), a mesh of a skull, a volume (CT), or a configuration. Phantoms and
 // volumes become meshes below folder/subject; landmarks move into the state. Throws as LoadSubject

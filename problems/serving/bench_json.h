@@ -2,8 +2,10 @@
 // What the page is told, as JSON.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "problems/workbench/bench.h"
 
@@ -14,6 +16,13 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
 
 // {mesh: {blobs of scene_blobs.h}, dowels, notes, seconds}.
 std::string FaceJson(const BenchFace& face, double seconds);
+
+// {per_mm: three for pulls along x, y and z, each with the x, y and z of the vertices' ways as
+// blobs of values}, in hundredths of the pull.
+std::string PullMovesJson(const std::array<std::vector<Vec3>, 3>& moves);
+
+// {kind, path, name, ways}: what was brought, and as what it can be opened.
+std::string BroughtJson(const Brought& brought);
 
 // {skull, skin}: blobs, null where there is none.
 std::string MeshesJson(const BenchSubject& subject);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/workbench/http_server.h"
+#include "problems/serving/http_server.h"
 
 #include <fmt/format.h>
 #include <httplib.h>
@@ -13,7 +13,7 @@
 #include <optional>
 #include <string_view>
 
-#include "problems/workbench/bench_api.h"
+#include "problems/serving/bench_api.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/workbench/bench_json.h"
+#include "problems/serving/bench_json.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -15,8 +16,6 @@ namespace semblance {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr int kQuadsPerPatch = 2;
 
 Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
@@ -146,7 +145,11 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
                 {{"there", shot.has_face},
                  {"fresh", shot.face_fresh},
                  {"saved", shot.run_saved},
-                 {"revision", shot.face_revision}}}};
+                 {"revision", shot.face_revision}}},
+               {"variants", Json::array()}};
+  for (const BenchVariant variant : shot.variants) {
+    json["variants"].push_back(NameOf(variant));
+  }
   for (const BenchLandmark& landmark : state.landmarks) {
     json["landmarks"].push_back(LandmarkJson(landmark, shot.checks));
   }
@@ -160,12 +163,39 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
 }
 
 std::string FaceJson(const BenchFace& face, double seconds) {
-  return Json{{"mesh", BlobOf(Tessellate(face.surface, kQuadsPerPatch).mesh)},
+  return Json{{"mesh", BlobOf(Tessellate(face.surface, kShownQuadsPerPatch).mesh)},
               {"dowels", DowelsJson(face.dowels)},
               {"notes", face.notes},
               {"finest_level", face.surface.shape().max_level},
               {"seconds", seconds}}
       .dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string PullMovesJson(const std::array<std::vector<Vec3>, 3>& moves) {
+  Json json = {{"per_mm", Json::array()}};
+  for (const std::vector<Vec3>& along : moves) {
+    Json blobs = Json::array();
+    for (int k = 0; k < 3; ++k) {
+      std::vector<double> hundredths(along.size());
+      std::ranges::transform(along, hundredths.begin(), [k](const Vec3& v) { return 100 * v[k]; });
+      SceneBlobs one;
+      const std::string name = one.AddValues(hundredths);
+      blobs.push_back(one.All().at(name));
+    }
+    json["per_mm"].push_back(std::move(blobs));
+  }
+  return json.dump();
+}
+
+std::string BroughtJson(const Brought& brought) {
+  Json json = {{"kind", EnumNames(brought.kind).at(static_cast<std::size_t>(brought.kind))},
+               {"path", brought.path.string()},
+               {"name", brought.path.filename().string()},
+               {"ways", Json::array()}};
+  for (const OpenAs as : WaysToOpen(brought.kind)) {
+    json["ways"].push_back(EnumNames(as).at(static_cast<std::size_t>(as)));
+  }
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string MeshesJson(const BenchSubject& subject) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a stranger may try at the workbench's address, by raw bytes over a socket of the test's own.
-#include "problems/workbench/http_server.h"
+#include "problems/serving/http_server.h"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -187,8 +187,21 @@ TEST_F(WorkbenchServer, NoPathLeadsOutOfTheRun) {
 
 TEST_F(WorkbenchServer, GarbageIsAnsweredInWords) {
   for (const char* body :
-       {"", "{", "[]", "null", "\"do\"", "{}", R"({"do": 3})", R"({"do": "nothing"})",
-        R"({"do": "place"})", R"({"do": "place", "site": "g", "origin": [1, 2], "near": 1})",
+       {"",
+        "{",
+        "[]",
+        "null",
+        "\"do\"",
+        "{}",
+        R"({"do": 3})",
+        R"({"do": "nothing"})",
+        R"({"do": "place"})",
+        R"({"do": "open"})",
+        R"({"do": "open", "path": "/", "as": "king"})",
+        R"({"do": "open", "path": "/", "as": "head", "volume": {"bone_hu": "hard"}})",
+        R"({"do": "variants"})",
+        R"({"do": "variants", "variants": ["thick"]})",
+        R"({"do": "place", "site": "g", "origin": [1, 2], "near": 1})",
         R"({"do": "set", "path": "no.such", "value": 1})",
         R"({"do": "set", "path": "tissue.set_mm.g", "value": 1e999})",
         R"({"do": "set", "path": "subject", "value": {"type": "phantom"}})",
@@ -202,6 +215,12 @@ TEST_F(WorkbenchServer, GarbageIsAnsweredInWords) {
   EXPECT_THAT(Post("api/act", deep, OwnOrigin()), StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(Ask(server_.Port(), "garbage\r\n\r\n"), StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(GetBelow("api/coarse?variant=thick"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(GetBelow("api/variant?variant=obese"), StartsWith("HTTP/1.1 400"));
+  for (const char* path : {"api/look", "api/pull"}) {
+    EXPECT_THAT(Post(path, "{}", OwnOrigin()), StartsWith("HTTP/1.1 400")) << path;
+  }
+  EXPECT_THAT(Post("api/look", R"({"path": "/no/such"})", OwnOrigin()),
+              AllOf(StartsWith("HTTP/1.1 400"), HasSubstr("no such file")));
   EXPECT_THAT(GetBelow("api/landmarks?format=.exe"), StartsWith("HTTP/1.1 400"));
   EXPECT_THAT(GetBelow("api/state"), StartsWith("HTTP/1.1 200")) << "and it goes on";
 }
@@ -210,13 +229,23 @@ TEST_F(WorkbenchServer, AnUploadKeepsItsNameToItself) {
   const auto upload = [this](const std::string& query) {
     return Post("api/upload?" + query, "not a mesh", OwnOrigin(), "", "application/octet-stream");
   };
-  for (const char* name : {"..%2f..%2fa.ply", "%2fetc%2fa.ply", ".ply", "a%00.ply", ""}) {
-    EXPECT_THAT(upload(std::string("as=skull&name=") + name), StartsWith("HTTP/1.1 400")) << name;
+  for (const char* name :
+       {"..%2f..%2fa.ply", "%2fetc%2fa.ply", ".ply", "a%00.ply", "a%0a.ply", ""}) {
+    EXPECT_THAT(upload(std::string("batch=b&name=") + name), StartsWith("HTTP/1.1 400")) << name;
   }
-  EXPECT_THAT(upload("as=folder&name=a.ply"), StartsWith("HTTP/1.1 400"));
-  EXPECT_THAT(upload("as=skull&name=a.ply"), StartsWith("HTTP/1.1 400"));
+  for (const char* batch : {"..", "%2e%2e", "a%2fb", "", "%2f"}) {
+    EXPECT_THAT(upload(fmt::format("batch={}&name=a.ply", batch)), StartsWith("HTTP/1.1 400"))
+        << batch;
+  }
   EXPECT_FALSE(std::filesystem::exists(folder_ / "a.ply"));
-  EXPECT_THAT(GetBelow("api/state"), Not(HasSubstr("a.ply"))) << "what was no mesh is not taken";
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "bench/a.ply"));
+  EXPECT_THAT(upload("batch=b&name=a.ply"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(GetBelow("api/state"), Not(HasSubstr("a.ply"))) << "what is sent is not opened yet";
+  EXPECT_THAT(Post("api/act", R"({"do": "forget", "batch": ".."})", OwnOrigin()),
+              StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(Post("api/act", R"({"do": "forget", "batch": "b"})", OwnOrigin()),
+              StartsWith("HTTP/1.1 200"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "bench/incoming/b"));
 }
 
 TEST_F(WorkbenchServer, ASecondWorkbenchOnTheFolderIsRefused) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/workbench/bench_api.h"
+#include "problems/serving/bench_api.h"
 
 #include <fmt/format.h>
 
@@ -18,9 +18,10 @@
 #include "problems/landmark_files/site_page.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/report_assets.h"
+#include "problems/serving/bench_json.h"
 #include "problems/workbench/bench_actions.h"
 #include "problems/workbench/bench_assets.h"
-#include "problems/workbench/bench_json.h"
+#include "problems/workbench/bench_incoming.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -147,21 +148,22 @@ BenchReply Timed(const std::function<BenchFace()>& make) {
       face, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()));
 }
 
+BenchVariant VariantAsked(const BenchRequest& request) {
+  const auto asked = request.query.find("variant");
+  return asked == request.query.end() ? BenchVariant::kAsIs : VariantCalled(asked->second);
+}
+
 BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
-  constexpr std::array<std::string_view, 6> kNames = {"as_is", "emaciated", "normal",
-                                                      "obese", "thinner",   "thicker"};
   const auto path = request.query.find("path"), value = request.query.find("value");
   if (path != request.query.end() && value != request.query.end()) {
     return Timed([&] { return bench.CoarseWith({path->second, value->second}); });
   }
-  const auto asked = request.query.find("variant");
-  const std::string name = asked == request.query.end() ? "as_is" : asked->second;
-  const auto* const found = std::ranges::find(kNames, name);
-  if (found == kNames.end()) {
-    return Refusal(400, fmt::format("variant: there is no '{}'", name));
-  }
-  const auto variant = static_cast<BenchVariant>(found - kNames.begin());
+  const BenchVariant variant = VariantAsked(request);
   return Timed([&] { return bench.Coarse(variant); });
+}
+
+BenchReply VariantReply(Bench& bench, const BenchRequest& request) {
+  return Timed([&] { return bench.FullVariant(VariantAsked(request)); });
 }
 
 BenchReply FullReply(Bench& bench, const BenchRequest&) {
@@ -176,13 +178,17 @@ BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
   return {200, "application/octet-stream", EncodeLandmarks(file, name), name};
 }
 
-// The face of the last run with its edits, for other programs.
+// The face of the last run with its edits, or that of a variant, for other programs.
 BenchReply FaceFile(Bench& bench, const BenchRequest& request) {
   const auto format = request.query.find("format");
   const std::string extension = format == request.query.end() ? ".ply" : format->second;
+  const bool is_variant = request.query.contains("variant");
+  const BenchFace face = is_variant ? bench.FullVariant(VariantAsked(request)) : bench.Full();
+  const std::string name =
+      is_variant ? std::string(NameOf(VariantAsked(request))) : std::string("face");
   return {200, "application/octet-stream",
-          EncodeFace(bench.Full().surface, extension, /*chord_mm=*/std::nullopt, /*threads=*/1),
-          "face" + extension};
+          EncodeFace(face.surface, extension, /*chord_mm=*/std::nullopt, /*threads=*/1),
+          name + extension};
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -248,6 +254,10 @@ void ClearLandmarks(Bench& bench, const Json&) {
 void Foreseen(Bench& bench, const Json&) { bench.TakeForeseen(); }
 void Set(Bench& bench, const Json& json) {
   const std::string path = TextOf(json, "path");
+  if (path == "subject.axes" || path == "subject.units") {
+    bench.CorrectFrame(path, json.at("value").dump());
+    return;
+  }
   bench.Do("set " + path, [&](BenchState s) {
     return ChangeSetting(std::move(s), path, json.at("value").dump());
   });
@@ -256,11 +266,15 @@ void Unset(Bench& bench, const Json& json) {
   const std::string path = TextOf(json, "path");
   bench.Do("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
 }
+Pull PullOf(const Json& json) {
+  return {.level = json.at("level").get<int>(),
+          .reach = json.at("reach").get<double>(),
+          .mirror = json.at("mirror").get<bool>()};
+}
 void PullFace(Bench& bench, const Json& json) {
-  bench.PullAt(VectorOf(json, "at"), {.level = json.at("level").get<int>(),
-                                      .by_mm = VectorOf(json, "by"),
-                                      .reach = json.at("reach").get<double>(),
-                                      .mirror = json.at("mirror").get<bool>()});
+  Pull pull = PullOf(json);
+  pull.by_mm = VectorOf(json, "by");
+  bench.PullAt(VectorOf(json, "at"), pull);
 }
 void ClearEdits(Bench& bench, const Json&) {
   bench.Do("took all edits back", [](BenchState s) { return TakeEdits(std::move(s), {}); });
@@ -271,13 +285,44 @@ void Keep(Bench& bench, const Json& json) {
 void Blend(Bench& bench, const Json& json) {
   bench.BlendFeature(TextOf(json, "name"), json.at("weight").get<double>());
 }
+std::string TextOr(const Json& json, const char* key) {
+  return json.contains(key) && json.at(key).is_string() ? TextOf(json, key) : "";
+}
+template <class Enum>
+Enum WordOf(const Json& json, const char* key) {
+  constexpr auto kWords = EnumNames(Enum{});
+  const auto* const word = std::ranges::find(kWords, TextOf(json, key));
+  if (word == kWords.end()) {
+    throw InputError(fmt::format("{}: there is no '{}'", key, TextOf(json, key)));
+  }
+  return static_cast<Enum>(word - kWords.begin());
+}
+void OpenFile(Bench& bench, const Json& json) {
+  OpenRequest request{
+      .path = TextOf(json, "path"), .as = WordOf<OpenAs>(json, "as"), .volume = {}, .axes = {}};
+  if (json.contains("volume")) {
+    request.volume = ReadConfigText<CtSubject>(json.at("volume").dump(), "volume");
+  }
+  if (!TextOr(json, "axes").empty()) {
+    request.axes = WordOf<Axes>(json, "axes");
+  }
+  bench.StartOpening(request);
+}
+void Forget(Bench& bench, const Json& json) { DropIncoming(bench.Folder(), TextOf(json, "batch")); }
+void MakeVariants(Bench& bench, const Json& json) {
+  std::vector<BenchVariant> variants;
+  for (const Json& name : json.at("variants")) {
+    variants.push_back(VariantCalled(name.get<std::string>()));
+  }
+  bench.StartVariants(variants);
+}
 void UndoStep(Bench& bench, const Json&) { bench.Undo(); }
 void RedoStep(Bench& bench, const Json&) { bench.Redo(); }
 void RunFace(Bench& bench, const Json&) { bench.StartRun(); }
 void ProposeSites(Bench& bench, const Json&) { bench.StartProposal(); }
 void Cancel(Bench& bench, const Json&) { bench.CancelJob(); }
 
-constexpr std::array<std::pair<std::string_view, Action>, 20> kActions = {
+constexpr std::array<std::pair<std::string_view, Action>, 23> kActions = {
     {{"place", &Place},
      {"remove", &Remove},
      {"rename", &Rename},
@@ -289,6 +334,8 @@ constexpr std::array<std::pair<std::string_view, Action>, 20> kActions = {
      {"take_foreseen", &Foreseen},
      {"set", &Set},
      {"unset", &Unset},
+     {"open", &OpenFile},
+     {"forget", &Forget},
      {"pull", &PullFace},
      {"clear_edits", &ClearEdits},
      {"keep_feature", &Keep},
@@ -297,6 +344,7 @@ constexpr std::array<std::pair<std::string_view, Action>, 20> kActions = {
      {"redo", &RedoStep},
      {"run", &RunFace},
      {"propose", &ProposeSites},
+     {"variants", &MakeVariants},
      {"cancel", &Cancel}}};
 
 BenchReply Act(Bench& bench, const BenchRequest& request) {
@@ -311,66 +359,29 @@ BenchReply Act(Bench& bench, const BenchRequest& request) {
   return StateReply(bench);
 }
 
-// A name that is safe as a file's own: letters, digits, dot, minus and underscore.
-std::string SafeName(const std::string& name) {
-  const bool is_safe = !name.empty() && name.size() <= 100 && name[0] != '.' &&
-                       std::ranges::all_of(name, [](unsigned char c) {
-                         return std::isalnum(c) || c == '.' || c == '-' || c == '_';
-                       });
-  if (!is_safe) {
-    throw InputError(fmt::format(
-        "upload: a file may be named with letters, digits, '.', '-' and '_', not '{}'", name));
-  }
-  return name;
-}
-
-// "a.ply", or "a-2.ply" and so on where that is taken: no file is replaced.
-fs::path FreePath(const fs::path& wanted) {
-  fs::path path = wanted;
-  for (int n = 2; fs::exists(path); ++n) {
-    path.replace_filename(
-        fmt::format("{}-{}{}", wanted.stem().string(), n, wanted.extension().string()));
-  }
-  return path;
-}
-
-// Takes a file for what it is said to be.
-BenchReply OpenFile(Bench& bench, const std::string& as, const fs::path& path) {
-  if (as == "landmarks") {
-    const LandmarkReading reading = ReadLandmarks(path);
-    bench.Do("loaded landmarks",
-             [&](BenchState s) { return TakeLandmarks(std::move(s), reading.file); });
-  } else if (as == "skull" || as == "skin") {
-    bench.Do("opened the " + as, [&](BenchState s) {
-      return ChangeSetting(std::move(s), "subject." + as, Json(fs::absolute(path).string()).dump());
-    });
-  } else {
-    throw InputError("a file is opened as skull, skin or landmarks");
-  }
-  return StateReply(bench);
-}
-
-// A file from the browser: kept in subject/.
+// A file from the browser, until it is opened.
 BenchReply Upload(Bench& bench, const BenchRequest& request) {
   const auto text = [&request](const char* key) {
     const auto at = request.query.find(key);
     return at == request.query.end() ? std::string() : at->second;
   };
-  const fs::path path = FreePath(bench.Folder() / "subject" / SafeName(text("name")));
-  fs::create_directories(path.parent_path());
-  WriteFileAtomically(path, request.body);
-  try {
-    return OpenFile(bench, text("as"), path);
-  } catch (...) {
-    fs::remove(path);
-    throw;
-  }
+  const fs::path path = SaveIncoming(bench.Folder(), text("batch"), text("name"), request.body);
+  return JsonReply(Json{{"path", path.string()}}.dump());
 }
 
-// A file of this machine by its path.
-BenchReply Open(Bench& bench, const BenchRequest& request) {
+// What a path of this machine is, or what the browser has sent in a batch.
+BenchReply LookAtPath(Bench& bench, const BenchRequest& request) {
   const Json json = ParseJson(request.body, "the request");
-  return OpenFile(bench, TextOf(json, "as"), TextOf(json, "path"));
+  const std::string batch = TextOr(json, "batch");
+  const fs::path path =
+      batch.empty() ? fs::path(TextOf(json, "path")) : IncomingBatch(bench.Folder(), batch);
+  return JsonReply(BroughtJson(LookAtBrought(path)));
+}
+
+// How each vertex goes with a pull: for the page to draw it while the pointer moves.
+BenchReply PullShape(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseJson(request.body, "the request");
+  return JsonReply(PullMovesJson(bench.PullMovesAt(VectorOf(json, "at"), PullOf(json))));
 }
 
 BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); }
@@ -382,18 +393,13 @@ struct Route {
 };
 
 constexpr std::array kRoutes = {
-    Route{"GET", "api/state", &State},
-    Route{"GET", "api/schema", &Schema},
-    Route{"GET", "api/sites", &Sites},
-    Route{"GET", "api/sites.png", &SitesPicture},
-    Route{"GET", "api/files", &Files},
-    Route{"GET", "api/meshes", &Meshes},
-    Route{"GET", "api/coarse", &CoarseReply},
-    Route{"GET", "api/face", &FullReply},
-    Route{"GET", "api/landmarks", &LandmarksFile},
-    Route{"GET", "api/export", &FaceFile},
-    Route{"POST", "api/act", &Act},
-    Route{"POST", "api/open", &Open},
+    Route{"GET", "api/state", &State},          Route{"GET", "api/schema", &Schema},
+    Route{"GET", "api/sites", &Sites},          Route{"GET", "api/sites.png", &SitesPicture},
+    Route{"GET", "api/files", &Files},          Route{"GET", "api/meshes", &Meshes},
+    Route{"GET", "api/coarse", &CoarseReply},   Route{"GET", "api/face", &FullReply},
+    Route{"GET", "api/variant", &VariantReply}, Route{"GET", "api/landmarks", &LandmarksFile},
+    Route{"GET", "api/export", &FaceFile},      Route{"POST", "api/act", &Act},
+    Route{"POST", "api/look", &LookAtPath},     Route{"POST", "api/pull", &PullShape},
     Route{"POST", "api/upload", &Upload},
 };
 

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Bringing a file to the workbench: chosen, dropped, or by its path on this machine. What it is the program says; what
+// would take the place of something is asked of the person first.
+import {post, upload} from './api.js';
+import {documentation, kindOf} from './controls.js';
+import {button, element, field, select} from './dom.js';
+import {act, onState, say, store} from './store.js';
+
+const MOST_BYTES = 512 * 2 ** 20;  // that the program takes of a file from the browser
+const SKIPPED = /(^|\/)(\.[^/]*|Thumbs\.db|desktop\.ini)$/i;
+const KINDS = {mesh: 'a mesh', volume: 'a CT or MR', config: 'a configuration', landmarks: 'landmarks'};
+const WAYS = {
+  mesh: {head: 'Another head: this is its skull', skull: 'Skull of this head; its landmarks stay', skin: 'Skin of this head'},
+  volume: {head: 'Another head: skull and skin from it', skin: 'Skin of this head'},
+  config: {head: 'Its head and its options', options: 'Its options alone, for this head'},
+  landmarks: {landmarks: 'Take these landmarks'},
+};
+
+// A name that is one on every machine: no control characters, no dot in front, not too long.
+const safePart = (part) => {
+  const clean = part.replace(/[\u0000-\u001f\u007f\\]/g, '_').replace(/^\.+/, '_');
+  const end = /\.[A-Za-z0-9]{1,5}(\.gz)?$/.exec(clean)?.[0] || '';
+  let stem = clean.slice(0, clean.length - end.length);
+  while (new TextEncoder().encode(stem).length > 150) { stem = stem.slice(0, -10); }
+  return `${stem}${end}` || '_';
+};
+const safeName = (name) => name.split('/').filter((part) => part).map(safePart).join('/');
+
+// The files of a drop, those in folders too: [{file, name}]. Has to be called before the event ends.
+export const filesOfDrop = (transfer) => {
+  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry && item.webkitGetAsEntry()).filter((entry) => entry);
+  const read = async (entry) => {
+    if (entry.isFile) {
+      return new Promise((take, fail) => entry.file((file) => take([{file, name: entry.fullPath}]), fail));
+    }
+    const reader = entry.createReader(), found = [];
+    for (;;) {  // a reader gives a hundred at a time
+      const some = await new Promise((take, fail) => reader.readEntries(take, fail));
+      if (!some.length) { return found; }
+      for (const inner of some) { found.push(...await read(inner)); }
+    }
+  };
+  return entries.length ? Promise.all(entries.map(read)).then((lists) => lists.flat())
+                        : Promise.resolve([...transfer.files].map((file) => ({file, name: file.name})));
+};
+
+const words = (text) => text.replaceAll(`${store.state ? store.state.folder : ''}/incoming/`, '').replace(/(^|\s)[a-z0-9]{12}\//g, '$1');
+
+export class Opener {
+  constructor(root) {
+    this.root = root;
+    this.brought = null;   // what lies ready: {kind, path, name, ways}
+    this.batch = null;     // of what was sent
+    this.waits = false;    // for the program to have opened it
+    this.volume = {};      // how a volume is read, where the person has said so
+    onState((state) => this.state(state));
+  }
+
+  async files(list) {
+    const files = list.filter(({name}) => !SKIPPED.test(name));
+    if (!files.length) { say('There is no file in it.'); return; }
+    const large = files.find(({file}) => file.size > MOST_BYTES);
+    if (large) {
+      say(`${large.name}: ${Math.round(large.file.size / 2 ** 20)} MB; a browser sends 512 MB at most. Give its path on this machine instead.`);
+      return;
+    }
+    await this.look(async () => {
+      const batch = Array.from(crypto.getRandomValues(new Uint8Array(12)), (n) => (n % 36).toString(36)).join('');
+      this.batch = batch;
+      for (const [n, {file, name}] of files.entries()) {
+        this.show(`Reading ${n + 1} of ${files.length} \u2026`);
+        await upload(file, batch, safeName(name));
+      }
+      return {batch};
+    });
+  }
+
+  async path(path) {
+    if (path) { await this.look(async () => ({path})); }
+  }
+
+  // One thing at a time: what was brought before is forgotten.
+  async look(bring) {
+    await this.forget();
+    say('');
+    try {
+      this.brought = await post('look', await bring());
+    } catch (error) {
+      await this.forget();
+      say(words(error.message));
+      return;
+    }
+    const {triangles} = store.state.subject, [usual] = this.brought.ways;
+    const replaces = usual === 'landmarks' ? store.state.landmarks.length : triangles;
+    if (replaces) { this.draw(); } else { this.open(usual); }
+  }
+
+  async open(as) {
+    const axes = this.axes ? this.axes.value : '';
+    const {path, kind} = this.brought;
+    this.waits = true;
+    this.show(`Opening ${this.brought.name} \u2026`);
+    const done = await act('open', {path, as, axes, ...(kind === 'volume' ? {volume: this.volume} : {})});
+    if (!done) { this.waits = false; this.draw(); }
+  }
+
+  state({job}) {
+    if (!this.waits || job.name !== 'open' || job.state === 'running') { return; }
+    this.waits = false;
+    if (job.state === 'done') {
+      const notes = job.words, name = this.brought.name;
+      this.batch = null;
+      this.brought = null;
+      this.show(notes ? `${name}: ${notes}` : '');
+      return;
+    }
+    this.draw();
+    say(job.state === 'stopped' ? 'Stopped; nothing has changed.' : words(job.words));
+  }
+
+  // What was sent and is not wanted.
+  async forget() {
+    const {batch} = this;
+    this.batch = null;
+    this.brought = null;
+    this.waits = false;
+    this.show('');
+    if (batch) { await act('forget', {batch}); }
+  }
+
+  show(text) {
+    this.root.hidden = !text;
+    this.root.replaceChildren(text ? element('p', {textContent: text}) : '',
+        text && !this.waits && !this.batch ? button('Close', () => this.show('')) : '');
+  }
+
+  draw() {
+    const {kind, name, path, ways} = this.brought, {landmarks, edited_vertices: edits, subject} = store.state;
+    const head = `this head${landmarks.length ? `, its ${landmarks.length} landmarks` : ''}${edits ? ', its edits' : ''}`;
+    const taken = kind === 'landmarks' ? `the ${landmarks.length} landmarks that are there` : head;
+    this.axes = kind === 'landmarks' ? select([['', 'as the file says'], ['LPS', 'LPS'], ['RAS', 'RAS']], '', () => {}) : null;
+    const usable = ways.filter((way) => way !== 'skin' && way !== 'skull' && way !== 'options' || subject.triangles);
+    this.root.hidden = false;
+    this.root.replaceChildren(
+        element('h2', {textContent: name}),
+        element('p', {className: 'soft', textContent: `${KINDS[kind]}${this.batch ? '' : `: ${path}`}`}),
+        (kind === 'landmarks' ? landmarks.length : subject.triangles)
+            ? element('p', {textContent: `${kind === 'landmarks' ? 'They take' : 'Another head takes'} the place of ${taken}. Undo brings it back.`}) : '',
+        this.axes ? field('axes', this.axes, 'where the file does not say') : '',
+        kind === 'volume' ? this.volumeControls() : '',
+        element('div', {className: 'ways'}, ...usable.map((way) => button(WAYS[kind][way], () => this.open(way), {dataset: {way}})),
+                button('Leave it', () => this.forget())));
+    this.root.querySelector('.ways button').focus();
+  }
+
+  // How a volume is read: each control from the program's own list.
+  volumeControls() {
+    const ct = kindOf(store.schema.properties.subject).objects.find((object) => object.properties.type.const === 'ct').properties;
+    const row = (name, schema, target) => {
+      const {doc, unit} = documentation(schema), kind = kindOf(schema);
+      const set = (value) => { target()[name] = value; };
+      const made = kind.kind === 'bool' ? element('input', {type: 'checkbox', checked: Boolean(target()[name]), onchange: () => set(made.checked)})
+          : kind.kind === 'word' ? select(kind.words.map((word) => [word, word.replaceAll('_', ' ')]), target()[name] ?? schema.default, set)
+          : element('input', {type: kind.kind === 'number' ? 'number' : 'text', step: 'any', value: target()[name] ?? schema.default ?? '',
+                              onchange: () => set(kind.kind === 'number' ? Number(made.value) : made.value)});
+      made.title = doc;
+      return field(`${name.replaceAll('_', ' ').replace(/ (mm|hu|cm2)$/, '')}${unit ? ` (${unit})` : ''}`, made);
+    };
+    const inner = () => { this.volume.import = this.volume.import || {}; return this.volume.import; };
+    return element('details', {}, element('summary', {textContent: 'How it is read'}),
+        ...['series', 'fill_slices'].map((name) => row(name, ct[name], () => this.volume)),
+        ...Object.entries(ct.import.properties).map(([name, schema]) => row(name, schema, inner)));
+  }
+}
+
+// Files or a folder of the browser's own choosing, or a path on this machine.
+export const chooser = (opener, label, accept) => {
+  const pick = (input) => opener.files([...input.files].map((file) => ({file, name: file.webkitRelativePath || file.name})))
+      .finally(() => { input.value = ''; });
+  const file = element('input', {type: 'file', multiple: true, accept, onchange: () => pick(file)});
+  const folder = element('input', {type: 'file', webkitdirectory: true, hidden: true, onchange: () => pick(folder)});
+  const path = element('input', {type: 'text', placeholder: 'or a path on this machine', spellcheck: false});
+  const open = button('Open', () => opener.path(path.value.trim()));
+  path.addEventListener('keydown', (event) => { if (event.key === 'Enter') { open.click(); } });
+  file.setAttribute('aria-label', label);
+  path.setAttribute('aria-label', `${label}: path`);
+  return element('div', {className: 'chooser'}, element('strong', {textContent: label}),
+                 element('div', {className: 'row'}, file, accept ? '' : button('A folder \u2026', () => folder.click()), folder),
+                 element('div', {className: 'row'}, path, open));
+};
+
+// A drop anywhere on the page.
+export const takeDrops = (opener) => {
+  const isFile = (event) => event.dataTransfer && [...event.dataTransfer.types].includes('Files');
+  let depth = 0;  // of elements that the pointer has entered
+  const mark = () => document.body.classList.toggle('dropping', depth > 0);
+  document.addEventListener('dragenter', (event) => { if (isFile(event)) { ++depth; mark(); } });
+  document.addEventListener('dragleave', (event) => { if (isFile(event)) { depth = Math.max(0, depth - 1); mark(); } });
+  document.addEventListener('dragover', (event) => { if (isFile(event)) { event.preventDefault(); } });
+  document.addEventListener('drop', (event) => {
+    if (!isFile(event)) { return; }
+    event.preventDefault();
+    depth = 0;
+    mark();
+    filesOfDrop(event.dataTransfer).then((files) => opener.files(files)).catch((error) => say(error.message));
+  });
+};

@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a person brings to a workbench that is at work: what it is, what becomes of it, and that
+// each opening is one step that can be undone.
+#include "problems/workbench/bench_open.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <tuple>
+
+#include "problems/subject/phantom.h"
+#include "problems/workbench/bench.h"
+#include "problems/workbench/bench_actions.h"
+#include "problems/workbench/bench_incoming.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh_files/mesh_io.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::ScratchFolder;
+using ::testing::SizeIs;
+
+constexpr const char* kLandmarks =
+    "subject: other\nlandmarks:\n  - {site: g, point: [0, -90, 10]}\n"
+    "  - {site: n, point: [0, -88, 0]}\n";
+
+class WorkbenchOpening : public ::testing::Test {
+ protected:
+  WorkbenchOpening() {
+    PhantomOptions coarse;
+    coarse.rings = 16;
+    phantom_ = MakePhantom(coarse);
+    skull_ = Write("skull.ply", EncodeMesh(phantom_.skull, ".ply"));
+    config_ =
+        Write("phantom.yaml", fmt::format("base: {}/configs/phantom.yaml\nsubject: {{rings: 16}}\n"
+                                          "tissue: {{set_mm: {{g: 9}}}}\n",
+                                          SEMBLANCE_SOURCE_DIR));
+    landmarks_ = Write("other.landmarks.yaml", kLandmarks);
+  }
+
+  fs::path Write(const fs::path& name, const std::string& text) {
+    fs::create_directories((folder_ / name).parent_path());
+    WriteFileAtomically(folder_ / name, text);
+    return folder_ / name;
+  }
+
+  BenchOptions Options(const fs::path& source = {}) {
+    BenchOptions options;
+    options.source = source;
+    options.folder = folder_ / "bench";
+    return options;
+  }
+
+  // As the page would; the words of the end.
+  static JobStatus Open(Bench& bench, const fs::path& path, OpenAs as) {
+    OpenRequest request;
+    request.path = path;
+    request.as = as;
+    bench.StartOpening(request);
+    while (bench.Look().job.state == JobState::kRunning) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return bench.Look().job;
+  }
+
+  static std::string WhyNot(const fs::path& path) {
+    try {
+      LookAtBrought(path);
+      return "taken";
+    } catch (const Error& error) {
+      return error.what();
+    }
+  }
+
+  static const BenchState& StateOf(const Bench::Snapshot& shot) { return Now(shot.history); }
+
+  ScratchFolder folder_;
+  Phantom phantom_;
+  fs::path skull_, config_, landmarks_;
+};
+
+TEST_F(WorkbenchOpening, AFileIsKnownByItsNameAndItsKeys) {
+  EXPECT_EQ(LookAtBrought(skull_).kind, BroughtKind::kMesh);
+  EXPECT_EQ(LookAtBrought(Write("HEAD.STL", "")).kind, BroughtKind::kMesh);
+  EXPECT_EQ(LookAtBrought(Write("ct.nii.gz", "")).kind, BroughtKind::kVolume);
+  EXPECT_EQ(LookAtBrought(Write("points.fcsv", "")).kind, BroughtKind::kLandmarks);
+  EXPECT_EQ(LookAtBrought(landmarks_).kind, BroughtKind::kLandmarks);
+  EXPECT_EQ(LookAtBrought(config_).kind, BroughtKind::kConfig);
+}
+
+TEST_F(WorkbenchOpening, AFolderIsTheOneThingInItOrAVolume) {
+  Write("both/a.ply", "");
+  Write("both/head.yaml", "title: a head\nsubject: {type: files, skull: a.ply}\n");
+  EXPECT_EQ(LookAtBrought(folder_ / "both").path, folder_ / "both/head.yaml");
+  Write("raw/ct.mhd", "");
+  Write("raw/ct.raw", "");
+  EXPECT_EQ(LookAtBrought(folder_ / "raw").path, folder_ / "raw/ct.mhd");
+  Write("slices/IM0001", "");
+  Write("slices/IM0002", "");
+  EXPECT_EQ(LookAtBrought(folder_ / "slices").kind, BroughtKind::kVolume);
+  EXPECT_EQ(LookAtBrought(folder_ / "slices").path, folder_ / "slices");
+}
+
+TEST_F(WorkbenchOpening, WhatCannotBeOpenedIsSaidWithWhatCan) {
+  EXPECT_THAT(WhyNot(folder_ / "none.ply"), HasSubstr("no such file"));
+  EXPECT_THAT(WhyNot(Write("a.zip", "")), HasSubstr("unpack it"));
+  EXPECT_THAT(WhyNot(Write("a.docx", "")), HasSubstr("what can be opened: a mesh"));
+  EXPECT_THAT(WhyNot(Write("a.dcm", std::string(128, '\0') + "DICM")), HasSubstr("one slice"));
+  EXPECT_THAT(WhyNot(Write("study.yaml", "base: phantom.yaml\ngrid: {interp: [mean]}\n")),
+              HasSubstr("semblance study"));
+  EXPECT_THAT(WhyNot(fs::path(SEMBLANCE_SOURCE_DIR) / "configs/tables/rhine_caucasoid.yaml"),
+              HasSubstr("tissue.table"));
+  EXPECT_THAT(WhyNot(Write("other.yaml", "colour: red\n")), HasSubstr("no key at its top"));
+  EXPECT_THAT(WhyNot(Write("broken.yaml", "a: [1\n")), HasSubstr("broken.yaml:"));
+  Write("two/a.ply", "");
+  Write("two/b.ply", "");
+  EXPECT_THAT(WhyNot(folder_ / "two"), HasSubstr("2 files that are opened one by one: a.ply"));
+  const Bench bench(Options());
+  EXPECT_THAT(WhyNot(bench.Folder()), HasSubstr("semblance workbench"));
+}
+
+TEST_F(WorkbenchOpening, FromNothingToAHeadIsOneStepThatCanBeUndone) {
+  Bench bench(Options());
+  ASSERT_EQ(Open(bench, skull_, OpenAs::kHead).state, JobState::kFinished);
+  EXPECT_EQ(bench.Look().subject->skull.mesh.triangles.size(), phantom_.skull.triangles.size());
+  EXPECT_EQ(bench.Look().history.now, 1);
+  bench.Undo();
+  EXPECT_FALSE(bench.Look().subject->bone);
+  bench.Redo();
+  EXPECT_TRUE(bench.Look().subject->bone);
+}
+
+TEST_F(WorkbenchOpening, AnotherHeadKeepsTheOptionsAndNothingOfTheFormerHead) {
+  Bench bench(Options(config_));
+  bench.Do("build", [](BenchState s) { return ChangeSetting(s, "tissue.build", "\"obese\""); });
+  bench.Do("axes", [](BenchState s) { return ChangeSetting(s, "subject.axes", "\"RAS\""); });
+  bench.Do("depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.n", "7"); });
+  ASSERT_EQ(Open(bench, skull_, OpenAs::kHead).state, JobState::kFinished);
+  const Bench::Snapshot shot = bench.Look();
+  const auto& files = std::get<FileSubject>(shot.experiment.subject);
+  EXPECT_EQ(files.skull, skull_);
+  EXPECT_EQ(files.axes, Axes::kLps);
+  EXPECT_TRUE(files.skin.empty());
+  EXPECT_EQ(shot.experiment.tissue.build, Build::kObese);
+  EXPECT_FALSE(shot.experiment.tissue.set_mm.contains("n"));
+  EXPECT_THAT(StateOf(shot).landmarks, IsEmpty());
+  EXPECT_EQ(StateOf(shot).subject, "skull");
+  bench.Undo();
+  EXPECT_THAT(StateOf(bench.Look()).landmarks, SizeIs(32));
+  EXPECT_EQ(std::get<FileSubject>(bench.Look().experiment.subject).axes, Axes::kRas);
+}
+
+TEST_F(WorkbenchOpening, AConfigurationComesWithItsHeadAndItsOptionsAndIsThereAfterACrash) {
+  {
+    Bench bench(Options(skull_));
+    ASSERT_EQ(Open(bench, config_, OpenAs::kHead).state, JobState::kFinished);
+    EXPECT_EQ(bench.Look().experiment.tissue.set_mm.at("g"), 9);
+    EXPECT_THAT(StateOf(bench.Look()).landmarks, SizeIs(32));
+    EXPECT_EQ(StateOf(bench.Look()).start, "start-2.yaml");
+    bench.Undo();
+    EXPECT_FALSE(bench.Look().experiment.tissue.set_mm.contains("g"));
+    bench.Redo();
+  }
+  Bench again(Options());
+  EXPECT_EQ(again.Look().experiment.tissue.set_mm.at("g"), 9);
+  EXPECT_TRUE(again.Look().subject->skin.has_value());
+}
+
+TEST_F(WorkbenchOpening, OptionsAloneLeaveTheHead) {
+  Bench bench(Options(skull_));
+  bench.PlaceByRay("g", {0, -500, 0}, {0, 1, 0}, {0, 0, 0});
+  ASSERT_EQ(Open(bench, config_, OpenAs::kOptions).state, JobState::kFinished);
+  EXPECT_EQ(std::get<FileSubject>(bench.Look().experiment.subject).skull, skull_);
+  EXPECT_EQ(bench.Look().experiment.tissue.set_mm.at("g"), 9);
+  EXPECT_THAT(StateOf(bench.Look()).landmarks, SizeIs(1));
+}
+
+TEST_F(WorkbenchOpening, WhatFailsLeavesAllAsItWas) {
+  Bench bench(Options(config_));
+  const auto files = [&bench] {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::recursive_directory_iterator(bench.Folder())) {
+      names.push_back(entry.path().string());
+    }
+    std::ranges::sort(names);
+    return names;
+  };
+  const auto before = files();
+  const std::string history = ReadFileBytes(bench.Folder() / "workbench.yaml");
+  const fs::path no_mesh = Write("none.ply", "ply\nnothing\n");
+  const fs::path lost = Write("lost.yaml", "subject: {type: files, skull: gone.ply}\n");
+  const fs::path faulty = Write("faulty.yaml", "tissue: {build: fat}\n");
+  for (const auto& [path, as, words] :
+       {std::tuple(no_mesh, OpenAs::kHead, "none.ply"),
+        std::tuple(no_mesh, OpenAs::kSkin, "none.ply"), std::tuple(lost, OpenAs::kHead, "gone.ply"),
+        std::tuple(faulty, OpenAs::kOptions, "tissue.build"),
+        std::tuple(skull_, OpenAs::kLandmarks, "mesh cannot be opened as landmarks"),
+        std::tuple(landmarks_, OpenAs::kHead, "landmarks cannot be opened as head")}) {
+    const JobStatus end = Open(bench, path, as);
+    EXPECT_EQ(end.state, JobState::kFailed) << path;
+    EXPECT_THAT(end.words, HasSubstr(words));
+  }
+  EXPECT_EQ(files(), before);
+  EXPECT_EQ(ReadFileBytes(bench.Folder() / "workbench.yaml"), history);
+}
+
+TEST_F(WorkbenchOpening, WhatTheBrowserSentIsKeptOnceItIsOpened) {
+  Bench bench(Options());
+  const std::string mesh = EncodeMesh(phantom_.skull, ".ply");
+  SaveIncoming(bench.Folder(), "b1", "head of \"x\" <b>.ply", mesh);
+  const fs::path sent = IncomingBatch(bench.Folder(), "b1");
+  ASSERT_EQ(Open(bench, sent, OpenAs::kHead).state, JobState::kFinished) << bench.Look().job.words;
+  EXPECT_FALSE(fs::exists(sent));
+  const fs::path kept = bench.Folder() / "subject" / "head of \"x\" <b>.ply";
+  EXPECT_EQ(ReadFileBytes(kept), mesh);
+  SaveIncoming(bench.Folder(), "b2", "head of \"x\" <b>.ply", mesh);
+  ASSERT_EQ(Open(bench, IncomingBatch(bench.Folder(), "b2"), OpenAs::kHead).state,
+            JobState::kFinished);
+  EXPECT_NE(std::get<FileSubject>(bench.Look().experiment.subject).skull, kept) << "none replaced";
+}
+
+TEST_F(WorkbenchOpening, AConfigurationIsSentWithTheFilesThatItNames) {
+  Bench bench(Options());
+  const std::string config = "subject: {type: files, skull: meshes/skull.ply}\n";
+  SaveIncoming(bench.Folder(), "b1", "head/head.yaml", config);
+  const JobStatus alone = Open(bench, IncomingBatch(bench.Folder(), "b1"), OpenAs::kHead);
+  EXPECT_THAT(alone.words, HasSubstr("Bring the files that it names"));
+  SaveIncoming(bench.Folder(), "b1", "head/meshes/skull.ply", EncodeMesh(phantom_.skull, ".ply"));
+  const JobStatus both = Open(bench, IncomingBatch(bench.Folder(), "b1"), OpenAs::kHead);
+  ASSERT_EQ(both.state, JobState::kFinished) << both.words;
+  EXPECT_TRUE(bench.Look().subject->bone);
+}
+
+TEST_F(WorkbenchOpening, NoNameLeadsOutOfTheFolder) {
+  const std::string longest(200, 'a');
+  EXPECT_NO_THROW(SaveIncoming(folder_.Path(), "b", longest, ""));
+  for (const std::string& name :
+       {std::string("../a.ply"), std::string("a/../../b"), std::string("/etc/x"), std::string(),
+        std::string(".a"), std::string("a\nb"), std::string("a\0b", 3), std::string("a\\b"),
+        std::string("a//b"), std::string("\xff.ply"), longest + "a"}) {
+    EXPECT_THROW(SaveIncoming(folder_.Path(), "b", name, ""), InputError) << name;
+  }
+  EXPECT_THROW(IncomingBatch(folder_.Path(), ".."), InputError);
+  EXPECT_THROW(IncomingBatch(folder_.Path(), ""), InputError);
+}
+
+TEST_F(WorkbenchOpening, LandmarksOnTheBoneGoAlongWhenItsFrameIsCorrected) {
+  Bench bench(Options(skull_));
+  bench.PlaceByRay("g", {0, -500, 0}, {0, 1, 0}, {0, 0, 0});
+  bench.Do("placed", [](BenchState s) { return PlaceLandmark(s, "n", {0, -300, 0}); });
+  const auto point = [&bench](std::size_t k) {
+    return StateOf(bench.Look()).landmarks.at(k).point;
+  };
+  const auto before = point(0);
+  bench.CorrectFrame("subject.axes", "\"RAS\"");
+  EXPECT_NEAR(point(0)[1], -before[1], 1e-12);
+  EXPECT_EQ(point(1)[1], -300) << "off the bone: its file may have had the right frame";
+  bench.CorrectFrame("subject.units", "\"cm\"");
+  EXPECT_NEAR(point(0)[1], -10 * before[1], 1e-9);
+  EXPECT_LT(bench.Look().checks.sites.at("g").from_bone_mm, 1e-6);
+  bench.Undo();
+  bench.Undo();
+  EXPECT_EQ(point(0), before);
+}
+
+}  // namespace
+}  // namespace semblance
