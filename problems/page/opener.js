@@ -67,6 +67,7 @@ export class Opener {
     await this.look(async () => {
       const batch = Array.from(crypto.getRandomValues(new Uint8Array(12)), (n) => (n % 36).toString(36)).join('');
       this.batch = batch;
+      this.count = files.length;
       for (const [n, {file, name}] of files.entries()) {
         this.show(`Reading ${n + 1} of ${files.length} \u2026`);
         await upload(file, batch, safeName(name));
@@ -85,6 +86,7 @@ export class Opener {
     say('');
     try {
       this.brought = await post('look', await bring());
+      if (this.brought.name === this.batch) { this.brought.name = `${this.count} files`; }  // slices, sent by themselves
     } catch (error) {
       await this.forget();
       say(words(error.message));

@@ -326,6 +326,11 @@ std::string StemOf(const fs::path& path) {
   return stem.ends_with(".nii") ? stem.substr(0, stem.size() - 4) : stem;
 }
 
+// Slices that were sent by themselves have no name together.
+std::string NameOfVolume(const fs::path& path, const fs::path& root) {
+  return BatchOf(root, path) == path ? "volume" : StemOf(path);
+}
+
 Opened OpenSkinOf(const OpenRequest& request, const fs::path& path, const OpenPlace& place,
                   Additions& added, const RunContext& context) {
   const VolumeReading reading = ReadVolume(path, request.volume.read, context);
@@ -333,7 +338,7 @@ Opened OpenSkinOf(const OpenRequest& request, const fs::path& path, const OpenPl
   TriMesh skin = reading.modality == Modality::kMr
                      ? ImportMrSkin(reading.volume, {}, context).skin
                      : ImportCt(reading.volume, request.volume.import, context).skin;
-  const fs::path file = added.NewPath(StemOf(path) + "_skin.ply");
+  const fs::path file = added.NewPath(NameOfVolume(path, place.folder.Root()) + "_skin.ply");
   WriteFileAtomically(file, EncodeMesh(InFrameOf(FilesOf(place), std::move(skin)), ".ply"));
   opened.state = ChangeSetting(std::move(opened.state), "subject.skin",
                                PathForState(file, place.folder.Root()));
@@ -361,14 +366,15 @@ Opened OpenVolume(const OpenRequest& request, const fs::path& path, const OpenPl
   if (request.as == OpenAs::kSkin) {
     return OpenSkinOf(request, path, place, added, context);
   }
+  const std::string name = NameOfVolume(path, place.folder.Root());
   CtSubject subject = request.volume;
   subject.volume = path;
   subject.landmarks.clear();
   BenchState read;
   Opened opened;
   const FileSubject files =
-      SubjectAsFiles(subject, added.NewPath(StemOf(path)), read, context, opened.notes);
-  opened.state = WithHead(place.state, files, StemOf(path), place.folder.Root());
+      SubjectAsFiles(subject, added.NewPath(name), read, context, opened.notes);
+  opened.state = WithHead(place.state, files, name, place.folder.Root());
   return opened;
 }
 
@@ -460,8 +466,8 @@ void OpenBrought(const OpenRequest& request, const OpenPlace& place, const RunCo
   try {
     Additions added(place.folder);
     Opened opened = OpenAsAsked(request, brought, place, added, context);
-    opened.what =
-        fmt::format("opened {} as {}", brought.path.filename().string(), WordOf(request.as));
+    const std::string name = batch == brought.path ? "slices" : brought.path.filename().string();
+    opened.what = fmt::format("opened {} as {}", name, WordOf(request.as));
     take(std::move(opened));
     added.Keep();
   } catch (const Error& error) {

@@ -98,12 +98,35 @@ class Browser:
             time.sleep(0.1)
         raise AssertionError(f"after {seconds} s still not: {script}")
 
+    def pointer(self, *actions):
+        """Actions of the mouse in the protocol's own words."""
+        self._call("POST", self.session + "/actions", {"actions": [
+            {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": list(actions)}]})
+
+    @staticmethod
+    def move(x, y, milliseconds=0):
+        return {"type": "pointerMove", "duration": milliseconds, "x": round(x), "y": round(y), "origin": "viewport"}
+
     def click_at(self, x, y):
         """A press and a release of the left button at a point of the window."""
-        self._call("POST", self.session + "/actions", {"actions": [
-            {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": [
-                {"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y), "origin": "viewport"},
-                {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]}]})
+        self.pointer(self.move(x, y), {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0})
+
+    def press_and_drag(self, start, end, steps=4):
+        """The left button stays pressed."""
+        self.pointer(self.move(*start), {"type": "pointerDown", "button": 0},
+                     *[self.move(*[p + (q - p) * k / steps for p, q in zip(start, end)], 30) for k in range(1, steps + 1)])
+
+    def release(self):
+        self.pointer({"type": "pointerUp", "button": 0})
+
+    def choose_files(self, selector, *paths):
+        """As a person does in the window that a file input opens."""
+        found = self._call("POST", self.session + "/element", {"using": "css selector", "value": selector})
+        self._call("POST", f"{self.session}/element/{found[ELEMENT]}/value", {"text": "\n".join(map(str, paths))})
+
+    def settle(self):
+        """Until the page has drawn what was asked."""
+        self.run("return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
 
     def click(self, selector):
         """A click on the element of a CSS selector, scrolled into view."""

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a person brings to the workbench's page: a path, files that are chosen, files that are dropped; a configuration,
+the slices of a CT, a mesh in metres, landmarks; with names that would be tags or break the page. Then variants of a head
+side by side, first coarse and then in full.
+
+usage: workbench_open_page.py PROGRAM CONFIG FOLDER [PICTURES]     exit code 77: skipped, as something is not installed
+"""
+import os
+import pathlib
+import sys
+
+import dicom_slices
+from workbench_page import Workbench, landmark, run_in_browser, state, take_picture
+
+MESSAGE = "return document.getElementById('message').textContent"
+IDLE = "return window.semblance.store.state.job.state !== 'running' && !window.semblance.faces.busy" \
+       " && !window.semblance.opener.waits"
+HOSTILE = "<script>window.hurt=1</script><img src=x onerror=window.hurt=1>\"'&"
+LONG = "long" * 75
+
+
+def give_path(browser, path):
+    browser.click("[data-tab=skull]")
+    browser.run("const field = document.querySelector('#panel .chooser input[type=text]'); field.value = arguments[0];"
+                "field.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter'}))", str(path))
+
+
+def choose_way(browser, way):
+    browser.wait("return document.querySelector(arguments[0])", f'#opening [data-way="{way}"]')
+    browser.click(f'#opening [data-way="{way}"]')
+
+
+def await_subject(browser, name):
+    browser.wait("return window.semblance.store.state.subject.name === arguments[0]", name)
+    browser.wait(IDLE)
+
+
+def drop(browser, files):
+    """{name: text}, dropped together on the view."""
+    browser.run("""const data = new DataTransfer();
+        for (const [name, text] of Object.entries(arguments[0])) { data.items.add(new File([text], name)); }
+        const event = (type) => new DragEvent(type, {dataTransfer: data, bubbles: true, cancelable: true});
+        const view = document.getElementById('view');
+        for (const type of ['dragenter', 'dragover', 'drop']) { view.dispatchEvent(event(type)); }""", files)
+
+
+def refused(browser, give, words):
+    """One clear line; nothing has changed."""
+    revision = state(browser)["revision"]
+    browser.run("document.getElementById('message').textContent = ''")
+    give()
+    said = browser.wait(MESSAGE)
+    assert words in said, (words, said)
+    assert state(browser)["revision"] == revision, said
+
+
+def mesh_in_metres(path):
+    """A ball as wide as a head, in metres: OBJ."""
+    points = "".join(f"v {x} {y} {z}\n" for x in (-.08, .08) for y in (-.1, .1) for z in (-.1, .1))
+    faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
+    path.write_text(points + "".join(f"f {a} {b} {c}\nf {a} {c} {d}\n" for a, b, c, d in faces))
+    return path
+
+
+def open_from_nothing(browser, config):
+    """By a path; a mistake is one line; the opening is one step."""
+    refused(browser, lambda: give_path(browser, "/no/such/head.ply"), "/no/such/head.ply: no such file")
+    give_path(browser, config)
+    await_subject(browser, "phantom 1")
+    assert len(state(browser)["landmarks"]) > 20
+    browser.click("#undo")
+    browser.wait("return !window.semblance.store.state.subject.triangles")
+    browser.click("#redo")
+    await_subject(browser, "phantom 1")
+
+
+def open_slices(browser, folder, pictures):
+    """Several files chosen together: the other head is asked about, and comes with its skin."""
+    folder.mkdir()
+    slices = dicom_slices.write_slices(folder)
+    browser.click("[data-tab=skull]")
+    browser.choose_files("#panel .chooser input[type=file]", *slices)
+    browser.wait("return document.querySelector('#opening [data-way]')", seconds=100)
+    take_picture(browser, pictures, "ask")
+    assert state(browser)["subject"]["name"] == "phantom 1", "replaced unasked"
+    choose_way(browser, "head")
+    browser.wait("const s = window.semblance.store.state; return s.job.name === 'open' && s.job.state !== 'running'")
+    browser.wait(IDLE)
+    said = browser.run(MESSAGE)
+    if "ITK" in said:
+        print(f"no DICOM in this build: {said}")
+        browser.run("return window.semblance.opener.forget()")
+        return
+    now = state(browser)
+    assert now["subject"]["skin"] and 130 < now["subject"]["size_mm"][0] < 150, (said, now["subject"])
+    assert not now["landmarks"] and now["subject"]["name"] == "volume"
+    browser.wait("const box = window.semblance.scene.main.stage.layers.get('skull').object.geometry.boundingBox;"
+                 "return box && Math.abs(box.max.x - box.min.x - arguments[0]) < 2", now["subject"]["size_mm"][0])
+    take_picture(browser, pictures, "ct")
+    browser.click("#undo")
+    await_subject(browser, "phantom 1")
+    assert len(state(browser)["landmarks"]) > 20
+
+
+def correct_unit(browser, mesh):
+    """What is shown says which unit the file has."""
+    give_path(browser, mesh)
+    choose_way(browser, "head")
+    await_subject(browser, mesh.stem)
+    assert state(browser)["subject"]["size_mm"][0] < 1
+    browser.run("[...document.querySelectorAll('#panel button')].find((b) => b.textContent === 'Take metres').click()")
+    browser.wait("return window.semblance.store.state.subject.size_mm[0] > 150")
+    browser.run("const axes = [...document.querySelectorAll('#panel select')].find((s) => s.value === 'LPS');"
+                "axes.value = 'RAS'; axes.dispatchEvent(new Event('change'))")
+    browser.wait("return window.semblance.store.state.values.subject.axes === 'RAS'")
+
+
+def hostile_names(browser, pictures):
+    """Names that would be tags, or longer than any line, in subject, file, site, note and title."""
+    scripts = browser.run("return document.scripts.length")
+    text = f"subject: {quoted(HOSTILE)}\nlandmarks:\n  - {{site: g, point: [0, -80, 0], note: {quoted(HOSTILE)}}}\n"
+    drop(browser, {f"{HOSTILE.replace('/', '_')}.yaml": text})
+    await_subject(browser, HOSTILE)
+    assert landmark(browser, "g")["note"] == HOSTILE
+    browser.click("[data-tab=landmarks]")
+    browser.click('[data-site="g"]')
+    refused(browser, lambda: drop(browser, {f"{HOSTILE.replace('/', '_')}.docx": "x"}), "<script>")
+    refused(browser, lambda: drop(browser, {"a\n\u0007b.docx": "x"}), "a__b.docx")
+    refused(browser, lambda: drop(browser, {f"{LONG}.zip": "x"}), "unpack it")
+    drop(browser, {"sites.yaml": f"landmarks:\n  - {{site: {quoted(HOSTILE)}, point: [0, 0, 0]}}\n"})
+    choose_way(browser, "landmarks")
+    assert "<script>" in browser.wait(MESSAGE)
+    browser.run("return window.semblance.opener.forget()")
+    drop(browser, {f"{LONG}.yaml": f"title: {quoted(HOSTILE + LONG)}\ntissue: {{depths: measured}}\n"})
+    choose_way(browser, "options")
+    browser.wait("return window.semblance.store.state.values.title.startsWith('<script>')")
+    drop(browser, {"long.yaml": f"subject: {LONG}\nlandmarks:\n  - {{site: g, point: [0, -80, 0]}}\n"})
+    choose_way(browser, "landmarks")
+    await_subject(browser, LONG)
+    for width, height in ((1100, 700), (400, 800)):
+        browser.resize(width, height)
+        for tab in ("skull", "landmarks", "face", "sculpt", "compare", "measure"):
+            browser.click(f"[data-tab={tab}]")
+            browser.settle()
+            wide = browser.run("return document.documentElement.scrollWidth")
+            assert wide <= width, f"{tab}: {wide} pixels wide"
+        take_picture(browser, pictures, f"hostile-{width}")
+    browser.resize(1100, 700)
+    assert browser.run("return window.hurt === undefined && document.scripts.length === arguments[0]"
+                       " && !document.querySelector('[onerror], [onload], [onclick]')", scripts)
+
+
+def quoted(text):
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def compare_variants(browser, config, pictures):
+    """A standard deviation less and more: coarse at once, then in full; under one camera, with their differences."""
+    give_path(browser, config)
+    choose_way(browser, "head")
+    await_subject(browser, "phantom 1")
+    browser.click("[data-tab=compare]")
+    browser.click("[data-set=deviations]")
+    frames = "document.querySelectorAll('#view .view3d-frame:not([hidden]) canvas').length"
+    browser.wait(f"return {frames} === 3")
+    assert browser.run("return document.querySelector('.compare-kind').dataset.kind") == "coarse"
+    take_picture(browser, pictures, "compare-coarse")
+    browser.click("[data-make=variants]")
+    browser.wait("return document.querySelector('.compare-kind').dataset.kind === 'full'", seconds=200)
+    browser.wait(f"return {frames} === 3 && !document.querySelector('#panel [role=status]').textContent")
+    assert sorted(state(browser)["variants"]) == ["as_is", "thicker", "thinner"]
+    means = browser.run("const mean = ({stage}) => { const v = stage.layers.get('face').object.userData.values;"
+                        "return v ? v.reduce((sum, x) => sum + x, 0) / v.length : 0; };"
+                        "return window.semblance.scene.others.map(mean)")
+    assert means[0] < -1 and means[1] == 0 and means[2] > 1, means
+    assert browser.run("const [first, ...rest] = window.semblance.scene.others;"
+                       "return rest.every(({stage}) => stage.shared.camera === first.stage.shared.camera)")
+    take_picture(browser, pictures, "compare-full")
+    ply = browser.run("return fetch('api/export?variant=thicker&format=.ply').then((r) => r.text()).then((t) => t.slice(0, 3))")
+    assert ply == "ply", ply
+    browser.resize(400, 800)
+    browser.settle()
+    assert browser.run("return document.documentElement.scrollWidth") <= 400
+    take_picture(browser, pictures, "compare-small")
+
+
+def work(browser, program, config, folder, pictures):
+    folder.parent.mkdir(parents=True)
+    bench = Workbench(program, ["--out", str(folder)])
+    try:
+        browser.open(bench.url)
+        browser.wait("return window.semblance && window.semblance.store.state")
+        open_from_nothing(browser, config)
+        open_slices(browser, folder.parent / "slices", pictures)
+        correct_unit(browser, mesh_in_metres(folder.parent / "block.obj"))
+        hostile_names(browser, pictures)
+        compare_variants(browser, config, pictures)
+        # A refusal is an answer that the browser lists as such; of the page itself there is no complaint.
+        complaints = [words for words in browser.complaints() if "status of 400" not in words]
+        assert not complaints, complaints
+        assert not list((folder / "incoming").glob("*")), "what was opened or left is forgotten"
+        # All of it is there after a crash.
+        subject = state(browser)["subject"]["name"]
+        bench.kill()
+        bench = Workbench(program, [str(folder)])
+        browser.open(bench.url)
+        browser.wait("return window.semblance && window.semblance.store.state")
+        assert state(browser)["subject"]["name"] == subject
+        assert len(state(browser)["variants"]) == 3
+    finally:
+        browser.close()
+        bench.close()
+
+
+def main():
+    program, config, folder, *rest = sys.argv[1:]
+    pictures = rest[0] if rest else None
+    return run_in_browser([os.path.dirname(folder)], pictures,
+                          lambda browser: work(browser, program, config, pathlib.Path(folder), pictures))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
