@@ -19,6 +19,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -50,6 +51,9 @@ class WorkbenchBench : public ::testing::Test {
   }
   static void RunToTheEnd(Bench& bench) {
     bench.StartRun();
+    AwaitEnd(bench);
+  }
+  static void AwaitEnd(Bench& bench) {
     while (bench.Look().job.state == JobState::kRunning) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
@@ -190,6 +194,58 @@ TEST_F(WorkbenchBench, VariantsDifferAsTheirDepthsDo) {
   for (std::size_t k = 0; k < thin.dowels.size(); ++k) {
     EXPECT_GT(thick.dowels[k].depth_mm, thin.dowels[k].depth_mm) << thin.dowels[k].site;
   }
+}
+
+TEST_F(WorkbenchBench, AVariantInFullIsTheRunOfItsBuild) {
+  const auto set = [](const char* path, const char* value) {
+    return [=](BenchState s) { return ChangeSetting(std::move(s), path, value); };
+  };
+  {
+    Bench bench(Options());
+    bench.Do("depths", set("tissue.depths", "\"table\""));
+    bench.Do("table", set("tissue.table", "\"tables/rhine_caucasoid.yaml\""));
+    EXPECT_THROW(bench.FullVariant(BenchVariant::kObese), InputError);
+    bench.StartVariants({BenchVariant::kObese, BenchVariant::kThinner});
+    AwaitEnd(bench);
+    const std::vector<std::string> obese = {"tissue.build=obese"};
+    const RunResult again =
+        semblance::Run(ReadConfig<Experiment>(bench.Folder() / "config.yaml", obese), {});
+    EXPECT_EQ(bench.FullVariant(BenchVariant::kObese).surface.Offsets(),
+              again.fit.surface.Offsets());
+    EXPECT_FALSE(fs::exists(bench.Folder() / "run")) << "the run is another matter";
+    bench.Do("depth", set("tissue.set_mm.g", "9"));
+    EXPECT_THAT(bench.Look().variants, SizeIs(0));
+    bench.Undo();
+  }
+  Bench again(Again());
+  EXPECT_THAT(again.Look().variants, SizeIs(2));
+  for (const Dowel& dowel : again.FullVariant(BenchVariant::kThinner).dowels) {
+    EXPECT_GT(dowel.depth_mm, 0);
+  }
+}
+
+TEST_F(WorkbenchBench, WhatAPullIsShownToDoIsWhatItDoes) {
+  Bench bench(Options());
+  bench.Do("no skin", [](BenchState s) { return ChangeSetting(s, "subject.skin", "\"\""); });
+  Pull pull{.level = 1, .reach = 2, .mirror = true};
+  EXPECT_THROW(bench.PullMovesAt({0, -100, 0}, pull), InputError);
+  RunToTheEnd(bench);
+  const auto shown = [&bench] {
+    return Tessellate(bench.Full().surface, kShownQuadsPerPatch).mesh.points;
+  };
+  const std::vector<Vec3> before = shown();
+  const Vec3 at = bench.Full().surface.Point({0.6, 0.4});
+  const auto moves = bench.PullMovesAt(at, pull);
+  pull.by_mm = {1, -2, 0.5};
+  bench.PullAt(at, pull);
+  const std::vector<Vec3> after = shown();
+  double farthest = 0;
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    const Vec3 foreseen = moves[0][v] - 2 * moves[1][v] + 0.5 * moves[2][v];
+    EXPECT_LT((after[v] - before[v] - foreseen).norm(), 0.05);
+    farthest = std::max(farthest, foreseen.norm());
+  }
+  EXPECT_GT(farthest, 1.5);
 }
 
 TEST_F(WorkbenchBench, AFolderWithOtherThingsIsRefused) {
