@@ -19,13 +19,16 @@ std::string Duration(double seconds) {
                         : fmt::format("{:.1f} h", seconds / 3600);
 }
 
+int AllTrials(const StudyEta& eta) { return eta.trials + eta.later; }
+
 // A stream that takes nothing is no reason for a study to stop.
 void Put(std::FILE* stream, const std::string& text) { std::fputs(text.c_str(), stream); }
 
 }  // namespace
 
 std::string EtaText(const StudyEta& eta) {
-  std::string text = fmt::format("{} of {} trials", eta.finished, eta.trials);
+  std::string text =
+      fmt::format("{} of {}{} trials", eta.finished, eta.later > 0 ? "about " : "", AllTrials(eta));
   const int here = eta.finished - eta.finished_before;
   if (here == 0 && eta.elapsed_s >= 1) {
     text += fmt::format(", {} so far", Duration(eta.elapsed_s));
@@ -34,28 +37,35 @@ std::string EtaText(const StudyEta& eta) {
     const double each_s = eta.elapsed_s / here;
     text += each_s >= 1 ? fmt::format(", {:.1f} s each", each_s)
                         : fmt::format(", {:.1f} a second", 1 / each_s);
-    if (eta.finished < eta.trials) {
-      text += fmt::format(", about {} left", Duration(each_s * (eta.trials - eta.finished)));
+    if (eta.finished < AllTrials(eta)) {
+      text += fmt::format(", about {} left", Duration(each_s * (AllTrials(eta) - eta.finished)));
     }
   }
   return text + (eta.failed > 0 ? fmt::format("; {} failed", eta.failed) : "");
 }
 
 std::string BarText(const StudyEta& eta, int width) {
-  const int full = eta.trials > 0 ? width * eta.finished / eta.trials : width;
+  const int full = AllTrials(eta) > 0 ? width * eta.finished / AllTrials(eta) : width;
   return fmt::format("[{:#<{}}{:.<{}}]", "", full, "", width - full);
 }
 
 StudyProgress::StudyProgress(std::FILE* stream, std::chrono::milliseconds interval)
     : stream_(stream), is_terminal_(isatty(fileno(stream)) == 1), interval_(interval) {}
 
+StudyProgress::~StudyProgress() {
+  if (is_terminal_ && is_drawn_ && !is_over_) {
+    Put(stream_, "\n");
+  }
+}
+
 void StudyProgress::operator()(const StudyEta& eta, const std::string& trial) {
   constexpr const char* kClearLine = "\r\033[K";
-  const bool is_last = eta.finished == eta.trials;
+  const bool is_last = eta.finished == AllTrials(eta);
   if (is_over_) {
     return;
   }
   is_over_ = is_last;
+  is_drawn_ = true;
   if (eta.failed > failed_) {
     failed_ = eta.failed;
     Put(stream_, fmt::format("{}{}\n", is_terminal_ ? kClearLine : "", ForTerminal(trial)));

@@ -15,9 +15,11 @@ namespace semblance {
 struct StudyEta {
   int trials = 0, finished = 0, finished_before = 0, failed = 0;
   double elapsed_s = 0;
+  int later = 0;  // trials that a search has not asked for yet, about
 };
 
-// "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without what is not known yet.
+// "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without what is not known yet. Of a
+// search "12 of about 80 trials".
 std::string EtaText(const StudyEta& eta);
 
 // "[######......]", `width` characters between the brackets.
@@ -29,6 +31,9 @@ class StudyProgress {
  public:
   explicit StudyProgress(std::FILE* stream,
                          std::chrono::milliseconds interval = std::chrono::seconds(5));
+  ~StudyProgress();  // ends the line of a bar that has not come to its end
+  StudyProgress(const StudyProgress&) = delete;
+  StudyProgress& operator=(const StudyProgress&) = delete;
 
   // Any time. trial: the one that ended, subject, values and status; said alone where it failed.
   void operator()(const StudyEta& eta, const std::string& trial);
@@ -38,7 +43,7 @@ class StudyProgress {
   std::FILE* stream_;
   bool is_terminal_;
   std::chrono::milliseconds interval_;
-  bool is_over_ = false;
+  bool is_over_ = false, is_drawn_ = false;
   int failed_ = 0;
   Clock::time_point last_ = Clock::now();
 };

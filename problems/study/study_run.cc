@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <ctime>
 #include <mutex>
@@ -84,6 +85,25 @@ std::shared_ptr<const DiskCache> CacheOnDisk(const StudyRunOptions& options) {
              : std::make_shared<const DiskCache>(options.cache, kMegabyte * options.cache_limit_mb);
 }
 
+// How many trials a search will still ask for, about: what is left of its budget, at as many trials
+// for a full run as it has taken so far, and the best on the subjects held out.
+int StillToAsk(const StudyPlan& plan) {
+  if (!plan.search || plan.search_ended) {
+    return 0;
+  }
+  double spent = 0, trials = 0;
+  for (const SearchStep& step : plan.steps) {
+    spent += step.cost;
+    trials += static_cast<double>(step.trials.size());
+  }
+  const double subjects = static_cast<double>(plan.search->subjects.size());
+  const double left = std::max(0.0, plan.search->options.budget - spent);
+  const auto aside = std::ranges::count_if(plan.trials, &StudyTrial::aside);
+  const auto held_out = 2 * static_cast<std::ptrdiff_t>(plan.search->held_out.size()) - aside;
+  return static_cast<int>(std::lround(left * (spent > 0 ? trials / spent : subjects))) +
+         static_cast<int>(std::max<std::ptrdiff_t>(0, held_out));
+}
+
 class StudyRunner {
  public:
   StudyRunner(const StudyPlan& plan, fs::path folder, const StudyRunOptions& options,
@@ -99,6 +119,7 @@ class StudyRunner {
     const std::vector<bool> chosen = TrialsThat(plan_, options_.only);
     queue_.clear();
     next_ = ended_ = 0;
+    later_ = StillToAsk(plan_) / options_.shards;
     for (std::size_t n = first; n < plan_.trials.size(); ++n) {
       if (static_cast<int>(n % options_.shards) == options_.shard && chosen[n]) {
         Queue(plan_.trials[n]);
@@ -129,6 +150,12 @@ class StudyRunner {
     summary_.shared_made = cache_.made();
   }
   const StudySummary& summary() const { return summary_; }
+
+  // Nothing more is asked for.
+  void TellTheEnd() {
+    later_ = 0;
+    TellProgress("");
+  }
 
  private:
   void Queue(const StudyTrial& trial) {
@@ -333,7 +360,8 @@ class StudyRunner {
                             .finished = summary_.done + summary_.failed + summary_.skipped,
                             .finished_before = summary_.skipped,
                             .failed = summary_.failed,
-                            .elapsed_s = elapsed_s},
+                            .elapsed_s = elapsed_s,
+                            .later = later_},
                            trial);
     }
   }
@@ -352,6 +380,7 @@ class StudyRunner {
   std::mutex mutex_;
   std::condition_variable thread_ended_;
   std::size_t ended_ = 0;  // of the threads
+  int later_ = 0;          // trials that this shard will still be asked for, about
   std::exception_ptr broken_;
   StudySummary summary_;
 };
@@ -455,6 +484,9 @@ StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const Study
       }
       runner.Run(first);
     });
+    if (ended) {
+      runner.TellTheEnd();
+    }
   }
   output.Write("plan.json", PlanJson(grown));
   if (!plan.search) {

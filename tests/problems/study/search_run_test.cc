@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "problems/study/study_run.h"
@@ -86,6 +87,30 @@ TEST_F(SearchRunTest, SameBytesForAnyJobsShardsAndInterruptions) {
   fs::remove(folder_ / "one" / "plan.json");
   EXPECT_EQ(RunStudy(plan, folder_ / "one", {}, {}).done, 3);
   EXPECT_EQ(StudyFiles(folder_ / "one"), one);
+}
+
+// Six treatments and the base on two subjects, the best and the base on one held out: 16 trials.
+TEST_F(SearchRunTest, ProgressCountsWhatWillStillBeAskedFor) {
+  for (const int shards : {1, 2}) {
+    std::vector<StudyEta> told;
+    StudyRunOptions options{.shards = shards};
+    options.on_progress = [&told](const StudyEta& eta, const std::string&) { told.push_back(eta); };
+    const StudySummary end =
+        RunStudy(Plan(kBayes), folder_ / fmt::format("{}", shards), options, {});
+    ASSERT_FALSE(told.empty());
+    EXPECT_NEAR(told.front().trials + told.front().later, 16.0 / shards, 1);
+    if (shards == 1) {
+      EXPECT_EQ(told.back().trials, 16);
+      EXPECT_EQ(told.back().later, 0);
+      EXPECT_FALSE(end.waits);
+    } else {
+      EXPECT_GT(told.back().later, 0) << "it waits for the other shard";
+    }
+    const auto is_early = [&told](const StudyEta& eta) {
+      return eta.finished == eta.trials + eta.later && eta.finished < told.back().finished;
+    };
+    EXPECT_EQ(std::ranges::count_if(told, is_early), 0) << "said to be over before it was";
+  }
 }
 
 TEST_F(SearchRunTest, ALargerBudgetGoesOn) {
