@@ -132,6 +132,20 @@ int PrintPartState(const StudyResults& results, const std::vector<bool>& asked,
   return done == count ? kDone : kNotUsable;
 }
 
+// With its progress on the terminal, unless it is to be quiet.
+StudySummary RunTold(const StudyPlan& plan, const fs::path& root, StudyRunOptions options,
+                     const StudyArguments& a) {
+  StudyProgress progress(stderr);
+  if (!a.quiet) {
+    options.on_progress = [&progress](const StudyEta& eta, const std::string& trial) {
+      progress(eta, trial);
+    };
+  }
+  RunContext context;
+  context.stop_token = a.stop;
+  return RunStudy(plan, root, options, context);
+}
+
 void TellChange(const StudySummary& summary, const fs::path& root) {
   if (summary.changed) {
     Tell(
@@ -164,12 +178,7 @@ int StudyCommand(const StudyArguments& a) {
     return PrintPlan(plan, options.only);
   }
   const fs::path root = a.out.empty() ? "out/" + file.stem().string() : a.out;
-  if (!a.quiet) {
-    options.on_progress = StudyProgress(stderr);
-  }
-  RunContext context;
-  context.stop_token = a.stop;
-  const StudySummary summary = RunStudy(plan, root, options, context);
+  const StudySummary summary = RunTold(plan, root, options, a);
   TellChange(summary, root);
   if (options.shards > 1) {
     Tell(

@@ -9,6 +9,8 @@
 #include <map>
 #include <set>
 
+#include "problems/report/plain_names.h"
+
 namespace semblance {
 namespace {
 
@@ -89,9 +91,17 @@ std::set<std::string> NamesBetween(const StudyResults& results, const std::strin
   return names;
 }
 
+// Where a search took higher values of the metric as better, its own columns are to be read so.
+std::string Direction(const StudyResults& results) {
+  return results.higher_is_better ? ", higher is better" : "";
+}
+
 ReportTable SiblingsTable(const StudyResults& results, const std::vector<Treatment>& ranked,
                           const std::string& parent) {
   std::vector<Column> columns;
+  if (results.higher_is_better) {  // it is no error, and so none of the others
+    columns.push_back({WordsOfMetric(results.metric) + Direction(results), results.metric});
+  }
   for (const auto& [head, name] : std::to_array<std::pair<const char*, const char*>>(
            {{"RMS (mm)", "rms_mm"},
             {"mean (mm)", "mean_abs_mm"},
@@ -100,9 +110,16 @@ ReportTable SiblingsTable(const StudyResults& results, const std::vector<Treatme
             {"max (mm)", "max_mm"},
             {"signed mean (mm)", "mean_signed_mm"},
             {"within stated 90 %", "coverage_90"}})) {
-    columns.push_back({head, parent + name});
+    if (parent + name != results.metric || !results.higher_is_better) {
+      columns.push_back({head, parent + name});
+    }
   }
-  return TableOf(results, ranked, "The same error by other measures, means over subjects", columns);
+  return TableOf(results, ranked,
+                 results.higher_is_better
+                     ? "The metric and the error by other measures (lower is better), means over "
+                       "subjects"
+                     : "The same error by other measures, means over subjects",
+                 columns);
 }
 
 ReportTable RegionsTable(const StudyResults& results, const std::vector<Treatment>& ranked,
@@ -112,8 +129,10 @@ ReportTable RegionsTable(const StudyResults& results, const std::vector<Treatmen
   for (const std::string& name : NamesBetween(results, prefix, suffix)) {
     columns.push_back({name, prefix + name + suffix});
   }
-  return TableOf(results, ranked, fmt::format("{} by part of the face, means over subjects", leaf),
-                 columns);
+  return TableOf(
+      results, ranked,
+      fmt::format("{} by part of the face, means over subjects{}", leaf, Direction(results)),
+      columns);
 }
 
 constexpr const char* kTruthScores = "depth_truth.along_direction.scores.all.";
