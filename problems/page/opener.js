@@ -83,6 +83,7 @@ export class Opener {
   // One thing at a time: what was brought before is forgotten.
   async look(bring) {
     await this.forget();
+    this.volume = {};
     say('');
     try {
       this.brought = await post('look', await bring());
@@ -159,17 +160,17 @@ export class Opener {
   volumeControls() {
     const ct = kindOf(store.schema.properties.subject).objects.find((object) => object.properties.type.const === 'ct').properties;
     const row = (name, schema, target) => {
-      const {doc, unit} = documentation(schema), kind = kindOf(schema);
-      const set = (value) => { target()[name] = value; };
+      const {doc, unit: stated} = documentation(schema), kind = kindOf(schema), unit = name.endsWith('_hu') ? 'HU' : stated;
+      const set = (value) => { if (value === '') { delete target()[name]; } else { target()[name] = value; } };
       const made = kind.kind === 'bool' ? element('input', {type: 'checkbox', checked: Boolean(target()[name]), onchange: () => set(made.checked)})
           : kind.kind === 'word' ? select(kind.words.map((word) => [word, word.replaceAll('_', ' ')]), target()[name] ?? schema.default, set)
           : element('input', {type: kind.kind === 'number' ? 'number' : 'text', step: 'any', value: target()[name] ?? schema.default ?? '',
-                              onchange: () => set(kind.kind === 'number' ? Number(made.value) : made.value)});
+                              onchange: () => set(kind.kind === 'number' && made.value !== '' ? Number(made.value) : made.value)});
       made.title = doc;
       return field(`${name.replaceAll('_', ' ').replace(/ (mm|hu|cm2)$/, '')}${unit ? ` (${unit})` : ''}`, made);
     };
     const inner = () => { this.volume.import = this.volume.import || {}; return this.volume.import; };
-    return element('details', {}, element('summary', {textContent: 'How it is read'}),
+    return element('details', {open: Object.keys(this.volume).length > 0}, element('summary', {textContent: 'How it is read'}),
         ...['series', 'fill_slices'].map((name) => row(name, ct[name], () => this.volume)),
         ...Object.entries(ct.import.properties).map(([name, schema]) => row(name, schema, inner)));
   }

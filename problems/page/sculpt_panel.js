@@ -149,7 +149,8 @@ export function sculptPanel({scene, faces}) {
             check('A drag on the face pulls it', drags), field('a drag pulls', mode), way),
       group('By buttons and keys',
             button('Hold the point in the middle', holdMiddle, {title: 'H', dataset: {pull: 'hold'}}),
-            field('distance (mm)', distance), element('div', {className: 'row'}, ...Object.values(ways)),
+            field('distance (mm)', distance), element('div', {className: 'row'}, ways.out, ways.in),
+            element('div', {className: 'row'}, ways.left, ways.right, ways.up, ways.down),
             element('small', {className: 'doc', textContent: 'H holds the point in the middle of the view, O and I pull it out and push it in, W A S D move it in the plane of the view; Escape lets it go.'})),
       library, count, button('Take all edits back', () => act('clear_edits')));
 

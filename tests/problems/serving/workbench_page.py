@@ -86,7 +86,7 @@ def take_away(browser, sites):
 def place_by_clicks(browser, points):
     """Each site is chosen in the list, the head is turned to it, and the bone is clicked."""
     for site, point in points.items():
-        turn = {"_l": 50, "_r": -50}.get(site[-2:], 0)
+        turn = {"_l": 75, "_r": -75}.get(site[-2:], 0)
         browser.run("window.semblance.scene.shared.camera.look(arguments[0], 5)", turn)
         browser.click(f'[data-site="{site}"]')
         browser.click_at(*browser.run(PLACE, *point))
