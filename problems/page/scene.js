@@ -3,6 +3,7 @@
 // the camera and the measuring are those of a report's view (SemblanceStage, SemblanceCamera, SemblanceMeasure).
 import {element} from './dom.js';
 import {changeBetween} from './changes.js';
+import {nameOf} from './store.js';
 
 const LAYERS = {
   skull: {label: 'Skull', colour: '#e8dcc4'},
@@ -66,7 +67,8 @@ export class Scene {
   }
 
   putDowels(dowels, frame = this.main) {
-    frame.stage.put({id: 'dowels', ...LAYERS.dowels, dowels}, {});
+    const named = dowels.map((dowel) => ({...dowel, name: nameOf(dowel.site), fitted: 'not told'}));
+    frame.stage.put({id: 'dowels', ...LAYERS.dowels, dowels: named}, {});
     frame.stage.update();
   }
 

@@ -385,8 +385,15 @@ int ReportCommand(const Arguments& arguments) {
     throw IoError(
         fmt::format("{}: no such folder; name the folder of a run or a study", root.string()));
   }
+  const bool is_study = std::filesystem::exists(root / "plan.json");
+  if (!is_study && !std::filesystem::exists(root / "result.json")) {
+    throw IoError(
+        fmt::format("{}: neither the folder of a run (it has no result.json) nor that of a study "
+                    "(no plan.json); name one of these",
+                    root.string()));
+  }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
-  if (std::filesystem::exists(root / "plan.json")) {
+  if (is_study) {
     WriteStudyTables(folder);
   } else {
     WriteReport(folder);
