@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 #include <utility>
 
@@ -57,8 +58,41 @@ double FeaturePriorWeight(const FeatureRule& rule) {
                                                         : 0;
 }
 
-std::vector<Term> TermsOf(const FitOptions& options) {
+// Neither bends nor holds anything: where there are no points, the surface could do what it likes.
+bool AreOfPointsAlone(std::span<const Term> terms) {
+  return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
+    return WeightOf(term) == 0 || std::holds_alternative<PointTerm>(term) ||
+           std::holds_alternative<LandmarkTerm>(term);
+  });
+}
+
+// Of the thin-plate energy, length_mm 1, beside points of weight 1: that which halves waves of two
+// points' spacings. Shorter ones are not in the points, and longer ones it hardly changes, for what
+// it takes falls with the fourth power of the length.
+double WeightOfSpacing(const Vec2& lengths_mm, std::size_t points) {
+  const double spacing_mm = std::sqrt(lengths_mm.prod() / static_cast<double>(points));
+  return std::pow(spacing_mm / std::numbers::pi, 4);
+}
+
+// An adaptive plan may split patches until their points do not determine their vertices.
+bool MaySplitTooFar(const FitOptions& options, const HSplineShape& shape, std::size_t points) {
+  constexpr double kEnough = 16;  // points for a patch, which has as many vertices
+  const auto* const plan = std::get_if<AdaptivePlan>(&options.plan);
+  return plan != nullptr &&
+         static_cast<double>(points) < kEnough * shape.PatchesU(plan->finest) *
+                                           static_cast<double>(shape.PatchesV(plan->finest));
+}
+
+// The options', and those that the plan and the features need.
+std::vector<Term> TermsOf(const FitOptions& options, const HSplineSurface& rest,
+                          std::size_t points) {
   std::vector<Term> terms = options.terms;
+  const Vec2 lengths_mm = MeanLengths(rest);
+  if (AreOfPointsAlone(terms) && MaySplitTooFar(options, rest.shape(), points) &&
+      lengths_mm.allFinite() && lengths_mm.minCoeff() > 0) {
+    terms.emplace_back(SmoothnessTerm{
+        .weight = PointWeight(terms) * WeightOfSpacing(lengths_mm, points), .length_mm = 1});
+  }
   if (const double weight = FeaturePriorWeight(options.features); weight > 0) {
     terms.emplace_back(PriorTerm{.weight = weight, .held_only = true});
   }
@@ -164,7 +198,8 @@ class Fitter {
         options_(options),
         context_(context),
         result_{.surface = start},
-        driver_(rest, target, options, TermsOf(options), context, result_) {
+        driver_(rest, target, options, TermsOf(options, rest, target.points.size()), context,
+                result_) {
     std::sort(features_.begin(), features_.end());
     features_.erase(std::unique(features_.begin(), features_.end()), features_.end());
   }

@@ -10,7 +10,8 @@
 #include "tests/bench/fit_parts.h"
 
 // One BLAS thread for every case; OpenBLAS looks at the variable only when it is loaded.
-// fit_bench [head] [untuned] [peers] [heldout] [relax] [linear]: parts; none: all of them.
+// fit_bench [head] [command] [untuned] [peers] [heldout] [relax] [linear]: parts; none: all of
+// them.
 int main(int argc, char** argv) {
   if (std::getenv("OPENBLAS_NUM_THREADS") == nullptr) {
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
@@ -22,6 +23,9 @@ int main(int argc, char** argv) {
   };
   if (wanted("head")) {
     semblance::bench::RunHead();
+  }
+  if (wanted("command")) {
+    semblance::bench::RunCommand();
   }
   if (wanted("untuned")) {
     semblance::bench::RunUntuned();

@@ -10,6 +10,9 @@ namespace semblance::bench {
 // figures of peers that are not in Debian.
 void RunHead();
 
+// The whole command at 1e6 and 1e7 points of the head: processor seconds and memory.
+void RunCommand();
+
 // Ten sets that are hard in different ways (point_sets.h), with nothing chosen, against MBA and
 // FITPACK at their best on the truth.
 void RunUntuned();

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "fitting/fit.h"
+#include "fitting/nested/neighbour_noise.h"
 #include "fitting/problem/start_surface.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -112,6 +113,51 @@ TEST(NestedFit, TheOrderOfThePointsHasNoEffect) {
                          FitAuto(target).surface, 50)
                 .largest,
             1e-9);
+}
+
+// Rows of points, two by two; residuals that the two of a close pair share, or nobody.
+TEST(NestedFit, TheClosestPairsTellDetailFromNoise) {
+  NestedPoints points;
+  points.channels = 1;
+  std::vector<std::uint32_t> indices;
+  std::vector<NestedResidual> shared, alone;
+  Random random(4);
+  for (std::uint32_t k = 0; k < 4000; ++k) {
+    points.x.push_back(k / 2 + 0.1 * (k % 2));
+    points.y.push_back(0);
+    indices.push_back(k);
+    alone.push_back({{random.Normal(), 0, 0}});
+    shared.push_back(k % 2 == 0 ? NestedResidual{{random.Normal(), 0, 0}} : shared.back());
+  }
+  const PairCorrelation together = ClosestCorrelation(points, indices, shared),
+                        apart = ClosestCorrelation(points, indices, alone);
+  EXPECT_GT(together.value, 0.9);
+  EXPECT_LT(std::abs(apart.value) * std::sqrt(static_cast<double>(apart.count)), 4);
+  EXPECT_NEAR(NeighbourCorrelation(shared), 0.5, 0.1);
+}
+
+// What a fit says of each point is its distance from the surface, as given; a target is no
+// different from columns.
+TEST(NestedFit, ResidualsAreTheDistancesInTheOrderGiven) {
+  const FitTarget target = Scattered(HeadPoint, 3000, 1e-3, 3);
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    positions.push_back(p.position);
+    uv.push_back(p.uv);
+  }
+  const HSplineSurface start =
+      StartSurface({.patches_u = 8, .patches_v = 8, .max_level = 0, .closure = Closure::kPeriodicU},
+                   positions, uv);
+  const FitOptions options{.plan = AutoPlan{}, .terms = {PointTerm{}}, .solver = Solver::kFastest};
+  const FitResult fit = Fit(start, {positions, uv}, options, {});
+  double sum = 0;
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    EXPECT_NEAR(fit.residual_mm[k], (fit.surface.Point(uv[k]) - positions[k]).norm(), 1e-9);
+    sum += fit.residual_mm[k] * fit.residual_mm[k];
+  }
+  EXPECT_NEAR(fit.point_rms_mm, std::sqrt(sum / 3000), 1e-12);
+  EXPECT_EQ(fit.residual_mm, Fit(start, target, {}, options, {}).residual_mm);
 }
 
 TEST(NestedFit, APlaneIsReproduced) {

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -97,6 +99,74 @@ TEST(NestedSolve, RefinementIsThatOfTheSurface) {
   }
 }
 
+// Some of the patches, apart from each other and across the seam.
+std::vector<char> SomePatches(const GridLayout& layout) {
+  std::vector<char> some(layout.Patches(), 0);
+  for (const auto& [i, j] :
+       {std::array{0, 0}, std::array{7, 0}, std::array{3, 2}, std::array{4, 2}, std::array{7, 4}}) {
+    some[layout.Patch(i, j)] = 1;
+  }
+  return some;
+}
+
+TEST(NestedSolve, RunsHoldEachVertexOfThePatchesOnce) {
+  for (const bool periodic : {false, true}) {
+    const GridLayout layout = Layout(periodic).Finer().Finer();  // rows of several runs
+    std::vector<char> patches(layout.Patches(), 0);
+    for (const int i : {0, 1, 13, 31}) {
+      patches[layout.Patch(i, 5)] = 1;
+    }
+    std::vector<int> held(layout.Size(), 0);
+    for (const GridRun& run : RunsAround(layout, patches)) {
+      EXPECT_EQ(run.at, layout.At(run.begin, run.row));
+      for (int k = 0; k < run.size(); ++k) {
+        ++held[run.at + k];
+      }
+    }
+    EXPECT_LE(*std::max_element(held.begin(), held.end()), 1);
+    for (const int i : {0, 1, 13, 31}) {
+      for (const int vertex : layout.grid.PatchVertices(i, 5)) {
+        EXPECT_EQ(held[layout.At(vertex % layout.grid.Columns(), vertex / layout.grid.Columns())],
+                  1);
+      }
+    }
+  }
+}
+
+// The definition: the sum of the patches' products.
+TEST(NestedSolve, AStencilsProductIsTheSumOfThoseOfThePatches) {
+  for (const bool periodic : {false, true}) {
+    const GridLayout layout = Layout(periodic);
+    const std::vector<char> patches = SomePatches(layout);
+    const GridRuns runs = RunsAround(layout, patches);
+    StencilMatrix matrix(layout, runs);
+    GridValues x = RandomValues(layout, 5), product(layout, 2);
+    std::vector<double> expected(layout.grid.Columns() * layout.grid.Rows(), 0);
+    const Matrix16 root = Matrix16::Random(), form = root * root.transpose();
+    const auto at = [&](GridValues& values, int vertex) -> double& {
+      return values.Row(1, vertex / layout.grid.Columns())[vertex % layout.grid.Columns()];
+    };
+    for (int patch = 0; patch < static_cast<int>(layout.Patches()); ++patch) {
+      if (patches[patch] != 0) {
+        const int i = patch % layout.grid.patches_u, j = patch / layout.grid.patches_u;
+        matrix.AddPatch(i, j, form);
+        const std::array<int, 16> vertices = layout.grid.PatchVertices(i, j);
+        for (int k = 0; k < 16; ++k) {
+          for (int l = 0; l < 16; ++l) {
+            expected[vertices[k]] += form(k, l) * at(x, vertices[l]);
+          }
+        }
+      }
+    }
+    x.FillHalo(AllOf(layout));
+    matrix.AddProduct(x, product);
+    product.FoldHalo(runs);
+    for (int vertex = 0; vertex < std::ssize(expected); ++vertex) {
+      EXPECT_NEAR(at(product, vertex), expected[vertex], 1e-10) << vertex;
+    }
+  }
+}
+
 // All vertices of level 1 overlaid is level 1 as a plain B-spline, which a direct factor solves.
 TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
@@ -133,6 +203,60 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
       }
     }
   }
+}
+
+TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
+  const HSplineShape shape{
+      .patches_u = 8, .patches_v = 8, .max_level = 2, .closure = Closure::kPeriodicU};
+  const HSplineSurface start = PlainStart(shape);
+  const NestedPoints points = DisplacementsOf(start, Scattered(HeadPoint, 3000, 0.01, 4));
+  NestedSpace space(shape);
+  space.Overlay(0, 7, 3);
+  space.Overlay(0, 0, 3);
+  space.Link();
+  NestedSolve solve(points, MeanLengths(start));
+  std::vector<std::uint32_t> used;
+  for (std::uint32_t k = 0; k < points.size(); k += 2) {
+    used.push_back(k);
+  }
+  solve.Begin(space, used);
+  for (const double weight : {1e-3, 1e-7}) {
+    solve.SetWeight(weight);
+    solve.Solve(1e-6);
+    double sum = 0;
+    for (const NestedResidual& residual : solve.ResidualsOf(used)) {
+      sum += residual.Square();
+    }
+    const double expected = sum / static_cast<double>(used.size()) / points.channels;
+    EXPECT_NEAR(solve.MeanSquare(), expected, 1e-9 * expected);
+  }
+}
+
+TEST(NestedSolve, ASolutionComesBackAsItWas) {
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1};
+  const HSplineSurface start = PlainStart(shape);
+  const NestedPoints points = DisplacementsOf(start, Scattered(HeadPoint, 500, 0, 4));
+  NestedSpace space(shape);
+  space.Overlay(0, 2, 3);
+  space.Link();
+  NestedSolve solve(points, MeanLengths(start));
+  std::vector<std::uint32_t> all(points.size());
+  std::iota(all.begin(), all.end(), 0u);
+  solve.Begin(space, all);
+  solve.SetWeight(1e-5);
+  solve.Solve(0);
+  const NestedSolve::Packed packed = solve.Solution();
+  const double before = solve.MeanSquare();
+  solve.SetWeight(10);
+  solve.Solve(0);
+  EXPECT_GT(solve.ResidualsOf(all)[7].Square(), 0);
+  solve.SetSolution(packed);
+  EXPECT_EQ(solve.Solution(), packed);
+  double sum = 0;
+  for (const NestedResidual& residual : solve.ResidualsOf(all)) {
+    sum += residual.Square();
+  }
+  EXPECT_NEAR(sum / 500 / points.channels, before, 1e-9 * before);
 }
 
 // Without smoothness and with points enough each vertex is determined: the trace counts them.

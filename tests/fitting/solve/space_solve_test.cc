@@ -183,6 +183,21 @@ TEST(AdaptiveFit, FrankesFunctionWithinItsNoise) {
   EXPECT_NEAR(result.point_rms_mm, 1e-3 * std::sqrt(3), 2e-4);
 }
 
+// The finer a tolerance below the noise, the more vertices chase it; between the points the surface
+// stays within the noise all the same.
+TEST(AdaptiveFit, NoToleranceIsTooFineForTheSurfaceBetweenThePoints) {
+  constexpr double kNoise = 1e-3;
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 5};
+  const FitTarget target = Scattered(FrankePoint, 4000, kNoise, 5);
+  for (const double noises : {8.0, 4.0, 2.0, 1.0}) {
+    const FitResult fit =
+        Fit(PlainStart(shape), target, {}, Adaptive(noises * kNoise, shape.max_level), {});
+    const CleanError error = ErrorAgainst(FrankePoint, fit.surface, 200);
+    EXPECT_LT(error.rms, 2 * kNoise) << noises;
+    EXPECT_LT(error.largest, 15 * kNoise) << noises;
+  }
+}
+
 TEST(AdaptiveFit, VerticesAreFinerOnlyWhereTheyAreNeeded) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 5};
   const auto bump = [](const Vec2& uv) {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/config/config.h"
+#include "problems/output/manifest.h"
 #include "problems/points/point_files.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
@@ -124,6 +125,26 @@ TEST_F(PointFitCommand, PointsOfEachKindOfFileAreTheSame) {
   }
   EXPECT_EQ(ReadPointFile(folder_ / "p.ply").points.uv, csv.points.uv);
   EXPECT_THROW(ReadPointFile(folder_ / "p.doc"), IoError);
+}
+
+// Larger than what is read at once; with a blank somewhere it goes by the general reader.
+TEST_F(PointFitCommand, ALargeTableIsReadAsASmallOne) {
+  std::string text = Csv(Scattered(FrankePoint, 60000, 1e-3, 1), /*with_uv=*/true);
+  ASSERT_GT(text.size(), 4u << 20);
+  const auto expect_same = [&](const std::string& name) {
+    Write(name, text);
+    const PointFile file = ReadPointFile(folder_ / name);
+    const PointTable table = ParsePointTable(text, name);
+    EXPECT_EQ(file.sha256, Sha256OfText(text));
+    EXPECT_EQ(file.points.positions.size(), 60000u);
+    EXPECT_EQ(file.points.positions, table.positions);
+    EXPECT_EQ(file.points.uv, table.uv);
+  };
+  expect_same("plain.csv");
+  text.pop_back();  // the last line need not end
+  expect_same("open.csv");
+  text.insert(text.rfind(','), " ");
+  expect_same("blank.csv");
 }
 
 TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {

@@ -24,6 +24,18 @@ TEST(PointTable, ColumnsComeInAnyOrder) {
   EXPECT_TRUE(bare.uv.empty() && bare.weights.empty());
 }
 
+TEST(PointTable, PlainAndOtherLinesGiveTheSame) {
+  const PointTable plain = ParsePointTable("z,u,x,v,y\n3,.25,1e0,0.5,-2\n6,0,4,1,5\n", "p.csv"),
+                   other =
+                       ParsePointTable("z,u,x,v,y\r\n3, .25,+1,\"0.5\",-2\r\n6,0,4,1,5", "p.csv"),
+                   ended = ParsePointTable("z,u,x,v,y\r\n3,.25,1,0.5,-2\r\n6,0,4,1,5\r\n", "p.csv");
+  EXPECT_EQ(plain.positions[0], Vec3(1, -2, 3));
+  for (const PointTable& table : {other, ended}) {
+    EXPECT_EQ(table.positions, plain.positions);
+    EXPECT_EQ(table.uv, plain.uv);
+  }
+}
+
 TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
   const auto message = [](std::string_view text) -> std::string {
     try {
