@@ -146,7 +146,7 @@ export function sculptPanel({scene, faces}) {
       group('Pull',
             field('level', element('span', {className: 'row'}, level, levelWords), 'a coarse level moves much of the face, a fine one little'),
             field('how far around', reach), check('Both sides alike', mirror),
-            check('A drag on the face pulls it', drags), field('a drag pulls', mode), way),
+            check('A drag on the face pulls it', drags), field('a drag pulls', mode, 'a normal that points at you: up pulls out'), way),
       group('By buttons and keys',
             button('Hold the point in the middle', holdMiddle, {title: 'H', dataset: {pull: 'hold'}}),
             field('distance (mm)', distance), element('div', {className: 'row'}, ways.out, ways.in),
@@ -171,7 +171,11 @@ export function sculptPanel({scene, faces}) {
       if (!Object.values(ways).includes(control)) { control.disabled = !ready; }
     }
     count.textContent = now.edited_vertices ? `${now.edited_vertices} control vertices are edited.` : 'Nothing is edited.';
-    if (faces.finest) { level.max = faces.finest; }
+    if (faces.finest) {  // a face may have fewer levels than the one that is chosen
+      level.max = faces.finest;
+      options.level = Number(level.value);
+      levelWords.textContent = level.value;
+    }
   };
   return {
     element: root,

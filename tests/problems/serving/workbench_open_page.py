@@ -137,7 +137,7 @@ def hostile_names(browser, pictures):
     drop(browser, {"long.yaml": f"subject: {LONG}\nlandmarks:\n  - {{site: g, point: [0, -80, 0]}}\n"})
     choose_way(browser, "landmarks")
     await_subject(browser, LONG)
-    for width, height in ((1100, 700), (400, 800)):
+    for width, height in ((1000, 640), (400, 800)):
         browser.resize(width, height)
         for tab in ("skull", "landmarks", "face", "sculpt", "compare", "measure"):
             browser.click(f"[data-tab={tab}]")
@@ -145,7 +145,7 @@ def hostile_names(browser, pictures):
             wide = browser.run("return document.documentElement.scrollWidth")
             assert wide <= width, f"{tab}: {wide} pixels wide"
         take_picture(browser, pictures, f"hostile-{width}")
-    browser.resize(1100, 700)
+    browser.resize(1000, 640)
     assert browser.run("return window.hurt === undefined && document.scripts.length === arguments[0]"
                        " && !document.querySelector('[onerror], [onload], [onclick]')", scripts)
 

@@ -138,12 +138,12 @@ def pull_the_cheek(browser):
     before, turn = browser.run(POSITIONS), browser.run(TURN)
     moved = "const p = window.semblance.scene.faceGeometry().attributes.position.array;" \
             "return p.some((x, k) => Math.abs(x - arguments[0][k]) > 2)"
-    browser.press_and_drag(start, [start[0] - 60, start[1]])
+    browser.press_and_drag(start, [start[0] - 50, start[1] - 40])
     browser.wait(moved, before)
     browser.press("\ue00c")  # Escape
     browser.release()
     assert browser.run(POSITIONS) == before and state(browser)["edited_vertices"] == 0
-    browser.press_and_drag(start, [start[0] - 40, start[1]])
+    browser.press_and_drag(start, [start[0] - 40, start[1] - 30])
     browser.wait(moved, before)
     browser.settle()
     shown, former = browser.run(POSITIONS), undo_words(browser)
@@ -287,7 +287,7 @@ def run_in_browser(folders, pictures, work_in):
     subprocess.run(["rm", "-rf", *folders], check=True)
     try:
         # A small window is drawn sooner: all is drawn without a graphics card.
-        browser = webdriver.Browser(*((1440, 900) if pictures else (1100, 700)))
+        browser = webdriver.Browser(*((1440, 900) if pictures else (1000, 640)))
     except webdriver.CannotStart as error:
         print(f"skipped: Chromium does not start here: {error}")
         return SKIPPED
