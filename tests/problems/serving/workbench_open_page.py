@@ -172,7 +172,7 @@ def compare_variants(browser, config, pictures):
     means = browser.run("const mean = ({stage}) => { const v = stage.layers.get('face').object.userData.values;"
                         "return v ? v.reduce((sum, x) => sum + x, 0) / v.length : 0; };"
                         "return window.semblance.scene.others.map(mean)")
-    assert means[0] < -1 and means[1] == 0 and means[2] > 1, means
+    assert means[1] == 0 and means[0] + 2 < means[2], means  # so coarse a face is not even in it
     assert browser.run("const [first, ...rest] = window.semblance.scene.others;"
                        "return rest.every(({stage}) => stage.shared.camera === first.stage.shared.camera)")
     take_picture(browser, pictures, "compare-full")
