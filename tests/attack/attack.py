@@ -145,7 +145,7 @@ def not_numbers(path):
 
 
 def plain_lines(text):
-    asides = ("note:", "warning:", "not kept in this kind of file")
+    asides = ("note:", "warning:", "not kept in this kind of file", "libgomp: ")  # the last of a variable of the user's
     return [line for line in text.splitlines() if line.strip() and not line.startswith(asides)]
 
 
