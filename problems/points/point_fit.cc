@@ -169,6 +169,14 @@ std::string_view WhatIsMissing(const Term& term) {
                                                             : "";
 }
 
+// Whether there is a surface of so many patches; empty if there is.
+std::string ShapeFault(const PointFitOptions& options) try {
+  CheckShape(ShapeOf(options));
+  return "";
+} catch (const InputError& error) {
+  return error.what();
+}
+
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
@@ -177,6 +185,9 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
     if (std::string fault = ClosureFault(*source, options.closure); !fault.empty()) {
       faults.push_back({"closure", std::move(fault)});
     }
+  }
+  if (const std::string fault = ShapeFault(options); !fault.empty()) {
+    faults.push_back({"patches_u", fault});
   }
   for (std::size_t k = 0; k < options.fit.terms.size(); ++k) {
     const Term& term = options.fit.terms[k];

@@ -213,6 +213,7 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
               HasSubstr("the auto plan weighs 'points' without a loss"));
   EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
   EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
+  EXPECT_THAT(read("patches_u: 1\nclosure: periodic_u\n"), HasSubstr("patches_u: H-spline: 1 x 8"));
   for (const char* term : {"landmarks", "prior_shape", "spring", "non_penetration"}) {
     EXPECT_THAT(read(fmt::format("fit: {{plan: until, terms: [points, {}]}}\n", term)),
                 HasSubstr("and points of a file have none"));
