@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/study/results_sqlite.h"
+#include "problems/study_report/results_sqlite.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
