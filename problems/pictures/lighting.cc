@@ -31,36 +31,36 @@ struct SoftBox {
 };
 
 // Lights on a disc of the given radius (of the unit distance) around the direction, on a spiral.
-void AddSoftBox(const SoftBox& box, std::vector<Light>& lights) {
+void AddSoftBox(const SoftBox& box, const Mat3& view, std::vector<Light>& lights) {
   const Vec3 towards = box.towards.normalized();
   const Vec3 u = towards.unitOrthogonal(), v = towards.cross(u);
   for (int i = 0; i < box.lights; ++i) {
     const double r = box.radius * std::sqrt((i + 0.5) / box.lights);
     const double phi = i * std::numbers::pi * (3 - std::sqrt(5.0));
     const Vec3 direction = towards + r * (std::cos(phi) * u + std::sin(phi) * v);
-    lights.push_back({.to_light = direction.normalized(),
+    lights.push_back({.to_light = view.transpose() * direction.normalized(),
                       .irradiance = static_cast<float>(box.strength / box.lights) * box.colour,
                       .is_key = box.is_key});
   }
 }
 
-// A sky all round, in the view; top and bottom: radiance, relative.
-void AddDome(int count, double strength, double top, double bottom, std::vector<Light>& lights) {
+// A sky all round; top and bottom of the view: radiance, relative.
+void AddDome(int count, double strength, double top, double bottom, const Mat3& view,
+             std::vector<Light>& lights) {
   for (int i = 0; i < count; ++i) {
-    const Vec3 d = SphereDirection(i, count);
-    const Vec3 in_view(d.x(), d.z(), d.y());
-    const double radiance = bottom + (top - bottom) * 0.5 * (1 + in_view.y());
-    lights.push_back({.to_light = in_view,
+    const Vec3 direction = SphereDirection(i, count);
+    const double radiance = bottom + (top - bottom) * 0.5 * (1 + view.row(1).dot(direction));
+    lights.push_back({.to_light = direction,
                       .irradiance = Rgb::Constant(static_cast<float>(strength * radiance / count)),
                       .is_key = false});
   }
 }
 
-std::vector<Light> LightsInView(Lighting lighting) {
+std::vector<Light> LightsOf(Lighting lighting, const Mat3& view) {
   std::vector<Light> lights;
   if (lighting == Lighting::kEven) {
-    AddSoftBox({.towards = {0, 0, 1}, .strength = 0.55}, lights);
-    AddDome(24, 2.0, 1, 1, lights);
+    AddSoftBox({.towards = {0, 0, 1}, .strength = 0.55}, view, lights);
+    AddDome(24, 2.0, 1, 1, view, lights);
     return lights;
   }
   AddSoftBox({.towards = {-0.62, 0.62, 0.62},
@@ -69,28 +69,22 @@ std::vector<Light> LightsInView(Lighting lighting) {
               .strength = 1.0,
               .colour = {1.0F, 0.965F, 0.91F},
               .is_key = true},
-             lights);
+             view, lights);
   AddSoftBox({.towards = {0.8, 0.05, 0.6},
               .radius = 0.2,
               .lights = 3,
               .strength = 0.22,
               .colour = {0.90F, 0.95F, 1.0F}},
-             lights);
+             view, lights);
   AddSoftBox({.towards = {0.75, 0.45, -0.55},
               .radius = 0.1,
               .lights = 2,
               .strength = 0.55,
               .colour = {0.95F, 0.97F, 1.0F}},
-             lights);
-  AddDome(26, 1.3, 1.0, 0.4, lights);
+             view, lights);
+  AddDome(26, 1.3, 1.0, 0.4, view, lights);
   return lights;
 }
-
-// What is nearest to a light, seen from it.
-struct ShadowMap {
-  Projection projection;
-  std::vector<float> depth;  // kMapSize^2, row by row; infinite where nothing is
-};
 
 Mat3 ViewTowards(const Vec3& to_viewer) {
   Mat3 view;
@@ -156,7 +150,7 @@ Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
 }
 
 void LightVertex(const Material& material, const std::vector<Light>& lights,
-                 const std::vector<ShadowMap>& maps, SceneVertex& vertex) {
+                 const std::vector<const ShadowMap*>& maps, SceneVertex& vertex) {
   const Rgb scatter = material.scatter_mm.cast<float>().array();
   const auto wrap = static_cast<float>(material.wrap);
   float key_all = 0, key_seen = 0;
@@ -167,8 +161,8 @@ void LightVertex(const Material& material, const std::vector<Light>& lights,
       continue;
     }
     // From a little above the surface, so that it does not shade itself.
-    const Vec3 above = vertex.position + 1.5 / maps[i].projection.samples_per_mm * vertex.normal;
-    const Rgb through = LightThrough(maps[i], above, scatter);
+    const Vec3 above = vertex.position + 1.5 / maps[i]->projection.samples_per_mm * vertex.normal;
+    const Rgb through = LightThrough(*maps[i], above, scatter);
     vertex.light += wrapped * through * lights[i].irradiance;
     key_all += lights[i].is_key ? 1.0F : 0.0F;
     key_seen += lights[i].is_key ? through[1] : 0.0F;
@@ -176,42 +170,56 @@ void LightVertex(const Material& material, const std::vector<Light>& lights,
   vertex.key = key_all > 0 ? key_seen / key_all : 0;
 }
 
-}  // namespace
-
-std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world) {
-  std::vector<Light> lights = LightsInView(lighting);
-  Rgb facing = Rgb::Zero();
-  for (const Light& light : lights) {
-    facing += static_cast<float>(std::max(0.0, light.to_light.z())) * light.irradiance;
-  }
-  const float exposure = lighting == Lighting::kEven ? 1.0F : 0.86F;
-  for (Light& light : lights) {
-    light.irradiance *= exposure / facing;
-    light.to_light = view_from_world.transpose() * light.to_light;
-  }
-  return lights;
-}
-
-void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
-                   FlatScene& flat) {
-  std::vector<bool> casts;
-  for (const SceneObject& object : scene.objects) {
-    casts.push_back(object.opacity >= 1);
-  }
+// Of the vertices that cast shadows; a point where there are none.
+Box3 BoxOfCasters(const FlatScene& flat, const std::vector<bool>& casts) {
   Box3 box;
   for (std::size_t v = 0; v < flat.vertices.size(); ++v) {
     if (casts[flat.object_of_vertex[v]]) {
       box.extend(flat.vertices[v].position);
     }
   }
-  if (box.isEmpty()) {
-    box = Box3(Vec3::Zero(), Vec3::Zero());  // nothing casts shadows
+  return box.isEmpty() ? Box3(Vec3::Zero(), Vec3::Zero()) : box;
+}
+
+}  // namespace
+
+std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world) {
+  std::vector<Light> lights = LightsOf(lighting, view_from_world);
+  Rgb facing = Rgb::Zero();
+  for (const Light& light : lights) {
+    const double cosine = view_from_world.row(2).dot(light.to_light);
+    facing += static_cast<float>(std::max(0.0, cosine)) * light.irradiance;
   }
-  std::vector<ShadowMap> maps(lights.size());
-  ParallelFor(lights.size(), threads, 1,
-              [&](std::size_t i) { maps[i] = MapOf(flat, casts, box, lights[i].to_light); });
+  const float exposure = lighting == Lighting::kEven ? 1.0F : 0.86F;
+  for (Light& light : lights) {
+    light.irradiance *= exposure / facing;
+  }
+  return lights;
+}
+
+void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
+                   ShadowMaps& maps, FlatScene& flat) {
+  std::vector<bool> casts;
+  for (const SceneObject& object : scene.objects) {
+    casts.push_back(object.opacity >= 1);
+  }
+  std::vector<const ShadowMap*> map_of_light;
+  std::vector<std::pair<Vec3, ShadowMap*>> missing;
+  for (const Light& light : lights) {
+    const Vec3& d = light.to_light;
+    const auto [map, is_new] = maps.try_emplace({d.x(), d.y(), d.z()});
+    map_of_light.push_back(&map->second);
+    if (is_new) {
+      missing.emplace_back(d, &map->second);
+    }
+  }
+  const Box3 box = BoxOfCasters(flat, casts);
+  ParallelFor(missing.size(), threads, 1, [&](std::size_t i) {
+    *missing[i].second = MapOf(flat, casts, box, missing[i].first);
+  });
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
-    LightVertex(scene.objects[flat.object_of_vertex[v]].material, lights, maps, flat.vertices[v]);
+    LightVertex(scene.objects[flat.object_of_vertex[v]].material, lights, map_of_light,
+                flat.vertices[v]);
   });
 }
 

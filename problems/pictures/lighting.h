@@ -3,8 +3,11 @@
 // way, summed up once per picture.
 #pragma once
 
+#include <array>
+#include <map>
 #include <vector>
 
+#include "problems/pictures/raster.h"
 #include "problems/pictures/render.h"
 
 namespace semblance {
@@ -17,7 +20,8 @@ struct Light {
   bool is_key = false;           // its highlight is drawn
 };
 
-// Lights placed relative to the camera. Under kEven a surface that faces the viewer and lies in no
+// Lights placed relative to the camera, but for a sky all round, whose directions are those of the
+// world in every picture. Under kEven a surface that faces the viewer and lies in no
 // shadow receives exactly 1, under kStudio a little less, which leaves room for highlights.
 std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world);
 
@@ -41,8 +45,18 @@ struct FlatScene {
   std::vector<int> object_of_vertex;
 };
 
-// Sets light and key of every vertex. Only opaque objects cast shadows.
+// What is nearest to a light, seen from it.
+struct ShadowMap {
+  Projection projection;
+  std::vector<float> depth;  // row by row; infinite where nothing is
+};
+
+// Those that several pictures of one scene have in common, by the direction to the light.
+using ShadowMaps = std::map<std::array<double, 3>, ShadowMap>;
+
+// Sets light and key of every vertex. Only opaque objects cast shadows. maps: of the same scene;
+// those that are missing are added.
 void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
-                   FlatScene& flat);
+                   ShadowMaps& maps, FlatScene& flat);
 
 }  // namespace semblance

@@ -113,13 +113,12 @@ Image RenderViews(const Scene& scene, const Box3& region, std::span<const View> 
   for (const View view : views) {
     height_mm = std::max(height_mm, CameraFor(view, region, aspect).height_mm);
   }
-  std::vector<Image> pictures;
+  std::vector<Camera> cameras;
   for (const View view : views) {
-    Camera camera = CameraFor(view, region, aspect);
+    Camera& camera = cameras.emplace_back(CameraFor(view, region, aspect));
     camera.height_mm = height_mm;
-    pictures.push_back(Render(scene, camera, options, threads));
   }
-  return ContactSheet(pictures, sheet);
+  return ContactSheet(RenderAll(scene, cameras, options, threads), sheet);
 }
 
 }  // namespace semblance

@@ -116,7 +116,8 @@ struct Layer {
 // All that the bands share, set up once a picture.
 class Painter {
  public:
-  Painter(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads)
+  Painter(const Scene& scene, const Camera& camera, const RenderOptions& options,
+          ShadowMaps& shadows, int threads)
       : scene_(scene),
         options_(options),
         to_viewer_(camera.view_from_world.row(2)),
@@ -128,7 +129,7 @@ class Painter {
                    .samples_per_mm = s * options.height / camera.height_mm,
                    .width = static_cast<double>(s) * options.width,
                    .height = static_cast<double>(s) * options.height};
-    LightVertices(scene, lights_, threads, flat_);
+    LightVertices(scene, lights_, threads, shadows, flat_);
     SetHighlight();
     points_.resize(flat_.vertices.size());
     ParallelFor(points_.size(), threads, 4096,
@@ -339,13 +340,22 @@ Camera CameraFor(View view, const Box3& region, double aspect) {
   return camera;
 }
 
+std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
+                             const RenderOptions& options, int threads) {
+  std::vector<Image> images;
+  ShadowMaps shadows;
+  for (const Camera& camera : cameras) {
+    CheckOptions(camera, options);
+    const Painter painter(scene, camera, options, shadows, threads);
+    Image& image = images.emplace_back(MakeImage(options.width, options.height, Colour{}));
+    ParallelFor(painter.Bands(), threads, 1,
+                [&](std::size_t band) { painter.PaintBand(band, image); });
+  }
+  return images;
+}
+
 Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads) {
-  CheckOptions(camera, options);
-  const Painter painter(scene, camera, options, threads);
-  Image image = MakeImage(options.width, options.height, Colour{});
-  ParallelFor(painter.Bands(), threads, 1,
-              [&](std::size_t band) { painter.PaintBand(band, image); });
-  return image;
+  return std::move(RenderAll(scene, {&camera, 1}, options, threads).front());
 }
 
 }  // namespace semblance

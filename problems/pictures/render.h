@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -93,5 +94,8 @@ void Fields(Visitor& visit, RenderOptions& o) {
 // one per vertex. An empty scene shows the background. threads >= 1; the picture does not depend on
 // it.
 Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads);
+// The same scene from several sides: the shadows of the sky are found once for all of them.
+std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
+                             const RenderOptions& options, int threads);
 
 }  // namespace semblance

@@ -77,6 +77,21 @@ TEST(Render, SameBytesForAnyNumberOfThreadsAndEachTime) {
   }
 }
 
+TEST(Render, SeveralSidesTogetherAreThoseOfEachAlone) {
+  std::vector<Camera> cameras;
+  for (const View view : {View::kFront, View::kThreeQuarter, View::kSide}) {
+    cameras.push_back(CameraFor(view, Box3(Vec3(-42, -42, -42), Vec3(42, 42, 42)), 1));
+  }
+  for (const Lighting lighting : {Lighting::kStudio, Lighting::kEven}) {
+    const RenderOptions options{.width = 90, .height = 80, .lighting = lighting};
+    const std::vector<Image> all = RenderAll(Crowd(), cameras, options, 2);
+    ASSERT_EQ(all.size(), cameras.size());
+    for (std::size_t n = 0; n < cameras.size(); ++n) {
+      EXPECT_EQ(all[n].rgb, Render(Crowd(), cameras[n], options, 1).rgb);
+    }
+  }
+}
+
 TEST(Render, SphereIsADiscOfTheRightAreaInTheRightPlace) {
   // Black on white: what is missing from the white is what the disc covers.
   SceneObject sphere{.mesh = MakeSphere(Vec3(5, 0, -3), 20, 60), .material = MatteMaterial()};
