@@ -8,11 +8,15 @@
 
 namespace semblance {
 
+// It is always inlined: no call depends on how the vector would be returned.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
 SEMBLANCE_INLINE Wider EightAt(const double* from) {
   Wider n;
   std::memcpy(&n, from, sizeof n);
   return n;
 }
+#pragma GCC diagnostic pop
 SEMBLANCE_INLINE void PutEight(const Wider& n, double* to) { std::memcpy(to, &n, sizeof n); }
 
 // In one order, so that every processor gives the same bits.

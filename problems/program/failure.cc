@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <new>
 #include <nlohmann/json.hpp>
@@ -98,6 +100,21 @@ std::string Shortened(std::string_view message) {
   }
   return lines > kMostLines ? fmt::format("{}\n... and {} lines more", text, lines - kMostLines)
                             : text;
+}
+
+void EndInWords() noexcept {
+  std::string words;  // none: not even memory for them
+  try {
+    if (const std::exception_ptr thrown = std::current_exception()) {
+      words = FailureOf(thrown).words;
+    } else {
+      words = "a fault of the program itself; please report what you did";
+    }
+  } catch (...) {
+    words.clear();
+  }
+  std::fprintf(stderr, "semblance: %s\n", words.empty() ? kNoMemory : words.c_str());
+  std::_Exit(kNotUsable);
 }
 
 }  // namespace semblance

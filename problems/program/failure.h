@@ -21,4 +21,8 @@ Failure FailureOf(const std::exception_ptr& thrown);
 // control characters, which a hostile name can hold, as '?'.
 std::string Shortened(std::string_view message);
 
+// For std::set_terminate, before the work begins: what no catch can see, such as memory that runs
+// out in a thread of a library, ends the program with its words and kNotUsable too.
+[[noreturn]] void EndInWords() noexcept;
+
 }  // namespace semblance

@@ -65,6 +65,7 @@ int ParseAndRun(int argc, char** argv) {
 }
 
 int Main(int argc, char** argv) {
+  std::set_terminate(&EndInWords);
   try {
     return Flushed(ParseAndRun(argc, argv));
   } catch (...) {

@@ -5,10 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <exception>
 #include <filesystem>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <system_error>
+#include <thread>
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/out_of_memory.h"
@@ -23,6 +26,19 @@ using ::testing::Not;
 template <class E>
 Failure Of(const E& error) {
   return FailureOf(std::make_exception_ptr(error));
+}
+
+TEST(Failure, WhatEscapesFromAThreadEndsInWordsToo) {
+  const auto end_with = [](auto error) {
+    std::set_terminate(&EndInWords);
+    std::thread([&] { throw error; }).join();
+  };
+  EXPECT_EXIT(end_with(std::bad_alloc()), ::testing::ExitedWithCode(1),
+              "semblance: not enough memory; lower");
+  EXPECT_EXIT(end_with(InputError("a.ply: no faces")), ::testing::ExitedWithCode(1),
+              "semblance: a.ply: no faces");
+  EXPECT_EXIT((std::set_terminate(&EndInWords), std::terminate()), ::testing::ExitedWithCode(1),
+              "a fault of the program itself");
 }
 
 TEST(Failure, WhatTheUserCanMendIsTwoAndWorkThatFailedIsOne) {
