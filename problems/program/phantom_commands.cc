@@ -45,12 +45,14 @@ void WriteSlices(const CtVolume& volume, std::uint64_t random_seed, OutputFolder
 
 // Nothing where no file is asked for.
 std::optional<VolumeFormat> FormatOfVolume(const std::string& name) {
-  const auto format = VolumeFormatOf(name);
-  if (!name.empty() && (!format || name.find('/') != name.npos || name.starts_with('.'))) {
+  constexpr std::array kWhole = {".nii", ".nii.gz", ".nrrd", ".mha"};  // voxels and all
+  const bool is_whole =
+      std::ranges::any_of(kWhole, [&](const char* e) { return name.ends_with(e); });
+  if (!name.empty() && (!is_whole || name.find('/') != name.npos || name.starts_with('.'))) {
     throw InputError(fmt::format(
         "--volume {}: not a plain name that ends in .nii, .nii.gz, .nrrd or .mha", name));
   }
-  return format;
+  return VolumeFormatOf(name);
 }
 
 // Whole or not at all: written under another name, then renamed.
@@ -64,8 +66,9 @@ void WriteOneFile(const CtVolume& volume, const std::string& name, VolumeFormat 
 
 int WritePhantom(const PhantomArguments& a) {
   const std::optional<VolumeFormat> format = FormatOfVolume(a.volume);
-  OutputFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
   const Phantom phantom = MakePhantom(a.phantom);
+  IsLost(phantom.centre, phantom, a.ct.defect);  // an unknown site is told before a folder is made
+  OutputFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
   const CtVolume volume = VoxelisePhantom(phantom, a.ct);
   WriteSlices(volume, a.phantom.random_seed, folder);
   LandmarkFile landmarks = PhantomLandmarks(phantom, a.phantom.random_seed);

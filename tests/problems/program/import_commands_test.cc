@@ -60,6 +60,18 @@ TEST_F(ImportCommands, WrongInputIsOneLine) {
   ExpectRefused("import-ct head/ct", "1 missing slices");
 }
 
+TEST_F(ImportCommands, AHeadThatCannotBeMadeLeavesNoFolder) {
+  for (const char* wrong : {"--volume head.mhd", "--volume head.NHDR", "--volume head.txt",
+                            "--volume a/head.mha", "--volume .mha", "--lost nose"}) {
+    const testing::Outcome outcome =
+        CallProgram(folder_, fmt::format("phantom --out one {}", wrong));
+    EXPECT_EQ(outcome.code, 2) << wrong;
+    EXPECT_THAT(outcome.err,
+                ::testing::AnyOf(HasSubstr("not a plain name"), HasSubstr("no site 'nose'")));
+    EXPECT_FALSE(fs::exists(folder_ / "one")) << wrong;
+  }
+}
+
 TEST_F(ImportCommands, ASubjectMayBeAFolderOfDicom) {
   WriteFileAtomically(
       folder_ / "run.yaml",
