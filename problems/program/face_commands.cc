@@ -287,17 +287,18 @@ void DeclareFeature(CLI::App& feature, CommandLine& line) {
   Declare(kFeatureCommands, feature, line);
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"edit", "move vertices of an H-spline face as a script says", &DeclareEdit},
-    ProgramCommand{"export", "write a face, a mesh or a run for other programs", &DeclareExport},
-    ProgramCommand{"prior", "put the modes of a face model onto the H-spline of its mean",
-                   &DeclarePrior},
-    ProgramCommand{"feature", "carry detail from one face to another (thesis 4.3)",
-                   &DeclareFeature},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> FaceCommands() { return kCommands; }
+std::span<const ProgramCommand> FaceCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"edit", "move vertices of an H-spline face as a script says", &DeclareEdit},
+      ProgramCommand{"export", "write a face, a mesh or a run for other programs", &DeclareExport},
+      ProgramCommand{"prior", "put the modes of a face model onto the H-spline of its mean",
+                     &DeclarePrior},
+      ProgramCommand{"feature", "carry detail from one face to another (thesis 4.3)",
+                     &DeclareFeature},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

@@ -201,13 +201,14 @@ void DeclareLandmarks(CLI::App& landmarks, CommandLine& line) {
   Declare(kLandmarkCommands, landmarks, line);
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"landmarks", "landmarks on a skull, from and for other programs",
-                   &DeclareLandmarks},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> LandmarkCommands() { return kCommands; }
+std::span<const ProgramCommand> LandmarkCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"landmarks", "landmarks on a skull, from and for other programs",
+                     &DeclareLandmarks},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

@@ -114,13 +114,14 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
                    "replace files of the same name in a folder that is not empty");
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"phantom", "write a made-up head as a CT in DICOM, with its landmarks",
-                   &DeclarePhantom},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> PhantomCommands() { return kCommands; }
+std::span<const ProgramCommand> PhantomCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"phantom", "write a made-up head as a CT in DICOM, with its landmarks",
+                     &DeclarePhantom},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

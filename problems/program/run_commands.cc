@@ -535,29 +535,32 @@ void DeclareReport(CLI::App& command, CommandLine& line) {
   command.add_option("DIR", a.files, "folder of a run or a study")->required()->expected(1);
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"run", "reconstruct a face as a configuration says", &DeclareRun},
-    ProgramCommand{"depth",
-                   "interpolate depth alone: against the true skin, and with dowels left out",
-                   &DeclareDepth},
-    ProgramCommand{"fit", "fit an H-spline surface to any scattered points", &DeclareFit},
-    ProgramCommand{"import-ct",
-                   "make meshes of skull and skin from a CT volume, or of the skin from an MR, in "
-                   "mm",
-                   &DeclareImportCt},
-    ProgramCommand{
-        "check",
-        "check configurations of experiments, studies and fits, and all inputs that they "
-        "name; run nothing",
-        &DeclareCheck},
-    ProgramCommand{"options", "list every option: default, unit, range, meaning", &DeclareOptions},
-    ProgramCommand{"evaluate", "measure how far a face is from the true one, as JSON",
-                   &DeclareEvaluate},
-    ProgramCommand{"report", "build the report of a run or a study anew", &DeclareReport},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> RunCommands() { return kCommands; }
+std::span<const ProgramCommand> RunCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"run", "reconstruct a face as a configuration says", &DeclareRun},
+      ProgramCommand{"depth",
+                     "interpolate depth alone: against the true skin, and with dowels left out",
+                     &DeclareDepth},
+      ProgramCommand{"fit", "fit an H-spline surface to any scattered points", &DeclareFit},
+      ProgramCommand{
+          "import-ct",
+          "make meshes of skull and skin from a CT volume, or of the skin from an MR, in "
+          "mm",
+          &DeclareImportCt},
+      ProgramCommand{
+          "check",
+          "check configurations of experiments, studies and fits, and all inputs that they "
+          "name; run nothing",
+          &DeclareCheck},
+      ProgramCommand{"options", "list every option: default, unit, range, meaning",
+                     &DeclareOptions},
+      ProgramCommand{"evaluate", "measure how far a face is from the true one, as JSON",
+                     &DeclareEvaluate},
+      ProgramCommand{"report", "build the report of a run or a study anew", &DeclareReport},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

@@ -47,14 +47,15 @@ void DeclareManual(CLI::App& manual, CommandLine& line) {
   Bind(manual, line, &Manual)->command = &manual;
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"completion", "print what makes a shell complete the commands and options",
-                   &DeclareCompletion},
-    ProgramCommand{"manual", "print the manual page, for man -l -", &DeclareManual},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> ShellCommands() { return kCommands; }
+std::span<const ProgramCommand> ShellCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"completion", "print what makes a shell complete the commands and options",
+                     &DeclareCompletion},
+      ProgramCommand{"manual", "print the manual page, for man -l -", &DeclareManual},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

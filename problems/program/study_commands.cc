@@ -317,19 +317,20 @@ void DeclareCompare(CLI::App& compare, CommandLine& line) {
                    "replace files of the same name in a folder that is not empty");
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"study", "run every trial of a study that is not done yet", &DeclareStudy},
-    ProgramCommand{"submit", "run a study on a cluster: an array of shards, then the merge",
-                   &DeclareSubmit},
-    ProgramCommand{"merge", "make the tables and the report of a study from its shards",
-                   &DeclareMerge},
-    ProgramCommand{"compare", "compare the treatments of studies over the subjects they share",
-                   &DeclareCompare},
-    ProgramCommand{"status", "say how far a study has come", &DeclareStatus},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> StudyCommands() { return kCommands; }
+std::span<const ProgramCommand> StudyCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"study", "run every trial of a study that is not done yet", &DeclareStudy},
+      ProgramCommand{"submit", "run a study on a cluster: an array of shards, then the merge",
+                     &DeclareSubmit},
+      ProgramCommand{"merge", "make the tables and the report of a study from its shards",
+                     &DeclareMerge},
+      ProgramCommand{"compare", "compare the treatments of studies over the subjects they share",
+                     &DeclareCompare},
+      ProgramCommand{"status", "say how far a study has come", &DeclareStatus},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

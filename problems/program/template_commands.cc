@@ -233,17 +233,18 @@ void DeclareRecentre(CLI::App& command, CommandLine& line) {
       ->check(CLI::Range(1, 1024));
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"template", "make a generic H-spline face of a head mesh with landmarks",
-                   &DeclareTemplate},
-    ProgramCommand{
-        "recentre",
-        "set the sites of a generic face right, and its mean, by heads whose skin is known",
-        &DeclareRecentre},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> TemplateCommands() { return kCommands; }
+std::span<const ProgramCommand> TemplateCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"template", "make a generic H-spline face of a head mesh with landmarks",
+                     &DeclareTemplate},
+      ProgramCommand{
+          "recentre",
+          "set the sites of a generic face right, and its mean, by heads whose skin is known",
+          &DeclareRecentre},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

@@ -114,14 +114,15 @@ void DeclareWorkbench(CLI::App& workbench, CommandLine& line) {
   workbench.add_flag("--open", a.open, "open the page in the desktop's browser (xdg-open)");
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"workbench",
-                   "place landmarks and make a face in a browser, on this machine alone",
-                   &DeclareWorkbench},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> WorkbenchCommands() { return kCommands; }
+std::span<const ProgramCommand> WorkbenchCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"workbench",
+                     "place landmarks and make a face in a browser, on this machine alone",
+                     &DeclareWorkbench},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance
