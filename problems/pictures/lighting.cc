@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "problems/pictures/raster.h"
 #include "surfaces/base/parallel.h"
@@ -10,7 +11,8 @@
 namespace semblance {
 namespace {
 
-constexpr int kMapSize = 512;  // texels along a side of a depth map
+constexpr int kMapSize = 512;   // texels along a side of a depth map
+constexpr int kSkyLights = 26;  // in one set of directions, so that pictures share its depth maps
 constexpr SampleWindow kWholeMap = {0, kMapSize, 0, kMapSize};
 
 // Directions spread evenly over the sphere (Fibonacci lattice); z is up.
@@ -60,7 +62,7 @@ std::vector<Light> LightsOf(Lighting lighting, const Mat3& view) {
   std::vector<Light> lights;
   if (lighting == Lighting::kEven) {
     AddSoftBox({.towards = {0, 0, 1}, .strength = 0.55}, view, lights);
-    AddDome(24, 2.0, 1, 1, view, lights);
+    AddDome(kSkyLights, 2.0, 1, 1, view, lights);
     return lights;
   }
   AddSoftBox({.towards = {-0.62, 0.62, 0.62},
@@ -82,7 +84,7 @@ std::vector<Light> LightsOf(Lighting lighting, const Mat3& view) {
               .strength = 0.55,
               .colour = {0.95F, 0.97F, 1.0F}},
              view, lights);
-  AddDome(26, 1.3, 1.0, 0.4, view, lights);
+  AddDome(kSkyLights, 1.3, 1.0, 0.4, view, lights);
   return lights;
 }
 
@@ -203,17 +205,21 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
   for (const SceneObject& object : scene.objects) {
     casts.push_back(object.opacity >= 1);
   }
+  const Box3 box = BoxOfCasters(flat, casts);
+  if (!maps.of_direction.empty() && (maps.box.min() != box.min() || maps.box.max() != box.max())) {
+    throw std::logic_error("shadows of a scene with other meshes");
+  }
+  maps.box = box;
   std::vector<const ShadowMap*> map_of_light;
   std::vector<std::pair<Vec3, ShadowMap*>> missing;
   for (const Light& light : lights) {
     const Vec3& d = light.to_light;
-    const auto [map, is_new] = maps.try_emplace({d.x(), d.y(), d.z()});
+    const auto [map, is_new] = maps.of_direction.try_emplace({d.x(), d.y(), d.z()});
     map_of_light.push_back(&map->second);
     if (is_new) {
       missing.emplace_back(d, &map->second);
     }
   }
-  const Box3 box = BoxOfCasters(flat, casts);
   ParallelFor(missing.size(), threads, 1, [&](std::size_t i) {
     *missing[i].second = MapOf(flat, casts, box, missing[i].first);
   });

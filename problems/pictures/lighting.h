@@ -51,11 +51,14 @@ struct ShadowMap {
   std::vector<float> depth;  // row by row; infinite where nothing is
 };
 
-// Those that several pictures of one scene have in common, by the direction to the light.
-using ShadowMaps = std::map<std::array<double, 3>, ShadowMap>;
+// Those that several pictures of the same opaque meshes have in common.
+struct ShadowMaps {
+  std::map<std::array<double, 3>, ShadowMap> of_direction;  // to the light
+  Box3 box;                                                 // of what casts these shadows
+};
 
-// Sets light and key of every vertex. Only opaque objects cast shadows. maps: of the same scene;
-// those that are missing are added.
+// Sets light and key of every vertex. Only opaque objects cast shadows. maps: of the same opaque
+// meshes; those that are missing are added. Throws std::logic_error if they are of others.
 void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
                    ShadowMaps& maps, FlatScene& flat);
 

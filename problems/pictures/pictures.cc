@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "problems/pictures/lighting.h"
 #include "problems/pictures/mesh_primitives.h"
 #include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
@@ -106,19 +107,25 @@ Image ContactSheet(std::span<const Image> pictures, const Sheet& sheet) {
   return page;
 }
 
+std::vector<Camera> CamerasFor(std::span<const View> views, const Box3& region, double aspect) {
+  std::vector<Camera> cameras;
+  double height_mm = 0;
+  for (const View view : views) {
+    height_mm =
+        std::max(height_mm, cameras.emplace_back(CameraFor(view, region, aspect)).height_mm);
+  }
+  for (Camera& camera : cameras) {
+    camera.height_mm = height_mm;
+  }
+  return cameras;
+}
+
 Image RenderViews(const Scene& scene, const Box3& region, std::span<const View> views,
                   const Sheet& sheet, const RenderOptions& options, int threads) {
   const double aspect = static_cast<double>(options.width) / std::max(options.height, 1);
-  double height_mm = 0;
-  for (const View view : views) {
-    height_mm = std::max(height_mm, CameraFor(view, region, aspect).height_mm);
-  }
-  std::vector<Camera> cameras;
-  for (const View view : views) {
-    Camera& camera = cameras.emplace_back(CameraFor(view, region, aspect));
-    camera.height_mm = height_mm;
-  }
-  return ContactSheet(RenderAll(scene, cameras, options, threads), sheet);
+  ShadowMaps shadows;
+  return ContactSheet(
+      RenderAll(scene, CamerasFor(views, region, aspect), options, shadows, threads), sheet);
 }
 
 }  // namespace semblance

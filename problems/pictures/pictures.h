@@ -38,7 +38,10 @@ struct Sheet {
 // that are not one per picture.
 Image ContactSheet(std::span<const Image> pictures, const Sheet& sheet);
 
-// One Render a view, framed to `region` and all at one scale, on one sheet.
+// One per view, framed to `region` and all at one scale, for pictures of width / height `aspect`.
+std::vector<Camera> CamerasFor(std::span<const View> views, const Box3& region, double aspect);
+
+// One picture per view from these cameras, on one sheet.
 Image RenderViews(const Scene& scene, const Box3& region, std::span<const View> views,
                   const Sheet& sheet, const RenderOptions& options, int threads);
 

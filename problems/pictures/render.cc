@@ -341,9 +341,8 @@ Camera CameraFor(View view, const Box3& region, double aspect) {
 }
 
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
-                             const RenderOptions& options, int threads) {
+                             const RenderOptions& options, ShadowMaps& shadows, int threads) {
   std::vector<Image> images;
-  ShadowMaps shadows;
   for (const Camera& camera : cameras) {
     CheckOptions(camera, options);
     const Painter painter(scene, camera, options, shadows, threads);
@@ -355,7 +354,8 @@ std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras
 }
 
 Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads) {
-  return std::move(RenderAll(scene, {&camera, 1}, options, threads).front());
+  ShadowMaps shadows;
+  return std::move(RenderAll(scene, {&camera, 1}, options, shadows, threads).front());
 }
 
 }  // namespace semblance

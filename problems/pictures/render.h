@@ -14,6 +14,8 @@
 
 namespace semblance {
 
+struct ShadowMaps;
+
 struct Material {
   Colour colour = {0.8, 0.8, 0.8};    // of the vertices, unless they have their own
   double wrap = 0;                    // 0..1: how far light creeps round the terminator
@@ -94,8 +96,10 @@ void Fields(Visitor& visit, RenderOptions& o) {
 // one per vertex. An empty scene shows the background. threads >= 1; the picture does not depend on
 // it.
 Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads);
-// The same scene from several sides: the shadows of the sky are found once for all of them.
+// The same scene from several sides: the shadows of the sky are found once for all of them, and for
+// later scenes whose opaque meshes are the same, which hand the same `shadows` on
+// (problems/pictures/lighting.h).
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
-                             const RenderOptions& options, int threads);
+                             const RenderOptions& options, ShadowMaps& shadows, int threads);
 
 }  // namespace semblance

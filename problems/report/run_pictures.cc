@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "problems/pictures/lighting.h"
 #include "problems/pictures/pictures.h"
 #include "problems/pictures/render.h"
 #include "surfaces/base/parallel.h"
@@ -36,40 +37,37 @@ RenderOptions Options(Lighting lighting) {
   return {.width = kWidth, .height = kHeight, .lighting = lighting};
 }
 
-void WriteViews(const Scene& scene, const RunResult& result, const Sheet& sheet, Lighting lighting,
-                OutputFolder& folder, const char* name, int threads) {
-  folder.Write(name, EncodePng(RenderViews(scene, Region(result), kViews, sheet, Options(lighting),
-                                           threads)));
-}
+// What the sheets of one run share.
+struct Album {
+  const RunResult& result;
+  OutputFolder& folder;
+  int threads;
+  std::vector<Camera> cameras =
+      CamerasFor(kViews, Region(result), static_cast<double>(kWidth) / kHeight);
+  ShadowMaps of_skull = {}, of_face = {}, of_skin = {};
+};
 
-Image Front(const Scene& scene, const RunResult& result, int threads) {
-  const double aspect = static_cast<double>(kWidth) / kHeight;
-  return Render(scene, CameraFor(View::kFront, Region(result), aspect), Options(Lighting::kStudio),
-                threads);
+// Returns the pictures on the sheet, one per side.
+std::vector<Image> WriteSheet(const char* name, const Scene& scene, const Sheet& sheet,
+                              Lighting lighting, ShadowMaps& shadows, Album& album) {
+  std::vector<Image> sides =
+      RenderAll(scene, album.cameras, Options(lighting), shadows, album.threads);
+  album.folder.Write(name, EncodePng(ContactSheet(sides, sheet)));
+  return sides;
 }
 
 Scene SkullScene(const RunResult& result) {
   return {{SkullObject(result.subject.skull), DowelObject(result.subject.dowels_on_bone)}};
 }
 
-// The story in one row: skull and dowels, implicit face, H-spline face and, where it is known, the
-// true skin.
-void WriteOverview(const RunResult& result, OutputFolder& folder, int threads) {
-  std::vector<Image> pictures = {Front(SkullScene(result), result, threads),
-                                 Front({{SkinObject(result.implicit.dense)}}, result, threads),
-                                 Front({{SkinObject(result.face.mesh)}}, result, threads)};
-  Sheet sheet{.title = "",
-              .captions = {"skull and depth markers", "first face (implicit)", "recovered face"},
-              .legend = std::nullopt};
-  if (result.bust) {
-    pictures.push_back(Front(HeadScene(result), result, threads));
-    sheet.captions.push_back("head");
-  }
-  if (result.subject.skin) {
-    pictures.push_back(Front({{SkinObject(*result.subject.skin)}}, result, threads));
-    sheet.captions.push_back("true skin");
-  }
-  folder.Write("pictures/overview.png", EncodePng(ContactSheet(pictures, sheet)));
+// Framed by itself. Returns the head from the front as the other pictures are framed.
+Image WriteBust(Album& album) {
+  const Scene head = HeadScene(album.result);
+  const RenderOptions options = Options(Lighting::kStudio);
+  album.folder.Write("pictures/bust.png",
+                     EncodePng(RenderViews(head, Bounds(album.result.bust->skin), kViews,
+                                           {"", {}, std::nullopt}, options, album.threads)));
+  return Render(head, album.cameras.front(), options, album.threads);
 }
 
 Colour PlaceColour(SkinPlace place) {
@@ -89,30 +87,35 @@ Colour PlaceColour(SkinPlace place) {
 }
 
 // Green is scored, yellow masked, red inner, blue a lid; the rest is grey.
-void WriteScoredSkin(const RunResult& result, OutputFolder& folder, int threads) {
-  const std::vector<SkinPlace>& places = result.truth->skin.place;
-  SceneObject object = SkinObject(*result.subject.skin);
-  for (const SkinPlace place : places) {
+void WriteScoredSkin(Album& album) {
+  const ScoredSkin& skin = album.result.truth->skin;
+  SceneObject object = SkinObject(*album.result.subject.skin);
+  for (const SkinPlace place : skin.place) {
     object.vertex_colours.push_back(PlaceColour(place));
   }
-  WriteViews({{object}}, result, {InWords(result.truth->skin), {}, std::nullopt}, Lighting::kStudio,
-             folder, "pictures/scored.png", threads);
+  WriteSheet("pictures/scored.png", {{object}}, {InWords(skin), {}, std::nullopt},
+             Lighting::kStudio, album.of_skin, album);
 }
 
-void WriteTruth(const RunResult& result, OutputFolder& folder, int threads) {
-  const TriMesh& skin = *result.subject.skin;
-  WriteViews({{SkinObject(skin)}}, result, {"True skin", {}, std::nullopt}, Lighting::kStudio,
-             folder, "pictures/truth.png", threads);
-  WriteScoredSkin(result, folder, threads);
-  const Legend legend{ErrorColours(), "recovered face outside (+) or inside (-) the true skin"};
-  WriteViews({{MappedObject(skin, result.truth->face.signed_mm, legend.map)}}, result,
-             {"Signed error on the true skin", {}, legend}, Lighting::kEven, folder,
-             "pictures/error.png", threads);
-  const Legend implicit_legend{ErrorColours(),
-                               "first face outside (+) or inside (-) the true skin"};
-  WriteViews({{MappedObject(skin, result.truth->implicit.signed_mm, implicit_legend.map)}}, result,
-             {"Signed error of the first face", {}, implicit_legend}, Lighting::kEven, folder,
-             "pictures/error_implicit.png", threads);
+void WriteError(const char* name, const char* title, std::span<const double> signed_mm,
+                const Legend& legend, Album& album) {
+  WriteSheet(name, {{MappedObject(*album.result.subject.skin, signed_mm, legend.map)}},
+             {title, {}, legend}, Lighting::kEven, album.of_skin, album);
+}
+
+// Returns the true skin from the front.
+Image WriteTruth(Album& album) {
+  std::vector<Image> skin =
+      WriteSheet("pictures/truth.png", {{SkinObject(*album.result.subject.skin)}},
+                 {"True skin", {}, std::nullopt}, Lighting::kStudio, album.of_skin, album);
+  WriteScoredSkin(album);
+  const TruthComparison& truth = *album.result.truth;
+  WriteError("pictures/error.png", "Signed error on the true skin", truth.face.signed_mm,
+             {ErrorColours(), "recovered face outside (+) or inside (-) the true skin"}, album);
+  WriteError("pictures/error_implicit.png", "Signed error of the first face",
+             truth.implicit.signed_mm,
+             {ErrorColours(), "first face outside (+) or inside (-) the true skin"}, album);
+  return std::move(skin.front());
 }
 
 SceneObject ByOrigin(SceneObject object, const RunResult& result, int threads) {
@@ -123,7 +126,8 @@ SceneObject ByOrigin(SceneObject object, const RunResult& result, int threads) {
 }
 
 // Where any of it is invented: the shell, and the face over it.
-void WriteOrigin(const RunResult& result, OutputFolder& folder, int threads) {
+void WriteOrigin(Album& album) {
+  const RunResult& result = album.result;
   const auto [observed, mirrored, inferred] = AreaByOrigin_cm2(result.shell, result.origin);
   if (mirrored + inferred == 0) {
     return;
@@ -131,11 +135,50 @@ void WriteOrigin(const RunResult& result, OutputFolder& folder, int threads) {
   const std::string title = fmt::format(
       "Bone: {:.0f} cm² observed, {:.0f} cm² mirrored (blue), {:.0f} cm² inferred (yellow)",
       observed, mirrored, inferred);
-  WriteViews({{ByOrigin(SkullObject(result.shell), result, threads)}}, result,
-             {title, {}, std::nullopt}, Lighting::kStudio, folder, "pictures/origin.png", threads);
-  WriteViews({{ByOrigin(SkinObject(result.face.mesh), result, threads)}}, result,
-             {"The face, by the bone under it", {}, std::nullopt}, Lighting::kStudio, folder,
-             "pictures/origin_face.png", threads);
+  ShadowMaps of_shell;
+  WriteSheet("pictures/origin.png", {{ByOrigin(SkullObject(result.shell), result, album.threads)}},
+             {title, {}, std::nullopt}, Lighting::kStudio, of_shell, album);
+  WriteSheet("pictures/origin_face.png",
+             {{ByOrigin(SkinObject(result.face.mesh), result, album.threads)}},
+             {"The face, by the bone under it", {}, std::nullopt}, Lighting::kStudio, album.of_face,
+             album);
+}
+
+void WriteDepth(Album& album) {
+  const Legend depth{DepthColours(), "tissue depth on the skull's shell"};
+  ShadowMaps of_shell;
+  WriteSheet("pictures/depth.png",
+             {{MappedObject(album.result.shell, album.result.depth.depth_mm, depth.map)}},
+             {"Interpolated tissue depth", {}, depth}, Lighting::kEven, of_shell, album);
+}
+
+// Returns the implicit surface from the front.
+Image WriteImplicit(Album& album) {
+  ShadowMaps of_implicit;
+  return std::move(
+      WriteSheet("pictures/implicit.png", {{SkinObject(album.result.implicit.dense)}},
+                 {"First face, straight from the depths (implicit surface)", {}, std::nullopt},
+                 Lighting::kStudio, of_implicit, album)
+          .front());
+}
+
+void WriteFaceOverSkull(Album& album) {
+  Scene over = SkullScene(album.result);
+  over.objects.push_back(SkinObject(album.result.face.mesh, 0.55));
+  WriteSheet("pictures/face_over_skull.png", over,
+             {"Recovered face over skull and depth markers", {}, std::nullopt}, Lighting::kStudio,
+             album.of_skull, album);
+}
+
+void WriteSigma(Album& album) {
+  const auto& uncertainty = album.result.uncertainty;
+  if (!uncertainty || uncertainty->sigma_mm.empty()) {
+    return;
+  }
+  const Legend sigma{SigmaColours(), "standard deviation along the normal"};
+  WriteSheet("pictures/sigma.png",
+             {{MappedObject(album.result.face.mesh, uncertainty->sigma_mm, sigma.map)}},
+             {"How far the face may be off", {}, sigma}, Lighting::kEven, album.of_face, album);
 }
 
 }  // namespace
@@ -190,39 +233,33 @@ std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
 
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context) {
   context.Report("pictures");
-  const int threads = context.threads;
-  WriteOverview(result, folder, threads);
-  WriteViews(SkullScene(result), result, {"Skull and dowels", {}, std::nullopt}, Lighting::kStudio,
-             folder, "pictures/skull_dowels.png", threads);
-  const Legend depth{DepthColours(), "tissue depth on the skull's shell"};
-  WriteViews({{MappedObject(result.shell, result.depth.depth_mm, depth.map)}}, result,
-             {"Interpolated tissue depth", {}, depth}, Lighting::kEven, folder,
-             "pictures/depth.png", threads);
-  WriteViews({{SkinObject(result.implicit.dense)}}, result,
-             {"First face, straight from the depths (implicit surface)", {}, std::nullopt},
-             Lighting::kStudio, folder, "pictures/implicit.png", threads);
-  WriteViews({{SkinObject(result.face.mesh)}}, result, {"Recovered face", {}, std::nullopt},
-             Lighting::kStudio, folder, "pictures/face.png", threads);
+  Album album{.result = result, .folder = folder, .threads = context.threads};
+  std::vector<Image> story;
+  Sheet sheet{.title = "", .captions = {}, .legend = std::nullopt};
+  const auto tell = [&](Image picture, const char* caption) {
+    story.push_back(std::move(picture));
+    sheet.captions.push_back(caption);
+  };
+  tell(WriteSheet("pictures/skull_dowels.png", SkullScene(result),
+                  {"Skull and dowels", {}, std::nullopt}, Lighting::kStudio, album.of_skull, album)
+           .front(),
+       "skull and depth markers");
+  WriteDepth(album);
+  tell(WriteImplicit(album), "first face (implicit)");
+  tell(WriteSheet("pictures/face.png", {{SkinObject(result.face.mesh)}},
+                  {"Recovered face", {}, std::nullopt}, Lighting::kStudio, album.of_face, album)
+           .front(),
+       "recovered face");
   if (result.bust) {
-    folder.Write(
-        "pictures/bust.png",
-        EncodePng(RenderViews(HeadScene(result), Bounds(result.bust->skin), kViews,
-                              {"", {}, std::nullopt}, Options(Lighting::kStudio), threads)));
+    tell(WriteBust(album), "head");
   }
-  WriteOrigin(result, folder, threads);
-  Scene over = SkullScene(result);
-  over.objects.push_back(SkinObject(result.face.mesh, 0.55));
-  WriteViews(over, result, {"Recovered face over skull and depth markers", {}, std::nullopt},
-             Lighting::kStudio, folder, "pictures/face_over_skull.png", threads);
-  if (result.uncertainty && !result.uncertainty->sigma_mm.empty()) {
-    const Legend sigma{SigmaColours(), "standard deviation along the normal"};
-    WriteViews({{MappedObject(result.face.mesh, result.uncertainty->sigma_mm, sigma.map)}}, result,
-               {"How far the face may be off", {}, sigma}, Lighting::kEven, folder,
-               "pictures/sigma.png", threads);
-  }
+  WriteOrigin(album);
+  WriteFaceOverSkull(album);
+  WriteSigma(album);
   if (result.truth) {
-    WriteTruth(result, folder, threads);
+    tell(WriteTruth(album), "true skin");
   }
+  folder.Write("pictures/overview.png", EncodePng(ContactSheet(story, sheet)));
 }
 
 }  // namespace semblance

@@ -6,7 +6,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
+#include "problems/pictures/lighting.h"
 #include "problems/pictures/mesh_primitives.h"
 #include "problems/pictures/pictures.h"
 #include "surfaces/base/error.h"
@@ -77,19 +79,28 @@ TEST(Render, SameBytesForAnyNumberOfThreadsAndEachTime) {
   }
 }
 
-TEST(Render, SeveralSidesTogetherAreThoseOfEachAlone) {
+TEST(Render, SeveralSidesAndLightingsTogetherAreThoseOfEachAlone) {
   std::vector<Camera> cameras;
   for (const View view : {View::kFront, View::kThreeQuarter, View::kSide}) {
     cameras.push_back(CameraFor(view, Box3(Vec3(-42, -42, -42), Vec3(42, 42, 42)), 1));
   }
+  ShadowMaps shadows;
   for (const Lighting lighting : {Lighting::kStudio, Lighting::kEven}) {
     const RenderOptions options{.width = 90, .height = 80, .lighting = lighting};
-    const std::vector<Image> all = RenderAll(Crowd(), cameras, options, 2);
+    const std::vector<Image> all = RenderAll(Crowd(), cameras, options, shadows, 2);
     ASSERT_EQ(all.size(), cameras.size());
     for (std::size_t n = 0; n < cameras.size(); ++n) {
       EXPECT_EQ(all[n].rgb, Render(Crowd(), cameras[n], options, 1).rgb);
     }
   }
+}
+
+TEST(Render, ShadowsOfOtherMeshesAreRefused) {
+  ShadowMaps shadows;
+  const Camera camera = FrontCamera(60);
+  RenderAll({{Square(10, 0, {1, 1, 1})}}, {&camera, 1}, Plain(), shadows, 1);
+  EXPECT_THROW(RenderAll({{Square(11, 0, {1, 1, 1})}}, {&camera, 1}, Plain(), shadows, 1),
+               std::logic_error);
 }
 
 TEST(Render, SphereIsADiscOfTheRightAreaInTheRightPlace) {
