@@ -5,14 +5,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <string_view>
 #include <vector>
 
-#include "problems/pictures/pictures.h"
-#include "problems/pictures/stroke_font.h"
-#include "problems/subject/phantom.h"
 #include "problems/subject/site_names.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
@@ -108,47 +103,6 @@ std::string Rows(const std::vector<Site>& sites, std::span<const TissueTable> ta
   return text;
 }
 
-constexpr int kWidth = 460, kHeight = 540;
-
-void Disc(Image& image, double x, double y, double radius, const Colour& colour) {
-  for (int row = static_cast<int>(y - radius) - 1; row <= static_cast<int>(y + radius) + 1; ++row) {
-    for (int column = static_cast<int>(x - radius) - 1; column <= static_cast<int>(x + radius) + 1;
-         ++column) {
-      const double inside = radius + 0.5 - std::hypot(column + 0.5 - x, row + 0.5 - y);
-      BlendPixel(image, column, row, colour, std::clamp(inside, 0.0, 1.0));
-    }
-  }
-}
-
-// A disc, and its number on the left or the right of it.
-void Mark(Image& image, const Camera& camera, const Site& site, const Vec3& point, bool left) {
-  const Vec3 seen = camera.view_from_world * (point - camera.centre);
-  const double pixels = kHeight / camera.height_mm;
-  const double x = kWidth / 2.0 + pixels * seen.x(), y = kHeight / 2.0 - pixels * seen.y();
-  Disc(image, x, y, 5, HexColour(0xffffff));
-  Disc(image, x, y, 4, HexColour(0xb3261e));
-  DrawText(image, x + (left ? -9 : 9), y + 5, std::to_string(site.number),
-           {.cap_height_px = 11,
-            .stroke = 0.15,
-            .colour = HexColour(0x16304f),
-            .anchor = left ? Anchor::kRight : Anchor::kLeft});
-}
-
-Image SeenFrom(View view, const Phantom& phantom, const Box3& region, int threads) {
-  const Camera camera = CameraFor(view, region, static_cast<double>(kWidth) / kHeight);
-  Image image =
-      Render({{SkullObject(phantom.skull)}}, camera, {.width = kWidth, .height = kHeight}, threads);
-  for (std::size_t k = 0; k < phantom.sites.size(); ++k) {
-    const Site& site = StandardSites()[k];
-    if (view == View::kFront || site.side != Side::kRight) {
-      const bool left =
-          view == View::kFront ? site.side != Side::kLeft : site.side == Side::kMidline;
-      Mark(image, camera, site, phantom.sites[k].base, left);
-    }
-  }
-  return image;
-}
-
 }  // namespace
 
 std::string_view SiteDefinition(std::string_view landmark) {
@@ -204,16 +158,6 @@ std::string SitePage(std::span<const TissueTable> tables, const std::string& pic
       "they name. `sg`, `fe`, `im`, `lo` and `sgl` are not among those: for them, and for the "
       "directions of dowels, after the usual\ninstructions for Rhine's set of points.\n";
   return page;
-}
-
-Image SitePicture(int threads) {
-  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 120});
-  Box3 region = Bounds(phantom.skull);
-  region.extend(Vec3(region.min() - Vec3(0, 15, 0)));  // room for the numbers before the face
-  const std::array views = {SeenFrom(View::kFront, phantom, region, threads),
-                            SeenFrom(View::kSide, phantom, region, threads)};
-  return ContactSheet(views,
-                      {.title = "", .captions = {"front", "left side"}, .legend = std::nullopt});
 }
 
 }  // namespace semblance

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// docs/sites.md: each site's names, its place on the bone, the tables that have it, and a picture.
+// docs/sites.md: each site's names, its place on the bone, and the tables that have it.
 #pragma once
 
 #include <span>
 #include <string>
 #include <string_view>
 
-#include "problems/pictures/image.h"
 #include "problems/subject/tissue_table.h"
 
 namespace semblance {
@@ -18,8 +17,5 @@ std::string SitePage(std::span<const TissueTable> tables, const std::string& pic
 // Where a site lies on the bone, in words. landmark: its code without side. Throws InputError for
 // one that is not in sites.h.
 std::string_view SiteDefinition(std::string_view landmark);
-
-// A phantom's skull from the front and from its left, with the standard sites by their numbers.
-Image SitePicture(int threads);
 
 }  // namespace semblance

@@ -5,22 +5,36 @@ async function answerOf(response) {
   const type = response.headers.get('Content-Type') || '';
   const answer = type.startsWith('application/json') ? await response.json() : await response.text();
   if (!response.ok) { throw new Error(answer.error || answer || `the program answers ${response.status}`); }
+  if (answer.refused !== undefined) { throw new Error(answer.refused); }
   return answer;
 }
 
-async function ask(address, options) {
-  let response;
+async function fetchFrom(address, options) {
   try {
-    response = await fetch(address, options);
+    return await fetch(address, options);
   } catch {
     throw new Error('The program does not answer; it may have ended. Start it again: nothing is lost.');
   }
-  return answerOf(response);
 }
 
-export const get = (path, query = {}) => {
+const ask = async (address, options) => answerOf(await fetchFrom(address, options));
+
+const addressOf = (path, query) => {
   const text = new URLSearchParams(query).toString();
-  return ask(`api/${path}${text ? `?${text}` : ''}`);
+  return `api/${path}${text ? `?${text}` : ''}`;
+};
+
+export const get = (path, query = {}) => ask(addressOf(path, query));
+
+// A file that the program makes, and its name.
+export const getFile = async (path, query) => {
+  const response = await fetchFrom(addressOf(path, query));
+  const named = /filename="([^"]*)"/.exec(response.headers.get('Content-Disposition') || '');
+  if (!response.ok || !named) {
+    await answerOf(response);
+    throw new Error('The program sent no file.');
+  }
+  return {name: named[1], blob: await response.blob()};
 };
 
 export const post = (path, body) =>

@@ -4,7 +4,7 @@
 import {get} from './api.js';
 import {sizeOf} from './changes.js';
 import {button, check, element, select} from './dom.js';
-import {act, say, store} from './store.js';
+import {act, keep, say, store} from './store.js';
 
 const TITLES = {emaciated: 'Emaciated', normal: 'Normal', obese: 'Obese', thinner: '\u2212 1 SD', as_is: 'As chosen', thicker: '+ 1 SD'};
 const SETS = {
@@ -46,7 +46,7 @@ export function comparePanel({scene}) {
         () => act('variants', {variants: left}), {className: 'primary', dataset: {make: 'variants'}}) : '');
     const made = SETS[chosen].variants.filter((name) => store.state.variants.includes(name));
     save.replaceChildren(made.length ? element('div', {className: 'row'}, 'Save', format, ...made.map((name) => button(TITLES[name], () =>
-        element('a', {href: `api/export?${new URLSearchParams({variant: name, format: format.value})}`, download: ''}).click()))) : '');
+        keep('export', {variant: name, format: format.value})))) : '');
   };
 
   const show = (faces) => {

@@ -2,7 +2,7 @@
 // The choices that lead to a face: the few that matter most, single depths, and all the others.
 import {controlAt, tree} from './controls.js';
 import {button, check, element, field, group, lines} from './dom.js';
-import {act, nameOf, store} from './store.js';
+import {act, keep, nameOf, store} from './store.js';
 
 const MAIN = [['tissue.depths', 'depths from'], ['tissue.table', 'table'], ['tissue.fill_from', 'else from'],
               ['tissue.sex', 'sex'], ['tissue.build', 'build'], ['template', 'generic face'], ['face', 'way to the face'],
@@ -45,8 +45,7 @@ export function facePanel({faces, scene}) {
   search.setAttribute('aria-label', 'find an option');
   const format = element('select', {}, ...FORMATS.map((ending) => element('option', {value: ending, textContent: ending})));
   format.setAttribute('aria-label', 'kind of file');
-  const save = element('div', {className: 'row'}, 'The full face as a file', format, button('Save', () =>
-      element('a', {href: `api/export?format=${format.value}`, download: ''}).click()));
+  const save = element('div', {className: 'row'}, 'The full face as a file', format, button('Save', () => keep('export', {format: format.value})));
   const root = element('div', {}, line,
       group('Show', check('Colour what the last change did', colour), check('Keep comparing with the face of now', pin), field('solid face', clear)),
       group('Choices', main), element('details', {open: true}, element('summary', {textContent: 'Depths, mm'}), depths),

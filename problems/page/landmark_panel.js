@@ -2,7 +2,7 @@
 // Landmarks: a list of the sites, what the chosen one is, and clicks on the bone.
 import {button, element, field, group, lines, millimetres, select} from './dom.js';
 import {chooser} from './opener.js';
-import {act, choose, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
+import {act, choose, keep, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
 
 const FORMATS = [['.yaml', 'YAML (Semblance)'], ['.mrk.json', '3D Slicer (.mrk.json)'], ['.fcsv', '3D Slicer (.fcsv)'],
                  ['.pp', 'MeshLab (.pp)'], ['.csv', 'table (.csv)'], ['.txt', 'CloudCompare (.txt)']];
@@ -49,6 +49,17 @@ function remarks(landmark) {
                                       onchange: (event) => change({note: event.target.value})})));
 }
 
+// Made once a site, so that a change of something else does not make it flicker.
+const pictures = new Map();
+const pictureOf = (code) => {
+  if (!pictures.has(code)) {
+    pictures.set(code, element('img', {src: `api/site.png?${new URLSearchParams({site: code})}`, width: 440, height: 260,
+                                       alt: `where ${nameOf(code)} lies, on a made-up skull from the front and from the side`,
+                                       title: 'a made-up skull; a ring lies behind the bone'}));
+  }
+  return pictures.get(code);
+};
+
 function detail(code) {
   if (!code) {
     return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. A ball that is there is chosen by a click on it.'})];
@@ -60,7 +71,7 @@ function detail(code) {
   const names = store.sites.map((other) => [other.site, `${other.site}: ${nameOf(other.site)}`]);
   return [
     element('h2', {textContent: nameOf(code)}),
-    element('p', {textContent: `${site.definition}.`}),
+    element('div', {className: 'site-place'}, element('p', {textContent: `${site.definition}.`}), pictureOf(code)),
     checks.length ? element('ul', {className: 'checks'}, ...checks) : null,
     element('div', {className: 'row'},
         landmark && landmark.proposed ? button('It is right', () => act('confirm', {site: code}), {className: 'primary'}) : null,
@@ -71,7 +82,7 @@ function detail(code) {
       if (await act('rename', {site: code, name})) { choose(name); }
     })) : element('p', {className: 'hint', textContent: 'Click on the bone where it lies.'}),
     landmark ? remarks(landmark) : null,
-    element('details', {}, element('summary', {textContent: site.number ? `Picture: number ${site.number}` : 'Picture of the sites'}),
+    element('details', {}, element('summary', {textContent: 'All sites by their numbers'}),
             element('img', {src: 'api/sites.png', alt: 'the sites on a made-up skull, by number', loading: 'lazy'}))
   ].filter((part) => part);
 }
@@ -83,8 +94,7 @@ export function landmarkPanel(bench) {
   format.setAttribute('aria-label', 'kind of file');
   const files = element('details', {}, element('summary', {textContent: 'Load and save landmarks'}),
       chooser(bench.opener, 'Landmarks', '.yaml,.yml,.json,.fcsv,.pp,.csv,.txt,.asc'),
-      element('div', {className: 'row'}, format, button('Save as', () =>
-          element('a', {href: `api/landmarks?format=${encodeURIComponent(format.value)}`, download: ''}).click())),
+      element('div', {className: 'row'}, format, button('Save as', () => keep('landmarks', {format: format.value}))),
       button('Remove all', () => act('clear_landmarks')));
   const root = element('div', {}, head, about, list, files);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The state as the program told it last, and who wants to hear of it. The page keeps no truth of its own.
-import {get, post} from './api.js';
+import {get, getFile, post} from './api.js';
+import {element} from './dom.js';
 
 export const store = {state: null, schema: null, sites: [], files: null, site: null};
 
@@ -29,6 +30,19 @@ export const act = async (name, details = {}) => {
   } catch (error) {
     say(error.message);
     return false;
+  }
+};
+
+// The browser keeps a file that the program makes; a refusal is shown.
+export const keep = async (path, query) => {
+  try {
+    const {name, blob} = await getFile(path, query);
+    const address = URL.createObjectURL(blob);
+    element('a', {href: address, download: name}).click();
+    setTimeout(() => URL.revokeObjectURL(address), 60000);  // a browser may ask the person first where to
+    say('');
+  } catch (error) {
+    say(error.message);
   }
 };
 

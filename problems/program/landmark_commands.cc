@@ -15,6 +15,7 @@
 
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/landmark_files/site_page.h"
+#include "problems/landmark_files/site_picture.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/progress.h"
 #include "problems/propose/proposal_table.h"

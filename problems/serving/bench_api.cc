@@ -12,10 +12,11 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 
 #include "problems/config/config.h"
 #include "problems/landmark_files/read_landmarks.h"
-#include "problems/landmark_files/site_page.h"
+#include "problems/landmark_files/site_picture.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/report_assets.h"
 #include "problems/serving/bench_json.h"
@@ -38,13 +39,33 @@ constexpr const char* kJson = "application/json";
 BenchReply JsonReply(std::string body) { return {200, kJson, std::move(body), {}}; }
 
 // Words that quote what was sent may be as long as that.
-BenchReply Refusal(int status, const std::string& words) {
+BenchReply WordsReply(int status, const char* key, const std::string& words) {
   constexpr std::size_t kMost = 2000;
-  return {
-      status,
-      kJson,
-      Json{{"error", words.substr(0, kMost)}}.dump(-1, ' ', false, Json::error_handler_t::replace),
-      {}};
+  return {status,
+          kJson,
+          Json{{key, words.substr(0, kMost)}}.dump(-1, ' ', false, Json::error_handler_t::replace),
+          {}};
+}
+
+// A request that the page does not make.
+BenchReply Fault(int status, const std::string& words) {
+  return WordsReply(status, "error", words);
+}
+
+// What a person cannot have is an answer like any other: a browser lists each status from 400 on
+// as a fault of the page.
+BenchReply Refusal(const std::string& words) { return WordsReply(200, "refused", words); }
+
+class BadRequest : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+Json BodyOf(const BenchRequest& request) {
+  try {
+    return ParseJson(request.body, "the request");
+  } catch (const IoError& error) {
+    throw BadRequest(error.what());
+  }
 }
 
 BenchReply StateReply(const Bench& bench) {
@@ -87,7 +108,7 @@ BenchReply PageFile(const std::string& path) {
       return {200, TypeOf(name), std::string(file.text), {}};
     }
   }
-  return Refusal(404, fmt::format("there is no '{}' here", name));
+  return Fault(404, fmt::format("there is no '{}' here", name));
 }
 
 // A file of the last run: one that its manifest or its report names, never one outside run/.
@@ -98,7 +119,7 @@ BenchReply RunFile(const Bench& bench, const std::string& name) {
   const fs::path inside = error ? fs::path() : path.lexically_relative(fs::canonical(root));
   const bool is_inside = !inside.empty() && inside.begin()->string() != "..";
   if (error || !is_inside || !fs::is_regular_file(path)) {
-    return Refusal(404, fmt::format("the last run has no '{}'", name));
+    return Fault(404, fmt::format("the last run has no '{}'", name));
   }
   return {200, TypeOf(name), ReadFileBytes(path), {}};
 }
@@ -116,6 +137,17 @@ BenchReply Sites(Bench&, const BenchRequest&) { return JsonReply(SitesJson()); }
 BenchReply SitesPicture(Bench&, const BenchRequest&) {
   static const std::string kPicture = EncodePng(SitePicture(/*threads=*/1));
   return {200, "image/png", kPicture, {}};
+}
+
+std::string QueryText(const BenchRequest& request, const char* key) {
+  const auto at = request.query.find(key);
+  return at == request.query.end() ? std::string() : at->second;
+}
+
+// Where one site lies, for ?site=CODE.
+BenchReply SitePictureReply(Bench&, const BenchRequest& request) {
+  static const SiteSketch kSketch = MakeSiteSketch(/*threads=*/1);
+  return {200, "image/png", EncodePng(PictureOf(kSketch, QueryText(request, "site"))), {}};
 }
 
 BenchReply Schema(Bench&, const BenchRequest&) { return JsonReply(OptionsSchema<Experiment>()); }
@@ -348,12 +380,12 @@ constexpr std::array<std::pair<std::string_view, Action>, 23> kActions = {
      {"cancel", &Cancel}}};
 
 BenchReply Act(Bench& bench, const BenchRequest& request) {
-  const Json json = ParseJson(request.body, "the request");
+  const Json json = BodyOf(request);
   const std::string name = TextOf(json, "do");
   const auto* const found =
       std::ranges::find(kActions, name, &decltype(kActions)::value_type::first);
   if (found == kActions.end()) {
-    return Refusal(400, fmt::format("there is no action '{}'", name));
+    return Fault(400, fmt::format("there is no action '{}'", name));
   }
   found->second(bench, json);
   return StateReply(bench);
@@ -361,17 +393,14 @@ BenchReply Act(Bench& bench, const BenchRequest& request) {
 
 // A file from the browser, until it is opened.
 BenchReply Upload(Bench& bench, const BenchRequest& request) {
-  const auto text = [&request](const char* key) {
-    const auto at = request.query.find(key);
-    return at == request.query.end() ? std::string() : at->second;
-  };
-  const fs::path path = SaveIncoming(bench.Folder(), text("batch"), text("name"), request.body);
+  const fs::path path = SaveIncoming(bench.Folder(), QueryText(request, "batch"),
+                                     QueryText(request, "name"), request.body);
   return JsonReply(Json{{"path", path.string()}}.dump());
 }
 
 // What a path of this machine is, or what the browser has sent in a batch.
 BenchReply LookAtPath(Bench& bench, const BenchRequest& request) {
-  const Json json = ParseJson(request.body, "the request");
+  const Json json = BodyOf(request);
   const std::string batch = TextOr(json, "batch");
   const fs::path path =
       batch.empty() ? fs::path(TextOf(json, "path")) : IncomingBatch(bench.Folder(), batch);
@@ -380,7 +409,7 @@ BenchReply LookAtPath(Bench& bench, const BenchRequest& request) {
 
 // How each vertex goes with a pull: for the page to draw it while the pointer moves.
 BenchReply PullShape(Bench& bench, const BenchRequest& request) {
-  const Json json = ParseJson(request.body, "the request");
+  const Json json = BodyOf(request);
   return JsonReply(PullMovesJson(bench.PullMovesAt(VectorOf(json, "at"), PullOf(json))));
 }
 
@@ -393,13 +422,21 @@ struct Route {
 };
 
 constexpr std::array kRoutes = {
-    Route{"GET", "api/state", &State},          Route{"GET", "api/schema", &Schema},
-    Route{"GET", "api/sites", &Sites},          Route{"GET", "api/sites.png", &SitesPicture},
-    Route{"GET", "api/files", &Files},          Route{"GET", "api/meshes", &Meshes},
-    Route{"GET", "api/coarse", &CoarseReply},   Route{"GET", "api/face", &FullReply},
-    Route{"GET", "api/variant", &VariantReply}, Route{"GET", "api/landmarks", &LandmarksFile},
-    Route{"GET", "api/export", &FaceFile},      Route{"POST", "api/act", &Act},
-    Route{"POST", "api/look", &LookAtPath},     Route{"POST", "api/pull", &PullShape},
+    Route{"GET", "api/state", &State},
+    Route{"GET", "api/schema", &Schema},
+    Route{"GET", "api/sites", &Sites},
+    Route{"GET", "api/sites.png", &SitesPicture},
+    Route{"GET", "api/site.png", &SitePictureReply},
+    Route{"GET", "api/files", &Files},
+    Route{"GET", "api/meshes", &Meshes},
+    Route{"GET", "api/coarse", &CoarseReply},
+    Route{"GET", "api/face", &FullReply},
+    Route{"GET", "api/variant", &VariantReply},
+    Route{"GET", "api/landmarks", &LandmarksFile},
+    Route{"GET", "api/export", &FaceFile},
+    Route{"POST", "api/act", &Act},
+    Route{"POST", "api/look", &LookAtPath},
+    Route{"POST", "api/pull", &PullShape},
     Route{"POST", "api/upload", &Upload},
 };
 
@@ -408,11 +445,11 @@ BenchReply Find(Bench& bench, const BenchRequest& request) {
     if (route.path == request.path) {
       return route.method == request.method
                  ? route.handle(bench, request)
-                 : Refusal(405, fmt::format("{} takes {}", route.path, route.method));
+                 : Fault(405, fmt::format("{} takes {}", route.path, route.method));
     }
   }
   if (request.method != "GET") {
-    return Refusal(404, "there is nothing to post to here");
+    return Fault(404, "there is nothing to post to here");
   }
   constexpr std::string_view kRun = "run/";
   return request.path.starts_with(kRun) ? RunFile(bench, request.path.substr(kRun.size()))
@@ -425,17 +462,19 @@ BenchReply Answer(Bench& bench, const BenchRequest& request) {
   try {
     return Find(bench, request);
   } catch (const Error& error) {
-    return Refusal(400, error.what());
+    return Refusal(error.what());
+  } catch (const BadRequest& error) {
+    return Fault(400, error.what());
   } catch (const nlohmann::json::exception& error) {
-    return Refusal(400, fmt::format("the request cannot be used: {}", JsonFault(error)));
+    return Fault(400, fmt::format("the request cannot be used: {}", JsonFault(error)));
   } catch (const Cancelled&) {
-    return Refusal(409, "stopped");
+    return Refusal("stopped");
   } catch (const std::bad_alloc&) {
-    return Refusal(507, "not enough memory");
+    return Fault(507, "not enough memory");
   } catch (const fs::filesystem_error& error) {
-    return Refusal(400, fmt::format("a path: {}", error.code().message()));
+    return Refusal(fmt::format("a path: {}", error.code().message()));
   } catch (const std::exception& error) {
-    return Refusal(500, fmt::format("the work failed: {}", error.what()));
+    return Fault(500, fmt::format("the work failed: {}", error.what()));
   }
 }
 

@@ -24,7 +24,9 @@ struct BenchReply {
   std::string download_name;  // where the browser is to keep it as a file
 };
 
-// Never throws: a mistake of the asker is 400 or 404 with words for people.
+// Never throws. What is refused to a person is 200 with {"refused": words}, for the page to show:
+// no address of it answers so else. A request that the page does not make is 400, 404 or 405 with
+// {"error": words}; what failed in the program, 500 or 507.
 BenchReply Answer(Bench& bench, const BenchRequest& request);
 
 }  // namespace semblance

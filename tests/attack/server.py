@@ -87,17 +87,22 @@ def request(bench, folder, draw):
     return f"head {str(header)[:60]}", draw.choice(["POST", "GET"]), draw.choice(["api/act", "api/state", "api/upload?as=skull&name=a.ply"]), b'{"do": "undo"}', header, "application/json"
 
 
+def is_refusal(body):
+    return body.startswith(b'{"refused":')
+
+
 def faults_of(what, answer, before, after, method):
     if answer is None:
         if "head" not in what and "place" not in what:
             yield "no answer"
         return
     status, body = answer
+    refused = status >= 400 or is_refusal(body)
     if status >= 500 or not 200 <= status:
         yield f"status {status}: {body[:200]!r}"
-    if status >= 400 and method == "POST" and before["revision"] != after["revision"]:
+    if refused and method == "POST" and before["revision"] != after["revision"]:
         yield f"refused with {status}, and the state has changed"
-    if status >= 400 and body and len(body) > 4000:
+    if refused and body and len(body) > 4000:
         yield f"{len(body)} bytes of refusal"
 
 
@@ -119,7 +124,7 @@ def attack(program, folder, seed):
             continue
         found = list(faults_of(what, answer, before, after, method)) + ([f"{took_s:.1f} s"] if took_s > 15 else [])
         faults += [f"request {number}, {what}: {method} {path[:100]}: {fault}" for fault in found]
-        counts[3 if answer is None else 0 if answer[0] < 400 else 2] += 1
+        counts[3 if answer is None else 0 if answer[0] < 400 and not is_refusal(answer[1]) else 2] += 1
     code, err = bench.end()
     if code != 0 or err.strip():
         faults.append(f"ended with {code}: {err[:300]}")

@@ -71,15 +71,5 @@ TEST(SitePage, EveryRowOfTheTablesIsASiteOfThePage) {
   }
 }
 
-TEST(SitePicture, ShowsMarksOnBone) {
-  const Image picture = SitePicture(2);
-  int marks = 0;
-  for (std::size_t k = 0; k < picture.rgb.size(); k += 3) {
-    marks += picture.rgb[k] == 0xb3 && picture.rgb[k + 1] == 0x26 && picture.rgb[k + 2] == 0x1e;
-  }
-  EXPECT_GT(marks, 32 * 30);  // 32 discs in front, 21 at the side
-  EXPECT_EQ(picture.rgb, SitePicture(1).rgb);
-}
-
 }  // namespace
 }  // namespace semblance

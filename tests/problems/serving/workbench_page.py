@@ -58,8 +58,8 @@ def distance(a, b):
 class Workbench:
     """The program, and the address that it printed."""
 
-    def __init__(self, program, arguments):
-        self.process = subprocess.Popen([program, "workbench", *arguments], stdout=subprocess.PIPE, text=True)
+    def __init__(self, program, arguments, folder=None):
+        self.process = subprocess.Popen([program, "workbench", *arguments], stdout=subprocess.PIPE, text=True, cwd=folder)
         for line in self.process.stdout:
             if found := re.search(r"http://127\.0\.0\.1:\d+/\w+/", line):
                 self.url = found.group(0)
@@ -94,6 +94,22 @@ def place_by_clicks(browser, points):
         placed = landmark(browser, site)
         assert distance(placed["point"], point) < 1.5, (site, placed["point"], point)
         assert placed["from_bone_mm"] < 1e-3, placed
+
+
+def expect_site_picture(browser, site):
+    """Where the site lies stands beside what it is, and both are in the window."""
+    browser.run("document.querySelector(arguments[0]).click()", f'[data-site="{site}"]')
+    browser.wait("const image = document.querySelector('.site-place img');"
+                 "return image && image.src.endsWith(arguments[0]) && image.complete && image.naturalWidth === 440", site)
+    browser.run("document.querySelector('.site-place').scrollIntoView({block: 'end'})")
+    words, image = browser.run("return ['.site-place p', '.site-place img'].map((part) => {"
+                               "const box = document.querySelector(part).getBoundingClientRect();"
+                               "return {left: box.left, right: box.right, top: box.top, bottom: box.bottom}; })")
+    wide, high = browser.run("return [document.documentElement.clientWidth, innerHeight]")
+    assert words["right"] <= image["left"] + 1 and image["right"] <= wide, (words, image, wide)
+    assert min(words["bottom"], image["bottom"]) > max(words["top"], image["top"]), (words, image)
+    assert image["top"] >= 0 and image["bottom"] <= high, (image, high)
+    assert image["right"] - image["left"] > 120, image
 
 
 def change_depth(browser, site, depth_mm):
@@ -218,6 +234,7 @@ def work(browser, program, config, folder, pictures):
         take_skin_away(browser)
         points = {site: landmark(browser, site)["point"] for site in ("g", "pg", "zy_l", "go_r")}
         take_away(browser, points)
+        expect_site_picture(browser, "zy_l")
         picture("landmarks")
         place_by_clicks(browser, points)
         browser.press(UNDO)
@@ -267,6 +284,8 @@ def work(browser, program, config, folder, pictures):
             browser.settle()
             wide = browser.run("return document.documentElement.scrollWidth")
             assert wide <= 400, f"{tab}: {wide} pixels wide"
+            if tab == "landmarks":
+                expect_site_picture(browser, "go_r")
             picture("small-" + tab)
         complaints = browser.complaints()
         assert not complaints, complaints

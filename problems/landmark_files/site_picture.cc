@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/landmark_files/site_picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "problems/pictures/pictures.h"
+#include "problems/pictures/stroke_font.h"
+#include "problems/subject/phantom.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kWidth = 460, kHeight = 540;
+
+void Disc(Image& image, double x, double y, double radius, const Colour& colour) {
+  for (int row = static_cast<int>(y - radius) - 1; row <= static_cast<int>(y + radius) + 1; ++row) {
+    for (int column = static_cast<int>(x - radius) - 1; column <= static_cast<int>(x + radius) + 1;
+         ++column) {
+      const double inside = radius + 0.5 - std::hypot(column + 0.5 - x, row + 0.5 - y);
+      BlendPixel(image, column, row, colour, std::clamp(inside, 0.0, 1.0));
+    }
+  }
+}
+
+// A disc, and its number on the left or the right of it.
+void Mark(Image& image, const Camera& camera, const Site& site, const Vec3& point, bool left) {
+  const Vec3 seen = camera.view_from_world * (point - camera.centre);
+  const double pixels = kHeight / camera.height_mm;
+  const double x = kWidth / 2.0 + pixels * seen.x(), y = kHeight / 2.0 - pixels * seen.y();
+  Disc(image, x, y, 5, HexColour(0xffffff));
+  Disc(image, x, y, 4, HexColour(0xb3261e));
+  DrawText(image, x + (left ? -9 : 9), y + 5, std::to_string(site.number),
+           {.cap_height_px = 11,
+            .stroke = 0.15,
+            .colour = HexColour(0x16304f),
+            .anchor = left ? Anchor::kRight : Anchor::kLeft});
+}
+
+Image SeenFrom(View view, const Phantom& phantom, const Box3& region, int threads) {
+  const Camera camera = CameraFor(view, region, static_cast<double>(kWidth) / kHeight);
+  Image image =
+      Render({{SkullObject(phantom.skull)}}, camera, {.width = kWidth, .height = kHeight}, threads);
+  for (std::size_t k = 0; k < phantom.sites.size(); ++k) {
+    const Site& site = StandardSites()[k];
+    if (view == View::kFront || site.side != Side::kRight) {
+      const bool left =
+          view == View::kFront ? site.side != Side::kLeft : site.side == Side::kMidline;
+      Mark(image, camera, site, phantom.sites[k].base, left);
+    }
+  }
+  return image;
+}
+
+// ---------------------------------------------------------------------------------------------
+// One site at a time
+// ---------------------------------------------------------------------------------------------
+
+constexpr int kSketchWidth = 220, kSketchHeight = 260;
+
+// Between two standard landmarks, of a pair those on its side: first + share * (second - first).
+struct Between {
+  std::string_view landmark, first, second;
+  double share;
+};
+constexpr std::array<Between, 7> kBetween = {{{"mn", "n", "rhi", 0.5},
+                                              {"ss", "rhi", "mp", 0.85},
+                                              {"gn", "pg", "me", 0.5},
+                                              {"ac", "mp", "mio", 0.5},
+                                              {"sC", "mp", "sM2", 0.55},
+                                              {"iC", "id", "iM2", 0.5},
+                                              {"mmb", "me", "go", 0.5}}};
+
+std::string OnSideOf(const Site& site, std::string_view landmark) {
+  const auto known = std::ranges::find(StandardSites(), landmark, &Site::landmark);
+  return known->side == Side::kMidline
+             ? std::string(landmark)
+             : fmt::format("{}_{}", landmark, site.side == Side::kLeft ? "l" : "r");
+}
+
+// Of the points near the midline the one that `far` puts highest.
+template <class Far>
+Vec3 FarthestInMidline(const TriMesh& skull, const Far& far) {
+  constexpr double kNear_mm = 3;
+  Vec3 best = Vec3::Zero();
+  double most = -INFINITY;
+  for (const Vec3& p : skull.points) {
+    if (std::abs(p.x()) < kNear_mm && far(p) > most) {
+      best = p;
+      most = far(p);
+    }
+  }
+  return best;
+}
+
+Vec3 PlaceOf(const Site& site, const TriMesh& skull, const MeshQuery& query,
+             const std::map<std::string, Vec3>& standard) {
+  if (site.landmark == "v") {
+    return FarthestInMidline(skull, [](const Vec3& p) { return p.z(); });
+  }
+  if (site.landmark == "op") {
+    const Vec3 g = standard.at("g");
+    return FarthestInMidline(skull, [&](const Vec3& p) { return (p - g).norm(); });
+  }
+  const auto* const between = std::ranges::find(kBetween, site.landmark, &Between::landmark);
+  if (between == kBetween.end()) {
+    throw InputError(fmt::format("sites: no picture has a place for {}; write one", site.code));
+  }
+  const Vec3 a = standard.at(OnSideOf(site, between->first)),
+             b = standard.at(OnSideOf(site, between->second));
+  return query.Closest(a + between->share * (b - a)).position;
+}
+
+std::map<std::string, Vec3> PlacesOn(const Phantom& phantom, const MeshQuery& query) {
+  std::map<std::string, Vec3> places;
+  for (const PhantomSite& site : phantom.sites) {
+    places[site.site] = site.base;
+  }
+  const std::map<std::string, Vec3> standard = places;
+  for (const Site& site : FurtherSites()) {
+    places[site.code] = PlaceOf(site, phantom.skull, query, standard);
+  }
+  return places;
+}
+
+// CameraFor has no right side: the left one, turned half way round.
+Camera FromItsRight(Camera camera) {
+  camera.view_from_world.row(0) *= -1;
+  camera.view_from_world.row(2) *= -1;
+  return camera;
+}
+
+bool IsHidden(const MeshQuery& bone, const Camera& camera, const Vec3& place) {
+  constexpr double kAbove_mm = 2, kFar_mm = 1000;
+  const Vec3 towards = camera.view_from_world.row(2);
+  return bone.FirstHit(place + kAbove_mm * towards, towards, kFar_mm).has_value();
+}
+
+// A disc with a white rim; hollow where the bone hides the place.
+void Spot(Image& image, const SiteSketch::Seen& seen, const Vec3& place, double radius,
+          std::uint32_t colour, bool hollow) {
+  const Vec3 at = seen.camera.view_from_world * (place - seen.camera.centre);
+  const double pixels = kSketchHeight / seen.camera.height_mm;
+  const double x = kSketchWidth / 2.0 + pixels * at.x(), y = kSketchHeight / 2.0 - pixels * at.y();
+  Disc(image, x, y, radius + 1.5, HexColour(0xffffff));
+  Disc(image, x, y, radius, HexColour(colour));
+  if (hollow) {
+    Disc(image, x, y, 0.55 * radius, HexColour(0xffffff));
+  }
+}
+
+Image Marked(const SiteSketch& sketch, const SiteSketch::Seen& seen, const Site& site,
+             bool from_its_side) {
+  Image image = seen.bone;
+  for (const Site& other : StandardSites()) {
+    const bool is_seen = !from_its_side || other.side == Side::kMidline || other.side == site.side;
+    if (is_seen && other.code != site.code && !seen.hides.at(other.code)) {
+      Spot(image, seen, sketch.places.at(other.code), 2.5, 0x6f7883, /*hollow=*/false);
+    }
+  }
+  Spot(image, seen, sketch.places.at(site.code), 9, 0xb3261e, seen.hides.at(site.code));
+  return image;
+}
+
+const Site& KnownSite(std::string_view code) {
+  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
+    if (const auto at = std::ranges::find(*list, code, &Site::code); at != list->end()) {
+      return *at;
+    }
+  }
+  throw InputError(ComplaintAboutLandmark(code));
+}
+
+}  // namespace
+
+Image SitePicture(int threads) {
+  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 120});
+  Box3 region = Bounds(phantom.skull);
+  region.extend(Vec3(region.min() - Vec3(0, 15, 0)));  // room for the numbers before the face
+  const std::array views = {SeenFrom(View::kFront, phantom, region, threads),
+                            SeenFrom(View::kSide, phantom, region, threads)};
+  return ContactSheet(views,
+                      {.title = "", .captions = {"front", "left side"}, .legend = std::nullopt});
+}
+
+SiteSketch MakeSiteSketch(int threads) {
+  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 40});
+  const MeshQuery bone(phantom.skull);
+  const Box3 region = Bounds(phantom.skull);
+  constexpr double kAspect = static_cast<double>(kSketchWidth) / kSketchHeight;
+  Camera front = CameraFor(View::kFront, region, kAspect),
+         left = CameraFor(View::kSide, region, kAspect);
+  front.height_mm = left.height_mm = std::max(front.height_mm, left.height_mm);  // one scale
+  const std::array cameras = {front, left, FromItsRight(left)};
+  std::vector<Image> images = RenderAll({{SkullObject(phantom.skull)}}, cameras,
+                                        {.width = kSketchWidth, .height = kSketchHeight}, threads);
+  SiteSketch sketch{.places = PlacesOn(phantom, bone), .seen = {}};
+  for (std::size_t k = 0; k < cameras.size(); ++k) {
+    sketch.seen[k] = {cameras[k], std::move(images[k]), {}};
+    for (const auto& [site, place] : sketch.places) {
+      sketch.seen[k].hides[site] = IsHidden(bone, cameras[k], place);
+    }
+  }
+  return sketch;
+}
+
+Image PictureOf(const SiteSketch& sketch, std::string_view code) {
+  const Site& site = KnownSite(code);
+  Image both = MakeImage(2 * kSketchWidth, kSketchHeight, HexColour(0xffffff));
+  Paste(both, Marked(sketch, sketch.seen[0], site, /*from_its_side=*/false), 0, 0);
+  Paste(both,
+        Marked(sketch, sketch.seen[site.side == Side::kRight ? 2 : 1], site,
+               /*from_its_side=*/true),
+        kSketchWidth, 0);
+  return both;
+}
+
+}  // namespace semblance
