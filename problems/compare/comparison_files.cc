@@ -20,6 +20,10 @@ std::string Called(const ComparedTreatment& treatment) {
   return fmt::format("{}: {}", treatment.study, treatment.label);
 }
 
+const char* Direction(const StudyComparison& comparison) {
+  return comparison.better == Better::kHigher ? "higher is better" : "lower is better";
+}
+
 std::string IntervalText(const Interval& interval) {
   return std::isfinite(interval.low)
              ? fmt::format("{} to {}", TableNumber(interval.low), TableNumber(interval.high))
@@ -27,11 +31,11 @@ std::string IntervalText(const Interval& interval) {
 }
 
 ReportTable TreatmentTable(const StudyComparison& comparison) {
-  ReportTable table{fmt::format("{} over {} that all studies have; lower is better",
-                                WordsOfMetric(comparison.metric),
-                                Counted(std::ssize(comparison.subjects), "subject")),
-                    {"study", "treatment", "subjects", "mean", "sd", "95 % of the mean"},
-                    {}};
+  ReportTable table{
+      fmt::format("{} over {} that all studies have; {}", WordsOfMetric(comparison.metric),
+                  Counted(std::ssize(comparison.subjects), "subject"), Direction(comparison)),
+      {"study", "treatment", "subjects", "mean", "sd", "95 % of the mean"},
+      {}};
   for (const ComparedTreatment& t : comparison.treatments) {
     table.rows.push_back({t.study, t.label, std::to_string(t.summary.n),
                           TableNumber(t.summary.mean), TableNumber(t.summary.sd),
@@ -72,7 +76,8 @@ ReportImage BoxesOf(const StudyComparison& comparison) {
 
 Report ReportOf(const StudyComparison& comparison) {
   Report report{.title = fmt::format("{} compared", fmt::join(comparison.studies, ", ")),
-                .subtitle = fmt::format("{}, paired by subject", WordsOfMetric(comparison.metric)),
+                .subtitle = fmt::format("{}, paired by subject; {}",
+                                        WordsOfMetric(comparison.metric), Direction(comparison)),
                 .notes = comparison.notes,
                 .main_images = {BoxesOf(comparison)},
                 .tiles = {},
@@ -104,8 +109,9 @@ std::string PairText(const TreatmentPair& pair) {
 }  // namespace
 
 std::string ComparisonText(const StudyComparison& comparison) {
-  std::string text = fmt::format("{} over {} subjects; lower is better\n", comparison.metric,
-                                 comparison.subjects.size());
+  std::string text =
+      fmt::format("{} over {}; {}\n", comparison.metric,
+                  Counted(std::ssize(comparison.subjects), "subject"), Direction(comparison));
   for (const ComparedTreatment& t : comparison.treatments) {
     text += fmt::format("  {}: {}\n", Called(t), TableNumber(t.summary.mean));
   }

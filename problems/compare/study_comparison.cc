@@ -9,6 +9,7 @@
 #include <set>
 
 #include "problems/report/plain_names.h"
+#include "problems/study/study_metrics.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -58,15 +59,25 @@ std::set<std::string> SubjectsOf(const NamedStudy& study, const std::string& met
   return subjects;
 }
 
-void RequireLowerIsBetter(std::span<const NamedStudy> studies, const std::string& metric) {
+Better TakenAsBetter(const NamedStudy& study) {
+  return study.results.higher_is_better ? Better::kHigher : Better::kLower;
+}
+
+// Of the studies' own metric they have said it; of another one its name does.
+Better BetterIn(std::span<const NamedStudy> studies, const std::string& metric) {
+  const NamedStudy* teller = nullptr;
   for (const NamedStudy& study : studies) {
-    if (study.results.higher_is_better && study.results.metric == metric) {
-      throw InputError(fmt::format(
-          "{}: its search took higher values of '{}' as better, and studies are compared by what "
-          "is better lower; name another number with --metric",
-          study.name, metric));
+    if (study.results.metric != metric) {
+      continue;
     }
+    if (teller != nullptr && TakenAsBetter(*teller) != TakenAsBetter(study)) {
+      throw InputError(fmt::format(
+          "'{}': {} took {} values of it as better, and {} the others; say which are with --better",
+          metric, teller->name, teller->results.higher_is_better ? "higher" : "lower", study.name));
+    }
+    teller = &study;
   }
+  return teller == nullptr ? BetterOf(metric) : TakenAsBetter(*teller);
 }
 
 std::vector<std::string> CommonSubjects(std::span<const NamedStudy> studies,
@@ -84,10 +95,14 @@ std::vector<std::string> CommonSubjects(std::span<const NamedStudy> studies,
   return {common.begin(), common.end()};
 }
 
-std::vector<ComparedTreatment> TreatmentsOf(const NamedStudy& study, const std::string& metric,
-                                            const std::vector<std::string>& subjects) {
+// As a number of which less is better.
+double CostOf(double value, Better better) { return better == Better::kHigher ? -value : value; }
+
+std::vector<ComparedTreatment> TreatmentsOf(const NamedStudy& study,
+                                            const StudyComparison& comparison) {
+  const std::vector<std::string>& subjects = comparison.subjects;
   std::vector<ComparedTreatment> compared;
-  for (const Treatment& treatment : Treatments(study.results, metric)) {
+  for (const Treatment& treatment : Treatments(study.results, comparison.metric)) {
     ComparedTreatment one{
         .study = study.name, .label = treatment.label, .by_subject = {}, .summary = {}};
     std::vector<double> values;
@@ -100,17 +115,20 @@ std::vector<ComparedTreatment> TreatmentsOf(const NamedStudy& study, const std::
     one.summary = Summarize(values);
     compared.push_back(std::move(one));
   }
-  std::ranges::stable_sort(compared, [](const auto& a, const auto& b) {
-    return a.summary.n > 0 && (b.summary.n == 0 || a.summary.mean < b.summary.mean);
+  const auto cost = [&](const ComparedTreatment& t) {
+    return CostOf(t.summary.mean, comparison.better);
+  };
+  std::ranges::stable_sort(compared, [&](const auto& a, const auto& b) {
+    return a.summary.n > 0 && (b.summary.n == 0 || cost(a) < cost(b));
   });
   return compared;
 }
 
 TreatmentPair Pair(const ComparedTreatment& reference, const ComparedTreatment& other,
-                   bool same_label) {
+                   Better better) {
   TreatmentPair pair{.reference = reference,
                      .other = other,
-                     .same_label = same_label,
+                     .same_label = reference.label == other.label,
                      .difference = {},
                      .test = {}};
   std::vector<double> differences;
@@ -118,8 +136,9 @@ TreatmentPair Pair(const ComparedTreatment& reference, const ComparedTreatment& 
     if (const auto before = reference.by_subject.find(subject);
         before != reference.by_subject.end()) {
       differences.push_back(value - before->second);
-      pair.better += differences.back() < 0 ? 1 : 0;
-      pair.worse += differences.back() > 0 ? 1 : 0;
+      const double cost = CostOf(differences.back(), better);
+      pair.better += cost < 0 ? 1 : 0;
+      pair.worse += cost > 0 ? 1 : 0;
     }
   }
   pair.difference = Summarize(differences);
@@ -189,34 +208,34 @@ std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
   return studies;
 }
 
-StudyComparison CompareStudies(std::span<const NamedStudy> studies, const std::string& metric) {
+StudyComparison CompareStudies(std::span<const NamedStudy> studies, const CompareOptions& options) {
   if (studies.size() < 2) {
     throw InputError("one study alone cannot be compared; name two folders or more");
   }
-  StudyComparison comparison{.metric = metric.empty() ? studies.front().results.metric : metric,
+  const std::string metric =
+      options.metric.empty() ? studies.front().results.metric : options.metric;
+  StudyComparison comparison{.metric = metric,
+                             .better = options.better ? *options.better : BetterIn(studies, metric),
                              .studies = {},
                              .subjects = {},
                              .treatments = {},
                              .pairs = {},
                              .notes = {}};
-  RequireLowerIsBetter(studies, comparison.metric);
-  comparison.subjects = CommonSubjects(studies, comparison.metric);
-  const std::vector<ComparedTreatment> first =
-      TreatmentsOf(studies.front(), comparison.metric, comparison.subjects);
+  comparison.subjects = CommonSubjects(studies, metric);
+  const std::vector<ComparedTreatment> first = TreatmentsOf(studies.front(), comparison);
   for (const NamedStudy& study : studies) {
     comparison.studies.push_back(study.name);
-    for (ComparedTreatment& treatment :
-         TreatmentsOf(study, comparison.metric, comparison.subjects)) {
+    for (ComparedTreatment& treatment : TreatmentsOf(study, comparison)) {
       if (&study != &studies.front()) {
         const auto same = std::ranges::find(first, treatment.label, &ComparedTreatment::label);
         comparison.pairs.push_back(
-            Pair(same == first.end() ? first.front() : *same, treatment, same != first.end()));
+            Pair(same == first.end() ? first.front() : *same, treatment, comparison.better));
       }
       comparison.treatments.push_back(std::move(treatment));
     }
   }
   AdjustTests(comparison.pairs);
-  comparison.notes = NotesOn(studies, comparison.metric, comparison.subjects);
+  comparison.notes = NotesOn(studies, metric, comparison.subjects);
   return comparison;
 }
 

@@ -4,11 +4,13 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "problems/metrics/statistics.h"
+#include "problems/study/study_file.h"
 #include "problems/study/study_tables.h"
 
 namespace semblance {
@@ -34,7 +36,7 @@ struct ComparedTreatment {
 struct TreatmentPair {
   ComparedTreatment reference, other;
   bool same_label = false;    // else the reference is the best of the first study
-  int better = 0, worse = 0;  // subjects of which the other has the lower or the higher metric
+  int better = 0, worse = 0;  // subjects of which the other has the better or the worse metric
   SampleSummary difference;   // other less reference, over the subjects that both have
   WilcoxonResult test;        // of the differences
   double p_holm = kNaN;       // adjusted for all pairs (Holm 1979); NaN below 6 subjects
@@ -42,6 +44,7 @@ struct TreatmentPair {
 
 struct StudyComparison {
   std::string metric;
+  Better better = Better::kLower;
   std::vector<std::string> studies;
   std::vector<std::string> subjects;          // that all studies have, sorted
   std::vector<ComparedTreatment> treatments;  // study by study, best mean first
@@ -49,10 +52,15 @@ struct StudyComparison {
   std::vector<std::string> notes;             // what a reader should know
 };
 
-// metric: lower is better; empty: that of the first study. A treatment of a later study is paired
-// with the one of the same label in the first, else with the best of the first. The unit is the
-// subject, by its name. Throws InputError for fewer than two studies, if no subject is in all of
-// them, if a study has no number of that name, or if its search took higher values as better.
-StudyComparison CompareStudies(std::span<const NamedStudy> studies, const std::string& metric);
+struct CompareOptions {
+  std::string metric;            // a number of result.json by its path; empty: the first study's
+  std::optional<Better> better;  // none: as the studies of this metric took it, else BetterOf
+};
+
+// A treatment of a later study is paired with the one of the same label in the first, else with the
+// best of the first. The unit is the subject, by its name. Throws InputError for fewer than two
+// studies, if no subject is in all of them, if a study has no number of that name, or if one study
+// took lower values of the metric as better and another one higher, and `better` does not say.
+StudyComparison CompareStudies(std::span<const NamedStudy> studies, const CompareOptions& options);
 
 }  // namespace semblance

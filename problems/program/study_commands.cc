@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 struct StudyArguments {
   std::vector<std::string> files;
   std::string out, shard;
-  std::string rerun, metric;
+  std::string rerun, metric, better;
   bool force = false;
   bool quiet = false, list = false, slurm = false;
   StudyRunOptions run;
@@ -217,8 +217,12 @@ int StatusCommand(const StudyArguments& a) {
 }
 
 int CompareCommand(const StudyArguments& a) {
+  CompareOptions options{.metric = a.metric, .better = std::nullopt};
+  if (!a.better.empty()) {
+    options.better = a.better == "higher" ? Better::kHigher : Better::kLower;
+  }
   const StudyComparison comparison =
-      CompareStudies(ReadStudies({a.files.begin(), a.files.end()}), a.metric);
+      CompareStudies(ReadStudies({a.files.begin(), a.files.end()}), options);
   Tell("{}", ComparisonText(comparison));
   if (!a.out.empty()) {
     StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
@@ -312,6 +316,11 @@ void DeclareCompare(CLI::App& compare, CommandLine& line) {
       ->expected(2, 100);
   compare.add_option("--metric", a.metric,
                      "number of result.json by its path; else that of the first study");
+  compare
+      .add_option("--better", a.better,
+                  "which values of the metric are better; else as the studies took it, or as its "
+                  "name says: higher for shares within a distance, lower for all others")
+      ->check(CLI::IsMember({"lower", "higher"}));
   compare.add_option("--out", a.out, "folder for pairs.csv, values.csv and report.html");
   compare.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "problems/search/searcher.h"
+#include "problems/study/study_metrics.h"
 #include "problems/study/trial_folder.h"
 #include "surfaces/base/geometry.h"
 
@@ -96,7 +97,8 @@ class SearchRun {
         sum += MetricIn(*trial, plan_.metric);
       }
       const double mean = sum / static_cast<double>(plan_.steps[n].trials.size());
-      costs_.push_back(search_.options.better == Better::kHigher ? -mean : mean);
+      const Better better = search_.options.better.value_or(BetterOf(plan_.metric));
+      costs_.push_back(better == Better::kHigher ? -mean : mean);
       const bool is_full = plan_.steps[n].cost == 1;
       if (is_full && std::isfinite(mean) && (best_ < 0 || costs_[n] < costs_[Best()])) {
         best_ = static_cast<int>(n);

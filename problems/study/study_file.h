@@ -13,7 +13,7 @@
 //     sample: {method: lhs, n: 20, random_seed: 1, ranges: {seeds.weight: [0.1, 1.0]}}
 //     search: {method: bayes, budget: 30, ranges: {seeds.weight: {low: 0.1, high: 1.0}}}
 //     tags: [paper, 2026]              # words that people find it by
-//     metric: face.rms_mm              # that the report ranks by; lower is better
+//     metric: face.rms_mm              # that the report ranks by
 //     keep: summary
 //     job: face
 //     identify: {others: [{name: c, set: {subject.random_seed: 3}}]}   # for job: identify
@@ -160,8 +160,8 @@ struct StudySearch {
   SearchMethod method = BayesSearch{};  // the least runs where a treatment costs minutes
   int budget = 0;                       // must be given
   std::uint64_t random_seed = 1;
-  std::string metric;  // empty: the study's
-  Better better = Better::kLower;
+  std::string metric;            // empty: the study's
+  std::optional<Better> better;  // none: as the metric says of itself
   ConfigMap<SearchedNumber> ranges;
   OptionAxes choices;
   std::vector<StudySubject> held_out;  // empty: what is found is as good as it looks to itself
@@ -184,7 +184,11 @@ void Fields(Visitor& visit, StudySearch& o) {
                   .doc = "a number of result.json by its path, whose mean over subjects is "
                          "searched; the report ranks by it; left out, the study's metric"},
         o.metric);
-  visit(FieldInfo{.name = "better", .doc = "which values of the metric are better"}, o.better);
+  visit(
+      FieldInfo{.name = "better",
+                .doc = "which values of the metric are better; left out, higher for shares within "
+                       "a distance, as face.within_2_5mm, and lower for all others"},
+      o.better);
   visit(FieldInfo{.name = "ranges",
                   .doc = "numbers by option path, as in {seeds.weight: {low: 0.1, high: 10.0, log: "
                          "true}}"},
@@ -255,8 +259,8 @@ void Fields(Visitor& visit, StudyFile& o) {
                          "and in results.sqlite"},
         o.tags);
   visit(FieldInfo{.name = "metric",
-                  .doc = "a number of result.json by its path, which the report ranks by; lower is "
-                         "better"},
+                  .doc = "a number of result.json by its path, which the report ranks by: lower "
+                         "is better, but of shares within a distance, as face.within_2_5mm"},
         o.metric);
   visit(FieldInfo{.name = "keep",
                   .doc = "of each trial: summary, the numbers; view, also what the report's 3-D "

@@ -149,4 +149,10 @@ bool NeedsTrueSkin(const std::string& metric) {
   return std::ranges::any_of(kParts, [&](const char* part) { return metric.starts_with(part); });
 }
 
+Better BetterOf(const std::string& metric) {
+  const std::size_t dot = metric.rfind('.');
+  const std::string last = dot == metric.npos ? metric : metric.substr(dot + 1);
+  return last.starts_with("within_") ? Better::kHigher : Better::kLower;
+}
+
 }  // namespace semblance

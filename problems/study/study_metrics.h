@@ -20,4 +20,8 @@ std::string ComplaintAboutMetric(const std::string& metric, StudyJob job);
 // number.
 bool NeedsTrueSkin(const std::string& metric);
 
+// Which of its values are better: higher of shares within a distance, as face.within_2_5mm; of all
+// others lower.
+Better BetterOf(const std::string& metric);
+
 }  // namespace semblance

@@ -27,6 +27,7 @@
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"
 #include "problems/study/search_run.h"
+#include "problems/study/study_metrics.h"
 #include "problems/study/study_tables.h"
 #include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
@@ -388,10 +389,11 @@ class StudyRunner {
 // A search as plan.json has it: how it goes, and what it has asked for so far.
 Json SearchJson(const StudyPlan& plan) {
   const StudySearch& search = plan.search->options;
+  const Better better = search.better.value_or(BetterOf(plan.metric));
   Json json = {{"method", ToFlowYaml(ConfigTreeOf(search.method))},
                {"budget", search.budget},
                {"random_seed", search.random_seed},
-               {"better", EnumNames(search.better)[static_cast<std::size_t>(search.better)]},
+               {"better", EnumNames(better)[static_cast<std::size_t>(better)]},
                {"ended", plan.search_ended},
                {"best", plan.best_step},
                {"steps", Json::array()}};

@@ -14,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "problems/study/study_metrics.h"
 #include "problems/study/trial_folder.h"
 #include "problems/study/trial_numbers.h"
 #include "surfaces/base/atomic_file.h"
@@ -148,8 +149,9 @@ StudyResults ReadStudyResults(const fs::path& folder) {
     }
     ReadTrials(folder, results.trials);
     results.tags = plan.value("tags", std::vector<std::string>());
-    results.higher_is_better =
-        plan.contains("search") && plan["search"].at("better").get<std::string>() == "higher";
+    results.higher_is_better = plan.contains("search")
+                                   ? plan["search"].at("better").get<std::string>() == "higher"
+                                   : BetterOf(results.metric) == Better::kHigher;
   } catch (const nlohmann::json::exception&) {
     throw IoError(fmt::format(
         "{}: not the plan of a study, or of a part of it only; run the study again, which writes "

@@ -36,7 +36,7 @@ struct StudyResults {
   std::vector<TrialRow> trials;    // in the order of the plan
   std::vector<std::string> notes;  // of the plan; AreaNotes; the tags
   std::vector<std::string> tags = {};
-  bool higher_is_better = false;  // of the metric: what a search was told; else lower is
+  bool higher_is_better = false;  // of the metric: what a search was told, else BetterOf
 
   int Count(const std::string& status) const;
 };

@@ -49,7 +49,8 @@ std::string RankingText(const StudyResults& results) {
   if (ranked.empty()) {
     return {};
   }
-  std::string text = fmt::format("{}, best mean first:\n", WordsOfMetric(results.metric));
+  std::string text = fmt::format("{}, best mean first{}:\n", WordsOfMetric(results.metric),
+                                 results.higher_is_better ? " (higher is better)" : "");
   for (std::size_t n = 0; n < std::min(ranked.size(), kMost); ++n) {
     const double seconds = MeanSeconds(results, ranked[n]);
     const auto subjects = static_cast<long long>(ranked[n].by_subject.size());

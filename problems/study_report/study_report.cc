@@ -49,10 +49,12 @@ std::string Seconds(double seconds) {
 
 // Each treatment leads to the first of its trials.
 ReportTable RankingTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportTable table{fmt::format("Treatments by {}, best mean first", WordsOfMetric(results.metric)),
-                    {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median",
-                     "min", "max", "mean seconds"},
-                    {}};
+  ReportTable table{
+      fmt::format("Treatments by {}, best mean first{}", WordsOfMetric(results.metric),
+                  results.higher_is_better ? " (higher is better)" : ""),
+      {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median", "min", "max",
+       "mean seconds"},
+      {}};
   for (const Treatment& treatment : ranked) {
     const SampleSummary s = Summarize(ValuesOf(treatment));
     table.rows.push_back({treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "",

@@ -18,6 +18,7 @@
 namespace semblance {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -59,7 +60,7 @@ double Value(const NamedStudy& study, const std::string& treatment, const std::s
 
 TEST(StudyComparison, ADifferenceIsTheMeanOverSubjectsThatBothHave) {
   const NamedStudy a = Study("a", {"x", "y"}, 9, 1), b = Study("b", {"x"}, 7, 2);
-  const StudyComparison comparison = CompareStudies(std::vector{a, b}, "");
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
   EXPECT_THAT(comparison.subjects, SizeIs(7));
   ASSERT_THAT(comparison.pairs, SizeIs(1));
   const TreatmentPair& pair = comparison.pairs[0];
@@ -83,12 +84,12 @@ TEST(StudyComparison, OfAStudyAndItsCopyNothingDiffersAndOrderTurnsTheSign) {
   const NamedStudy a = Study("a", {"x", "y"}, 8, 1), b = Study("b", {"x", "y"}, 8, 2);
   NamedStudy copy = a;
   copy.name = "copy";
-  for (const TreatmentPair& pair : CompareStudies(std::vector{a, copy}, "").pairs) {
+  for (const TreatmentPair& pair : CompareStudies(std::vector{a, copy}, {}).pairs) {
     EXPECT_EQ(pair.difference.mean, 0);
     EXPECT_EQ(pair.better + pair.worse, 0);
   }
-  const auto there = CompareStudies(std::vector{a, b}, "").pairs,
-             back = CompareStudies(std::vector{b, a}, "").pairs;
+  const auto there = CompareStudies(std::vector{a, b}, {}).pairs,
+             back = CompareStudies(std::vector{b, a}, {}).pairs;
   for (const TreatmentPair& pair : there) {
     for (const TreatmentPair& other : back) {
       if (other.other.label == pair.other.label) {
@@ -101,7 +102,7 @@ TEST(StudyComparison, OfAStudyAndItsCopyNothingDiffersAndOrderTurnsTheSign) {
 
 TEST(StudyComparison, AStrangerIsComparedWithTheBestOfTheFirst) {
   const NamedStudy a = Study("a", {"x", "y", "z"}, 8, 1), b = Study("b", {"other"}, 8, 2);
-  const StudyComparison comparison = CompareStudies(std::vector{a, b}, "");
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
   ASSERT_THAT(comparison.pairs, SizeIs(1));
   EXPECT_FALSE(comparison.pairs[0].same_label);
   for (const ComparedTreatment& treatment : comparison.treatments) {
@@ -118,36 +119,84 @@ TEST(StudyComparison, ATreatmentThatNoSubjectHasInBothIsSaid) {
   b.name = "b";
   b.results.trials[1].status = "failed";
   b.results.trials[1].metrics.clear();
-  const std::string text = ComparisonText(CompareStudies(std::vector{b, a}, ""));
+  const std::string text = ComparisonText(CompareStudies(std::vector{b, a}, {}));
   EXPECT_THAT(text, HasSubstr("a: y less b: y: no subject was done with both"));
   EXPECT_THAT(text, Not(HasSubstr("nan")));
 }
 
 TEST(StudyComparison, BelowSixSubjectsThereIsNoTest) {
   const StudyComparison comparison =
-      CompareStudies(std::vector{Study("a", {"x"}, 5, 1), Study("b", {"x"}, 5, 2)}, "");
+      CompareStudies(std::vector{Study("a", {"x"}, 5, 1), Study("b", {"x"}, 5, 2)}, {});
   EXPECT_TRUE(std::isnan(comparison.pairs[0].p_holm));
 }
 
 TEST(StudyComparison, WhatCannotBeComparedIsRefusedOrSaid) {
   const NamedStudy a = Study("a", {"x"}, 3, 1);
   NamedStudy b = Study("b", {"x"}, 3, 2);
-  EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector{a}, ""); }),
+  EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector{a}, {}); }),
               HasSubstr("one study alone"));
   EXPECT_THAT(WordsOf<InputError>([&] {
-                CompareStudies(std::vector{a, b}, "face.nothing");
+                CompareStudies(std::vector{a, b}, {.metric = "face.nothing", .better = {}});
               }),
               HasSubstr("a: no trial that is done has the number 'face.nothing'"));
   b.results.trials[0].metrics["face.area_cm2"] = 200;
-  EXPECT_THAT(CompareStudies(std::vector{a, b}, "").notes,
+  EXPECT_THAT(CompareStudies(std::vector{a, b}, {}).notes,
               Contains(HasSubstr("not measured on the same area")));
   for (TrialRow& row : b.results.trials) {
     row.subject += "'";
   }
   EXPECT_THAT(WordsOf<InputError>([&] {
-                CompareStudies(std::vector{a, b}, "");
+                CompareStudies(std::vector{a, b}, {});
               }),
               HasSubstr("no subject in common"));
+}
+
+// Of a metric that is better higher, all is as of its negative that is better lower.
+TEST(StudyComparison, WhereHigherIsBetterAllIsTurnedRound) {
+  constexpr const char* kShare = "face.within_2_5mm";
+  NamedStudy a = Study("a", {"x", "y", "z"}, 8, 1), b = Study("b", {"y", "other"}, 8, 2);
+  for (NamedStudy* study : {&a, &b}) {
+    for (TrialRow& row : study->results.trials) {
+      row.metrics[kShare] = 1 - 0.1 * row.metrics[kMetric];
+      row.metrics["negative"] = -row.metrics[kShare];
+    }
+  }
+  const auto by = [&](const char* metric) {
+    return CompareStudies(std::vector{a, b}, {.metric = metric, .better = {}});
+  };
+  const StudyComparison share = by(kShare), negative = by("negative");
+  EXPECT_EQ(share.better, Better::kHigher);
+  EXPECT_EQ(negative.better, Better::kLower);
+  ASSERT_THAT(share.pairs, SizeIs(2));
+  for (std::size_t k = 0; k < share.pairs.size(); ++k) {
+    const TreatmentPair &x = share.pairs[k], &y = negative.pairs[k];
+    EXPECT_EQ(x.other.label, y.other.label);
+    EXPECT_EQ(x.reference.label, y.reference.label);
+    EXPECT_NEAR(x.difference.mean, -y.difference.mean, 1e-12);
+    EXPECT_EQ(x.better, y.better);
+    EXPECT_EQ(x.worse, y.worse);
+    EXPECT_NEAR(x.p_holm, y.p_holm, 1e-12);
+  }
+  EXPECT_GE(share.treatments[0].summary.mean, share.treatments[1].summary.mean);
+  EXPECT_THAT(ComparisonText(share),
+              HasSubstr("face.within_2_5mm over 8 subjects; higher is better"));
+  EXPECT_THAT(ComparisonText(negative), HasSubstr("lower is better"));
+}
+
+TEST(StudyComparison, WhatASearchTookAsBetterIsKeptAndAContradictionIsAskedAbout) {
+  NamedStudy a = Study("a", {"x"}, 8, 1), b = Study("b", {"x"}, 8, 2);
+  a.results.higher_is_better = true;
+  EXPECT_THAT(WordsOf<InputError>([&] {
+                CompareStudies(std::vector{a, b}, {});
+              }),
+              AllOf(HasSubstr("a took higher values"), HasSubstr("--better")));
+  EXPECT_EQ(CompareStudies(std::vector{a, b}, {.metric = "", .better = Better::kLower}).better,
+            Better::kLower);
+  b.results.higher_is_better = true;
+  EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).better, Better::kHigher);
+  b.results.higher_is_better = false;
+  b.results.metric = "face.mean_abs_mm";  // says nothing of the metric that is compared
+  EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).better, Better::kHigher);
 }
 
 TEST(StudyComparison, FoldersAreCalledByAsMuchOfTheirPathAsTellsThemApart) {
@@ -175,7 +224,7 @@ TEST(StudyComparison, FoldersAreCalledByAsMuchOfTheirPathAsTellsThemApart) {
 
 TEST(ComparisonFiles, TheTablesHoldEveryPairAndValue) {
   const StudyComparison comparison =
-      CompareStudies(std::vector{Study("a", {"x", "y"}, 8, 1), Study("b", {"x", "y"}, 8, 2)}, "");
+      CompareStudies(std::vector{Study("a", {"x", "y"}, 8, 1), Study("b", {"x", "y"}, 8, 2)}, {});
   const std::string pairs = PairsCsv(comparison), values = ComparedCsv(comparison);
   EXPECT_EQ(std::count(pairs.begin(), pairs.end(), '\n'), 1 + 2);
   EXPECT_EQ(std::count(values.begin(), values.end(), '\n'), 1 + 2 * 2 * 8);
