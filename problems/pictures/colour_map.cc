@@ -43,9 +43,14 @@ Colour ColourOf(const Triple& lab) {
   return {SrgbFromLinear(linear[0]), SrgbFromLinear(linear[1]), SrgbFromLinear(linear[2])};
 }
 
+// Without a power of ten where that is short.
 std::string TickLabel(double value, double step) {
+  constexpr int kMostDecimals = 4;
+  constexpr double kMostPlain = 1e6;
   const int decimals = std::max(0, static_cast<int>(std::ceil(-std::log10(step) - 1e-9)));
-  return fmt::format("{:.{}f}", value == 0 ? 0.0 : value, decimals);
+  const bool is_plain = decimals <= kMostDecimals && std::abs(value) < kMostPlain;
+  return is_plain ? fmt::format("{:.{}f}", value == 0 ? 0.0 : value, decimals)
+                  : fmt::format("{:.6g}", value == 0 ? 0.0 : value);
 }
 
 struct Bar {
@@ -53,19 +58,55 @@ struct Bar {
   double scale;  // 1: letters of about 11 pixels
 };
 
+struct BarTick {
+  double x;  // pixels from the bar's left end
+  std::string label;
+};
+
+TextStyle TickStyle(const Bar& bar) {
+  return {.cap_height_px = 10.5 * bar.scale, .anchor = Anchor::kCentre};
+}
+
+bool HaveRoom(const std::vector<BarTick>& ticks, const Bar& bar) {
+  const double gap = 10 * bar.scale;
+  for (std::size_t k = 1; k < ticks.size(); ++k) {
+    const double half = (TextWidth(ticks[k - 1].label, TickStyle(bar)) +
+                         TextWidth(ticks[k].label, TickStyle(bar))) /
+                        2;
+    if (ticks[k].x - ticks[k - 1].x < half + gap) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::vector<BarTick> BarTicks(const ColourMap& map, const Bar& bar, int wanted) {
+  const std::vector<double> values = Ticks(map, wanted);
+  const double step = values.size() > 1 ? values[1] - values[0] : map.high_mm - map.low_mm;
+  std::vector<BarTick> ticks;
+  for (const double value : values) {
+    const double t = (value - map.low_mm) / (map.high_mm - map.low_mm);
+    ticks.push_back({std::round(t * (bar.width - 1)), TickLabel(value, step)});
+  }
+  return ticks;
+}
+
+// As many as the labels have room for.
 void DrawTicks(Image& image, const ColourMap& map, const Bar& bar) {
-  const int wanted = static_cast<int>(bar.width / (50 * bar.scale));
-  const std::vector<double> ticks = Ticks(map, std::clamp(wanted, 2, 10));
-  const double step = ticks.size() > 1 ? ticks[1] - ticks[0] : map.high_mm - map.low_mm;
+  constexpr int kFewest = 2, kMost = 10;
+  const int wanted = std::clamp(static_cast<int>(bar.width / (50 * bar.scale)), kFewest, kMost);
+  std::vector<BarTick> ticks = BarTicks(map, bar, wanted);
+  for (int fewer = wanted - 1; fewer > 0 && !HaveRoom(ticks, bar); --fewer) {
+    std::vector<BarTick> some = BarTicks(map, bar, fewer);
+    ticks = some.size() < kFewest ? ticks : std::move(some);  // one says nothing of the scale
+  }
   const int tick_width = std::max(1, static_cast<int>(bar.scale));
   const int tick_height = static_cast<int>(5 * bar.scale);
-  for (const double tick : ticks) {
-    const double t = (tick - map.low_mm) / (map.high_mm - map.low_mm);
-    const int x = bar.x + static_cast<int>(std::lround(t * (bar.width - 1)));
+  for (const BarTick& tick : ticks) {
+    const int x = bar.x + static_cast<int>(tick.x);
     FillRectangle(image, x - tick_width / 2, bar.y + bar.height, tick_width, tick_height,
                   HexColour(0x30343a));
-    DrawText(image, x + 0.5, bar.y + bar.height + 20 * bar.scale, TickLabel(tick, step),
-             {.cap_height_px = 10.5 * bar.scale, .anchor = Anchor::kCentre});
+    DrawText(image, x + 0.5, bar.y + bar.height + 20 * bar.scale, tick.label, TickStyle(bar));
   }
 }
 

@@ -34,16 +34,24 @@ const SemblanceGuides = (() => {
     }
   };
 
+  // Three figures; very small and large numbers with a power of ten, as 1.2e-5.
+  const figureOf = (value, scaled) => {
+    const is_plain = value === 0 || !scaled || (Math.abs(value) >= 1e-3 && Math.abs(value) < 1e5);
+    return `${!is_plain ? value.toExponential(1) : scaled ? +value.toPrecision(3) : +value.toFixed(2)}`.replaceAll('-', '\u2212');
+  };
+
   // range_mm: as SemblanceGeometry.domainOf takes it.
   const legendOf = (map, range_mm) => {
     const [low, high] = SemblanceGeometry.domainOf(map, range_mm);
     const bar = element('div', {className: 'view3d-bar'});
     bar.style.background = `linear-gradient(to right, ${map.colours.join(',')})`;
     const ticks = element('div', {className: 'view3d-ticks'});
-    for (let k = 0; k <= 4; ++k) {
+    const figures = [0, 1, 2, 3, 4].map((k) => {
       const value = (low + (high - low) * k / 4) * (map.scale || 1), sign = low < 0 && value > 0 ? '+' : '';
-      ticks.append(element('span', {textContent: `${sign}${map.scale ? +value.toPrecision(3) : +value.toFixed(2)}`.replace('-', '\u2212')}));
-    }
+      return sign + figureOf(value, Boolean(map.scale));
+    });
+    const is_long = figures.some((figure) => figure.length > 5);  // there is no room for five of them
+    for (const figure of is_long ? [figures[0], figures[2], figures[4]] : figures) { ticks.append(element('span', {textContent: figure})); }
     const none = element('i', {style: `background:${map.no_data}`});
     return element('div', {className: 'view3d-legend'}, element('div', {textContent: `${map.title} (mm)`}),
                    bar, ticks, element('small', {}, none, 'no data'));

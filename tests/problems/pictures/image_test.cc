@@ -189,5 +189,33 @@ TEST(Legend, BarRunsThroughTheMapFromLeftToRight) {
   ExpectColour(PixelAt(image, 519, row), kNoDataColour, 0.01);
 }
 
+// The columns of [top, bottom) with ink in them, in groups that at least `gap` blank ones part.
+int InkedGroups(const Image& image, int top, int bottom, int gap) {
+  int groups = 0, blank = gap;
+  for (int x = 0; x < image.width; ++x) {
+    bool inked = false;
+    for (int y = top; y < bottom; ++y) {
+      inked = inked || PixelAt(image, x, y).g < 0.5;
+    }
+    groups += inked && blank >= gap ? 1 : 0;
+    blank = inked ? 0 : blank + 1;
+  }
+  return groups;
+}
+
+TEST(Legend, EachTickHasALabelWithRoomAroundItWhateverTheSizeOfTheNumbers) {
+  for (const double high : {3e-12, 2.3e-6, 4.7e-4, 0.031, 1.0, 25.0, 8800.0, 7.1e5, 4e9}) {
+    for (const int width : {400, 600, 1200}) {
+      Image image = MakeImage(width, 84, {1, 1, 1});
+      DrawLegend(image,
+                 {.map = SequentialMap(0, high), .title = "distance", .shows_no_data = false}, 0, 0,
+                 width, 84);
+      const int ticks = InkedGroups(image, 52, 54, 1);
+      EXPECT_GE(ticks, 2) << high;
+      EXPECT_EQ(InkedGroups(image, 58, 74, 7), ticks) << high << " in " << width;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace semblance
