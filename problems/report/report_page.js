@@ -64,6 +64,17 @@
   };
   const filters = Array.from(document.querySelectorAll('table[data-filter]')).map(filterOf);
 
+  // On a phone a tap shows a picture as large as it was made, in a box of its own that scrolls; another one takes it back.
+  for (const picture of document.querySelectorAll('figure > svg.plot, figure > img')) {
+    const box = document.createElement('div');
+    box.className = 'picture';
+    picture.before(box);
+    box.append(picture);
+    box.addEventListener('click', (event) => {
+      if (matchMedia('(max-width: 44rem)').matches && !event.target.closest('a')) { box.classList.toggle('large'); }
+    });
+  }
+
   // Folded parts.
   const reveal = () => {
     const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));

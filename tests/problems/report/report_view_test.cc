@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/pipeline/experiment_config.h"
+#include "problems/plots/svg_plot.h"
 #include "problems/report/report.h"
 #include "problems/report/report_assets.h"
 #include "problems/report/scene_json.h"
@@ -172,6 +173,10 @@ addEventListener('load', () => setTimeout(() => {
   for (const part of document.querySelectorAll('details')) { part.open = true; }
   out.across = document.documentElement.scrollWidth;
   out.boxes = [...document.querySelectorAll('.scroll')].filter((box) => box.scrollWidth > box.clientWidth + 1).length;
+  const plot = document.querySelector('svg.plot'), wide = () => plot.getBoundingClientRect().width;
+  const tap = () => plot.dispatchEvent(new MouseEvent('click', {bubbles: true}));
+  out.plot = [wide()];
+  for (let n = 0; n < 2; ++n) { tap(); out.plot.push(wide()); out.across = Math.max(out.across, document.documentElement.scrollWidth); }
   fold.open = false;
   location.hash = 'row-9';
   setTimeout(() => {
@@ -197,6 +202,7 @@ TEST_F(ReportViewTest, FitsAPhoneAndFindsWhatIsFolded) {
     table.ids.push_back(fmt::format("row-{}", row));
   }
   table.filter = true;
+  report.main_images = {{BoxPlotSvg({{"row", {1, 2, 3}}}, "axis"), "caption", "a plot"}};
   report.sections.push_back({.heading = "open", .preformatted = std::string(300, 'x')});
   report.sections.push_back({.heading = "folded", .tables = {table}, .folded = true});
   std::string html = ReportHtml(report);
@@ -205,6 +211,9 @@ TEST_F(ReportViewTest, FitsAPhoneAndFindsWhatIsFolded) {
   EXPECT_EQ(out["faults"], nlohmann::json::array());
   EXPECT_LE(out["across"], out["width"]);
   EXPECT_EQ(out["boxes"], 0);
+  EXPECT_LE(out["plot"][0], out["width"]);
+  EXPECT_EQ(out["plot"][1], 900);  // as it was made
+  EXPECT_EQ(out["plot"][2], out["plot"][0]);
   EXPECT_EQ(out["contents"], false);
   EXPECT_EQ(out["folded"], true);
   EXPECT_EQ(out["opened"], true);
