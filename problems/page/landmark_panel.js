@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Landmarks: a list of the sites, what the chosen one is, and clicks on the bone.
-import {button, element, field, group, lines, millimetres, select} from './dom.js';
+import {button, element, field, lines, millimetres, select} from './dom.js';
 import {chooser} from './opener.js';
 import {act, choose, keep, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
 
@@ -35,10 +35,13 @@ function row(site) {
   return made;
 }
 
+let remarksOpen = false;  // while one goes from site to site
+
 function remarks(landmark) {
   const change = (what) => act('remark', {site: landmark.site, certainty: landmark.certainty, note: landmark.note,
                                           depth_mm: landmark.depth_along_normal_mm, ...what});
-  return group('What is known of it',
+  return element('details', {open: remarksOpen, ontoggle: (event) => { remarksOpen = event.target.open; }},
+      element('summary', {textContent: 'What is known of it'}),
       field('certainty', select([['high', 'high'], ['medium', 'medium'], ['low', 'low']], landmark.certainty,
                                 (certainty) => change({certainty}))),
       field('depth measured here (mm)', element('input', {type: 'number', min: 0.01, max: 100, step: 0.1,
@@ -139,7 +142,11 @@ export function landmarkPanel(bench) {
     if (done && isNew) { choose(nextOpen(site)); }
   };
 
-  onChoice(() => { if (root.isConnected) { draw(); } });
+  onChoice((code) => {
+    if (!root.isConnected) { return; }
+    draw();
+    if (code) { about.scrollIntoView({block: 'nearest'}); }  // the list may have been scrolled far down
+  });
   document.addEventListener('keydown', (event) => {
     if (!root.isConnected || ['INPUT', 'SELECT'].includes(event.target.tagName)) { return; }
     if (event.key.toLowerCase() === 'n' && !event.ctrlKey) { choose(nextOpen(store.site || '')); }
