@@ -16,7 +16,7 @@ struct SparseFactor::Cholmod : Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::
 
 SparseFactor::SparseFactor(const SparseMatrix& lower, double shift)
     : cholmod_(std::make_unique<Cholmod>()) {
-  UseOneBlasThread();
+  UseOneLibraryThread();
   cholmod_->cholmod().print = 0;  // what it would say is in usable()
   cholmod_->setShift(shift);
   cholmod_->compute(lower);
@@ -86,16 +86,19 @@ int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
   return static_cast<int>(std::min<std::size_t>(rank, rows));
 }
 
-void UseOneBlasThread() {
-  static const bool done = [] {
-    using SetThreads = void (*)(int);
-    void* const symbol = dlsym(RTLD_DEFAULT, "openblas_set_num_threads");
-    if (symbol != nullptr) {
-      reinterpret_cast<SetThreads>(symbol)(1);
-    }
-    return true;
-  }();
-  static_cast<void>(done);
+void UseOneLibraryThread() {
+  using SetNumber = void (*)(int);
+  const auto look_up = [](const char* name) {
+    return reinterpret_cast<SetNumber>(dlsym(RTLD_DEFAULT, name));
+  };
+  static const SetNumber set_blas_threads = look_up("openblas_set_num_threads");
+  static const SetNumber set_parallel_levels = look_up("omp_set_max_active_levels");
+  if (set_blas_threads != nullptr) {
+    set_blas_threads(1);
+  }
+  if (set_parallel_levels != nullptr) {
+    set_parallel_levels(0);
+  }
 }
 
 }  // namespace semblance

@@ -30,9 +30,11 @@ class SparseFactor {
 // rounding leaves no factor, as with a number that is not finite.
 int NumericalRank(const SparseMatrix& lower, std::size_t rows);
 
-// OpenBLAS, where the sparse Cholesky uses it, sums in an order that depends on its number of
-// threads, and so on the machine. One thread gives the same bytes everywhere (and small blocks gain
-// nothing from more); looked up at run time, for other BLAS libraries have no such function.
-void UseOneBlasThread();
+// For what this thread calls next. OpenBLAS, where the sparse Cholesky uses it, sums in an order
+// that depends on its number of threads, and so on the machine: one thread gives the same bytes
+// everywhere (and small blocks gain nothing from more). CHOLMOD would start four of OpenMP however
+// many are asked for, and OpenMP ends the program where the system gives none. Both are looked up
+// at run time, for other libraries have no such functions.
+void UseOneLibraryThread();
 
 }  // namespace semblance

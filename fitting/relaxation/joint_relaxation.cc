@@ -297,7 +297,7 @@ void JointRound::Bound(std::vector<Vec2>& places, ceres::Problem& problem) const
 
 ceres::Solver::Options SchurOptions(std::vector<Vec2>& places, ControlNet& net,
                                     const ceres::Problem& problem) {
-  UseOneBlasThread();
+  UseOneLibraryThread();
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
   options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;

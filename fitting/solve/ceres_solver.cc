@@ -46,7 +46,7 @@ double Radius(std::span<const Term> terms, std::size_t vertices) {
 // least-squares solution nearest to the start. Damping by the diagonal, Ceres' default, would
 // instead move the least-held vertices most. Determined directions converge in two or three steps.
 ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t vertices) {
-  UseOneBlasThread();
+  UseOneLibraryThread();
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;

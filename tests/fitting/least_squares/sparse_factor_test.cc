@@ -6,6 +6,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <vector>
 
 #include "surfaces/base/random.h"
 
@@ -45,6 +47,38 @@ TEST(NumericalRank, IsThatOfTheSingularValues) {
                              .rank());
     EXPECT_EQ(NumericalRank(LowerOf(a), rows), expected) << k;
   }
+}
+
+// The Laplacian of a square grid, a little stiffened: its factor has wide dense blocks.
+SparseMatrix GridLaplacian(int side) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int k = 0; k < side * side; ++k) {
+    entries.emplace_back(k, k, 4.1);
+    if (k % side > 0) {
+      entries.emplace_back(k, k - 1, -1);
+    }
+    if (k >= side) {
+      entries.emplace_back(k, k - side, -1);
+    }
+  }
+  SparseMatrix lower(side * side, side * side);
+  lower.setFromTriplets(entries.begin(), entries.end());
+  return lower;
+}
+
+std::ptrdiff_t ThreadsOfThisProcess() {
+  return std::ranges::distance(std::filesystem::directory_iterator("/proc/self/task"));
+}
+
+TEST(SparseFactor, NoLibraryStartsThreads) {
+  const SparseMatrix lower = GridLaplacian(60);
+  const std::ptrdiff_t before = ThreadsOfThisProcess();
+  const SparseFactor factor(lower, 0);
+  ASSERT_TRUE(factor.usable());
+  EXPECT_EQ(ThreadsOfThisProcess(), before);
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(lower.rows());
+  const Eigen::VectorXd solved = factor.Solve(ones);
+  EXPECT_LT((lower.selfadjointView<Eigen::Lower>() * solved - ones).norm(), 1e-10);
 }
 
 TEST(NumericalRank, OfNothingIsZero) { EXPECT_EQ(NumericalRank(SparseMatrix(7, 7), 5), 0); }
