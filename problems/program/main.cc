@@ -64,8 +64,10 @@ int ParseAndRun(int argc, char** argv) {
   return line.chosen();
 }
 
+// Runs before the constructors of the shared libraries, in which memory can run out already.
+void BeforeLibraries() { std::set_terminate(&EndInWords); }
+
 int Main(int argc, char** argv) {
-  std::set_terminate(&EndInWords);
   try {
     return Flushed(ParseAndRun(argc, argv));
   } catch (...) {
@@ -79,6 +81,9 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
+
+[[gnu::section(".preinit_array"), gnu::used]] void (*const kBeforeLibraries)() = &BeforeLibraries;
+
 }  // namespace semblance
 
 int main(int argc, char** argv) { return semblance::Main(argc, argv); }

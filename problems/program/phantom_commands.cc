@@ -15,6 +15,7 @@
 #include "problems/ct/read_volume.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/output/files.h"
+#include "problems/output/staged_folder.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/phantom_ct.h"
 #include "problems/subject/phantom_landmarks.h"
@@ -67,13 +68,14 @@ void WriteOneFile(const CtVolume& volume, const std::string& name, VolumeFormat 
 int WritePhantom(const PhantomArguments& a) {
   const std::optional<VolumeFormat> format = FormatOfVolume(a.volume);
   const Phantom phantom = MakePhantom(a.phantom);
-  IsLost(phantom.centre, phantom, a.ct.defect);  // an unknown site is told before a folder is made
-  OutputFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
+  const LostBone lost(phantom, a.ct.defect);  // an unknown site is told before a folder is made
+  StagedFolder staged(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
+  OutputFolder& folder = staged.Files();
   const CtVolume volume = VoxelisePhantom(phantom, a.ct);
   WriteSlices(volume, a.phantom.random_seed, folder);
   LandmarkFile landmarks = PhantomLandmarks(phantom, a.phantom.random_seed);
   std::erase_if(landmarks.landmarks, [&](const Landmark& l) {
-    return IsLost({l.point[0], l.point[1], l.point[2]}, phantom, a.ct.defect);
+    return lost.Holds({l.point[0], l.point[1], l.point[2]});
   });
   folder.Write("landmarks.yaml", EncodeLandmarks(landmarks, "landmarks.yaml"));
   folder.Write("true_skin.ply", EncodeMesh(phantom.face, ".ply"));
@@ -86,7 +88,8 @@ int WritePhantom(const PhantomArguments& a) {
   if (format) {
     WriteOneFile(volume, a.volume, *format, folder);
   }
-  fmt::print("next: semblance import-ct {}\n", (folder.Root() / "ct").string());
+  staged.Publish();
+  fmt::print("next: semblance import-ct {}\n", (staged.Root() / "ct").string());
   return kDone;
 }
 

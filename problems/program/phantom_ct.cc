@@ -97,9 +97,9 @@ bool InHolder(const Vec3& p, const Box3& head, const PhantomCtOptions& options) 
 
 }  // namespace
 
-bool IsLost(const Vec3& point, const Phantom& phantom, const BoneDefect& defect) {
+LostBone::LostBone(const Phantom& phantom, const BoneDefect& defect) {
   if (defect.site.empty()) {
-    return false;
+    return;
   }
   const auto site = std::ranges::find(phantom.sites, defect.site, &PhantomSite::site);
   if (site == phantom.sites.end()) {
@@ -107,7 +107,8 @@ bool IsLost(const Vec3& point, const Phantom& phantom, const BoneDefect& defect)
         fmt::format("phantom: the head has no site '{}' to lose bone at; docs/sites.md lists them",
                     defect.site));
   }
-  return (point - site->base).norm() < defect.radius_mm;
+  centre_ = site->base;
+  radius_mm_ = defect.radius_mm;
 }
 
 CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options) {
@@ -115,7 +116,7 @@ CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options
     throw InputError(fmt::format("phantom: voxels of {} x {} mm are not usable; each must be > 0",
                                  options.pixel_mm, options.slice_mm));
   }
-  IsLost(phantom.centre, phantom, options.defect);  // an unknown site is told before any work
+  const LostBone lost(phantom, options.defect);
   const Box3 head = Bounds(phantom.face);
   const MeshQuery skin(phantom.face), bone(phantom.skull);
   const MeshQuery inner(InnerTable(phantom, options.bone_mm));
@@ -129,7 +130,7 @@ CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options
     const std::vector<double> in_brain = RowCoverage(inner, volume, row, slice);
     for (int i = 0; i < volume.columns; ++i) {
       const Vec3 at = volume.World(i, row, slice);
-      const double bone_here = IsLost(at, phantom, options.defect) ? 0 : in_bone[i] - in_brain[i];
+      const double bone_here = lost.Holds(at) ? 0 : in_bone[i] - in_brain[i];
       const double hu =
           kAirHu + in_skin[i] * (kTissueHu - kAirHu) + bone_here * (kBoneHu - kTissueHu);
       const bool holder = InHolder(at, head, options);

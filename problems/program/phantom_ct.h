@@ -30,7 +30,16 @@ struct PhantomCtOptions {
 // InputError for spacings that are not positive, and a defect at a site that the phantom lacks.
 CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options);
 
-// Whether the point lies where the defect has taken the bone.
-bool IsLost(const Vec3& point, const Phantom& phantom, const BoneDefect& defect);
+// Where a phantom's bone is lost: the ball of a defect, its site looked up once.
+class LostBone {
+ public:
+  // Throws InputError for a site that the phantom lacks.
+  LostBone(const Phantom& phantom, const BoneDefect& defect);
+  bool Holds(const Vec3& point) const { return (point - centre_).norm() < radius_mm_; }
+
+ private:
+  Vec3 centre_ = Vec3::Zero();
+  double radius_mm_ = -1;  // holds nothing
+};
 
 }  // namespace semblance

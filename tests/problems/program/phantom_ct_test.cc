@@ -49,13 +49,14 @@ TEST(PhantomCt, BoneIsLostInABallAndNowhereElse) {
   const CtVolume whole = VoxelisePhantom(phantom, {.pixel_mm = 3, .slice_mm = 3}),
                  volume =
                      VoxelisePhantom(phantom, {.pixel_mm = 3, .slice_mm = 3, .defect = defect});
+  const LostBone ball(phantom, defect);
   int lost = 0;
   for (int k = 0; k < volume.slices; ++k) {
     for (int j = 0; j < volume.rows; ++j) {
       for (int i = 0; i < volume.columns; ++i) {
         const auto before = whole.values[whole.Index(i, j, k)],
                    now = volume.values[volume.Index(i, j, k)];
-        const bool is_lost = IsLost(volume.World(i, j, k), phantom, defect);
+        const bool is_lost = ball.Holds(volume.World(i, j, k));
         EXPECT_TRUE(is_lost ? now <= 40 : now == before);
         lost += is_lost && before > 600 ? 1 : 0;
       }

@@ -37,6 +37,12 @@ const std::string kPhantom = SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml";
 // A second or less of work.
 const std::string kDepth = "depth " + kPhantom + " --set subject.rings=20 --quiet";
 
+#ifdef SEMBLANCE_SANITIZED
+constexpr bool kMemoryHasLimits = false;  // a sanitizer's has none
+#else
+constexpr bool kMemoryHasLimits = true;
+#endif
+
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -116,6 +122,18 @@ TEST_F(Trust, ARefusalLeavesNoFolder) {
   ExpectRefused(kDepth + " --out out/a/b --set landmarks.max_distance_mm=0", "max_distance_mm");
 }
 
+// Half of a CT would be read as a shorter one.
+TEST_F(Trust, AKilledPhantomLeavesNoPartOfAHead) {
+  const pid_t child = Start({"phantom", "--out", "out", "--pixel-mm", "2", "--slice-mm", "3"});
+  WaitFor(folder_ / ".out.semblance-part");
+  ::kill(child, SIGKILL);
+  CodeOf(child);
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  EXPECT_EQ(Call("phantom --out out --pixel-mm 5 --slice-mm 10").code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / ".out.semblance-part"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/landmarks.yaml"));
+}
+
 TEST_F(Trust, AFullDiskLeavesNoFolderAndTheOldFiles) {
   const std::string no_room = "ulimit -f 20; trap '' XFSZ;";  // in blocks of 512 or 1024 bytes
   ExpectRefused(kDepth + " --out out", "cannot be written: File too large", 2, no_room);
@@ -181,12 +199,40 @@ TEST_F(Trust, AStudysFilesMayHoldAnything) {
 }
 
 TEST_F(Trust, TooLittleMemoryIsSaidWithWhatToAskFor) {
+  if (!kMemoryHasLimits) {
+    GTEST_SKIP();
+  }
   ExpectRefused("run " + kPhantom + " --out out --quiet --threads 1 --set subject.rings=1000",
                 "not enough memory for the step 'load subject'; give meshes", 1,
                 "ulimit -v 300000;");
 }
 
+// Where the libraries' own constructors find no memory, before the program's first line.
+TEST_F(Trust, TooLittleMemoryToBeginWithIsSaidToo) {
+  if (!kMemoryHasLimits) {
+    GTEST_SKIP();
+  }
+  const auto with = [&](int megabytes) {
+    return Call("--version", fmt::format("ulimit -v {};", 1024 * megabytes));
+  };
+  int enough = 512, too_little = 64;
+  while (enough - too_little > 1) {
+    const int half = (enough + too_little) / 2;
+    (with(half).code == 0 ? enough : too_little) = half;
+  }
+  for (int megabytes = enough - 1; megabytes > enough - 8; --megabytes) {
+    const Outcome outcome = with(megabytes);
+    EXPECT_THAT(outcome.code, AnyOf(1, 126, 127))
+        << megabytes;  // the last two: the system's loader
+    EXPECT_THAT(outcome.err,
+                outcome.code == 1 ? HasSubstr("semblance: not enough memory") : HasSubstr(""));
+  }
+}
+
 TEST_F(Trust, AStudyGoesOnWhenATrialRunsOutOfMemory) {
+  if (!kMemoryHasLimits) {
+    GTEST_SKIP();
+  }
   Write("study.yaml", fmt::format("base: {}\nset: {{implicit.resolution: 16, seeds.level: 0, "
                                   "template.max_level: 1, first_fit: []}}\n"
                                   "grid: {{fit.plan.schedule: [[{{level: 0, fraction: 1}}]], "
