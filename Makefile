@@ -8,7 +8,7 @@ BUILD        := $(if $(filter sanitize debug quick threads coverage,$(PRESET)),b
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build deb demo demo-phantom test bench faults attack same-bytes pairwise pairwise-share fuzz sanitize races coverage format check headers tidy configs clean site
+.PHONY: all setup configure build deb demo demo-phantom test bench faults attack same-bytes clang-numbers pairwise pairwise-share fuzz sanitize races coverage format check headers tidy configs clean site
 
 all: build
 
@@ -84,24 +84,31 @@ same-bytes: build
 	@python3 -B tests/faults/same_bytes.py $(BUILD)/problems/semblance configs --program "no AVX-512"=build-256/problems/semblance \
 	  --program "no AVX"=build-128/problems/semblance
 
+# The same by a program of clang's: numbers within 1e-9. It is built in the way that is fastest from nothing.
+clang-numbers: build
+	@CXX=clang++ cmake --preset quick -B build-clang -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DSEMBLANCE_WITH_CAD=OFF -DSEMBLANCE_WITH_ITK=OFF > /dev/null
+	@cmake --build build-clang --target semblance
+	@python3 -B tests/faults/same_bytes.py $(BUILD)/problems/semblance configs --compiler clang=build-clang/problems/semblance --compilers-only
+
 # All pairs of options, each run on the smallest phantom or a few points, or refused at once (docs/reliability.md).
 PAIRS        ?= 1000000
 pairwise: build
-	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --cases $(PAIRS)
-	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --cases $(PAIRS)
+	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --cases $(PAIRS)
+	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --cases $(PAIRS)
 
-# Of these a minute's worth, others every day.
+# Of these what 50 seconds of processor are enough for, others every day.
 pairwise-share: build
-	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --minutes 0.5 --seed day
-	@python3 tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --minutes 0.5 --seed day
+	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --share 20 --seed day
+	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --share 30 --seed day
 
-# Each reader under libFuzzer with ASan and UBSan for so many minutes; needs clang and its runtime (docs/reliability.md).
+# Each reader under libFuzzer with ASan and UBSan for so many minutes, JOBS at a time; needs clang and its runtime (docs/reliability.md).
 MINUTES      ?= 10
+JOBS         ?= $(shell nproc)
 FUZZERS       = mesh_reader_fuzz config_fuzz text_reader_fuzz invesalius_fuzz volume_fuzz
 fuzz:
-	@CXX=clang++ cmake -G Ninja -B build-fuzz -DSEMBLANCE_FUZZ=ON > /dev/null
+	@CXX=clang++ cmake -G Ninja -B build-fuzz -DSEMBLANCE_FUZZ=ON -DBUILD_TESTING=ON > /dev/null
 	@cmake --build build-fuzz --target $(FUZZERS)
-	@tests/fuzz/fuzz.sh build-fuzz/tests/fuzz $(MINUTES) $(FUZZERS)
+	@JOBS=$(JOBS) tests/fuzz/fuzz.sh build-fuzz/tests/fuzz $(MINUTES) $(FUZZERS)
 
 # The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:
@@ -116,13 +123,13 @@ races: setup
 	@cmake --build --preset threads --target $(RACES)
 	@ctest --preset threads -R "^($$(echo $(RACES) | tr ' ' '|'))\."
 
-# Lines and branches that the tests of what reads files pass; COVERED=. for all tests. Needs gcovr.
-COVERED      ?= mesh_io_test|mesh_readers_test|vtk_xml_test|npy_test|csv_test|json_text_test|hspline_json_test|feature_test|config|value_filter|read_landmarks|landmark_commands|point_table|point_fit|invesalius|ct_volume|read_volume|slice_stack|import|network_file|tissue_table|template_io|edit_script|trial_folder
-READERS       = surfaces/mesh_files/|surfaces/base/(csv|json_text|npy)|surfaces/hspline_files/(hspline_json|json_parts|feature)|problems/config/|problems/ct/(ct_volume|dicom|invesalius|itk|read|slice|voxel_array)|problems/landmark_files/|problems/points/point_(files|table)
+# Lines and branches of what reads files (READERS) that these tests pass; COVERED=. READERS=. for all of both. Needs gcovr.
+COVERED      ?= mesh_io_test|mesh_readers_test|vtk_xml_test|glb_test|npy_test|csv_test|json_text_test|hspline_json_test|feature_test|config_edit_test|config_test|value_filter_test|terminal_text_test|command_line_test|input_check_test|read_landmarks_test|landmark_commands_test|point_table_test|point_fit_test|apart_test|invesalius_test|ct_volume_test|read_volume_test|slice_stack_test|import_ct_test|import_commands_test|network_file_test|tissue_table_test|template_io_test|edit_script_test|trial_folder_test
+READERS      ?= surfaces/mesh_files/|surfaces/base/(csv|json_text|npy)|surfaces/hspline_files/(hspline_json|json_parts|feature)|problems/config/|problems/ct/(apart|ct_volume|dicom|invesalius|itk|read|slice|voxel_array)|problems/landmark_files/(fcsv|landmark_table|markups|picked|point_lines|read)|problems/points/point_(files|table)|problems/subject/(network_file|tissue_table)|problems/edits/edit_script|problems/face_template/template_io|problems/study/trial_folder
 coverage: setup
-	@cmake --preset coverage > /dev/null
-	@cmake --build --preset coverage
-	@ctest --preset coverage -j "$$(nproc)" -R "$(COVERED)" --quiet; \
+	@cmake --preset coverage "-DSEMBLANCE_COVERAGE=$(READERS)" > /dev/null
+	@cmake --build --preset coverage --target $(if $(filter .,$(COVERED)),all,$(subst |, ,$(COVERED)))
+	@ctest --preset coverage -j "$$(nproc)" -R "^($(COVERED))" --quiet; \
 	gcovr -r . build-coverage -j "$$(nproc)" --exclude-throw-branches --exclude-unreachable-branches -e tests/ --json build-coverage/coverage.json
 	@python3 tests/coverage.py build-coverage/coverage.json "$(READERS)"
 
@@ -150,4 +157,4 @@ configs: build
 	@$(BUILD)/problems/semblance check --without-inputs configs/heads/*.yaml configs/demo_phantom/*.yaml
 
 clean:
-	@rm -rf build build-debug build-sanitize build-quick build-tidy build-fuzz build-threads build-coverage build-256 build-128
+	@rm -rf build build-debug build-sanitize build-quick build-tidy build-fuzz build-threads build-coverage build-clang build-256 build-128

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Same input, same bytes: whatever the threads, the clock, the language, the folder, and the instructions of our own code.
 
-usage: same_bytes.py PROGRAM CONFIGS [--program NAME=PROGRAM]... [--compiler NAME=PROGRAM]
+usage: same_bytes.py PROGRAM CONFIGS [--program NAME=PROGRAM]... [--compiler NAME=PROGRAM [--compilers-only]]
 
 A run, a depth and a fit are done in each of these ways, and their files compared with those of the first, times apart.
 --program: the same, built for other instructions (make same-bytes). --compiler: built by another compiler; its numbers
@@ -78,18 +78,26 @@ def numbers(value, path=""):
     return [(path, value)] if isinstance(value, (int, float)) and not isinstance(value, bool) else []
 
 
-def tell_compiler(what, first, other):
-    """result.json of two folders, number by number."""
-    worst, at, count = 0.0, "", 0
+def numbers_of(folder):
+    """All numbers of the results and the surfaces of a folder's jobs."""
+    found = {}
     for job in ("run", "depth", "fit"):
-        one, two = (dict(numbers(json.loads((folder / job / "result.json").read_text()))) for folder in (first, other))
-        for path in one.keys() | two.keys():
-            a, b = one.get(path, math.nan), two.get(path, math.nan)
-            off = abs(a - b) / max(1.0, abs(a)) if a == a and b == b else math.inf
-            count += 1
-            if off > worst:
-                worst, at = off, job + path
-    print(f"{what:<64} {count:4d} numbers, at most {worst:.1e} apart {at}", flush=True)
+        for path in sorted((folder / job).glob("*.json")):
+            if path.name not in (*TIMES, "manifest.json"):  # the latter has hashes
+                found |= {f"{job}/{path.name}{name}": value for name, value in numbers(json.loads(path.read_text()))}
+    return found
+
+
+def tell_compiler(what, first, other):
+    """Results and surfaces of two folders, number by number."""
+    worst, at = 0.0, ""
+    one, two = numbers_of(first), numbers_of(other)
+    for path in one.keys() | two.keys():
+        a, b = one.get(path, math.nan), two.get(path, math.nan)
+        off = abs(a - b) / max(1.0, abs(a)) if a == a and b == b else math.inf
+        if off > worst:
+            worst, at = off, path
+    print(f"{what:<64} {len(one):4d} numbers, at most {worst:.1e} apart {at}", flush=True)
     return worst > 1e-9
 
 
@@ -105,9 +113,8 @@ def languages():
     return [name for name in known if name.lower().startswith(("de", "fr", "tr", "fa"))][:2]
 
 
-def compare(work, others, compilers):
-    first, bad = work.do("first"), []
-    bad.append(tell("the same again", first, work.do("again")))
+def compare_surroundings(work, first):
+    bad = [tell("the same again", first, work.do("again"))]
     for threads in (2, 4):
         bad.append(tell(f"{threads} threads", first, work.do(f"threads{threads}", threads)))
     clock = jumping_clock(work.folder)
@@ -125,9 +132,15 @@ def compare(work, others, compilers):
     resolved = {job: [job, str(work.folder / f"first/{job}/resolved.yaml"), "--quiet", "--threads", "1"] for job in ("run", "depth")}
     resolved["fit"] = ["fit", "points.csv", str(work.folder / "first/fit/resolved.yaml"), "--quiet", "--threads", "1"]
     bad.append(tell("resolved.yaml, from another folder", first, work.do("resolved/elsewhere", calls=resolved)))
-    for name, program in others:
+    return bad
+
+
+def compare(work, given):
+    first = work.do("first")
+    bad = [] if given.compilers_only else compare_surroundings(work, first)
+    for name, program in given.others:
         bad.append(tell(name, first, work.do("other_" + name, program=program)))
-    for name, program in compilers:
+    for name, program in given.compiler:
         work.do("compiler_" + name, program=program)
         bad.append(tell_compiler(name, work.folder / "first", work.folder / ("compiler_" + name)))
     return any(bad)
@@ -144,10 +157,11 @@ def main():
     arguments.add_argument("configs", type=pathlib.Path)
     arguments.add_argument("--program", dest="others", type=named, action="append", default=[])
     arguments.add_argument("--compiler", type=named, action="append", default=[])
+    arguments.add_argument("--compilers-only", action="store_true")
     given = arguments.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         work = Work(str(given.program.resolve()), given.configs.resolve(), pathlib.Path(scratch))
-        return 1 if compare(work, given.others, given.compiler) else 0
+        return 1 if compare(work, given) else 0
 
 
 if __name__ == "__main__":

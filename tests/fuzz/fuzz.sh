@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Runs fuzzers, one after the other, and prints a table; ends with 1 if one of them found something.
-# usage: fuzz.sh FOLDER MINUTES TARGET...   FOLDER: of the programs; $BROKEN: a folder of files to begin with too.
+# Runs fuzzers and prints a table; ends with 1 if one of them found something.
+# usage: fuzz.sh FOLDER MINUTES TARGET...   FOLDER: of the programs; $BROKEN: a folder of files to begin with too; $JOBS: so many at a time (1).
 # The corpus grows in FOLDER/corpus; what is found is kept in FOLDER/found.
 set -u
 shopt -s nullglob
@@ -34,19 +34,27 @@ seeds() {
   esac
 }
 
-findings=0
-printf '%-20s %8s %12s %12s %9s\n' target seconds executions 'per second' findings
-for target in "$@"; do
+# One target; its line of the table into TARGET.row, and below it what was found.
+fuzz() {
+  local target=$1 leaks=1 found done
   mkdir -p "corpus/$target"
   seeds "$target"
-  # What ITK and GDCM forget when they give up is theirs.
-  [ "$target" = volume_fuzz ] && leaks=0 || leaks=1
+  [ "$target" = volume_fuzz ] && leaks=0  # what ITK and GDCM forget when they give up is theirs
   ASAN_OPTIONS=detect_leaks=$leaks "./$target" "corpus/$target" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
     -artifact_prefix="found/$target-" > "$target.log" 2>&1
-  found=$?
+  found=$(($? != 0))
   done=$(awk '/stat::number_of_executed_units/ { print $2 }' "$target.log")
-  found=$((found != 0)) findings=$((findings + found))
-  printf '%-20s %8d %12s %12s %9d\n' "$target" "$seconds" "${done:-0}" "$((${done:-0} / seconds))" $found
-  [ $found = 0 ] || grep -m 3 -E 'ERROR|SUMMARY|runtime error' "$target.log"
+  {
+    printf '%-20s %8d %12s %12s %9d\n' "$target" "$seconds" "${done:-0}" "$((${done:-0} / seconds))" $found
+    [ $found = 0 ] || grep -m 3 -E 'ERROR|SUMMARY|runtime error' "$target.log"
+  } > "$target.row"
+}
+
+for target in "$@"; do
+  [ "$(jobs -rp | wc -l)" -lt "${JOBS:-1}" ] || wait -n
+  fuzz "$target" &
 done
-[ $findings = 0 ]
+wait
+printf '%-20s %8s %12s %12s %9s\n' target seconds executions 'per second' findings
+for target in "$@"; do cat "$target.row"; done
+! for target in "$@"; do head -1 "$target.row"; done | grep -qv ' 0$'

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Options in pairs: what `check` lets pass, the program can do.
 
-usage: pairwise.py PROGRAM CONFIGS [--kind experiment|fit] [--cases N] [--minutes M] [--seed N|day] [--keep FOLDER]
+usage: pairwise.py PROGRAM CONFIGS [--kind experiment|fit] [--cases N] [--share SECONDS] [--seed N|day] [--keep FOLDER]
 
 Cases are made from the schema of the options: every pair of choices (words, variants, booleans, terms) that can stand
 together is in one of them, and every number is at each end of its range in one. A case is run on the smallest phantom
@@ -16,7 +16,8 @@ together is in one of them, and every number is at each end of its range in one.
               times the median of the processor time
 
 Prints a table, and each case that fell short with its configuration; ends with 1 if there is one. --cases: the first so
-many, which cover the most.
+many, which cover the most. --share: those that so many seconds of processor are enough for, which a busy machine does not
+change; a median of less than 2 s then counts as 2 s.
 """
 import argparse
 import itertools
@@ -37,7 +38,8 @@ import time
 from option_space import CoveringArray, OptionSpace
 
 LIMIT_S = 60  # of processor time; a case that needs more is killed
-BATCH = 48  # cases that one call of check looks at
+BATCH, BATCH_OF_SHARE = 48, 8  # cases that one call of check looks at
+SHARE_MEDIAN_S = 2
 EXCHANGES = 12  # turns in which a choice that is refused may be exchanged for another; then it is left out
 
 
@@ -110,18 +112,29 @@ LIST_DEFAULTS = {"experiment": {"fit.terms": [{"type": "points"}, {"type": "smoo
                  "fit": {"fit.terms": [{"type": "points"}, {"type": "smoothness", "weight": 1e-4}]}}
 
 
-def call(command, folder, limit_s=LIMIT_S):
+class ShareIsUsed(Exception):
+    """No call is begun after the share's seconds."""
+
+
+def used_s():
+    """Processor seconds of this process, and of what it has called."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
+
+
+def call(command, folder, limit_s=LIMIT_S, until_s=math.inf):
     """exit code (negative: a signal), what was printed, processor seconds"""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
 
     def limits():
         resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 1))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
+    before_s = used_s()
+    if before_s > until_s:
+        raise ShareIsUsed()
     done = subprocess.run(command, cwd=folder, preexec_fn=limits, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.STDOUT, text=True, errors="replace")
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return done.returncode, done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return done.returncode, done.stdout, used_s() - before_s
 
 
 def numbers_that_are_none(json_value, path=""):
@@ -140,8 +153,8 @@ def yaml(tree):
 
 
 class Runner:
-    def __init__(self, program, configs, kind, folder):
-        self.program, self.configs, self.kind = str(program), configs, kind
+    def __init__(self, program, configs, kind, folder, until_s):
+        self.program, self.configs, self.kind, self.until_s = str(program), configs, kind, until_s
         self.folder = pathlib.Path(folder)
         (self.folder / "base.yaml").write_text(BASE[kind].format(configs=configs))
         (self.folder / "study.yaml").write_text("title: one\nbase: case.yaml\nmetric: face.rms_mm\n")
@@ -177,7 +190,7 @@ class Runner:
         names = [f"cases/{n:04d}.yaml" for n in range(len(trees))]
         for name, tree in zip(names, trees):
             (self.folder / name).write_text(yaml({"base": "../base.yaml", **tree}))
-        code, said, _ = call([self.program, "check", *names], self.folder, LIMIT_S + len(names))
+        code, said, _ = call([self.program, "check", *names], self.folder, LIMIT_S + len(names), self.until_s)
         lines = {name: [] for name in names}
         for line in said.splitlines():
             name = line[:len(names[0])]
@@ -197,7 +210,7 @@ class Runner:
             result = self.folder / "out" / "result.json"
         else:
             command = [self.program, "study", "study.yaml", "--out", "out", "--quiet"]
-        code, said, cpu_s = call(command, self.folder)
+        code, said, cpu_s = call(command, self.folder, until_s=self.until_s)
         if self.kind != "fit":
             trials = list((self.folder / "out").glob("trials/*/trial.json"))
             result = trials[0] if trials else self.folder / "none"
@@ -216,8 +229,8 @@ class Runner:
 
 
 class Search:
-    def __init__(self, runner, space, seed):
-        self.runner, self.space = runner, space
+    def __init__(self, runner, space, seed, batch):
+        self.runner, self.space, self.batch = runner, space, batch
         self.array = CoveringArray(space, seed)
         self.random = random.Random(seed + 1)
         self.refusals, self.checks, self.refused_pairs, self.judged, self.results, self.words = 0, 0, set(), set(), [], {}
@@ -299,20 +312,19 @@ class Search:
             drawn.append((case, pair, ends, covered))
         return drawn
 
-    def pairs(self, most, until_s):
-        while len(self.results) < most and time.monotonic() < until_s:
-            drawn = self.next_cases(min(BATCH, most - len(self.results)))
+    def pairs(self, most):
+        while len(self.results) < most:
+            drawn = self.next_cases(min(self.batch, most - len(self.results)))
             if not drawn:
                 return
             settled = self.repaired([(case, pair) for case, pair, _, _ in drawn])
             for (_, pair, ends, covered), (case, _) in zip(drawn, settled):
-                runs = case is not None and time.monotonic() < until_s
-                lost = covered - (self.array.pairs_of(case) if runs else set())
+                lost = covered - (self.array.pairs_of(case) if case is not None else set())
                 if case is None:
                     self.refused_pairs.add(pair)
                     lost.discard(pair)
-                self.array.give_back(lost, [e for e in ends if not runs or case.get(e[0].name) != e[1]])
-                if runs:
+                self.array.give_back(lost, [e for e in ends if case is None or case.get(e[0].name) != e[1]])
+                if case is not None:
                     self.run(case)
             self.forget_lone({choice for (_, pair, _, _), (case, _) in zip(drawn, settled) if case is None for choice in pair})
 
@@ -326,15 +338,15 @@ class Search:
                 self.array.left -= gone
                 self.refused_pairs |= gone
 
-    def lone_ends(self, most, until_s):
+    def lone_ends(self, most):
         """Numbers at an end that no case has held: each alone, which must be refused or done."""
-        while self.array.ends and len(self.results) < most and time.monotonic() < until_s:
-            ends, self.array.ends = self.array.ends[:BATCH], self.array.ends[BATCH:]
+        while self.array.ends and len(self.results) < most:
+            ends, self.array.ends = self.array.ends[:self.batch], self.array.ends[self.batch:]
             settled = self.repaired([(self.space.closure({f.name: v}), ((f.name, v),)) for f, v in ends])
             for end, (case, pair) in zip(ends, settled):
                 if case is None:
                     self.refused_pairs.add(pair)
-                elif len(self.results) < most and time.monotonic() < until_s:
+                elif len(self.results) < most:
                     self.run(case)
                 else:
                     self.array.ends.append(end)
@@ -344,10 +356,8 @@ class Search:
             print(f"{len(self.results)} cases, {len(self.array.left)} of {self.array.total} pairs left", file=sys.stderr)
 
 
-def slow(results):
-    median = statistics.median([r[3] for r in results if r[0] != "SHORT"] or [1])
-    if len(results) < 30:
-        median = max(median, 1.0)  # of so few it is a matter of luck
+def slow(results, least_median_s):
+    median = max(least_median_s, statistics.median([r[3] for r in results if r[0] != "SHORT"] or [1]))
     return median, [("SHORT", case, f"{cpu_s:.1f} s, over ten times the median of {median:.2f} s", cpu_s)
                     for verdict, case, _, cpu_s in results if verdict != "SHORT" and cpu_s > 10 * median]
 
@@ -358,7 +368,7 @@ def main():
     arguments.add_argument("configs", type=pathlib.Path)
     arguments.add_argument("--kind", choices=["experiment", "fit"], default="experiment")
     arguments.add_argument("--cases", type=int, default=10**9)
-    arguments.add_argument("--minutes", type=float, default=1e6, help="no case is begun after so many")
+    arguments.add_argument("--share", type=float, help="processor seconds after which no case is begun")
     arguments.add_argument("--seed", type=lambda text: int(time.time() // 86400) if text == "day" else int(text), default=1,
                            help="a number, or `day` for another one each day")
     arguments.add_argument("--keep", type=pathlib.Path, help="folder for the cases that fell short")
@@ -367,14 +377,17 @@ def main():
     program, configs = given.program.resolve(), given.configs.resolve()
     schema = json.loads(subprocess.run([program, "options", given.kind, "--schema"], capture_output=True, check=True).stdout)
     with tempfile.TemporaryDirectory() as folder:
-        runner = Runner(program, configs, given.kind, folder)
+        until_s = used_s() + given.share if given.share else math.inf
+        runner = Runner(program, configs, given.kind, folder, until_s)
         files = runner.prepare()
         space = (fit_space if given.kind == "fit" else experiment_space)(schema, files)
-        search = Search(runner, space, given.seed)
-        until_s = start + 60 * given.minutes
-        search.pairs(given.cases, until_s)
-        search.lone_ends(given.cases, until_s)
-    median, late = slow(search.results)
+        search = Search(runner, space, given.seed, BATCH_OF_SHARE if given.share else BATCH)
+        try:
+            search.pairs(given.cases)
+            search.lone_ends(given.cases)
+        except ShareIsUsed:
+            pass
+    median, late = slow(search.results, SHARE_MEDIAN_S if given.share else 0)
     short = [r for r in search.results if r[0] == "SHORT"] + late
     count = lambda verdict: sum(r[0] == verdict for r in search.results)
     print(f"{given.kind}: {len(space.choices)} choices in {search.array.total} pairs, {len(space.ends)} ends of numbers")

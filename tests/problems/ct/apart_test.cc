@@ -84,7 +84,7 @@ TEST(Apart, WhateverElseHappensNamesTheFileAtHand) {
 }
 
 TEST(Apart, MemoryIsLimited) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef SEMBLANCE_SANITIZED
   GTEST_SKIP() << "a sanitizer's memory has no limit";
 #endif
   EXPECT_THAT(WordsWhenDone<IoError>([] {
