@@ -102,8 +102,9 @@ Parametrisation ParametersOf(const Scattered& points, const GivenParameters& giv
 using PlaneAxes = std::array<Vec3, 2>;
 
 PlaneAxes LeastSquaresPlane(std::span<const Vec3> positions) {
+  constexpr double kRounding = 1e-14;  // of mean squares; points of a slanted line come to 1e-16
   const Principal principal = PrincipalOf(positions);
-  if (!(principal.spreads[1] > 1e-20 * principal.spreads[2])) {
+  if (!(principal.spreads[1] > kRounding * principal.spreads[2])) {
     Fail("the points lie on a line and span no plane; give (u,v), or other points");
   }
   return {principal.axes.col(2), principal.axes.col(1)};

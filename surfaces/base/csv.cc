@@ -9,6 +9,7 @@
 #include <cassert>
 #include <charconv>
 #include <cmath>
+#include <set>
 #include <system_error>
 
 #include "surfaces/base/error.h"
@@ -35,9 +36,10 @@ CsvReader::CsvReader(std::string_view text, std::string_view name, const CsvDial
   }
   ReadCells();
   columns_.assign(cells_.begin(), cells_.end());
-  for (std::size_t k = 0; k < columns_.size(); ++k) {
-    if (*Find(columns_[k]) != k) {
-      Fail(fmt::format("the column '{}' stands twice; leave one out", columns_[k]));
+  std::set<std::string_view> seen;
+  for (const std::string& column : columns_) {
+    if (!seen.insert(column).second) {
+      Fail(fmt::format("the column '{}' stands twice; leave one out", column));
     }
   }
 }

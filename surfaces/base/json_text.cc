@@ -5,14 +5,21 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "surfaces/base/error.h"
 
 namespace semblance {
+namespace {
 
-// Brackets outside of texts, counted before the parser builds a tree of them.
+// For each new entry of an object the library looks at all others.
+constexpr int kMostEntries = 4000;
+
+}  // namespace
+
+// Brackets and colons outside of texts, counted before the parser builds a tree of them.
 void CheckJsonDepth(std::string_view text) {
-  int depth = 0;
+  std::vector<int> entries = {0};  // of each list and object that is open
   bool is_in_text = false;
   for (std::size_t k = 0; k < text.size(); ++k) {
     const char c = text[k];
@@ -22,13 +29,18 @@ void CheckJsonDepth(std::string_view text) {
     } else if (c == '"') {
       is_in_text = true;
     } else if (c == '[' || c == '{') {
-      ++depth;
-    } else if (c == ']' || c == '}') {
-      --depth;
+      entries.push_back(0);
+    } else if ((c == ']' || c == '}') && entries.size() > 1) {
+      entries.pop_back();
+    } else if (c == ':') {
+      ++entries.back();
     }
-    if (depth > kDeepestJson) {
+    if (entries.size() > kDeepestJson + 1) {
       throw IoError(
           fmt::format("more than {} levels of lists and objects within each other", kDeepestJson));
+    }
+    if (entries.back() > kMostEntries) {
+      throw IoError(fmt::format("an object of more than {} entries", kMostEntries));
     }
   }
 }

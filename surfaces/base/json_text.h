@@ -11,7 +11,7 @@ namespace semblance {
 
 inline constexpr int kDeepestJson = 64;  // levels of lists and objects within each other
 
-// Throws IoError for deeper nesting, whether the text is JSON or not.
+// Throws IoError for deeper nesting, and for an object of over 4,000 entries; JSON or not.
 void CheckJsonDepth(std::string_view text);
 
 // Throws IoError, which begins with `name`, for deeper nesting and for what is no JSON.

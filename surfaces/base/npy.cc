@@ -72,8 +72,13 @@ std::vector<std::size_t> ShapeOf(std::string_view header, std::string_view name)
     const auto [stop, error] = std::from_chars(text.data() + at, text.data() + end, extent);
     if (error == std::errc()) {
       shape.push_back(extent);
+      at = static_cast<std::size_t>(stop - text.data());
+    } else if (text[at] == ' ' || text[at] == ',') {
+      ++at;
+    } else {
+      Fail(name, fmt::format("the shape ({} is not one of whole numbers such as (60, 5000, 3)",
+                             text.substr(1, end)));
     }
-    at = error == std::errc() ? stop - text.data() : at + 1;
   }
   if (shape.empty()) {
     Fail(name, "the array has no shape, such as (60, 5000, 3)");

@@ -247,6 +247,19 @@ PlyPlaces PlacesOf(const PlyElement& vertex) {
   return places;
 }
 
+// In text any number may stand there.
+template <class Data>
+void CheckColour(const Data& data, const std::vector<double>& row, const PlyPlaces& places,
+                 std::int64_t vertex) {
+  constexpr double kColours = 256;
+  for (std::size_t k = 0; places.colour && k < 3; ++k) {
+    if (const double value = row[(*places.colour)[k]]; !IsIndex(value, kColours)) {
+      data.Fail(fmt::format("vertex {} has a colour of {}; allowed are whole numbers from 0 to 255",
+                            vertex, value));
+    }
+  }
+}
+
 // One row of values as the attributes of a vertex.
 void AppendVertex(const std::vector<double>& row, const PlyPlaces& places,
                   MeshAttributes& attributes) {
@@ -281,8 +294,9 @@ MeshAttributes ReadAttributesData(Data data, const PlyHeader& header, const PlyE
             row[k] = value;
           }
         },
-        [&](std::int64_t) {
+        [&](std::int64_t vertex_number) {
           if (is_vertex) {
+            CheckColour(data, row, places, vertex_number);
             AppendVertex(row, places, attributes);
           }
         });

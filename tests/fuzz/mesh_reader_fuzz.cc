@@ -23,6 +23,12 @@ TriMesh Read(std::string_view bytes) {
     if (semblance::PlyVertexScalar(bytes, "x", "fuzz.ply").size() != mesh.points.size()) {
       std::abort();
     }
+    const semblance::MeshAttributes more = semblance::ReadPlyAttributes(bytes, "fuzz.ply");
+    for (const auto& scalar : more.scalars) {
+      if (scalar.values.size() != mesh.points.size()) {
+        std::abort();
+      }
+    }
     return mesh;
   }
   if (first == 'O' || first == 'C' || first == 'N') {

@@ -97,6 +97,11 @@ TEST(Parametrise, WrongInputIsNamed) {
               HasSubstr("range [1, 0] is empty"));
   const std::vector<Vec3> line = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
   EXPECT_THAT(message(line, PlaneParameters{}, {}), HasSubstr("lie on a line"));
+  std::vector<Vec3> slanted;  // whose moments are of full rank but for rounding
+  for (int k = 0; k < 100; ++k) {
+    slanted.push_back(k * Vec3(1, 2, 3));
+  }
+  EXPECT_THAT(message(slanted, AutoParameters{}, {}), HasSubstr("lie on a line"));
 }
 
 }  // namespace

@@ -89,6 +89,16 @@ TEST(Csv, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THROW(reader.ColumnOf("c"), IoError);
 }
 
+// Half a million names are told apart at once, not each from each.
+TEST(Csv, ManyColumnsTakeTheirTurn) {
+  std::string names = "c";
+  for (int k = 0; k < 500'000; ++k) {
+    names += ",c" + std::to_string(k);
+  }
+  EXPECT_EQ(CsvReader(names + "\n", "t.csv").Columns().size(), 500'001u);
+  EXPECT_EQ(FaultOf(names + ",c7\n"), "t.csv:1: the column 'c7' stands twice; leave one out");
+}
+
 TEST(Csv, ALineAfterABreakInACellHasItsOwnNumber) {
   EXPECT_THAT(FaultOf("\"two\nlines\"\nx\n"), HasSubstr("t.csv:3: column 'two\nlines'"));
 }

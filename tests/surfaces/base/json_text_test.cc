@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/base/json_text.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,8 +46,22 @@ TEST(JsonText, BracketsInTextsAreNoLevels) {
   EXPECT_EQ(ParseJson(wide + "]", "a").size(), 1001u);
 }
 
+// For each new entry the library looks at all that there are.
+TEST(JsonText, AnObjectHasFourThousandEntriesAtMost) {
+  const auto object = [](int entries) {
+    std::string text = "{";
+    for (int k = 0; k < entries; ++k) {
+      text += fmt::format("{}\"a:{}\": [{{}}]", k > 0 ? "," : "", k);
+    }
+    return text + "}";
+  };
+  EXPECT_EQ(ParseJson("[" + object(4000) + "," + object(1) + "]", "a").size(), 2u);
+  EXPECT_THAT(WordsOf<IoError>([&] { ParseJson(object(1'000'000), "a.json"); }),
+              HasSubstr("a.json: an object of more than 4000 entries"));
+}
+
 TEST(JsonText, WhatIsNoJsonIsNamed) {
-  for (const char* const text : {"", "{", "[1,]", "nan", "\"\xff\""}) {
+  for (const char* const text : {"", "{", "[1,]", "nan", "\"\xff\"", "]]}[", "::"}) {
     EXPECT_THAT(WordsOf<IoError>([&] { ParseJson(text, "a.json"); }),
                 HasSubstr("a.json: this is not JSON"));
   }

@@ -72,6 +72,9 @@ TEST(Npy, WhatCannotBeReadIsNamed) {
   EXPECT_THAT(FaultOf(Npy("'<f8'", "(2,)", Raw<double>({1}))), HasSubstr("there are 8"));
   EXPECT_THAT(FaultOf(Npy("'<f8'", "(4294967296, 4294967296)", "")), HasSubstr("too large"));
   EXPECT_THAT(FaultOf(Npy("'<f8'", "(1,)", Raw<double>({kNaN}))), HasSubstr("not finite"));
+  for (const char* wrong : {"(-1,)", "(1.0,)", "(x,)", "(0, 99999999999999999999)"}) {
+    EXPECT_THAT(FaultOf(Npy("'<f8'", wrong, Raw<double>({1}))), HasSubstr("not one of whole"));
+  }
   EXPECT_THAT(FaultOf(Npy("'<f8'", "()", Raw<double>({1}))), HasSubstr("no shape"));
   EXPECT_THAT(FaultOf(Npy("'<f8'", "(1,)", Raw<double>({1})).substr(0, 30)), HasSubstr("header"));
 }

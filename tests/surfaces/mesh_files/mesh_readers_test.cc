@@ -198,6 +198,24 @@ TEST(MeshReaders, AScalarOfAPlyIsReadInEveryForm) {
               ::testing::ThrowsMessage<InputError>("a.ply: a vertex has no 'q'; it has x, y, z"));
 }
 
+TEST(MeshReaders, ColoursOfATextPlyAreBytesOrRefused) {
+  const auto read = [](const std::string& red) {
+    return ReadPlyAttributes(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+        "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+        "element face 0\nproperty list uchar int vertex_indices\nend_header\n0 0 0 " +
+            red + " 1 2\n",
+        "a.ply");
+  };
+  EXPECT_EQ(read("255").colors.at(0)[0], 255);
+  for (const std::string wrong : {"256", "-1", "0.5", "nan", "1e99"}) {
+    EXPECT_THAT([&] { read(wrong); },
+                ::testing::ThrowsMessage<InputError>(::testing::AllOf(
+                    HasSubstr("a.ply: line 13: vertex 0 has a colour of "), HasSubstr("0 to 255"))))
+        << wrong;
+  }
+}
+
 TEST(MeshReaders, RelativeAndLaterVerticesOfAnObj) {
   EXPECT_EQ(Read(".obj", kObj).triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 1, 2}, {0, 2, 3}}));
   EXPECT_EQ(Read(".obj", "f 1 2 3\nv 0 0 0\nv 1 0 0 1\nv 0 1 0 0.1 0.2 0.3\nf -1 -2 -3\nv 5 5 5\n")
