@@ -46,6 +46,10 @@ std::string NearestWord(std::string_view word, std::span<const std::string> know
   int least = static_cast<int>(word.size()) + 1;
   for (const std::string& candidate : known) {
     const int longer = static_cast<int>(std::max(word.size(), candidate.size()));
+    const int shorter = static_cast<int>(std::min(word.size(), candidate.size()));
+    if (!LacksOnlyItsEnd(word, candidate) && 3 * (longer - shorter) > std::max(longer, 3)) {
+      continue;  // so many edits at least; a word may be as long as a file
+    }
     const int distance = LacksOnlyItsEnd(word, candidate) ? 1 : EditDistance(word, candidate);
     if (distance < least && 3 * distance <= std::max(longer, 3)) {
       least = distance;

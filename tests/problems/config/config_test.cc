@@ -279,6 +279,7 @@ TEST(NearestWord, CountsEditsAndSwaps) {
   const std::vector<std::string> known = {"thesis", "split", "flat"};
   EXPECT_EQ(NearestWord("splt", known), "split");
   EXPECT_EQ(NearestWord("voronoi", known), "");
+  EXPECT_EQ(NearestWord(std::string(100'000'000, 's'), known), "");  // in no memory to speak of
 }
 
 // A run's folder that was sent to somebody: what went in lies beside resolved.yaml.
