@@ -17,6 +17,7 @@ namespace {
 constexpr double kSamePlace_mm = 0.02;
 constexpr double kOffShare = 0.1;  // of a step, or of a pixel: how far a slice may be off
 constexpr double kLeastOff_mm = 0.1;
+constexpr double kMostSteps = 1e4;  // between neighbours; what is farther off is of another scan
 
 // At most four of the items, and how many there are.
 std::string Some(const std::vector<std::string>& items) {
@@ -88,7 +89,7 @@ std::vector<int> Places(const std::vector<Level>& levels, const std::string& whe
   std::vector<std::string> odd;
   for (std::size_t k = 1; k < levels.size(); ++k) {
     const double apart = (levels[k].height_mm - levels[k - 1].height_mm) / step;
-    const int steps = std::max(1, static_cast<int>(std::lround(apart)));
+    const int steps = static_cast<int>(std::lround(std::clamp(apart, 1.0, kMostSteps)));
     places.push_back(places.back() + steps);
     if (std::abs(apart - steps) > std::max(kOffShare, kLeastOff_mm / step)) {
       odd.push_back(

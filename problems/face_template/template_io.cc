@@ -110,13 +110,17 @@ std::string SitesText(const TemplateFace& face) {
 // `what` names the entry in the message.
 template <class Number, std::size_t count>
 std::array<Number, count> Numbers(const Json& json, const std::string& what) {
+  constexpr int kMost = 1'000'000;  // no level has as many vertices; what is beyond would be cut
   const auto is_number = [](const Json& entry) {
-    return std::is_integral_v<Number> ? entry.is_number_integer() : entry.is_number();
+    return std::is_integral_v<Number>
+               ? entry.is_number_integer() && entry >= -kMost && entry <= kMost
+               : entry.is_number();
   };
   if (!json.is_array() || json.size() != count ||
       !std::all_of(json.begin(), json.end(), is_number)) {
-    throw InputError(fmt::format("{} is {}; it must be a list of {} {}", what, json.dump(), count,
-                                 std::is_integral_v<Number> ? "integers" : "numbers"));
+    throw InputError(
+        fmt::format("{} is {}; it must be a list of {} {}", what, json.dump(), count,
+                    std::is_integral_v<Number> ? "integers below a million" : "numbers"));
   }
   return json.get<std::array<Number, count>>();
 }

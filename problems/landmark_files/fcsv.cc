@@ -49,6 +49,11 @@ void ReadHeaderLine(const PointLines& lines, Header& header) {
     header.axes = AxesOf(lines, value);
   } else if (line.find("columns") < equals) {
     header.columns = SplitCells(value, ',');
+    constexpr std::size_t kMost = 100;  // each point looks its own up
+    if (header.columns.size() > kMost) {
+      lines.Fail(fmt::format("{} columns; Slicer writes 14, and no more than {} are read",
+                             header.columns.size(), kMost));
+    }
   }
 }
 

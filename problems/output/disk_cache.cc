@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/output/disk_cache.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "problems/output/manifest.h"
@@ -37,6 +40,17 @@ bool BeginsWithMark(const fs::path& path) {
 
 }  // namespace
 
+DiskCache::DiskCache(fs::path folder, std::uintmax_t limit_bytes)
+    : folder_(std::move(folder)), limit_bytes_(limit_bytes) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (error || !fs::is_directory(folder_, error)) {
+    throw IoError(fmt::format("{}: no folder for the cache, and none can be made there{}{}",
+                              folder_.string(), error ? ": " : "",
+                              error ? error.message() : std::string()));
+  }
+}
+
 fs::path DiskCache::FileOf(const std::string& key) const {
   return folder_ / (key + std::string(kEnding));
 }
@@ -59,8 +73,6 @@ std::optional<std::string> DiskCache::Get(const std::string& key) const {
 }
 
 void DiskCache::Put(const std::string& key, std::string_view bytes) const {
-  std::error_code ignored;
-  fs::create_directories(folder_, ignored);
   try {
     SweepTemporaryFiles(folder_);
     WriteFileAtomically(FileOf(key),

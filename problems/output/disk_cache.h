@@ -12,13 +12,13 @@
 namespace semblance {
 
 // Safe from several threads and processes: a file is written whole or not at all, carries a hash of
-// its content, and is read as missing where it does not fit. Nothing here is an error that stops
-// work: what cannot be kept is made again.
+// its content, and is read as missing where it does not fit. Once there is a folder, nothing here
+// is an error that stops work: what cannot be kept is made again.
 class DiskCache {
  public:
-  // Above limit_bytes the files that were read or written longest ago go.
-  DiskCache(std::filesystem::path folder, std::uintmax_t limit_bytes)
-      : folder_(std::move(folder)), limit_bytes_(limit_bytes) {}
+  // Above limit_bytes the files that were read or written longest ago go. Throws IoError if there
+  // is no such folder and it cannot be made; one that can only be read is one to read from.
+  DiskCache(std::filesystem::path folder, std::uintmax_t limit_bytes);
 
   // key: lower-case hexadecimal, 64 digits (Sha256OfText).
   std::optional<std::string> Get(const std::string& key) const;

@@ -74,6 +74,9 @@ Json NetJson(const ControlNet& net) {
 
 ControlNet NetFrom(const Json& json, const HSplineShape& shape, int level) {
   ControlNet net{.columns = shape.Columns(level), .rows = shape.Rows(level), .vertices = {}};
+  if (!std::ranges::all_of(json, [](const Json& value) { return value.is_number_integer(); })) {
+    throw InputError("a mode has an entry that is no whole number");
+  }
   const auto values = json.get<std::vector<std::int64_t>>();
   if (values.size() != 3 * static_cast<std::size_t>(net.columns) * net.rows) {
     throw InputError(fmt::format("a mode has {} numbers; level {} of {} x {} patches needs {}",
@@ -93,9 +96,18 @@ HSplineModes ModesFrom(const Json& json) {
     throw InputError(fmt::format("format and version must be \"{}\" and 1", kFormat));
   }
   HSplineModes modes;
-  modes.shape = {.patches_u = json.at("patches_u").get<int>(),
-                 .patches_v = json.at("patches_v").get<int>(),
-                 .max_level = json.at("level").get<int>()};
+  constexpr int kMost = 4096;  // patches of level 0, as everywhere
+  const auto whole = [&](const char* key) {
+    const Json& value = json.at(key);
+    if (!value.is_number_integer() || value < 0 || value > kMost) {
+      throw InputError(fmt::format("{} is {}; it must be a whole number from 0 to {}", key,
+                                   value.dump(), kMost));
+    }
+    return value.get<int>();
+  };
+  modes.shape = {.patches_u = whole("patches_u"),
+                 .patches_v = whole("patches_v"),
+                 .max_level = whole("level")};
   CheckShape(modes.shape);
   modes.level = modes.shape.max_level;
   for (const Json& feature : json.at("features")) {

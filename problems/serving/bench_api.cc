@@ -27,6 +27,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/face_export.h"
+#include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
 namespace {
@@ -299,7 +300,7 @@ void Unset(Bench& bench, const Json& json) {
   bench.Do("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
 }
 Pull PullOf(const Json& json) {
-  return {.level = json.at("level").get<int>(),
+  return {.level = json_parts::IntFromJson(json.at("level")),
           .reach = json.at("reach").get<double>(),
           .mirror = json.at("mirror").get<bool>()};
 }

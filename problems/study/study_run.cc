@@ -466,7 +466,8 @@ StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const Study
     throw InputError(fmt::format(
         "--only {}: a search decides itself which trials are run; take it out", options.only));
   }
-  TrialsThat(plan, options.only);  // what is wrong with it is said before anything is written
+  TrialsThat(plan, options.only);  // what is wrong with it is said before anything is written,
+  CacheOnDisk(options);            // and so is what is wrong with the cache
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
   const PlanThere there = ReadPlanThere(folder);
   const bool changed = !there.hash.empty() && there.hash != plan.hash;

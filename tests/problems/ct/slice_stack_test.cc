@@ -87,6 +87,8 @@ TEST(SliceStack, ADoubledSliceIsToldOrLeftOut) {
 TEST(SliceStack, WhatIsNoRegularStackIsRefused) {
   EXPECT_THAT(Series({0, 2, 4, 6, 9, 11}).Words({.fill = true}),
               HasSubstr("not at equal distances"));
+  EXPECT_THAT(Series({0, 2, 4, 1e13, 3e13}).Words({.fill = true}),  // more steps than an int holds
+              HasSubstr("not at equal distances"));
   EXPECT_THAT(Series({3}).Words(), HasSubstr("needs 2"));
   Series aside({0, 2, 4, 6});
   aside.positions[2].x() += 30;

@@ -131,6 +131,10 @@ TEST_F(TemplateIo, NamesAVertexThatTheSurfaceDoesNotHave) {
                 json["features"][1]["vertices"][0] = {0, 1, 1};
               }),
               HasSubstr("levels 1 to 2"));
+  EXPECT_THAT(MessageAfter([](auto& json) {
+                json["features"][1]["vertices"][0] = {1, 4294967297, 1};  // 1 where it is cut
+              }),
+              HasSubstr("[1,4294967297,1]; it must be a list of 3 integers below a million"));
 }
 
 TEST_F(TemplateIo, NamesARadiusThatIsNotPositive) {

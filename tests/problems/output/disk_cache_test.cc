@@ -11,6 +11,7 @@
 #include "problems/pipeline/implicit_cache.h"
 #include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -37,6 +38,15 @@ TEST(DiskCache, GivesBackWhatWasPutAndNothingElse) {
   EXPECT_EQ(cache.Get(Key(1)), std::string("a\0b", 3));
   EXPECT_EQ(cache.Get(Key(2)), "");
   EXPECT_EQ(cache.Get(Key(3)), std::nullopt);
+}
+
+TEST(DiskCache, AFileIsNoFolderForIt) {
+  const ScratchFolder folder;
+  WriteFileAtomically(folder / "mine", "a");
+  for (const char* wrong : {"mine", "mine/cache"}) {
+    EXPECT_THROW(DiskCache(folder / wrong, 1 << 20), IoError) << wrong;
+  }
+  EXPECT_EQ(ReadFileBytes(folder / "mine"), "a");
 }
 
 TEST(DiskCache, WhatIsDamagedIsMissing) {

@@ -225,6 +225,13 @@ TEST(HSplinePrior, WhatCannotBeUsedIsNamed) {
   EXPECT_THAT(fault(R"({"format": "x", "version": 1})"), HasSubstr("format and version"));
   EXPECT_THAT(fault(head + R"("features": [], "modes": [[1, 2]]})"), HasSubstr("has 2 numbers"));
   EXPECT_THAT(fault(head + R"("features": [], "modes": []})"), HasSubstr("no mode"));
+  EXPECT_THAT(fault(head + R"("features": [], "modes": [[1.5, 1e300, 0]]})"),
+              HasSubstr("an entry that is no whole number"));
+  for (const std::string wrong : {"4294967300", "4.5", "true", "-4"}) {  // 4 where they are cut
+    EXPECT_THAT(fault(R"({"format": "semblance face prior", "version": 1, "patches_u": )" + wrong +
+                      R"(, "patches_v": 4, "level": 0, "features": [], "modes": []})"),
+                HasSubstr("patches_u is " + wrong + "; it must be a whole number"));
+  }
   EXPECT_THAT(fault(head + R"("features": [{"uv": [2, 0], "clearance_mm": 1}], "modes": []})"),
               HasSubstr("outside [0,1]"));
   HSplineModes modes;

@@ -316,6 +316,15 @@ TEST_F(Trust, AShardIsTwoNumbersThatFit) {
 }
 
 // Also what has no place in the file; check may look at many.
+TEST_F(Trust, ACacheThatCannotBeOneIsSaid) {
+  Write("study.yaml",
+        fmt::format("base: {}\njob: depth\ngrid: {{interp: [nearest, mean]}}\nmetric: "
+                    "depth_truth.along_direction.rms_mm\n",
+                    kPhantom));
+  ExpectRefused("study study.yaml --out out --cache study.yaml",
+                "study.yaml: no folder for the cache");
+}
+
 TEST_F(Trust, CheckNamesTheFileOfEachFault) {
   Write("volume.yaml", "subject: {type: ct}\n");
   Write("fit.yaml", "patches_u: 4\n");
