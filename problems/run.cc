@@ -95,8 +95,9 @@ std::optional<FaceUncertainty> UncertaintyOf(const Experiment& experiment, const
                                              const Tessellation& face, Case& subject,
                                              const RunContext& context) {
   if (made.prior) {
-    return experiment.uncertainty.sigma ? std::optional(PriorUncertainty(*prior, *made.prior, face))
-                                        : std::nullopt;
+    return experiment.uncertainty.sigma || !made.samples.empty()
+               ? std::optional(PriorUncertainty(experiment.uncertainty, *prior, made, face))
+               : std::nullopt;
   }
   if (!std::holds_alternative<FittedTemplate>(WayToFace(experiment))) {
     return std::nullopt;
@@ -121,6 +122,17 @@ std::shared_ptr<const BustModel> GivenBust(const Experiment& experiment, StageCa
 Bust BustOf(const BustModel& model, const MadeFace& made, const TriMesh& seedable,
             const RunContext& context) {
   return PoseBust({model, made.fitted.fit.surface, made.placed.face.site_uv, seedable}, context);
+}
+
+void NoteDraw(const Experiment& experiment, Case& subject) {
+  const FaceSource way = WayToFace(experiment);
+  const PriorUse* const use = PriorUseOf(way);
+  if (use != nullptr && use->draw > 0) {
+    subject.notes.push_back(
+        fmt::format("the face is not the most likely one, but number {} of those drawn from what "
+                    "bone and depths leave possible",
+                    use->draw));
+  }
 }
 
 // Where a template's features hide how far a face is off; none of a prior's, which knows of nose,
@@ -167,6 +179,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   MadeFace made = step("fit", [&] {
     return MakeFace({experiment, *generic, prior.get(), subject, seedable, bone.shell}, context);
   });
+  NoteDraw(experiment, subject);
   std::optional<HSplineSurface> before_edits = EditByHand(experiment, made.fitted, subject);
   CheckFinite(made.fitted.fit.surface);
   Tessellation face =

@@ -53,11 +53,13 @@ void CheckTips(const ShapeModel& model, const ShapeTarget& target) {
           "shape model: the mark '{}' has no point, place, direction or deviation", mark.label));
     }
   }
-  if (target.surface != nullptr && !target.surface_sd_mm.empty() &&
-      target.surface_sd_mm.size() != target.surface->points.size()) {
-    throw InputError(fmt::format(
-        "shape model: {} deviations for the {} points of the surface; give one per point or none",
-        target.surface_sd_mm.size(), target.surface->points.size()));
+  for (const auto* sd_mm : {&target.surface_sd_mm, &target.surface_error_mm}) {
+    if (target.surface != nullptr && !sd_mm->empty() &&
+        sd_mm->size() != target.surface->points.size()) {
+      throw InputError(fmt::format(
+          "shape model: {} deviations for the {} points of the surface; give one per point or none",
+          sd_mm->size(), target.surface->points.size()));
+    }
   }
   if (!(target.start.scale > 0)) {
     throw InputError(
@@ -149,23 +151,25 @@ std::vector<DrawnPoint> DrawnPoints(const ShapeModel& model, const ShapeTarget& 
 
 class DrawingSurface {
  public:
-  DrawingSurface(const TriMesh& mesh, std::span<const double> sd_mm, const ShapeFitOptions& options)
-      : mesh_(mesh),
-        sd_mm_(sd_mm),
+  DrawingSurface(const ShapeTarget& target, const ShapeFitOptions& options)
+      : mesh_(*target.surface),
+        sd_mm_(target.surface_sd_mm),
+        error_mm_(target.surface_error_mm.empty() ? target.surface_sd_mm : target.surface_error_mm),
         otherwise_sd_mm_(options.surface_sd_mm),
-        normals_(VertexNormals(mesh)),
-        on_border_(mesh.points.size(), 0),
-        query_(mesh),
+        normals_(VertexNormals(mesh_)),
+        on_border_(mesh_.points.size(), 0),
+        query_(mesh_),
         reach_mm_(options.surface_reach_mm),
         least_cosine_(std::cos(options.surface_max_angle_deg * std::numbers::pi / 180)) {
-    for (const MeshEdge& edge : BorderEdges(mesh)) {
+    for (const MeshEdge& edge : BorderEdges(mesh_)) {
       on_border_[edge[0]] = on_border_[edge[1]] = 1;
     }
   }
 
   struct Foot {
     Vec3 position, normal;
-    double sd_mm;
+    double sd_mm;     // by which it weighs
+    double error_mm;  // by which it is off
   };
   // Where a point with this normal is drawn to, if anywhere.
   std::optional<Foot> FootOf(const Vec3& p, const Vec3& normal) const {
@@ -178,22 +182,23 @@ class DrawingSurface {
     const Vec3 out = (at.weights[0] * normals_[t[0]] + at.weights[1] * normals_[t[1]] +
                       at.weights[2] * normals_[t[2]])
                          .normalized();
-    return out.dot(normal) >= least_cosine_ ? std::optional(Foot{at.position, out, SdAt(at)})
-                                            : std::nullopt;
+    return out.dot(normal) >= least_cosine_
+               ? std::optional(Foot{at.position, out, ValueAt(at, sd_mm_), ValueAt(at, error_mm_)})
+               : std::nullopt;
   }
 
  private:
-  double SdAt(const MeshPoint& at) const {
-    if (sd_mm_.empty()) {
+  double ValueAt(const MeshPoint& at, std::span<const double> values) const {
+    if (values.empty()) {
       return otherwise_sd_mm_;
     }
     const Triangle& t = mesh_.triangles[at.triangle];
-    return at.weights[0] * sd_mm_[t[0]] + at.weights[1] * sd_mm_[t[1]] +
-           at.weights[2] * sd_mm_[t[2]];
+    return at.weights[0] * values[t[0]] + at.weights[1] * values[t[1]] +
+           at.weights[2] * values[t[2]];
   }
 
   const TriMesh& mesh_;
-  std::span<const double> sd_mm_;  // one per point; none: the same everywhere
+  std::span<const double> sd_mm_, error_mm_;  // one per point; none: the same everywhere
   double otherwise_sd_mm_;
   std::vector<Vec3> normals_;
   std::vector<char> on_border_;
@@ -211,7 +216,9 @@ class ShapeEstimator {
       : model_(model),
         target_(target),
         options_(options),
-        prior_{.scale_sd = options.scale_sd, .mode_sd = options.mode_sd},
+        prior_{.scale_sd = options.scale_sd,
+               .mode_sd = options.mode_sd,
+               .population_sd = options.population_sd},
         frame_(StartFrame(model, target.start)) {
     const std::vector<int> centres =
         FarthestPoints(model.mean.points, AllPoints(model.mean), options.field.centres);
@@ -219,7 +226,7 @@ class ShapeEstimator {
     parameters_ = StartParameters(frame_, target.start, model.Modes(), std::ssize(centres));
     start_pose_ = parameters_.pose;
     if (target.surface != nullptr && options.surface_points > 0 && options.surface_worth > 0) {
-      surface_.emplace(*target.surface, target.surface_sd_mm, options);
+      surface_.emplace(target, options);
       drawn_ = DrawnPoints(model, target, options);
     }
   }
@@ -235,6 +242,7 @@ class ShapeEstimator {
   void SeeSurface();
   void Solve(bool pose_alone);
   void AddPriors(ceres::Problem& problem);
+  void TellSpread(const RunContext& context, ShapeEstimate& result) const;
 
   const ShapeModel& model_;
   const ShapeTarget& target_;
@@ -311,7 +319,8 @@ void ShapeEstimator::SeeSurface() {
                        .whitening = foot->normal.transpose() / foot->sd_mm,
                        .loss_width = options_.surface_loss_width,
                        .weight = weight,
-                       .shared_mm = shared_sd_mm * foot->normal});
+                       .shared_mm = shared_sd_mm * foot->normal,
+                       .smooth_sd_mm = foot->error_mm});
       ++surface_points_;
     }
   }
@@ -386,24 +395,33 @@ double Rms(const Eigen::MatrixXd& rows) {
   return rows.size() == 0 ? 0 : std::sqrt(rows.rowwise().squaredNorm().mean());
 }
 
-ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
-  Place();
+// Sigma, and what is drawn.
+void ShapeEstimator::TellSpread(const RunContext& context, ShapeEstimate& result) const {
   std::vector<ShapeRow> rows;
   for (const int v : AllPoints(model_.mean)) {
     rows.push_back(RowOfVertex(model_, field_, v));
   }
-  ShapeEstimate result;
-  result.subject_from_model = SimilarityOf(frame_, parameters_);
-  result.coefficients = parameters_.coefficients;
-  result.points = placed_.points;
-  const ShapePosterior posterior = PosteriorOf(frame_, parameters_, seen_, prior_);
+  const ShapePosterior posterior =
+      PosteriorOf(frame_, parameters_, seen_, prior_, options_.surface_length_mm);
   result.sigma_mm =
-      DeviationsAlong(frame_, parameters_, posterior, {options_.mode_sd, options_.population_sd},
-                      rows, normals_, context.threads);
+      DeviationsAlong(frame_, parameters_, posterior, rows, normals_, context.threads);
   for (std::size_t v = 0; v < result.sigma_mm.size(); ++v) {
     const double unseen_mm = UnseenSd_mm(model_.mean.points[v], seen_, options_);
     result.sigma_mm[v] = std::hypot(result.sigma_mm[v], options_.discrepancy_mm, unseen_mm);
   }
+  for (const std::uint64_t random_seed : target_.draws) {
+    result.drawn.push_back(
+        PlacedPoints(frame_, model_, field_, DrawnAbout(parameters_, posterior, random_seed)));
+  }
+}
+
+ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
+  Place();
+  ShapeEstimate result;
+  result.subject_from_model = SimilarityOf(frame_, parameters_);
+  result.coefficients = parameters_.coefficients;
+  result.points = placed_.points;
+  TellSpread(context, result);
   for (const ShapeTip& tip : target_.tips) {
     result.tip_residual_mm.push_back(
         (tip.position - PositionOf(tip.at, model_.mean, placed_.points))

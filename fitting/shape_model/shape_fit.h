@@ -3,6 +3,7 @@
 // coefficients of the modes and a smooth rest, in one robust least-squares problem.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,6 +29,7 @@ struct ShapeFitOptions {
   double surface_reach_mm = 15;       // farther off a point is not drawn
   double surface_max_angle_deg = 60;  // nor where normals differ by more
   double surface_range_mm = 60;       // nor farther than this from every dowel
+  double surface_length_mm = 20;      // over which the surface's errors resemble; for sigma
   int rounds = 12;                    // at most
   double population_sd = 1.3;         // of a coefficient among people; for sigma
   double discrepancy_mm = 1.25;       // what neither modes nor field can express; for sigma
@@ -114,6 +116,13 @@ void Fields(Visitor& visit, ShapeFitOptions& o) {
                          "the implicit face rests on no depth; weights that fall with that "
                          "distance do worse"},
         o.surface_range_mm);
+  visit(FieldInfo{.name = "surface_length_mm",
+                  .unit = "mm",
+                  .min = 0.1,
+                  .max = 1000,
+                  .doc = "length over which the errors of the implicit face resemble each other: "
+                         "the estimate knows of it by `surface_worth` alone, sigma by this"},
+        o.surface_length_mm);
   visit(FieldInfo{.name = "rounds",
                   .min = 3,
                   .max = 1000,
@@ -178,8 +187,10 @@ struct ShapeTarget {
   std::vector<ShapeTip> tips;        // may be empty
   const TriMesh* surface = nullptr;  // outward, in the subject's frame; none: the tips alone
   std::vector<ShapeFeature> features;
-  std::vector<double> surface_sd_mm = {};  // one per point of the surface; none: of the options
+  std::vector<double> surface_sd_mm = {};     // one per point of the surface; none: of the options
+  std::vector<double> surface_error_mm = {};  // how far it is off there, for sigma; none: the same
   std::vector<ShapeMark> marks = {};
+  std::vector<std::uint64_t> draws = {};  // random seeds of shapes to draw
 };
 
 struct ShapeEstimate {
@@ -191,6 +202,7 @@ struct ShapeEstimate {
                                          // outside, along the shape's normal
   std::vector<double> mark_residual_mm;  // one per mark: from the shape to the mark, along its
                                          // direction
+  std::vector<std::vector<Vec3>> drawn;  // one per draw: its points
   double field_rms_mm = kNaN;            // of the smooth rest over the points
   int surface_points = -1;               // that were drawn to the surface in the last round
   int rounds = -1;
@@ -205,13 +217,15 @@ struct ShapeEstimate {
 // C of shape_observation.h with the shape's own normal, c the surface's closest point to x and n
 // its normal; and a prior of 1 rad and 100 mm on the pose, so weak that it matters only where
 // nothing else speaks. Points and normals are taken anew in each round. The posterior is the normal
-// distribution of the last linearisation, widened as DeviationsAlong says; the surface shares the
-// error of the nearest tip. Sigma has two parts besides, added in squares: discrepancy_mm, and
+// distribution of the last linearisation, widened as PosteriorOf says: the surface shares the
+// error of the nearest tip, and its own errors are smooth. What is drawn has that distribution.
+// Sigma has two parts besides, added in squares: discrepancy_mm, and
 // unseen_rate (d - unseen_reach_mm) where d, the distance on the mean from the nearest point that
 // was observed, is larger than that: modes alone are too sure of a jaw whose bone nobody saw.
 // One thread apart from sigma; same bytes whatever their
 // number. Throws InputError as CheckShapeModel (name: "shape model"), for a tip that is not on the
-// model or not finite, and for a start without a positive scale; Cancelled.
+// model or not finite, for deviations that are not one per point of the surface, and for a start
+// without a positive scale; Cancelled.
 ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,
                             const ShapeFitOptions& options, const RunContext& context);
 

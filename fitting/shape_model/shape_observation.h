@@ -18,6 +18,8 @@ struct ShapeObservation {
   double weight = 1;
   Vec3 shared_mm = Vec3::Zero();  // how far one standard deviation of an error that all
                                   // observations share moves the position
+  double smooth_sd_mm = 0;        // of an error along the whitening's only row that resembles those
+                                  // of its neighbours; 0: it errs alone, as whitening says
 };
 
 // How sure a point is in its directions.

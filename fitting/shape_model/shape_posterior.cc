@@ -6,8 +6,62 @@
 #include <cmath>
 
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
+namespace {
+
+// The observations' rows, each at the root of its weight.
+struct SeenRows {
+  Eigen::MatrixXd jacobian;  // of what is weighed
+  Eigen::VectorXd shared;    // one standard deviation of the error that all share
+  std::vector<Eigen::Index> smooth;
+  std::vector<Vec3> smooth_at;    // of those, mm
+  std::vector<double> smooth_sd;  // of those, in the units of the rows
+};
+
+SeenRows RowsOf(const ShapeFrame& frame, const ShapeParameters& parameters,
+                std::span<const ShapeObservation> seen) {
+  Eigen::Index count = 0, row = 0;
+  for (const ShapeObservation& one : seen) {
+    count += one.whitening.rows();
+  }
+  SeenRows rows{Eigen::MatrixXd(count, parameters.size()), Eigen::VectorXd(count), {}, {}, {}};
+  for (const ShapeObservation& one : seen) {
+    ShapeDerivatives derivatives;
+    const Vec3 placed = PlacedPoint(frame, one.row, parameters, &derivatives);
+    const double root = std::sqrt(one.weight * LossWeight(one, placed));
+    if (one.smooth_sd_mm > 0) {
+      rows.smooth.push_back(row);
+      rows.smooth_at.push_back(one.position);
+      rows.smooth_sd.push_back(root * one.smooth_sd_mm * one.whitening.row(0).norm());
+    }
+    for (Eigen::Index r = 0; r < one.whitening.rows(); ++r) {
+      const Vec3 direction = root * one.whitening.row(r).transpose();
+      rows.jacobian.row(row) = DerivativeAlong(direction, one.row, derivatives);
+      rows.shared[row++] = direction.dot(one.shared_mm);
+    }
+  }
+  return rows;
+}
+
+// J' E J, E the covariance of the rows' errors but for the part that all share.
+Eigen::MatrixXd SpreadOf(const SeenRows& rows, double length_mm) {
+  const Eigen::Index count = std::ssize(rows.smooth);
+  Eigen::MatrixXd alone = rows.jacobian, smooth(count, rows.jacobian.cols()), errors(count, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    smooth.row(j) = rows.jacobian.row(rows.smooth[j]);
+    alone.row(rows.smooth[j]).setZero();
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const double squared = (rows.smooth_at[j] - rows.smooth_at[k]).squaredNorm();
+      errors(j, k) =
+          rows.smooth_sd[j] * rows.smooth_sd[k] * std::exp(-squared / (2 * length_mm * length_mm));
+    }
+  }
+  return alone.transpose() * alone + smooth.transpose() * errors * smooth;
+}
+
+}  // namespace
 
 Eigen::VectorXd ShapePrior::Deviations(const ShapeParameters& parameters) const {
   Eigen::VectorXd deviations = Eigen::VectorXd::Ones(parameters.size());
@@ -19,38 +73,26 @@ Eigen::VectorXd ShapePrior::Deviations(const ShapeParameters& parameters) const 
 }
 
 ShapePosterior PosteriorOf(const ShapeFrame& frame, const ShapeParameters& parameters,
-                           std::span<const ShapeObservation> seen, const ShapePrior& prior) {
-  Eigen::Index count = 0, row = 0;
-  for (const ShapeObservation& one : seen) {
-    count += one.whitening.rows();
-  }
-  Eigen::MatrixXd jacobian(count, parameters.size());
-  Eigen::VectorXd shared(count);
-  for (const ShapeObservation& one : seen) {
-    ShapeDerivatives derivatives;
-    const Vec3 placed = PlacedPoint(frame, one.row, parameters, &derivatives);
-    const double root = std::sqrt(one.weight * LossWeight(one, placed));
-    for (Eigen::Index r = 0; r < one.whitening.rows(); ++r) {
-      const Vec3 direction = root * one.whitening.row(r).transpose();
-      jacobian.row(row) = DerivativeAlong(direction, one.row, derivatives);
-      shared[row++] = direction.dot(one.shared_mm);
-    }
-  }
-  ShapePosterior posterior{jacobian.transpose() * jacobian, jacobian.transpose() * shared};
-  posterior.information.diagonal() +=
-      prior.Deviations(parameters).array().inverse().square().matrix();
+                           std::span<const ShapeObservation> seen, const ShapePrior& prior,
+                           double smooth_length_mm) {
+  const SeenRows rows = RowsOf(frame, parameters, seen);
+  ShapePosterior posterior{rows.jacobian.transpose() * rows.jacobian,
+                           SpreadOf(rows, smooth_length_mm)};
+  const Eigen::VectorXd shared = rows.jacobian.transpose() * rows.shared;
+  posterior.spread += shared * shared.transpose();
+  Eigen::VectorXd pull = prior.Deviations(parameters).array().inverse().square();
+  posterior.information.diagonal() += pull;
+  pull.segment(7, parameters.coefficients.size()) *=
+      std::pow(prior.population_sd / prior.mode_sd, 2);
+  posterior.spread.diagonal() += pull;
   return posterior;
 }
 
 std::vector<double> DeviationsAlong(const ShapeFrame& frame, const ShapeParameters& parameters,
-                                    const ShapePosterior& posterior, const Population& population,
-                                    std::span<const ShapeRow> rows,
+                                    const ShapePosterior& posterior, std::span<const ShapeRow> rows,
                                     std::span<const Vec3> directions, int threads) {
   constexpr std::size_t kBlock = 128;  // columns that are solved for at once
   const Eigen::LLT<Eigen::MatrixXd> factor(posterior.information);
-  const double taken = 1 / (population.mode_sd * population.mode_sd),
-               wider = std::pow(population.population_sd * taken, 2) - taken;
-  const Eigen::Index modes = parameters.coefficients.size();
   std::vector<double> deviations(rows.size(), kNaN);
   ParallelFor((rows.size() + kBlock - 1) / kBlock, threads, 1, [&](std::size_t block) {
     const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, rows.size());
@@ -60,16 +102,29 @@ std::vector<double> DeviationsAlong(const ShapeFrame& frame, const ShapeParamete
       PlacedPoint(frame, rows[k], parameters, &derivatives);
       along.col(k - begin) = DerivativeAlong(directions[k], rows[k], derivatives).transpose();
     }
-    const Eigen::MatrixXd answer = factor.solve(along);
+    const Eigen::MatrixXd answer = factor.solve(along), pulled = posterior.spread * answer;
     for (std::size_t k = begin; k < end; ++k) {
-      const auto a = along.col(k - begin);
-      const auto x = answer.col(k - begin);
-      const double moved = posterior.shared.dot(x);
-      const double variance = a.dot(x) + wider * x.segment(7, modes).squaredNorm() + moved * moved;
+      const double variance = answer.col(k - begin).dot(pulled.col(k - begin));
       deviations[k] = std::sqrt(std::max(variance, 0.0));
     }
   });
   return deviations;
+}
+
+ShapeParameters DrawnAbout(const ShapeParameters& parameters, const ShapePosterior& posterior,
+                           std::uint64_t random_seed) {
+  Random random(random_seed);
+  Eigen::VectorXd pull(parameters.size());
+  for (double& value : pull) {
+    value = random.Normal();
+  }
+  const Eigen::VectorXd spread = posterior.spread.llt().matrixL() * pull,
+                        step = posterior.information.llt().solve(spread);
+  ShapeParameters drawn = parameters;
+  Eigen::Map<Eigen::Matrix<double, 7, 1>>(drawn.pose.data()) += step.head<7>();
+  drawn.coefficients += step.segment(7, drawn.coefficients.size());
+  drawn.field += step.tail(drawn.field.size());
+  return drawn;
 }
 
 }  // namespace semblance

@@ -144,11 +144,6 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   if (asks) {
     CheckPriorFiles(experiment.prior, faults);
   }
-  if (asks && experiment.uncertainty.samples > 0) {
-    faults.push_back({"uncertainty.samples",
-                      "faces are drawn from the distribution of a fit alone; write 0, or "
-                      "`face: fit`"});
-  }
   if (asks && std::holds_alternative<NoPrior>(experiment.prior)) {
     faults.push_back({"face",
                       "it asks a prior, and there is none; name one under `prior`, or take "

@@ -150,16 +150,14 @@ FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, cons
 // A face that no fit has touched, in the form of a fit's result.
 FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {
   FitResult fit{.surface = std::move(surface)};
-  double sum = 0;
   for (const FitPoint& point : dowels.points) {
     fit.uv.push_back(point.uv);
-    fit.residual_mm.push_back((fit.surface.Point(point.uv) - point.position).norm());
-    sum += fit.residual_mm.back() * fit.residual_mm.back();
   }
-  fit.dowel_rms_mm = fit.point_rms_mm = std::sqrt(sum / static_cast<double>(fit.uv.size()));
   fit.restored_features = 0;
   fit.usable = true;
-  return {{.points = {}, .masked = 0, .missed = 0, .folded = 0}, dowels, std::move(fit)};
+  FaceFit unfitted{{.points = {}, .masked = 0, .missed = 0, .folded = 0}, dowels, std::move(fit)};
+  MeasureResiduals(unfitted);
+  return unfitted;
 }
 
 HSplineSurface UnderThinPlate(const HSplineSurface& surface, const FitTarget& dowels,
@@ -238,6 +236,31 @@ RuleMarks RulesOf(const FaceInput& in, const FacePrior& prior) {
                                 : RuleMarks();
 }
 
+// Random seeds of the faces to draw: first the one that takes the place of the most likely face.
+std::vector<std::uint64_t> DrawsOf(const PriorUse& use, const UncertaintyOptions& options) {
+  std::vector<std::uint64_t> seeds;
+  if (use.draw > 0) {
+    seeds.push_back(use.draw);
+  }
+  for (int k = 0; k < options.samples; ++k) {
+    seeds.push_back(options.random_seed + k);
+  }
+  return seeds;
+}
+
+void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made) {
+  const HSplineSurface likely = made.fitted.fit.surface;
+  for (std::size_t k = 0; k < made.prior->drawn.size(); ++k) {
+    HSplineSurface drawn = MovedAsDrawn(likely, *made.prior, k, prior.face, prior.on_template);
+    if (use.draw > 0 && k == 0) {
+      made.fitted.fit.surface = std::move(drawn);
+      MeasureResiduals(made.fitted);
+    } else {
+      made.samples.push_back(std::move(drawn));
+    }
+  }
+}
+
 // The prior's most likely face as a placed template.
 MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceInput& in,
                         const RunContext& context) {
@@ -249,11 +272,14 @@ MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceIn
   ShapeTarget target =
       PriorTarget(prior.face, dowels, table, implicit, OtherSites(placed.dowels, prior));
   if (implicit != nullptr) {
-    target.surface_sd_mm =
-        ImplicitSd_mm(use.implicit_spread, *implicit, in.shell, dowels, table, context.threads);
+    ImplicitSpread spread =
+        ImplicitSpread_mm(use.implicit_spread, *implicit, in.shell, dowels, table, context.threads);
+    target.surface_sd_mm = std::move(spread.sd);
+    target.surface_error_mm = std::move(spread.error);
   }
   RuleMarks rules = RulesOf(in, prior.face);
   target.marks = std::move(rules.marks);
+  target.draws = DrawsOf(use, in.experiment.uncertainty);
   ShapeEstimate shape = EstimateShape(prior.face.model, target, use.estimate, context);
   if (MeetAnew(shape, prior.face, target)) {
     shape = EstimateShape(prior.face.model, target, use.estimate, context);
@@ -297,7 +323,9 @@ MadeFace MakeFace(const FittedTemplate&, PlacedTemplate placed, const FaceInput&
 
 MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
-  return MostLikelyFace(o.use, std::move(placed), in, context);
+  MadeFace made = MostLikelyFace(o.use, std::move(placed), in, context);
+  TakeDraws(o.use, *in.prior, made);
+  return made;
 }
 
 // By how much the tips' variance exceeds that of measured depths: a fit weighs its points among
@@ -342,6 +370,7 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
       .features = FeaturesOn(*made.prior, in.prior->face),
       .trust = &o.seed_trust};
   made.fitted = FitFace(OnPrior(o, in), made.placed, in, known, context);
+  TakeDraws(o.use, *in.prior, made);
   return made;
 }
 
@@ -377,10 +406,33 @@ MadeFace MakeFace(const FaceInput& in, const RunContext& context) {
                     WayToFace(in.experiment));
 }
 
-FaceUncertainty PriorUncertainty(const LoadedPrior& prior, const ShapeEstimate& estimate,
-                                 const Tessellation& face) {
+void MeasureResiduals(FaceFit& fitted) {
+  FitResult& fit = fitted.fit;
+  double all = 0, weight = 0, of_dowels = 0, dowel_weight = 0;
+  fit.residual_mm.clear();
+  for (std::size_t k = 0; k < fitted.target.points.size(); ++k) {
+    const FitPoint& point = fitted.target.points[k];
+    fit.residual_mm.push_back((fit.surface.Point(fit.uv[k]) - point.position).norm());
+    const double squared = point.weight * fit.residual_mm[k] * fit.residual_mm[k];
+    all += squared;
+    weight += point.weight;
+    if (point.role != PointRole::kSeed) {
+      of_dowels += squared;
+      dowel_weight += point.weight;
+    }
+  }
+  fit.point_rms_mm = std::sqrt(all / weight);
+  fit.dowel_rms_mm = std::sqrt(of_dowels / dowel_weight);
+}
+
+FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const LoadedPrior& prior,
+                                 const MadeFace& made, const Tessellation& face) {
   FaceUncertainty result;
-  result.sigma_mm = SigmaAt(face.uv, estimate, prior.face, prior.on_template);
+  result.samples = made.samples;
+  if (!options.sigma) {
+    return result;
+  }
+  result.sigma_mm = SigmaAt(face.uv, *made.prior, prior.face, prior.on_template);
   const std::vector<WeightedValue> by_area = SortedValues(result.sigma_mm, VertexAreas(face.mesh));
   result.median_mm = Quantile(by_area, 0.5);
   result.p95_mm = Quantile(by_area, 0.95);

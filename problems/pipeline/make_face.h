@@ -51,8 +51,9 @@ struct FaceInput {
 struct MadeFace {
   PlacedTemplate placed;
   FaceFit fitted;
-  std::optional<ShapeEstimate> prior;   // where a prior was asked
-  std::vector<AppliedRule> rules = {};  // that took part in it
+  std::optional<ShapeEstimate> prior;        // where a prior was asked
+  std::vector<AppliedRule> rules = {};       // that took part in it
+  std::vector<HSplineSurface> samples = {};  // drawn beside it: uncertainty.samples
 };
 
 // The prior of the experiment, laid on its template; null where no face asks it. Throws as
@@ -70,8 +71,12 @@ TriMesh SeedableFace(const Experiment& experiment, std::span<const CutPlane> cut
 // says. Throws InputError as Fit and EstimateShape do; Cancelled.
 MadeFace MakeFace(const FaceInput& in, const RunContext& context);
 
-// The posterior's sigma, which knows the discrepancy of the model, in place of the fit's.
-FaceUncertainty PriorUncertainty(const LoadedPrior& prior, const ShapeEstimate& estimate,
-                                 const Tessellation& face);
+// Residuals and their RMS, weighted as those of a fit, of a surface that was changed after it.
+void MeasureResiduals(FaceFit& fitted);
+
+// The posterior's sigma, which knows the discrepancy of the model, in place of the fit's; and its
+// samples. made: with a prior.
+FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const LoadedPrior& prior,
+                                 const MadeFace& made, const Tessellation& face);
 
 }  // namespace semblance

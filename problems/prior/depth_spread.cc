@@ -39,21 +39,23 @@ double DepthSd_mm(const TableDepthOptions& options, const Dowel& dowel) {
   return options.own * PublishedSd_mm(dowel);
 }
 
-std::vector<double> ImplicitSd_mm(const ImplicitSpreadOptions& options, const TriMesh& implicit,
-                                  const TriMesh& shell, std::span<const Dowel> dowels,
-                                  const TableDepthOptions* table, int threads) {
+ImplicitSpread ImplicitSpread_mm(const ImplicitSpreadOptions& options, const TriMesh& implicit,
+                                 const TriMesh& shell, std::span<const Dowel> dowels,
+                                 const TableDepthOptions* table, int threads) {
   const MeshQuery query(shell);
-  std::vector<double> sd_mm(implicit.points.size());
-  ParallelFor(sd_mm.size(), threads, 256, [&](std::size_t v) {
+  ImplicitSpread spread{std::vector<double>(implicit.points.size()),
+                        std::vector<double>(implicit.points.size())};
+  ParallelFor(implicit.points.size(), threads, 256, [&](std::size_t v) {
     const MeshPoint foot = query.Closest(implicit.points[v]);
     const auto squared_mm = [&](const Dowel& d) { return (d.base - foot.position).squaredNorm(); };
     const Dowel& nearest = *std::ranges::min_element(dowels, {}, squared_mm);
     const double beyond_mm = std::max(0.0, std::sqrt(squared_mm(nearest)) - options.reach_mm),
                  own_mm = table == nullptr ? 0 : DepthSd_mm(*table, nearest);
-    sd_mm[v] = std::hypot(std::hypot(options.sd_mm, options.share * foot.distance_mm),
-                          options.rate * beyond_mm, own_mm);
+    const double near_mm = std::hypot(options.sd_mm, options.share * foot.distance_mm, own_mm);
+    spread.sd[v] = std::hypot(near_mm, options.rate * beyond_mm);
+    spread.error[v] = std::hypot(near_mm, options.sigma_rate * beyond_mm);
   });
-  return sd_mm;
+  return spread;
 }
 
 }  // namespace semblance

@@ -46,6 +46,7 @@ struct ImplicitSpreadOptions {
   double share = 0.18;
   double reach_mm = 15;
   double rate = 0;
+  double sigma_rate = 0.1;
 };
 template <class Visitor>
 void Fields(Visitor& visit, ImplicitSpreadOptions& o) {
@@ -71,14 +72,26 @@ void Fields(Visitor& visit, ImplicitSpreadOptions& o) {
                   .max = 10,
                   .doc = "it also grows by so many mm with each mm farther"},
         o.rate);
+  visit(FieldInfo{.name = "sigma_rate",
+                  .min = 0,
+                  .max = 10,
+                  .doc = "the same, for sigma: the estimate would rather follow a face that may be "
+                         "off than none, and sigma says that it may"},
+        o.sigma_rate);
 }
 
-// One per point of the implicit face: by its distance from the shell, which is the tissue's
-// thickness, and that of its foot there from the nearest dowel. table: what the depths of a table
-// err besides, each by itself; null for measured ones. dowels: with depths, not empty.
-std::vector<double> ImplicitSd_mm(const ImplicitSpreadOptions& options, const TriMesh& implicit,
-                                  const TriMesh& shell, std::span<const Dowel> dowels,
-                                  const TableDepthOptions* table, int threads);
+// One per point of the implicit face, mm.
+struct ImplicitSpread {
+  std::vector<double> sd;     // by which an estimate weighs it
+  std::vector<double> error;  // how far it may be off, for sigma
+};
+
+// By the point's distance from the shell, which is the tissue's thickness, and that of its foot
+// there from the nearest dowel. table: what the depths of a table err besides, each by itself; null
+// for measured ones. dowels: with depths, not empty.
+ImplicitSpread ImplicitSpread_mm(const ImplicitSpreadOptions& options, const TriMesh& implicit,
+                                 const TriMesh& shell, std::span<const Dowel> dowels,
+                                 const TableDepthOptions* table, int threads);
 
 // The standard deviation of the dowel's depth among people: what its table states, else that of
 // the T-Table 2023 at its site (Hona & Stephan 2024, adults pooled), else, where that lacks the

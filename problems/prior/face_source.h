@@ -53,6 +53,7 @@ struct PriorUse {
   ShapeFitOptions estimate;
   TableDepthOptions table_depths;
   ImplicitSpreadOptions implicit_spread;
+  int draw = 0;  // 0: the most likely face
 };
 template <class Visitor>
 void PriorUseFields(Visitor& visit, PriorUse& o) {
@@ -64,6 +65,13 @@ void PriorUseFields(Visitor& visit, PriorUse& o) {
         o.table_depths);
   visit(FieldInfo{.name = "implicit_spread", .doc = "how sure the implicit face is"},
         o.implicit_spread);
+  visit(FieldInfo{.name = "draw",
+                  .min = 0,
+                  .max = 1000000,
+                  .doc = "0: the most likely face; 1, 2 ...: instead a face drawn from those that "
+                         "bone and depths leave possible, the same one for the same number; for "
+                         "`alternatives`"},
+        o.draw);
 }
 
 // The most likely face of the prior.
@@ -111,8 +119,13 @@ void Fields(Visitor& visit, PriorThenFit& o) {
 using FaceSource =
     std::variant<AutoFace, FittedTemplate, PlacedFace, ThinPlateFace, PriorFace, PriorThenFit>;
 
-inline bool AsksPrior(const FaceSource& face) {
-  return std::holds_alternative<PriorFace>(face) || std::holds_alternative<PriorThenFit>(face);
+// Null for a face that does not ask the prior.
+inline const PriorUse* PriorUseOf(const FaceSource& face) {
+  const auto* const prior = std::get_if<PriorFace>(&face);
+  const auto* const fitted = std::get_if<PriorThenFit>(&face);
+  return prior != nullptr ? &prior->use : fitted != nullptr ? &fitted->use : nullptr;
 }
+
+inline bool AsksPrior(const FaceSource& face) { return PriorUseOf(face) != nullptr; }
 
 }  // namespace semblance

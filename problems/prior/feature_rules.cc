@@ -32,7 +32,8 @@ struct MouthCorner {
   double sign;  // of the lateral axis
 };
 constexpr MouthCorner kCorners[] = {{"r", 49, -1}, {"l", 55, 1}};
-constexpr int kPronasale = 31;
+constexpr int kPronasale = 31, kSubnasale = 34;
+constexpr double kSubnasaleMm = 13.5;
 
 class RuleBook {
  public:
@@ -47,6 +48,7 @@ class RuleBook {
   void EyeProtrusion(const RuleUse& rule);
   void MouthWidth(const RuleUse& rule);
   void Pronasale(const RuleUse& rule);
+  void Subnasale(const RuleUse& rule);
   RuleMarks Take() { return std::move(result_); }
 
  private:
@@ -143,6 +145,17 @@ void RuleBook::Pronasale(const RuleUse& rule) {
   Add({"pronasale", "prn", "height", source, rule.sd_mm}, std::array{kPronasale}, tip, -down);
 }
 
+void RuleBook::Subnasale(const RuleUse& rule) {
+  if (const Vec3* const ss = Bone("ss")) {
+    Add({.rule = "subnasale",
+         .point = "sn",
+         .coordinate = "front",
+         .source = "T-Table 2023: Hona & Stephan 2024",
+         .sd_mm = rule.sd_mm},
+        std::array{kSubnasale}, *ss + kSubnasaleMm * front_, front_);
+  }
+}
+
 bool HasMultiPie(const FacePrior& prior) { return prior.features.size() == kFeatures; }
 
 }  // namespace
@@ -176,7 +189,8 @@ RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> la
       {&rules.eye_height, &RuleBook::EyeHeight},
       {&rules.eye_protrusion, &RuleBook::EyeProtrusion},
       {&rules.mouth_width, &RuleBook::MouthWidth},
-      {&rules.pronasale, &RuleBook::Pronasale}};
+      {&rules.pronasale, &RuleBook::Pronasale},
+      {&rules.subnasale, &RuleBook::Subnasale}};
   for (const auto& [rule, apply] : all) {
     if (rule->use) {
       (book.*apply)(*rule);

@@ -38,6 +38,7 @@ struct FeatureRules {
   RuleUse eye_protrusion = {.use = false, .sd_mm = 2.9};
   RuleUse mouth_width = {.sd_mm = 3.8};
   RuleUse pronasale = {.use = false, .sd_mm = 3};
+  RuleUse subnasale = {.sd_mm = 3.5};
 };
 template <class Visitor>
 void Fields(Visitor& visit, FeatureRules& o) {
@@ -74,6 +75,10 @@ void Fields(Visitor& visit, FeatureRules& o) {
                        "Mala 2013, who give no deviation in their abstract: 3 mm is a guess). "
                        "Off, for on three heads it was 3 to 6 mm too far in front"},
       o.pronasale);
+  visit(FieldInfo{.name = "subnasale",
+                  .doc = "the base of the nose lies 13.5 mm in front of ss (T-Table 2023, ss-sn', "
+                         "standard deviation of 3.5 mm: Hona & Stephan 2024)"},
+        o.subnasale);
 }
 
 // What rules may be given in `points`.
@@ -85,7 +90,7 @@ std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules);
 // A rule at work. One that predicts two coordinates stands twice.
 struct AppliedRule {
   std::string rule;        // as in FeatureRules
-  std::string point;       // of the face: eye_l, ch_r, prn
+  std::string point;       // of the face: eye_l, ch_r, prn, sn
   std::string coordinate;  // height, front, side
   std::string source;      // author, year, population
   double sd_mm = kNaN;

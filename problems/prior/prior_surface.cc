@@ -111,6 +111,20 @@ HSplineSurface SurfaceOf(const ShapeEstimate& estimate, const FacePrior& prior,
   return SurfaceThrough(shape, on_template.grid, samples);
 }
 
+HSplineSurface MovedAsDrawn(const HSplineSurface& face, const ShapeEstimate& estimate,
+                            std::size_t draw, const FacePrior& prior,
+                            const PriorOnTemplate& on_template) {
+  std::vector<Vec3> moves = estimate.drawn.at(draw), samples;
+  for (std::size_t v = 0; v < moves.size(); ++v) {
+    moves[v] -= estimate.points[v];
+  }
+  for (std::size_t k = 0; k < on_template.under.size(); ++k) {
+    samples.emplace_back(face.Point(on_template.grid.UvAt(k)) +
+                         PositionOf(on_template.under[k], prior.model.mean, moves));
+  }
+  return SurfaceThrough(face.shape(), on_template.grid, samples);
+}
+
 std::vector<double> SigmaAt(std::span<const Vec2> uv, const ShapeEstimate& estimate,
                             const FacePrior& prior, const PriorOnTemplate& on_template) {
   std::vector<double> sigma_mm;

@@ -31,6 +31,12 @@ PriorOnTemplate LayOnTemplate(const FacePrior& prior, const TemplateFace& face,
 HSplineSurface SurfaceOf(const ShapeEstimate& estimate, const FacePrior& prior,
                          const PriorOnTemplate& on_template, const HSplineShape& shape);
 
+// A face that the estimate led to, moved by what the draw (one of estimate.drawn) differs from the
+// most likely face.
+HSplineSurface MovedAsDrawn(const HSplineSurface& face, const ShapeEstimate& estimate,
+                            std::size_t draw, const FacePrior& prior,
+                            const PriorOnTemplate& on_template);
+
 // The estimate's sigma at (u,v), mm.
 std::vector<double> SigmaAt(std::span<const Vec2> uv, const ShapeEstimate& estimate,
                             const FacePrior& prior, const PriorOnTemplate& on_template);

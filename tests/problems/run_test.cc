@@ -94,13 +94,19 @@ TEST(Run, TheThinPlateNearsTheTipsAndThePlacedTemplateStays) {
   EXPECT_FALSE(placed.uncertainty);
 }
 
-TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
+Experiment PhantomWithPrior(const std::vector<std::string>& more) {
   const std::string ict = (kConfigs / "faces/ict/").string();
-  const Experiment experiment = SmallPhantom(
-      {fmt::format("template={{type: file, surface: {0}head.hspline.json, sites: {0}sites.csv, "
-                   "features: {0}features.json}}",
-                   ict),
-       fmt::format("prior={{type: hspline, modes: {}modes.json, count: 20}}", ict), "face=prior"});
+  std::vector<std::string> overrides = {
+      fmt::format("template={{type: file, surface: {0}head.hspline.json, sites: {0}sites.csv, "
+                  "features: {0}features.json}}",
+                  ict),
+      fmt::format("prior={{type: hspline, modes: {}modes.json, count: 20}}", ict), "face=prior"};
+  overrides.insert(overrides.end(), more.begin(), more.end());
+  return SmallPhantom(overrides);
+}
+
+TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
+  const Experiment experiment = PhantomWithPrior({});
   const RunResult result = semblance::Run(experiment, {});
   ASSERT_TRUE(result.prior && result.uncertainty);
   EXPECT_TRUE(result.usable());
@@ -110,6 +116,18 @@ TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
     EXPECT_LT(std::abs(off), 6);
   }
   EXPECT_THAT(ResultJson(experiment, result).dump(), HasSubstr("coefficients_rms"));
+}
+
+TEST(Run, ASampleIsTheFaceOfTheDrawOfItsNumber) {
+  StageCache cache(8);
+  const RunResult likely = semblance::Run(
+      PhantomWithPrior({"uncertainty.samples=2", "uncertainty.random_seed=3"}), {}, &cache);
+  const RunResult drawn = semblance::Run(PhantomWithPrior({"face.draw=4"}), {}, &cache);
+  ASSERT_EQ(likely.uncertainty->samples.size(), 2u);
+  EXPECT_EQ(likely.uncertainty->samples[1].Offsets(), drawn.fit.surface.Offsets());
+  EXPECT_NE(likely.fit.surface.Offsets(), drawn.fit.surface.Offsets());
+  EXPECT_EQ(likely.uncertainty->sigma_mm, drawn.uncertainty->sigma_mm);
+  EXPECT_THAT(drawn.subject.notes, ::testing::Contains(HasSubstr("number 4 of those drawn")));
 }
 
 TEST(Run, AFaceOfAPriorNeedsOne) {

@@ -294,13 +294,20 @@ struct SeenDome {
                       .whitening = WhiteningOf(spread),
                       .loss_width = 3});
     }
+    return SigmaOf(seen, population_sd, 20);
+  }
+
+  // All points, upwards.
+  std::vector<double> SigmaOf(const std::vector<ShapeObservation>& seen, double population_sd,
+                              double smooth_length_mm) const {
     std::vector<ShapeRow> rows;
     for (int v = 0; v < kSide * kSide; ++v) {
       rows.push_back(RowOfVertex(model, field, v));
     }
     const std::vector<Vec3> up(rows.size(), Vec3::UnitZ());
-    return DeviationsAlong(frame, parameters, PosteriorOf(frame, parameters, seen, {}),
-                           {.population_sd = population_sd}, rows, up, 1);
+    const ShapePosterior posterior =
+        PosteriorOf(frame, parameters, seen, {.population_sd = population_sd}, smooth_length_mm);
+    return DeviationsAlong(frame, parameters, posterior, rows, up, 1);
   }
 };
 
@@ -369,6 +376,78 @@ TEST(ShapePosterior, ASharedErrorCountsAsTheEstimateFollowsIt) {
     const double way = (after.points[v] - before.points[v]).dot(normals[v]);
     EXPECT_NEAR(std::sqrt(std::max(added, 0.0)), std::abs(way), 0.04) << v;
   }
+}
+
+// Of errors that resemble each other over any distance there is one, which all share; of those that
+// do so over none each is its own.
+TEST(ShapePosterior, SmoothErrorsLieBetweenOneForEachAndOneForAll) {
+  const SeenDome dome;
+  const auto sigma = [&](double smooth_length_mm, const std::vector<int>& sharing) {
+    std::vector<ShapeObservation> seen;
+    for (const int v : {12, 22, 40, 41, 66}) {
+      seen.push_back({.row = RowOfVertex(dome.model, dome.field, v),
+                      .position = dome.model.mean.points[v],
+                      .whitening = Vec3::UnitZ().transpose() / 2,
+                      .loss_width = 3,
+                      .weight = 0.3,
+                      .smooth_sd_mm = 2.5});
+      if (std::ranges::find(sharing, v) != sharing.end()) {
+        seen.back().shared_mm = 2.5 * Vec3::UnitZ();
+      }
+    }
+    return dome.SigmaOf(seen, 1, smooth_length_mm);
+  };
+  const double none_mm = 1e-3, any_mm = 1e6;
+  const std::vector<double> own = sigma(none_mm, {}), one = sigma(any_mm, {}),
+                            all = sigma(none_mm, {12, 22, 40, 41, 66}), between = sigma(20, {});
+  std::vector<double> expected;
+  for (std::size_t v = 0; v < own.size(); ++v) {
+    expected.push_back(all[v] * all[v]);
+  }
+  for (const int v : {12, 22, 40, 41, 66}) {  // the same error once as its own, once as shared
+    const std::vector<double> shares = sigma(none_mm, {v});
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      expected[k] -= shares[k] * shares[k] - own[k] * own[k];
+    }
+  }
+  for (std::size_t v = 0; v < own.size(); ++v) {
+    EXPECT_NEAR(one[v] * one[v], expected[v], 1e-6 * expected[v]) << v;
+  }
+  EXPECT_GT(between[40], own[40]);
+  EXPECT_LT(between[40], one[40]);
+}
+
+// What is drawn lies about the most likely shape as sigma says.
+TEST(ShapePosterior, DrawsSpreadAsSigmaSays) {
+  constexpr int kDraws = 600;
+  const ShapeModel model = Dome();
+  const TriMesh surface{model.mean.points, model.mean.triangles};
+  ShapeTarget target;
+  target.surface = &surface;
+  for (int t = 0; t < std::ssize(model.mean.triangles); t += 9) {
+    target.tips.push_back(TipAt(model, t, model.mean.points));
+    target.tips.back().direction = Vec3::UnitZ();
+    target.tips.back().shared_sd_mm = 1;
+  }
+  for (int k = 1; k <= kDraws; ++k) {
+    target.draws.push_back(k);
+  }
+  ShapeFitOptions options;
+  options.discrepancy_mm = options.unseen_rate = 0;
+  options.field.centres = 20;
+  options.population_sd = 1.5;
+  const ShapeEstimate estimate = EstimateShape(model, target, options, {});
+  ASSERT_EQ(estimate.drawn.size(), kDraws);
+  const std::vector<Vec3> normals = VertexNormals(TriMesh{estimate.points, model.mean.triangles});
+  for (const std::size_t v : {20u, 40u, 44u, 58u}) {  // none at the open border
+    double squares = 0;
+    for (const std::vector<Vec3>& drawn : estimate.drawn) {
+      squares += std::pow((drawn[v] - estimate.points[v]).dot(normals[v]), 2);
+    }
+    EXPECT_NEAR(std::sqrt(squares / kDraws) / estimate.sigma_mm[v], 1, 0.12) << v;
+  }
+  target.draws = {7};
+  EXPECT_EQ(EstimateShape(model, target, options, {}).drawn.front(), estimate.drawn[6]);
 }
 
 // What the modes do not tell grows with the distance from the nearest tip, and moves no point.

@@ -150,6 +150,17 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
     const Vec3 expected = estimate.subject_from_model * Vec3(p + Vec3(3 * s, 0, 2 * s));
     EXPECT_LT((surface.Point(uv) - expected).norm(), 0.3);
   }
+  // A draw that lies beside the most likely shape moves every face by that, also one fitted since.
+  estimate.drawn = {estimate.points, estimate.points};
+  for (Vec3& p : estimate.drawn[1]) {
+    p += Vec3(1, 2, 3);
+  }
+  const HSplineSurface stays = MovedAsDrawn(Face().surface, estimate, 0, prior, on_template),
+                       moves = MovedAsDrawn(Face().surface, estimate, 1, prior, on_template);
+  for (const Vec2& uv : {Vec2(0.3, 0.4), Vec2(0.5, 0.5), Vec2(0.62, 0.7)}) {
+    EXPECT_LT((stays.Point(uv) - Face().surface.Point(uv)).norm(), 0.05);
+    EXPECT_LT((moves.Point(uv) - stays.Point(uv) - Vec3(1, 2, 3)).norm(), 0.05);
+  }
   const std::vector<Vec2> middle = {Vec2(0.5, 0.5)};
   EXPECT_NEAR(SigmaAt(middle, estimate, prior, on_template)[0], 1.5, 1e-12);
   // What a fit is held to, and what of the implicit face it does not follow.

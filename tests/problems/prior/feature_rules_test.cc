@@ -49,13 +49,15 @@ std::vector<std::string> Names(const RuleMarks& marks) {
 TEST(FeatureRules, ARuleIsOnWhenItsPointsAreThere) {
   EXPECT_THAT(Names(MarksOfRules({}, AverageLandmarks(), {}, Ict())),
               ::testing::ElementsAre("eye_height eye_r height", "eye_height eye_l height"));
-  EXPECT_THAT(Names(MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict())),
-              ::testing::ElementsAre("eye_height eye_r height", "eye_height eye_l height",
-                                     "eye_protrusion eye_r front", "eye_protrusion eye_l front",
-                                     "mouth_width ch_r side", "mouth_width ch_l side",
-                                     "pronasale prn front", "pronasale prn height"));
+  EXPECT_THAT(
+      Names(MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict())),
+      ::testing::ElementsAre("eye_height eye_r height", "eye_height eye_l height",
+                             "eye_protrusion eye_r front", "eye_protrusion eye_l front",
+                             "mouth_width ch_r side", "mouth_width ch_l side",
+                             "pronasale prn front", "pronasale prn height", "subnasale sn front"));
   FeatureRules off = AllRules();
   off.eye_height.use = off.eye_protrusion.use = off.mouth_width.use = off.pronasale.use = false;
+  off.subnasale.use = false;
   EXPECT_TRUE(MarksOfRules(off, AverageLandmarks(), {}, Ict()).marks.empty());
 }
 
@@ -75,6 +77,7 @@ TEST(FeatureRules, ForeseeWhatTheirFormulasSay) {
   EXPECT_NEAR(tip.dot(down), vertical, 1e-9);
   EXPECT_NEAR(std::abs(tip.dot(front)), anterior, 1e-9);
   EXPECT_LT(tip.y(), 0);
+  EXPECT_NEAR(mark(8).y(), 2 - 13.5, 1e-9);
 }
 
 // The marks are of the landmarks that they are called after: the mean's own eyes, corners and tip.
@@ -89,6 +92,9 @@ TEST(FeatureRules, MarksLieOnTheirLandmarks) {
   EXPECT_NEAR(at(5).x(), 25, 2);  // ch_l
   const double tip_y = std::ranges::min(mean.points, {}, [](const Vec3& p) { return p.y(); }).y();
   EXPECT_NEAR(at(6).y(), tip_y, 1.5);
+  EXPECT_GT(at(8).y(), tip_y + 8);  // the nose's base, behind and under its tip
+  EXPECT_LT(at(8).z(), at(6).z() - 5);
+  EXPECT_NEAR(at(8).x(), 0, 1);
 }
 
 TEST(FeatureRules, AnEstimateFollowsAMark) {
