@@ -32,7 +32,7 @@ std::map<std::string, Vec3> AverageLandmarks() {
 
 FeatureRules AllRules() {
   FeatureRules rules;
-  rules.pronasale.use = rules.eye_protrusion.use = true;
+  rules.pronasale.use = rules.subnasale.use = rules.eye_protrusion.use = true;
   rules.points = {{"dlom_l", {47, 22, -8}}, {"dlom_r", {-47, 22, -8}}, {"uc_l", {19, 8, -72}},
                   {"uc_r", {-19, 8, -72}},  {"ans", {0, -2, -50}},     {"ss", {0, 2, -58}}};
   return rules;
