@@ -57,7 +57,7 @@ const std::map<std::string, Layers> kRooms = {
     {"problems",
      {{"config", "ct", "output", "thinning"},
       {"edits", "page", "pictures", "search", "subject", "view"},
-      {"landmark_files", "preparation"},
+      {"conditional", "landmark_files", "phantom", "preparation"},
       {"face_template"},
       {"bust", "metrics", "prior"},
       {"pipeline", "plots", "propose"},

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "problems/bust/bust_model.h"
+#include "problems/conditional/condition_depths.h"
 #include "problems/edits/edit_script.h"
 #include "problems/inputs/input_files.h"
 #include "problems/landmark_files/read_landmarks.h"
@@ -80,7 +81,9 @@ LandmarkFile LandmarksOf(const Subject& subject) {
   }
   LandmarkFile all;
   for (const std::string& site : StandardSiteCodes()) {
-    all.landmarks.emplace_back().site = site;
+    Landmark& landmark = all.landmarks.emplace_back();
+    landmark.site = site;
+    landmark.depth_along_normal_mm = 10;  // there is one; which is not asked
   }
   return all;
 }
@@ -94,7 +97,9 @@ void LookAtCover(const Experiment& experiment, const LandmarkFile& landmarks,
   }
   Lines lost;
   const std::vector<Dowel> all = dowels;
-  FillDepths(WithSiteDepths(experiment, landmarks), landmarks, dowels);
+  const TissueOptions tissue = WithSiteDepths(experiment, landmarks);
+  FillDepths(tissue, landmarks, dowels);
+  ConditionDepths(tissue, landmarks, dowels);
   for (const Dowel& dowel : all) {
     if (std::ranges::find(dowels, dowel.site, &Dowel::site) == dowels.end()) {
       lost.push_back(dowel.site);

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <set>
 
+#include "problems/conditional/condition_depths.h"
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/phantom/phantom_landmarks.h"
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_file.h"
-#include "problems/subject/phantom_landmarks.h"
 #include "problems/thinning/thinned_network.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -38,7 +39,11 @@ TriMesh ReadHeadMesh(const FileSubject& options, const std::filesystem::path& pa
   return mesh;
 }
 
-LandmarkFile LandmarksOf(const std::filesystem::path& path, SubjectData& subject) {
+LandmarkFile LandmarksOf(const std::filesystem::path& path, Landmarking landmarking,
+                         SubjectData& subject) {
+  if (path.empty() && landmarking == Landmarking::kOpen) {
+    return {};
+  }
   if (path.empty()) {
     throw InputError(
         "subject.landmarks: no file is named; a skull needs landmarks (configs/landmarks/ shows "
@@ -51,7 +56,8 @@ LandmarkFile LandmarksOf(const std::filesystem::path& path, SubjectData& subject
 }
 
 // Each Load fills subject.skull, skin, inputs and notes, and returns the landmarks.
-LandmarkFile Load(const PhantomOptions& options, SubjectData& subject, const RunContext&) {
+LandmarkFile Load(const PhantomOptions& options, Landmarking, SubjectData& subject,
+                  const RunContext&) {
   Phantom phantom = MakePhantom(options);
   subject.skull = std::move(phantom.skull);
   subject.skin = std::move(phantom.face);
@@ -64,8 +70,9 @@ void Mirror(const MirrorOptions& options, LandmarkFile& landmarks, SubjectData& 
          PrepareMirrored(options, subject.skull, subject.origin, landmarks, context.threads));
 }
 
-LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunContext& context) {
-  LandmarkFile landmarks = LandmarksOf(options.landmarks, subject);
+LandmarkFile Load(const FileSubject& options, Landmarking landmarking, SubjectData& subject,
+                  const RunContext& context) {
+  LandmarkFile landmarks = LandmarksOf(options.landmarks, landmarking, subject);
   subject.skull = ReadHeadMesh(options, options.skull, "skull", subject);
   if (!options.skin.empty()) {
     subject.skin = ReadHeadMesh(options, options.skin, "skin", subject);
@@ -79,13 +86,14 @@ LandmarkFile Load(const FileSubject& options, SubjectData& subject, const RunCon
   return landmarks;
 }
 
-LandmarkFile Load(const CtSubject& options, SubjectData& subject, const RunContext& context) {
+LandmarkFile Load(const CtSubject& options, Landmarking landmarking, SubjectData& subject,
+                  const RunContext& context) {
   if (options.volume.empty()) {
     throw InputError(
         "subject.volume: no file is named; give a folder of DICOM files, or a volume as .nii, "
         ".nrrd, .mha or .inv3");
   }
-  LandmarkFile landmarks = LandmarksOf(options.landmarks, subject);
+  LandmarkFile landmarks = LandmarksOf(options.landmarks, landmarking, subject);
   const VolumeReading reading = ReadVolume(options.volume, options.read, context);
   if (reading.modality == Modality::kMr) {
     throw InputError(fmt::format(
@@ -141,6 +149,7 @@ std::optional<TissueOptions> ExpectedTissue(const Experiment& experiment) {
   TissueOptions table = experiment.tissue;
   table.depths = DepthSource::kTable;
   table.set_mm.clear();
+  table.given = {};
   return table;
 }
 
@@ -236,6 +245,7 @@ void GiveDepths(const SubjectData& data, const Experiment& experiment, const Mes
   Append(subject.notes, UsesAllAsGiven(experiment.landmarks)
                             ? on_depths
                             : UseSome(data, experiment.landmarks, tissue, query, subject));
+  Append(subject.notes, ConditionDepths(tissue, data.landmarks, subject.dowels_on_bone));
 }
 
 void LayNetwork(const NetworkPlan& plan, Case& subject) {
@@ -252,6 +262,9 @@ void LayNetwork(const NetworkPlan& plan, Case& subject) {
 void AppendInputs(const Experiment& experiment, Case& subject) {
   subject.inputs.push_back(experiment.network);
   Append(subject.inputs, TablesOf(ExpectedTissue(experiment).value_or(experiment.tissue)));
+  if (IsConditioned(experiment.tissue) && !experiment.tissue.given.spread.empty()) {
+    subject.inputs.push_back(experiment.tissue.given.spread);
+  }
   if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {
     subject.inputs.push_back(map->file);
     subject.inputs.push_back(map->mesh);
@@ -261,10 +274,11 @@ void AppendInputs(const Experiment& experiment, Case& subject) {
 
 }  // namespace
 
-SubjectData LoadSubject(const Subject& subject, const RunContext& context) {
+SubjectData LoadSubject(const Subject& subject, const RunContext& context,
+                        Landmarking landmarking) {
   SubjectData data;
-  data.landmarks =
-      std::visit([&](const auto& options) { return Load(options, data, context); }, subject);
+  data.landmarks = std::visit(
+      [&](const auto& options) { return Load(options, landmarking, data, context); }, subject);
   return data;
 }
 

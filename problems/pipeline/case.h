@@ -40,9 +40,13 @@ struct Case {
   std::vector<std::filesystem::path> inputs;  // for the manifest
 };
 
+// Whether a subject of files may come without landmarks, which are then none.
+enum class Landmarking { kNeeded, kOpen };
+
 // Reads or makes the subject and checks its meshes. Throws InputError, IoError or ConfigError with
 // one clear line for what cannot be used.
-SubjectData LoadSubject(const Subject& subject, const RunContext& context);
+SubjectData LoadSubject(const Subject& subject, const RunContext& context,
+                        Landmarking landmarking = Landmarking::kNeeded);
 
 // Whether skull and landmarks belong together and are a head's (landmark_mistakes.h). Returns what
 // may be meant so, a line each; throws InputError, a line for each mistake.

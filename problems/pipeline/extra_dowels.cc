@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "interp/dowels/network_insertion.h"
+#include "problems/conditional/condition_depths.h"
 #include "problems/config/spelling_suggestion.h"
 #include "problems/face_template/template_source.h"
 #include "problems/pipeline/dowel_target.h"
@@ -120,7 +121,8 @@ std::optional<std::pair<TissueDepth, std::string>> DepthInTables(const TissueOpt
 }
 
 // Sets the depth where it is known, and tells where it comes from.
-std::string GiveDepth(const ExtraSite& site, const TissueOptions& tissue, Dowel& dowel) {
+std::string GiveDepth(const ExtraSite& site, const TissueOptions& tissue,
+                      const LandmarkFile& landmarks, Dowel& dowel) {
   if (site.depth) {
     dowel.depth_mm = site.depth->automatic ? kNaN : site.depth->value;
     return site.depth->automatic ? "as deep as interpolated there; it changes no other depth"
@@ -132,7 +134,8 @@ std::string GiveDepth(const ExtraSite& site, const TissueOptions& tissue, Dowel&
   }
   dowel.depth_mm = depth->first.mean_mm;
   dowel.sd_mm = depth->first.sd_mm.value_or(kNaN);
-  return fmt::format("{} mm, from table '{}'", dowel.depth_mm, depth->second);
+  ConditionDepths(tissue, landmarks, std::span(&dowel, 1));  // its notes are the landmarks' own
+  return fmt::format("{:.4g} mm, from table '{}'", dowel.depth_mm, depth->second);
 }
 
 // Whether a site of the landmarks is only given a (u,v) or a depth. Throws if it is placed anew.
@@ -206,7 +209,7 @@ void InsertDowels(const Experiment& experiment, const SubjectData& data, const M
     CheckApart(dowel, subject.dowels_on_bone);
     CheckApart(dowel, inserted);
     subject.notes.push_back(fmt::format("site {}: dowel inserted, {}", SiteInWords(name),
-                                        GiveDepth(site, experiment.tissue, dowel)));
+                                        GiveDepth(site, experiment.tissue, data.landmarks, dowel)));
     inserted.push_back(std::move(dowel));
   }
   for (Dowel& dowel : inserted) {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "problems/conditional/condition_depths.h"
 #include "problems/metrics/quantile.h"
 #include "problems/pipeline/dowel_target.h"
 #include "problems/pipeline/stage_key.h"
@@ -261,13 +262,20 @@ void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made) {
   }
 }
 
+// A table's deviations are of people at large, which its options split into what a person's depths
+// have in common and what they have not; those given something of this person are its own.
+TableDepthOptions PartsOf(const TableDepthOptions& table, const Experiment& experiment) {
+  return IsConditioned(experiment.tissue) ? TableDepthOptions{.own = 1, .shared = 0} : table;
+}
+
 // The prior's most likely face as a placed template.
 MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceInput& in,
                         const RunContext& context) {
   const LoadedPrior& prior = *in.prior;
   const std::vector<Dowel>& dowels = in.subject.dowels_on_bone;
+  const TableDepthOptions parts = PartsOf(use.table_depths, in.experiment);
   const TableDepthOptions* const table =
-      in.experiment.tissue.depths == DepthSource::kTable ? &use.table_depths : nullptr;
+      in.experiment.tissue.depths == DepthSource::kTable ? &parts : nullptr;
   const TriMesh* const implicit = in.implicit.triangles.empty() ? nullptr : &in.implicit;
   ShapeTarget target =
       PriorTarget(prior.face, dowels, table, implicit, OtherSites(placed.dowels, prior));
@@ -334,10 +342,11 @@ double TipVarianceRatio(const PriorThenFit& o, const FaceInput& in) {
   if (in.experiment.tissue.depths != DepthSource::kTable) {
     return 1;
   }
+  const TableDepthOptions parts = PartsOf(o.use.table_depths, in.experiment);
   const double measured = std::pow(o.use.estimate.tip_normal_sd_mm, 2);
   double sum = 0;
   for (const Dowel& dowel : in.subject.dowels_on_bone) {
-    sum += measured / (measured + std::pow(DepthSd_mm(o.use.table_depths, dowel), 2));
+    sum += measured / (measured + std::pow(DepthSd_mm(parts, dowel), 2));
   }
   return static_cast<double>(in.subject.dowels_on_bone.size()) / sum;
 }

@@ -9,6 +9,7 @@
 #include "fitting/uncertainty/pivoted_root.h"
 #include "interp/evaluation/calibration.h"
 #include "interp/kriging/kriging_process.h"
+#include "problems/conditional/condition_depths.h"
 #include "problems/metrics/quantile.h"
 #include "problems/prior/depth_spread.h"
 #include "surfaces/base/parallel.h"
@@ -119,8 +120,9 @@ struct SplitDeviations {
 };
 
 SplitDeviations Split(const Experiment& experiment, std::span<const DepthBehind> depths) {
-  const double shared = FromTable(experiment) ? experiment.uncertainty.shared : 0,
-               own = FromTable(experiment) ? experiment.uncertainty.own : 1;
+  const bool at_large = FromTable(experiment) && !IsConditioned(experiment.tissue);
+  const double shared = at_large ? experiment.uncertainty.shared : 0,
+               own = at_large ? experiment.uncertainty.own : 1;
   SplitDeviations split{Eigen::VectorXd::Zero(std::ssize(depths)), {}};
   for (std::size_t k = 0; k < depths.size(); ++k) {
     const double sd_mm = depths[k].dowels_sd_mm;

@@ -16,9 +16,9 @@
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/output/files.h"
 #include "problems/output/staged_folder.h"
+#include "problems/phantom/phantom_ct.h"
+#include "problems/phantom/phantom_landmarks.h"
 #include "problems/program/exit_code.h"
-#include "problems/program/phantom_ct.h"
-#include "problems/subject/phantom_landmarks.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

@@ -5,14 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "problems/command_line/shard.h"
 #include "problems/compare/comparison_files.h"
 #include "problems/config/terminal_text.h"
 #include "problems/output/staged_folder.h"
@@ -39,29 +38,6 @@ struct StudyArguments {
   SubmitOptions submit;
   std::stop_token stop;
 };
-
-// Whether all of `text` is "I/N".
-bool ReadShard(const std::string& text, StudyRunOptions& options) {
-  const char* const end = text.data() + text.size();
-  const auto [slash, fault] = std::from_chars(text.data(), end, options.shard);
-  if (fault != std::errc() || slash == end || *slash != '/') {
-    return false;
-  }
-  const auto [rest, other_fault] = std::from_chars(slash + 1, end, options.shards);
-  return other_fault == std::errc() && rest == end;
-}
-
-// "I/N", or what Slurm says of an array of jobs.
-void SetShard(const std::string& text, StudyRunOptions& options) {
-  const char *index = std::getenv("SLURM_ARRAY_TASK_ID"),
-             *count = std::getenv("SLURM_ARRAY_TASK_COUNT");
-  const std::string given =
-      text.empty() && index && count ? fmt::format("{}/{}", index, count) : text;
-  if (!(given.empty() || ReadShard(given, options)) || options.shards < 1 || options.shard < 0 ||
-      options.shard >= options.shards) {
-    throw InputError(fmt::format("--shard {}: write I/N with 0 <= I < N, e.g. 0/4", given));
-  }
-}
 
 // Names of subjects, axes and studies come from files.
 template <class... Values>
@@ -165,7 +141,9 @@ int StudyCommand(const StudyArguments& a) {
   }
   const fs::path file = a.files.back();
   StudyRunOptions options = a.run;
-  SetShard(a.shard, options);
+  const Shard shard = ShardOf(a.shard);
+  options.shard = shard.index;
+  options.shards = shard.count;
   options.rerun = a.rerun == "failed"     ? Rerun::kFailed
                   : a.rerun == "unusable" ? Rerun::kUnusable
                   : a.rerun == "all"      ? Rerun::kAll

@@ -46,6 +46,7 @@ class DepthFormula {
  public:
   explicit DepthFormula(Random& random);
   double At(const Vec3& direction) const;  // mm, > 0
+  double Thickness() const { return subject_; }
 
  private:
   std::vector<DirectionAnchor> anchors_;
@@ -175,6 +176,7 @@ class Head {
             shape_.Normal(direction), depth_.At(direction)};
   }
   const Vec3& Centre() const { return centre_; }
+  double Thickness() const { return depth_.Thickness(); }
 
  private:
   Random random_;
@@ -202,6 +204,7 @@ Phantom MakePhantom(const PhantomOptions& options) {
   const Head head(options.random_seed);
   Phantom phantom;
   phantom.centre = head.Centre();
+  phantom.thickness = head.Thickness();
   phantom.skull.triangles = RingTriangles(options.rings);
   phantom.face.triangles = phantom.skull.triangles;
   for (const Vec3& direction : RingDirections(options.rings)) {

@@ -45,6 +45,7 @@ struct Phantom {
   TriMesh face;                        // skull vertex + depth * exact normal; the skull's triangles
   std::vector<PhantomSite> sites;      // all 32: midline from the forehead down, then pairs
   Vec3 centre = Vec3::Constant(kNaN);  // every ray from here meets the skull once
+  double thickness = kNaN;             // by which all its depths exceed those of an average adult
 };
 
 // The same options give the same bytes. Throws InputError for rings out of range.

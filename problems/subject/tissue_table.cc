@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <set>
 
@@ -92,7 +95,80 @@ std::string BrokenOrder(const TissueRow& row) {
   return broken;
 }
 
+bool IsCovariateOf(const TissueCorrelations& o, const std::string& name) {
+  return std::ranges::find(o.covariates, name, &TissueCovariate::name) != o.covariates.end();
+}
+
+// "" if the rows are a lower triangle of numbers within -1 .. 1.
+std::string ComplaintAboutRows(const TissueCorrelations& o) {
+  if (o.rows.size() != o.names.size()) {
+    return fmt::format("{} rows for {} names; write one per name", o.rows.size(), o.names.size());
+  }
+  for (std::size_t k = 0; k < o.rows.size(); ++k) {
+    if (o.rows[k].size() != k) {
+      return fmt::format("the row of '{}' has {} numbers; it needs {}, one for each name before it",
+                         o.names[k], o.rows[k].size(), k);
+    }
+    if (!std::ranges::all_of(o.rows[k], [](double r) { return std::abs(r) < 1; })) {
+      return fmt::format("the row of '{}' has a number that is not between -1 and 1", o.names[k]);
+    }
+  }
+  return "";
+}
+
+bool IsPositiveDefinite(const TissueCorrelations& o) {
+  const auto size = static_cast<Eigen::Index>(o.names.size());
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      matrix(i, j) = matrix(j, i) = o.rows[i][j];
+    }
+  }
+  return matrix.llt().info() == Eigen::Success;
+}
+
+// "" if every stratum of the site's row has an sd.
+std::string ComplaintAboutSpread(const TissueTable& table, const std::string& site) {
+  const auto row = std::ranges::find(table.rows, WithoutSide(site), &TissueRow::site);
+  if (row == table.rows.end()) {
+    return fmt::format("'{}' is not in the table", site);
+  }
+  for (const auto& [stratum, cell] : row->values) {
+    if (!cell.sd || *cell.sd <= 0) {
+      return fmt::format("'{}' has no sd above 0 for {}; a correlation needs one", site, stratum);
+    }
+  }
+  return "";
+}
+
 }  // namespace
+
+template <class Report>
+void CheckValue(Report& report, const TissueCorrelations& o) {
+  std::set<std::string> seen;
+  for (const std::string& name : o.names) {
+    if (!seen.insert(name).second) {
+      report("names", fmt::format("'{}' stands twice; keep one", name));
+    }
+    if (!IsCovariateOf(o, name) && !ComplaintAboutLandmark(name).empty()) {
+      report("names", fmt::format("{}; or is it a covariate that `covariates` lacks?",
+                                  ComplaintAboutLandmark(name)));
+    }
+  }
+  for (const TissueCovariate& covariate : o.covariates) {
+    const std::vector<std::string> known = CovariateNames();
+    if (std::ranges::find(known, covariate.name) == known.end() || !std::isfinite(covariate.mean) ||
+        !std::isfinite(covariate.sd)) {
+      report("covariates", fmt::format("'{}': must be one of {}, with mean and sd", covariate.name,
+                                       fmt::join(known, ", ")));
+    }
+  }
+  if (const std::string complaint = ComplaintAboutRows(o); !complaint.empty()) {
+    report("rows", complaint);
+  } else if (!IsPositiveDefinite(o)) {
+    report("rows", "no depths can correlate so: the matrix is not positive definite");
+  }
+}
 
 template <class Report>
 void CheckValue(Report& report, const TissueCell& cell) {
@@ -142,7 +218,21 @@ void CheckValue(Report& report, const TissueTable& table) {
                                  row.site));
     }
   }
+  for (const std::string& name :
+       table.correlations ? table.correlations->names : std::vector<std::string>()) {
+    const std::string complaint = IsCovariateOf(*table.correlations, name)
+                                      ? std::string()
+                                      : ComplaintAboutSpread(table, name);
+    if (!complaint.empty()) {
+      report("correlations", complaint);
+    }
+  }
 }
+
+std::vector<std::string> CovariateNames() { return {"sex", "build", "age_years", "bmi"}; }
+
+double CovariateOf(Sex sex) { return sex == Sex::kMale ? 1 : 0; }
+double CovariateOf(Build build) { return static_cast<int>(build) - 1; }
 
 std::string StratumName(Sex sex, Build build) {
   return fmt::format("{}_{}", EnumNames(build)[static_cast<std::size_t>(build)],
@@ -159,7 +249,7 @@ std::optional<TissueDepth> FindDepth(const TissueTable& table, Sex sex, Build bu
   if (!HasDepth(cell)) {
     return std::nullopt;
   }
-  return TissueDepth{*cell->mean, cell->sd, cell->flag, cell->note};
+  return TissueDepth{*cell->mean, cell->sd, cell->flag, cell->note, cell->n};
 }
 
 std::string WhyNoDepth(const TissueTable& table, Sex sex, Build build, const std::string& site) {

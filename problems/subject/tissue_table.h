@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "surfaces/base/fields.h"
+#include "surfaces/base/geometry.h"
 
 namespace semblance {
 
@@ -47,6 +48,7 @@ constexpr auto EnumNames(DepthPosture) {
 struct TissueCell {
   std::optional<double> mean;  // mm; none if and only if missing
   std::optional<double> sd;    // mm
+  std::optional<int> n;        // subjects behind them
   CellFlag flag = CellFlag::kOk;
   std::string note;
 };
@@ -64,6 +66,21 @@ struct TissueMeasurement {
   DepthPosture posture = DepthPosture::kUnspecified;
 };
 
+// What is known of a person beside depths, as a number.
+struct TissueCovariate {
+  std::string name;  // one of CovariateNames()
+  double mean = kNaN, sd = kNaN;
+};
+
+// How depths go together over people: what one of them tells of the others.
+struct TissueCorrelations {
+  int subjects = 0;      // they were found on
+  double shrinkage = 0;  // part that is not theirs but a model's
+  std::vector<TissueCovariate> covariates;
+  std::vector<std::string> names;         // sites with their side, and covariates
+  std::vector<std::vector<double>> rows;  // row k: with the names 0 .. k-1
+};
+
 struct TissueTable {
   std::string id;
   std::string title;
@@ -72,6 +89,7 @@ struct TissueTable {
   std::string units = "mm";
   TissueMeasurement measurement;
   std::vector<TissueRow> rows;
+  std::optional<TissueCorrelations> correlations;
 };
 
 struct TissueDepth {
@@ -79,6 +97,7 @@ struct TissueDepth {
   std::optional<double> sd_mm;
   CellFlag flag = CellFlag::kOk;  // never kMissing
   std::string note;
+  std::optional<int> n;  // subjects
 };
 
 template <class Visitor>
@@ -87,6 +106,7 @@ void Fields(Visitor& visit, TissueCell& o) {
         o.mean);
   visit(FieldInfo{.name = "sd", .unit = "mm", .min = 0, .max = 100, .doc = "standard deviation"},
         o.sd);
+  visit(FieldInfo{.name = "n", .min = 1, .max = 1e7, .doc = "subjects behind them"}, o.n);
   visit(FieldInfo{.name = "flag", .doc = "suspect: used, but reported; missing: no mean"}, o.flag);
   visit(FieldInfo{.name = "note", .doc = "why the cell is flagged"}, o.note);
 }
@@ -107,6 +127,38 @@ void Fields(Visitor& visit, TissueMeasurement& o) {
 }
 
 template <class Visitor>
+void Fields(Visitor& visit, TissueCovariate& o) {
+  visit(FieldInfo{.name = "name",
+                  .doc = "sex (0 female, 1 male), build (-1 emaciated, 0 normal, 1 "
+                         "obese), age_years or bmi"},
+        o.name);
+  visit(FieldInfo{.name = "mean", .doc = "over the subjects"}, o.mean);
+  visit(FieldInfo{.name = "sd", .min = 1e-9, .doc = "over the subjects"}, o.sd);
+}
+
+template <class Visitor>
+void Fields(Visitor& visit, TissueCorrelations& o) {
+  visit(FieldInfo{.name = "subjects",
+                  .min = 0,
+                  .max = 1e7,
+                  .doc = "that they were found on; 0: taken as exact"},
+        o.subjects);
+  visit(FieldInfo{.name = "shrinkage",
+                  .min = 0,
+                  .max = 1,
+                  .doc = "part of each correlation that is a model's and not the subjects'"},
+        o.shrinkage);
+  visit(FieldInfo{.name = "covariates", .doc = "what the names beside sites are"}, o.covariates);
+  visit(FieldInfo{.name = "names", .min = 1, .doc = "sites with their side, and covariates"},
+        o.names);
+  visit(FieldInfo{.name = "rows",
+                  .min = 1,
+                  .doc = "one per name: its correlations with the names before it, so the first "
+                         "row is empty"},
+        o.rows);
+}
+
+template <class Visitor>
 void Fields(Visitor& visit, TissueTable& o) {
   visit(FieldInfo{.name = "id", .doc = "short name for messages"}, o.id);
   visit(FieldInfo{.name = "title", .doc = "for people"}, o.title);
@@ -116,7 +168,18 @@ void Fields(Visitor& visit, TissueTable& o) {
   visit(FieldInfo{.name = "units", .doc = "mm"}, o.units);
   visit(FieldInfo{.name = "measurement", .doc = "method, convention and posture"}, o.measurement);
   visit(FieldInfo{.name = "rows", .min = 1, .doc = "one per site"}, o.rows);
+  visit(FieldInfo{.name = "correlations",
+                  .doc = "of depths with each other, with build, sex and age, over people; null: "
+                         "not known"},
+        o.correlations);
 }
+
+// sex, build, age_years, bmi: what depths may be conditioned on beside depths.
+std::vector<std::string> CovariateNames();
+
+// As the table counts them: male 1, female 0; emaciated -1, normal 0, obese 1.
+double CovariateOf(Sex sex);
+double CovariateOf(Build build);
 
 // "emaciated_male" ... "obese_female".
 std::string StratumName(Sex sex, Build build);
@@ -124,7 +187,7 @@ std::string StratumName(Sex sex, Build build);
 // The one way to read a table, as the checks are made here. Throws IoError if the file cannot be
 // read; ConfigError if it is not such a table: units other than mm, strata that are neither the six
 // nor "adult", a site that stands twice or with a side, a mean in a missing cell or none in
-// another.
+// another, correlations that no depths can have (not positive definite) or of a site without sd.
 TissueTable ReadTissueTable(const std::filesystem::path& path);
 
 // The depth at a site, with or without _l / _r; a pooled table ignores `sex` and `build`. None if

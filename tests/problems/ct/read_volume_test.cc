@@ -20,7 +20,7 @@
 #include "problems/ct/import_ct.h"
 #include "problems/ct/itk_files.h"
 #include "problems/ct/mr_skin.h"
-#include "problems/program/phantom_ct.h"
+#include "problems/phantom/phantom_ct.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/itk_writers.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/subject/phantom_landmarks.h"
+#include "problems/phantom/phantom_landmarks.h"
 
 #include <fmt/format.h>
 

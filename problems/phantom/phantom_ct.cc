@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/phantom_ct.h"
+#include "problems/phantom/phantom_ct.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/conditional/condition_depths.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "problems/conditional/site_correlation.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using Notes = std::vector<std::string>;
+
+constexpr double kThinnest_mm = 0.5;
+
+// The sites that a code means: a pair's code without side both of them.
+std::vector<std::string> SitesOf(const std::string& code) {
+  std::vector<std::string> sites;
+  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
+    for (const Site& site : *list) {
+      if (site.code == code || site.landmark == code) {
+        sites.push_back(site.code);
+      }
+    }
+  }
+  return sites;
+}
+
+[[noreturn]] void RefuseSite(const char* option, const std::string& code) {
+  throw InputError(fmt::format("tissue.given.{}: {}", option, ComplaintAboutLandmark(code)));
+}
+
+void Add(const char* option, const std::string& site, double depth_mm,
+         std::map<std::string, double>& known) {
+  if (!known.emplace(site, depth_mm).second) {
+    throw InputError(fmt::format("tissue.given.{}: the depth of {} is given twice; leave one out",
+                                 option, SiteInWords(site)));
+  }
+}
+
+std::optional<double> MeasuredAt(const LandmarkFile& file, const std::string& site) {
+  const auto at = std::ranges::find(file.landmarks, site, &Landmark::site);
+  if (at == file.landmarks.end()) {
+    return std::nullopt;
+  }
+  return at->depth_along_normal_mm ? at->depth_along_normal_mm : at->depth_closest_mm;
+}
+
+void AddMeasured(const std::string& code, const LandmarkFile& file,
+                 std::map<std::string, double>& known) {
+  const std::vector<std::string> sites = SitesOf(code);
+  if (sites.empty()) {
+    RefuseSite("measured", code);
+  }
+  bool any = false;
+  for (const std::string& site : sites) {
+    if (const auto depth_mm = MeasuredAt(file, site)) {
+      Add("measured", site, *depth_mm, known);
+      any = true;
+    }
+  }
+  if (!any) {
+    throw InputError(fmt::format(
+        "tissue.given.measured: {} has no measured depth in the landmarks' file; measure it there, "
+        "or give it under depths_mm",
+        SiteInWords(code)));
+  }
+}
+
+void AddAllMeasured(const LandmarkFile& file, std::map<std::string, double>& known) {
+  for (const Landmark& landmark : file.landmarks) {
+    const auto depth_mm = MeasuredAt(file, landmark.site);
+    if (depth_mm && !known.contains(landmark.site)) {
+      known[landmark.site] = *depth_mm;
+    }
+  }
+}
+
+// Of depths_mm and measured, by site with side.
+std::map<std::string, double> KnownDepths(const TissueGiven& given, const LandmarkFile& file) {
+  std::map<std::string, double> known;
+  for (const auto& [code, depth_mm] : given.depths_mm) {
+    const std::vector<std::string> sites = SitesOf(code);
+    if (sites.empty()) {
+      RefuseSite("depths_mm", code);
+    }
+    for (const std::string& site : sites) {
+      Add("depths_mm", site, depth_mm, known);
+    }
+  }
+  for (const std::string& code : given.measured) {
+    code == "all" ? AddAllMeasured(file, known) : AddMeasured(code, file, known);
+  }
+  return known;
+}
+
+std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
+  std::map<std::string, double> known;
+  const auto add = [&](const char* name, const std::optional<double>& value) {
+    if (value) {
+      known[name] = *value;
+    }
+  };
+  add("sex", given.sex ? std::optional(CovariateOf(*given.sex)) : std::nullopt);
+  add("build", given.build ? std::optional(CovariateOf(*given.build)) : std::nullopt);
+  add("age_years", given.age_years);
+  add("bmi", given.bmi);
+  return known;
+}
+
+// Whether the depth of a site is set by hand and so not a table's.
+bool IsSet(const TissueOptions& options, const std::string& site) {
+  return options.set_mm.contains(site) || options.set_mm.contains(WithoutSide(site));
+}
+
+// The tables' means in place of those of the table of spreads.
+void TakeMeans(const TissueOptions& options, JointNormal& joint) {
+  std::vector<TissueTable> tables;
+  for (const std::filesystem::path& path : TablesOf(options)) {
+    tables.push_back(ReadTissueTable(path));
+  }
+  for (std::size_t k = 0; k < joint.names.size(); ++k) {
+    for (const TissueTable& table : tables) {
+      if (const auto depth = FindDepth(table, options.sex, options.build, joint.names[k])) {
+        joint.mean[static_cast<Eigen::Index>(k)] = depth->mean_mm;
+        break;
+      }
+    }
+  }
+}
+
+std::vector<std::string> AllSites() {
+  std::vector<std::string> sites;
+  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
+    for (const Site& site : *list) {
+      sites.push_back(site.code);
+    }
+  }
+  return sites;
+}
+
+JointNormal JointOf(const TissueOptions& options) {
+  const TissueGiven& given = options.given;
+  const std::filesystem::path& path = given.spread.empty() ? options.table : given.spread;
+  const TissueTable table = ReadTissueTable(path);
+  JointNormal joint =
+      JointOfTable(table, options.sex, options.build, given.correlation, AllSites());
+  if (joint.names.empty()) {
+    throw InputError(fmt::format(
+        "tissue.given: table '{}' states no standard deviation, so nothing tells how depths vary; "
+        "name one that does under given.spread, such as configs/tables/t_table_2023.yaml",
+        table.id));
+  }
+  if (!given.spread.empty()) {
+    TakeMeans(options, joint);
+  }
+  return joint;
+}
+
+// What is known and tells something. Covariates must; sites may be strange to the table.
+std::vector<KnownValue> Telling(const TissueGiven& given, const JointNormal& joint,
+                                const std::map<std::string, double>& depths, Notes& notes) {
+  std::vector<KnownValue> known;
+  std::vector<std::string> silent;
+  for (const auto& [site, depth_mm] : depths) {
+    joint.Find(site) ? known.push_back({site, depth_mm, given.error_mm}) : silent.push_back(site);
+  }
+  for (const auto& [name, value] : KnownCovariates(given)) {
+    if (!joint.Find(name)) {
+      throw InputError(
+          fmt::format("tissue.given.{}: the table has no such covariate among its correlations; "
+                      "leave it out, or "
+                      "name a table of a population that has it (semblance population)",
+                      name));
+    }
+    known.push_back({name, value});
+  }
+  if (!silent.empty()) {
+    notes.push_back(
+        fmt::format("tissue.given: the depth at {} tells nothing of the others, as the "
+                    "table does not say how it varies",
+                    fmt::join(silent, ", ")));
+  }
+  return known;
+}
+
+// The depth of one dowel; false if the table does not say how it varies.
+bool Give(const TissueOptions& options, const JointNormal& joint, const ConditionalNormal& expected,
+          Dowel& dowel) {
+  const std::optional<int> at = joint.Find(dowel.site);
+  if (!at) {
+    return false;
+  }
+  dowel.sd_mm = expected.sd[*at];
+  dowel.depth_mm = expected.mean[*at];
+  if (dowel.sd_mm > 0) {
+    dowel.depth_mm = std::max(dowel.depth_mm + options.sds * dowel.sd_mm, kThinnest_mm);
+  }
+  return true;
+}
+
+std::string InWords(const std::vector<KnownValue>& known) {
+  std::vector<std::string> words;
+  for (const KnownValue& value : known) {
+    words.push_back(fmt::format("{} {:.4g}", value.name, value.value));
+  }
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+}  // namespace
+
+bool IsConditioned(const TissueOptions& options) {
+  return options.depths == DepthSource::kTable && !options.given.HasNothing();
+}
+
+JointNormal JointOfTable(const TissueTable& table, Sex sex, Build build,
+                         const SiteCorrelation& model, std::span<const std::string> sites) {
+  JointNormal joint;
+  std::vector<double> mean, sd;
+  const auto add = [&](const std::string& name, double m, double s, int n) {
+    joint.names.push_back(name);
+    mean.push_back(m);
+    sd.push_back(s);
+    joint.sample.push_back(n);
+  };
+  const TissueCorrelations none, &stated = table.correlations ? *table.correlations : none;
+  for (const std::string& name :
+       table.correlations ? stated.names : std::vector<std::string>(sites.begin(), sites.end())) {
+    const auto covariate = std::ranges::find(stated.covariates, name, &TissueCovariate::name);
+    const auto depth = FindDepth(table, sex, build, name);
+    if (covariate != stated.covariates.end()) {
+      add(name, covariate->mean, covariate->sd, stated.subjects);
+    } else if (depth && depth->sd_mm && *depth->sd_mm > 0) {
+      add(name, depth->mean_mm, *depth->sd_mm,
+          stated.subjects == 0 ? 0 : depth->n.value_or(stated.subjects));
+    }
+  }
+  joint.shrinkage = stated.shrinkage;
+  joint.mean = Eigen::Map<const Eigen::VectorXd>(mean.data(), std::ssize(mean));
+  joint.sd = Eigen::Map<const Eigen::VectorXd>(sd.data(), std::ssize(sd));
+  joint.correlation = ModelledCorrelation(model, joint.names);
+  for (std::size_t i = 0; i < stated.rows.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto a = static_cast<Eigen::Index>(i), b = static_cast<Eigen::Index>(j);
+      joint.correlation(a, b) = joint.correlation(b, a) = stated.rows[i][j];
+    }
+  }
+  return joint;
+}
+
+std::vector<std::string> ConditionDepths(const TissueOptions& options,
+                                         const LandmarkFile& landmarks, std::span<Dowel> dowels) {
+  Notes notes;
+  if (!IsConditioned(options)) {
+    return notes;
+  }
+  const JointNormal joint = JointOf(options);
+  const std::map<std::string, double> depths = KnownDepths(options.given, landmarks);
+  const std::vector<KnownValue> known = Telling(options.given, joint, depths, notes);
+  const ConditionalNormal expected = Condition(joint, known);
+  std::vector<std::string> kept;
+  for (Dowel& dowel : dowels) {
+    const auto own = depths.find(dowel.site);
+    if (IsSet(options, dowel.site)) {
+      continue;
+    }
+    if (!Give(options, joint, expected, dowel)) {
+      own == depths.end() ? kept.push_back(dowel.site) : void(dowel.sd_mm = options.given.error_mm);
+      dowel.depth_mm = own == depths.end() ? dowel.depth_mm : own->second;
+    }
+  }
+  notes.push_back(fmt::format("tissue depths are those to be expected given {}", InWords(known)));
+  if (!kept.empty()) {
+    notes.push_back(fmt::format(
+        "tissue.given: {} keep the table's depth, which does not say how it varies there",
+        fmt::join(kept, ", ")));
+  }
+  return notes;
+}
+
+}  // namespace semblance
