@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "problems/pictures/lighting.h"
 #include "problems/pictures/pictures.h"
 #include "problems/pictures/stroke_font.h"
 #include "problems/subject/phantom.h"
@@ -194,12 +195,12 @@ SiteSketch MakeSiteSketch(int threads) {
   const MeshQuery bone(phantom.skull);
   const Box3 region = Bounds(phantom.skull);
   constexpr double kAspect = static_cast<double>(kSketchWidth) / kSketchHeight;
-  Camera front = CameraFor(View::kFront, region, kAspect),
-         left = CameraFor(View::kSide, region, kAspect);
-  front.height_mm = left.height_mm = std::max(front.height_mm, left.height_mm);  // one scale
-  const std::array cameras = {front, left, FromItsRight(left)};
-  std::vector<Image> images = RenderAll({{SkullObject(phantom.skull)}}, cameras,
-                                        {.width = kSketchWidth, .height = kSketchHeight}, threads);
+  std::vector<Camera> cameras = CamerasFor(std::array{View::kFront, View::kSide}, region, kAspect);
+  cameras.push_back(FromItsRight(cameras.back()));
+  ShadowMaps shadows;
+  std::vector<Image> images =
+      RenderAll({{SkullObject(phantom.skull)}}, cameras,
+                {.width = kSketchWidth, .height = kSketchHeight}, shadows, threads);
   SiteSketch sketch{.places = PlacesOn(phantom, bone), .seen = {}};
   for (std::size_t k = 0; k < cameras.size(); ++k) {
     sketch.seen[k] = {cameras[k], std::move(images[k]), {}};
