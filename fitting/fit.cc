@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
 #include "fitting/solve/auto_weight.h"
@@ -133,41 +134,6 @@ std::vector<Term> WithSmoothness(std::span<const Term> terms, double weight) {
     all.emplace_back(smooth);
   }
   return all;
-}
-
-LevelSummary SummaryOf(const NestedRound& round) {
-  return {.level = round.finest,
-          .fraction = 1,
-          .terms = {},
-          .iterations = round.steps,
-          .free_vertices = round.vertices,
-          .auto_weight = round.weight,
-          .solver = "conjugate gradients",
-          .termination = "convergence",
-          .usable = true};
-}
-
-// The auto plan without any other term. Only the surface as it ends is measured.
-FitResult FitAlone(const HSplineSurface& start, const ScatteredPoints& points,
-                   const FitOptions& options, const RunContext& context) {
-  NestedFitResult fit = FitNested(start, points, std::get<AutoPlan>(options.plan), context);
-  FitResult result{.surface = std::move(fit.surface),
-                   .uv = {points.uv.begin(), points.uv.end()},
-                   .residual_mm = std::move(fit.residual_mm),
-                   .point_rms_mm = fit.rms_mm,
-                   .dowel_rms_mm = fit.rms_mm,
-                   .restored_features = 0,
-                   .automatic = std::move(fit.report),
-                   .usable = std::isfinite(fit.rms_mm)};
-  for (const NestedRound& round : result.automatic->rounds) {
-    result.levels.push_back(SummaryOf(round));
-  }
-  result.levels.back().rms_after_mm = fit.rms_mm;
-  return result;
-}
-
-bool IsAlone(const FitOptions& options) {
-  return std::holds_alternative<AutoPlan>(options.plan) && options.solver == Solver::kFastest;
 }
 
 // The points of a target as columns.
@@ -311,7 +277,8 @@ class Fitter {
   void Follow(const AutoPlan&) {
     const ControlNet start = result_.surface.Net(0);
     const PointColumns points(driver_.target());
-    FitResult alone = FitAlone(result_.surface, points.Points(), options_, context_);
+    FitResult alone =
+        FitAlone(result_.surface, points.Points(), std::get<AutoPlan>(options_.plan), context_);
     result_.surface = std::move(alone.surface);
     result_.automatic = std::move(alone.automatic);
     for (const LevelSummary& level : alone.levels) {
@@ -374,7 +341,8 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
               const RunContext& context) {
   CheckFit(start, rest, target, features, options);
   if (IsAlone(options)) {
-    return FitAlone(start, PointColumns(target).Points(), options, context);
+    return FitAlone(start, PointColumns(target).Points(), std::get<AutoPlan>(options.plan),
+                    context);
   }
   return Fitter(start, rest, target, features, options, context).Run();
 }
@@ -391,7 +359,7 @@ FitResult Fit(const HSplineSurface& start, const ScatteredPoints& points, const 
     return Fit(start, TargetOf(points.positions, points.uv, points.weights), {}, options, context);
   }
   CheckFit(start, points, options);
-  return FitAlone(start, points, options, context);
+  return FitAlone(start, points, std::get<AutoPlan>(options.plan), context);
 }
 
 }  // namespace semblance

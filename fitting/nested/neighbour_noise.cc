@@ -88,29 +88,39 @@ double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t>
 
 namespace {
 
-// Of the residuals n and n + 1 for which counts(n).
-template <class Counts>
-PairCorrelation Correlation(std::span<const NestedResidual> residuals, const Counts& counts) {
-  double together = 0, squares = 0;
-  PairCorrelation pairs;
-  for (std::size_t n = 0; n + 1 < residuals.size(); ++n) {
-    if (counts(n)) {
-      const NestedResidual &a = residuals[n], &b = residuals[n + 1];
-      for (int c = 0; c < 3; ++c) {
-        together += a.along[c] * b.along[c];
-      }
-      squares += (a.Square() + b.Square()) / 2;
-      ++pairs.count;
+class PairSums {
+ public:
+  void Add(const NestedResidual& a, const NestedResidual& b) {
+    for (int c = 0; c < 3; ++c) {
+      together_ += a.along[c] * b.along[c];
     }
+    squares_ += (a.Square() + b.Square()) / 2;
+    ++count_;
   }
-  pairs.value = squares > 0 ? together / squares : 0;
-  return pairs;
-}
+  PairCorrelation Correlation() const {
+    return {.value = squares_ > 0 ? together_ / squares_ : 0, .count = count_};
+  }
+
+ private:
+  double together_ = 0, squares_ = 0;
+  std::size_t count_ = 0;
+};
 
 }  // namespace
 
-double NeighbourCorrelation(std::span<const NestedResidual> residuals) {
-  return Correlation(residuals, [](std::size_t) { return true; }).value;
+double NeighbourCorrelation(std::span<const NestedResidual> residuals,
+                            std::span<const char> left_out) {
+  PairSums pairs;
+  const NestedResidual* last = nullptr;
+  for (std::size_t n = 0; n < residuals.size(); ++n) {
+    if (left_out.empty() || left_out[n] == 0) {
+      if (last != nullptr) {
+        pairs.Add(*last, residuals[n]);
+      }
+      last = &residuals[n];
+    }
+  }
+  return pairs.Correlation().value;
 }
 
 PairCorrelation ClosestCorrelation(const NestedPoints& points,
@@ -129,7 +139,13 @@ PairCorrelation ClosestCorrelation(const NestedPoints& points,
   std::vector<double> sorted = apart;
   const auto tenth = sorted.begin() + std::ssize(sorted) / kOneIn;
   std::nth_element(sorted.begin(), tenth, sorted.end());
-  return Correlation(residuals, [&](std::size_t n) { return apart[n] <= *tenth; });
+  PairSums pairs;
+  for (std::size_t n = 0; n + 1 < indices.size(); ++n) {
+    if (apart[n] <= *tenth) {
+      pairs.Add(residuals[n], residuals[n + 1]);
+    }
+  }
+  return pairs.Correlation();
 }
 
 }  // namespace semblance

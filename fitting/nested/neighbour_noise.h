@@ -19,8 +19,10 @@ double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t>
                       NeighbourModel model);
 
 // Of residuals along the curve: the sum of e_a . e_b over that of |e|^2, b being next to a. 0 for
-// errors that do not know of each other.
-double NeighbourCorrelation(std::span<const NestedResidual> residuals);
+// errors that do not know of each other. left_out: of each residual, not 0 for one that does not
+// count; or none.
+double NeighbourCorrelation(std::span<const NestedResidual> residuals,
+                            std::span<const char> left_out = {});
 
 // The same of that tenth of the pairs whose points are closest to each other in (u,v).
 struct PairCorrelation {

@@ -8,8 +8,10 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "fitting/nested/neighbour_noise.h"
+#include "fitting/nested/nested_steps.h"
 #include "fitting/nested/outlier_search.h"
 #include "fitting/nested/unresolved_detail.h"
 #include "fitting/nested/weight_search.h"
@@ -72,12 +74,12 @@ struct Snapshot {
 
 class NestedFitter {
  public:
-  NestedFitter(const HSplineSurface& start, const ScatteredPoints& points, const AutoPlan& plan,
+  NestedFitter(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
                const RunContext& context)
       : start_(start),
         plan_(plan),
         context_(context),
-        points_(DisplacementsFrom(start, points, context.threads)),
+        points_(std::move(points)),
         solve_(points_, MeanLengths(start)),
         space_(start.shape()),
         cap_(plan.finest),
@@ -338,7 +340,7 @@ class NestedFitter {
     report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, 0.02));
     report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
     report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
-    report_.neighbour_correlation = NeighbourCorrelation(KeptResiduals());
+    report_.neighbour_correlation = NeighbourCorrelation(residuals_, outlier_);
     for (std::uint32_t k = 0; k < points_.size(); ++k) {
       if (outlier_[k] != 0) {
         report_.outliers.push_back(points_.given[k]);
@@ -429,8 +431,7 @@ void CheckWeights(const ScatteredPoints& points) {
 
 }  // namespace
 
-NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,
-                          const AutoPlan& plan, const RunContext& context) {
+void CheckNested(const HSplineSurface& start, const ScatteredPoints& points) {
   if (!start.Offsets().empty()) {
     Fail("the start has detail of finer levels; start from one without, or take plan adaptive");
   }
@@ -445,7 +446,17 @@ NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& po
   if (!(lengths_mm.allFinite() && lengths_mm.minCoeff() > 0)) {
     Fail("the points have no extent along u or v; give other (u,v)");
   }
-  return NestedFitter(start, points, plan, context).Run();
+}
+
+NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
+                          const RunContext& context) {
+  return NestedFitter(start, std::move(points), plan, context).Run();
+}
+
+NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,
+                          const AutoPlan& plan, const RunContext& context) {
+  CheckNested(start, points);
+  return FitNested(start, DisplacementsFrom(start, points, context.threads), plan, context);
 }
 
 }  // namespace semblance

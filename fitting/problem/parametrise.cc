@@ -15,10 +15,8 @@ namespace {
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("parameters: " + what); }
 
-struct Scattered {
-  std::span<const Vec3> positions;
-  std::span<const Vec2> given_uv;
-};
+constexpr double kMostFaults = 0.02;  // share of the points
+constexpr double kNextToNone = 0.003;
 
 Vec3 MeanOf(std::span<const Vec3> points) {
   Vec3 sum = Vec3::Zero();
@@ -68,7 +66,7 @@ void Normalise(int coordinate, const std::string& what, std::vector<Vec2>& uv) {
   }
 }
 
-Parametrisation ParametersOf(const Scattered& points, const GivenParameters& given) {
+Parametrisation ParametersOf(const Scan& points, const GivenParameters& given) {
   if (points.given_uv.empty()) {
     Fail(
         "type 'given' needs each point's (u,v) (of a table, the columns u and v); give them, or "
@@ -81,6 +79,7 @@ Parametrisation ParametersOf(const Scattered& points, const GivenParameters& giv
     }
   }
   Parametrisation result{.uv = {}, .source = ParameterSource::kGiven};
+  result.uv.reserve(points.given_uv.size());
   for (std::size_t k = 0; k < points.given_uv.size(); ++k) {
     Vec2 uv;
     for (const int c : {0, 1}) {
@@ -121,17 +120,117 @@ PlaneAxes PlaneAcross(const Vec3& normal) {
   return {u, unit.cross(u)};
 }
 
-Parametrisation ParametersOf(const Scattered& points, const PlaneParameters& plane) {
-  const Vec3 normal(plane.normal[0], plane.normal[1], plane.normal[2]);
-  const auto [u, v] = normal.isZero(0) ? LeastSquaresPlane(points.positions) : PlaneAcross(normal);
-  const Vec3 mean = MeanOf(points.positions);
-  Parametrisation result{.uv = {}, .source = ParameterSource::kPlane};
-  for (const Vec3& p : points.positions) {
-    result.uv.emplace_back((p - mean).dot(u), (p - mean).dot(v));
+// A way to (u,v) that may be taken or not.
+struct Candidate {
+  std::string how;
+  std::vector<Vec2> at;  // mm
+  double period_mm = 0;
+  MapFaults faults = {};
+  int number = 0;  // among those that may be taken
+};
+
+MapFaults FaultsOf(const Scan& points, const Candidate& candidate) {
+  const PlaneMap map{points.positions, candidate.at, candidate.period_mm};
+  const MapFaults by_points = FaultsOfPoints(map);
+  if (points.triangles.empty()) {
+    return by_points;
   }
+  const MapFaults by_triangles = FaultsOfTriangles(map, points.triangles);
+  return {.folded = std::max(by_points.folded, by_triangles.folded),
+          .collapsed = std::max(by_points.collapsed, by_triangles.collapsed),
+          .mirrored = by_triangles.mirrored};
+}
+
+std::string Percent(double share) { return fmt::format("{:.2g} %", 100 * share); }
+
+std::string FaultsText(const std::vector<Candidate>& tried) {
+  std::string text;
+  for (const Candidate& candidate : tried) {
+    text += fmt::format("{}{} of them over {}", text.empty() ? "" : ", ",
+                        Percent(candidate.faults.Sum()), candidate.how);
+  }
+  return text;
+}
+
+// The first that is next to faultless, else that with the least faults; all that were looked at
+// come back, the chosen one last, the others without their places. make(k): the k-th of `count`.
+template <class Make>
+std::vector<Candidate> Choose(const Scan& points, int count, const Make& make) {
+  std::vector<Candidate> tried;
+  for (int k = 0; k < count && (k == 0 || tried.back().faults.Sum() > kNextToNone); ++k) {
+    Candidate next = make(k);
+    next.number = k;
+    next.faults = FaultsOf(points, next);
+    const bool better = k == 0 || next.faults.Sum() < tried.back().faults.Sum();
+    const auto at = tried.insert(better ? tried.end() : tried.end() - 1, std::move(next));
+    if (k > 0) {
+      (better ? at - 1 : at)->at = {};
+    }
+  }
+  return tried;
+}
+
+bool MayBeTaken(const Candidate& candidate, FoldRule folds) {
+  return folds == FoldRule::kAccept || candidate.faults.Sum() <= kMostFaults;
+}
+
+Candidate OnPlane(std::span<const Vec3> positions, const PlaneAxes& axes, std::string how) {
+  const Vec3 mean = MeanOf(positions);
+  Candidate plane{.how = std::move(how), .at = {}};
+  plane.at.reserve(positions.size());
+  for (const Vec3& p : positions) {
+    plane.at.emplace_back((p - mean).dot(axes[0]), (p - mean).dot(axes[1]));
+  }
+  return plane;
+}
+
+// Those of least squares, across z, y and x; or that which is asked for.
+std::vector<Candidate> PlanesOver(const Scan& points, const PlaneParameters& plane) {
+  const Vec3 normal(plane.normal[0], plane.normal[1], plane.normal[2]);
+  if (!normal.isZero(0)) {
+    return Choose(points, 1, [&](int) {
+      return OnPlane(
+          points.positions, PlaneAcross(normal),
+          fmt::format("the plane across [{}, {}, {}]", normal.x(), normal.y(), normal.z()));
+    });
+  }
+  return Choose(points, 4, [&](int k) {
+    return k == 0 ? OnPlane(points.positions, LeastSquaresPlane(points.positions),
+                            "the plane of least squares")
+                  : OnPlane(points.positions, PlaneAcross(Vec3::Unit(3 - k)),
+                            fmt::format("the plane across {}", "xyz"[3 - k]));
+  });
+}
+
+// du x dv is to look where the triangles look.
+void TurnToTriangles(const MapFaults& faults, int coordinate, std::vector<Vec2>& at) {
+  for (Vec2& p : at) {
+    p[coordinate] *= faults.mirrored ? -1 : 1;
+  }
+}
+
+Parametrisation TakePlane(Candidate plane) {
+  TurnToTriangles(plane.faults, 1, plane.at);
+  Parametrisation result{.uv = std::move(plane.at),
+                         .source = ParameterSource::kPlane,
+                         .how = std::move(plane.how),
+                         .faults = plane.faults};
   Normalise(0, "the plane's u", result.uv);
   Normalise(1, "the plane's v", result.uv);
   return result;
+}
+
+constexpr char kOtherWays[] =
+    "give u and v, or triangles between the points (a PLY, OBJ, STL or OFF with faces) with "
+    "parameters: mesh, or, for what goes round, parameters: cylinder with closure: periodic_u";
+
+Parametrisation ParametersOf(const Scan& points, const PlaneParameters& plane) {
+  std::vector<Candidate> planes = PlanesOver(points, plane);
+  if (!MayBeTaken(planes.back(), plane.folds)) {
+    Fail(fmt::format("the points fold over the plane: {}; {}; or write folds: accept",
+                     FaultsText(planes), kOtherWays));
+  }
+  return TakePlane(std::move(planes.back()));
 }
 
 struct CylinderAxis {
@@ -172,53 +271,152 @@ CylinderAxis AxisAlong(const Vec3& direction, std::span<const Vec3> points) {
   return axis;
 }
 
-CylinderAxis BestAxis(const CylinderParameters& cylinder, std::span<const Vec3> points) {
+// That which is given; or the principal ones, the evenest first.
+std::vector<CylinderAxis> AxesFor(const CylinderParameters& cylinder,
+                                  std::span<const Vec3> points) {
   const Vec3 given(cylinder.axis[0], cylinder.axis[1], cylinder.axis[2]);
   if (given.norm() > 0) {
-    return AxisAlong(given, points);
+    return {AxisAlong(given, points)};
   }
   const Principal principal = PrincipalOf(points);
-  CylinderAxis best = AxisAlong(principal.axes.col(2), points);
-  for (const int k : {1, 0}) {
-    const CylinderAxis axis = AxisAlong(principal.axes.col(k), points);
-    best = axis.unevenness < best.unevenness ? axis : best;
+  std::vector<CylinderAxis> axes;
+  for (const int k : {2, 1, 0}) {
+    axes.push_back(AxisAlong(principal.axes.col(k), points));
   }
-  return best;
+  std::stable_sort(axes.begin(), axes.end(), [](const CylinderAxis& a, const CylinderAxis& b) {
+    return a.unevenness < b.unevenness;
+  });
+  return axes;
 }
 
-Parametrisation ParametersOf(const Scattered& points, const CylinderParameters& cylinder) {
-  const CylinderAxis axis = BestAxis(cylinder, points.positions);
-  Parametrisation result{.uv = {}, .source = ParameterSource::kCylinder};
-  for (const Vec3& p : points.positions) {
+// In turns and mm along the axis.
+std::vector<Vec2> AroundAxis(const CylinderAxis& axis, std::span<const Vec3> positions) {
+  std::vector<Vec2> around;
+  around.reserve(positions.size());
+  for (const Vec3& p : positions) {
     const Vec3 x = p - axis.centre;
     const double turn = std::atan2(x.dot(axis.third), x.dot(axis.across)) / (2 * std::numbers::pi);
-    result.uv.emplace_back(turn < 0 ? turn + 1 : turn, x.dot(axis.direction));
+    around.emplace_back(turn < 0 ? turn + 1 : turn, x.dot(axis.direction));
   }
+  return around;
+}
+
+double MeanRadius(const CylinderAxis& axis, std::span<const Vec3> positions) {
+  double sum = 0;
+  for (const Vec3& p : positions) {
+    const Vec3 x = p - axis.centre;
+    sum += std::hypot(x.dot(axis.third), x.dot(axis.across));
+  }
+  return sum / static_cast<double>(positions.size());
+}
+
+Candidate OnCylinder(const CylinderAxis& axis, std::span<const Vec3> positions) {
+  const double period_mm = 2 * std::numbers::pi * MeanRadius(axis, positions);
+  Candidate cylinder{.how = fmt::format("the cylinder along [{:.3g}, {:.3g}, {:.3g}]",
+                                        axis.direction.x(), axis.direction.y(), axis.direction.z()),
+                     .at = AroundAxis(axis, positions),
+                     .period_mm = period_mm};
+  for (Vec2& p : cylinder.at) {
+    p.x() *= period_mm;
+  }
+  return cylinder;
+}
+
+Parametrisation ParametersOf(const Scan& points, const CylinderParameters& cylinder) {
+  const std::vector<CylinderAxis> axes = AxesFor(cylinder, points.positions);
+  const std::vector<Candidate> cylinders =
+      Choose(points, static_cast<int>(axes.size()),
+             [&](int k) { return OnCylinder(axes[k], points.positions); });
+  const Candidate& best = cylinders.back();
+  if (!MayBeTaken(best, cylinder.folds)) {
+    Fail(fmt::format(
+        "the points fold over the cylinder, or close at its ends, where its angle is not known: "
+        "{}; give another axis, cut off what closes the ends, or give u and v; or write folds: "
+        "accept",
+        FaultsText(cylinders)));
+  }
+  Parametrisation result{.uv = AroundAxis(axes[best.number], points.positions),
+                         .source = ParameterSource::kCylinder,
+                         .how = best.how,
+                         .faults = best.faults};
   for (Vec2& uv : result.uv) {
     uv.x() = std::clamp(uv.x(), 0.0, 1.0);
   }
+  TurnToTriangles(best.faults, 1, result.uv);
   Normalise(1, "the cylinder's axis", result.uv);
   return result;
 }
 
-Parametrisation ParametersOf(const Scattered& points, const AutoParameters&) {
-  return points.given_uv.empty() ? ParametersOf(points, PlaneParameters{})
-                                 : ParametersOf(points, GivenParameters{});
+void CheckTriangles(const Scan& points) {
+  const auto count = static_cast<std::int64_t>(points.positions.size());
+  for (const Triangle& t : points.triangles) {
+    for (const std::int32_t corner : t) {
+      if (corner < 0 || corner >= count) {
+        Fail(fmt::format("a triangle has the corner {}, and there are {} points", corner, count));
+      }
+    }
+  }
+}
+
+Parametrisation ParametersOf(const Scan& points, const MeshParameters& mesh) {
+  if (points.triangles.empty()) {
+    Fail(
+        "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces, "
+        "or take 'plane' or 'cylinder'");
+  }
+  MeshLayout layout = LayOut({.points = {points.positions.begin(), points.positions.end()},
+                              .triangles = {points.triangles.begin(), points.triangles.end()}},
+                             mesh.map);
+  const std::string_view map = EnumNames(layout.map)[static_cast<std::size_t>(layout.map)];
+  Candidate laid{.how = fmt::format("the mesh laid out by {}", map), .at = std::move(layout.at)};
+  laid.faults = FaultsOf(points, laid);
+  if (laid.faults.folded > kMostFaults) {
+    Fail(fmt::format("{} folds {} of it; take another map (mean_value does not fold)", laid.how,
+                     Percent(laid.faults.folded)));
+  }
+  Parametrisation result{.uv = std::move(laid.at),
+                         .source = ParameterSource::kMesh,
+                         .how = std::move(laid.how),
+                         .faults = laid.faults};
+  Normalise(0, "the mesh's u", result.uv);
+  Normalise(1, "the mesh's v", result.uv);
+  return result;
+}
+
+Parametrisation ParametersOf(const Scan& points, const AutoParameters&) {
+  if (!points.given_uv.empty()) {
+    return ParametersOf(points, GivenParameters{});
+  }
+  if (points.closure != Closure::kOpen) {
+    return ParametersOf(points, CylinderParameters{});
+  }
+  std::vector<Candidate> planes = PlanesOver(points, {});
+  if (MayBeTaken(planes.back(), FoldRule::kRefuse)) {
+    return TakePlane(std::move(planes.back()));
+  }
+  if (points.triangles.empty()) {
+    Fail(fmt::format("the points fold over every plane: {}; {}", FaultsText(planes), kOtherWays));
+  }
+  return ParametersOf(points, MeshParameters{});
 }
 
 }  // namespace
 
-Parametrisation Parametrise(std::span<const Vec3> positions, const Parameters& parameters,
-                            std::span<const Vec2> given_uv) {
-  if (positions.empty()) {
+Parametrisation Parametrise(const Scan& scan, const Parameters& parameters) {
+  if (scan.positions.empty()) {
     Fail("there is no point; give some");
   }
-  if (!given_uv.empty() && given_uv.size() != positions.size()) {
-    Fail(fmt::format("{} pairs (u,v) for {} points; give one per point, or none", given_uv.size(),
-                     positions.size()));
+  if (!scan.given_uv.empty() && scan.given_uv.size() != scan.positions.size()) {
+    Fail(fmt::format("{} pairs (u,v) for {} points; give one per point, or none",
+                     scan.given_uv.size(), scan.positions.size()));
   }
-  const Scattered points{positions, given_uv};
-  return std::visit([&](const auto& p) { return ParametersOf(points, p); }, parameters);
+  CheckTriangles(scan);
+  return std::visit([&](const auto& p) { return ParametersOf(scan, p); }, parameters);
+}
+
+Parametrisation Parametrise(std::span<const Vec3> positions, const Parameters& parameters,
+                            std::span<const Vec2> given_uv) {
+  return Parametrise({.positions = positions, .given_uv = given_uv}, parameters);
 }
 
 }  // namespace semblance

@@ -4,21 +4,38 @@
 
 #include <array>
 #include <span>
+#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "fitting/problem/mesh_map.h"
+#include "fitting/problem/one_to_one.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
+#include "surfaces/hspline/hspline_shape.h"
 
 namespace semblance {
 
-// Those that are given, if there are any, else the plane's.
+// Those that are given, if there are any. Else, of a surface that goes round, the cylinder's; of an
+// open one a plane's, and, where every plane folds and there are triangles, those of the mesh laid
+// out.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
 template <class Visitor>
 void Fields(Visitor&, AutoParameters&) {}
+
+// What becomes of a plane or cylinder over which the points fold.
+enum class FoldRule { kRefuse, kAccept };
+constexpr auto EnumNames(FoldRule) { return std::to_array<std::string_view>({"refuse", "accept"}); }
+template <class Visitor>
+void FoldField(Visitor& visit, FoldRule& folds) {
+  visit(FieldInfo{.name = "folds",
+                  .doc = "what becomes of points that fold over it, more than 2 % of them: refuse "
+                         "them; or accept it: the surface then goes between the sheets"},
+        folds);
+}
 
 // Those that are given, with the ranges mapped to [0,1].
 struct GivenParameters {
@@ -33,49 +50,85 @@ void Fields(Visitor& visit, GivenParameters& o) {
 }
 
 // Orthogonal projection on a plane, for points that do not fold over it: on the plane of least
-// squares, u along its longest direction; or on the plane across `normal`, u along the coordinate
-// axis nearest to the plane (the first of equals).
+// squares, u along its longest direction, or, where they fold over that, on the plane across z, y
+// or x over which they fold least; or on the plane across `normal`, u along the coordinate axis
+// nearest to the plane (the first of equals).
 struct PlaneParameters {
   static constexpr std::string_view kName = "plane";
   std::array<double, 3> normal = {0, 0, 0};
+  FoldRule folds = FoldRule::kRefuse;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PlaneParameters& o) {
   visit(FieldInfo{.name = "normal",
                   .doc = "direction of the heights, such as [0, 0, 1] for a terrain; [0, 0, 0] "
-                         "takes that in which the points spread least"},
+                         "takes that in which the points spread least, or, where they fold over "
+                         "it, z, y or x"},
         o.normal);
+  FoldField(visit, o.folds);
 }
 
 // Angle around an axis and height along it, for points that go round; u is the angle, closed.
 struct CylinderParameters {
   static constexpr std::string_view kName = "cylinder";
   std::array<double, 3> axis = {0, 0, 0};
+  FoldRule folds = FoldRule::kRefuse;
 };
 template <class Visitor>
 void Fields(Visitor& visit, CylinderParameters& o) {
   visit(FieldInfo{.name = "axis",
                   .doc = "direction of v; [0, 0, 0] takes that principal axis of the points from "
-                         "which their distances differ least"},
+                         "which their distances differ least, or, where they fold over its "
+                         "cylinder, that over which they fold least"},
         o.axis);
+  FoldField(visit, o.folds);
 }
 
-using Parameters =
-    std::variant<AutoParameters, GivenParameters, PlaneParameters, CylinderParameters>;
+// The triangles between the points, laid out on the plane (mesh_map.h); u and v along its sides.
+struct MeshParameters {
+  static constexpr std::string_view kName = "mesh";
+  MeshMap map = MeshMap::kLscm;
+};
+template <class Visitor>
+void Fields(Visitor& visit, MeshParameters& o) {
+  visit(FieldInfo{.name = "map",
+                  .doc = "lscm: angles kept, with a free border; arap: as rigid as possible, with "
+                         "a free border, slow; mean_value: the border on a square, which never "
+                         "folds; tutte: the same with uniform weights; auto: arap, or mean_value "
+                         "where that folds"},
+        o.map);
+}
 
-enum class ParameterSource { kGiven, kPlane, kCylinder };
+using Parameters = std::variant<AutoParameters, GivenParameters, PlaneParameters,
+                                CylinderParameters, MeshParameters>;
+
+enum class ParameterSource { kGiven, kPlane, kCylinder, kMesh };
 constexpr auto EnumNames(ParameterSource) {
-  return std::to_array<std::string_view>({"given", "plane", "cylinder"});
+  return std::to_array<std::string_view>({"given", "plane", "cylinder", "mesh"});
 }
 
 struct Parametrisation {
   std::vector<Vec2> uv;  // one per point, in [0,1] x [0,1]
   ParameterSource source = ParameterSource::kGiven;
+  std::string how = {};   // in words: which plane, axis or map; empty of given ones
+  MapFaults faults = {};  // of what was chosen; none of given ones, which are not looked at
 };
 
-// positions: mm. given_uv: one per point, or none. Throws InputError for no points, `given` without
-// given_uv, a number of given_uv that is not that of the points, an empty range, given_uv outside
-// of it, and points that span no plane or have no extent along the axis.
+// Points of a file.
+struct Scan {
+  std::span<const Vec3> positions;           // mm
+  std::span<const Vec2> given_uv = {};       // one per point, or none
+  std::span<const Triangle> triangles = {};  // between the points, or none
+  Closure closure = Closure::kOpen;          // of the surface that is wanted, for AutoParameters
+};
+
+// du x dv looks where the triangles look. Whatever is chosen is one-to-one, but for given (u,v) and
+// where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are
+// any. Throws InputError for no points, `given` without given_uv, a number of given_uv that is not
+// that of the points, an empty range, given_uv outside of it, points that span no plane or have no
+// extent along the axis, points that fold over every plane or cylinder that may be taken, `mesh`
+// without triangles, a corner that is no point, and as LayOut.
+Parametrisation Parametrise(const Scan& scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},
                             std::span<const Vec2> given_uv = {});

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/points/plain_points.h"
 
-#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <system_error>
@@ -9,10 +8,6 @@
 
 namespace semblance {
 namespace {
-
-bool Has(const std::vector<PointColumn>& columns, PointColumn wanted) {
-  return std::find(columns.begin(), columns.end(), wanted) != columns.end();
-}
 
 // Past a line's end; false if there is something else.
 bool TakeLineEnd(const char*& at, const char* end) {
@@ -24,15 +19,25 @@ bool TakeLineEnd(const char*& at, const char* end) {
 
 }  // namespace
 
-PlainPoints::PlainPoints(std::vector<PointColumn> columns)
+PlainPoints::PlainPoints(PointColumns columns)
     : columns_(std::move(columns)),
-      has_uv_(Has(columns_, PointColumn::kU)),
-      has_weight_(Has(columns_, PointColumn::kWeight)) {}
+      has_uv_(columns_.Has(PointColumn::kU)),
+      has_weight_(columns_.Has(PointColumn::kWeight)),
+      has_sigma_(columns_.Has(PointColumn::kSigma)),
+      values_(columns_.Kinds(), 0.0) {
+  table_.weights_of_sigma = has_sigma_;
+  for (const std::string& attribute : columns_.attributes) {
+    table_.attributes.push_back({attribute, {}});
+  }
+}
 
 void PlainPoints::Reserve(std::size_t count) {
   table_.positions.reserve(count);
   table_.uv.reserve(has_uv_ ? count : 0);
-  table_.weights.reserve(has_weight_ ? count : 0);
+  table_.weights.reserve(has_weight_ || has_sigma_ ? count : 0);
+  for (PointAttribute& attribute : table_.attributes) {
+    attribute.values.reserve(count);
+  }
 }
 
 bool PlainPoints::Add(std::string_view lines) {
@@ -47,27 +52,37 @@ bool PlainPoints::Add(std::string_view lines) {
 }
 
 bool PlainPoints::AddLine(const char*& at, const char* end) {
-  std::array<double, kPointColumns> values{};
-  for (std::size_t k = 0; k < columns_.size(); ++k) {
+  for (std::size_t k = 0; k < columns_.kinds.size(); ++k) {
     if (k > 0 && (at == end || *at++ != ',')) {
       return false;
     }
-    double& value = values[static_cast<std::size_t>(columns_[k])];
+    double& value = values_[columns_.kinds[k]];
     const auto [next, error] = std::from_chars(at, end, value);
     if (error != std::errc{} || !std::isfinite(value)) {
       return false;
     }
     at = next;
   }
-  const auto& [x, y, z, u, v, weight] = values;
-  table_.positions.emplace_back(x, y, z);
+  return AddPoint() && TakeLineEnd(at, end);
+}
+
+bool PlainPoints::AddPoint() {
+  const auto value = [&](PointColumn column) { return values_[static_cast<std::size_t>(column)]; };
+  table_.positions.emplace_back(value(PointColumn::kX), value(PointColumn::kY),
+                                value(PointColumn::kZ));
   if (has_uv_) {
-    table_.uv.emplace_back(u, v);
+    table_.uv.emplace_back(value(PointColumn::kU), value(PointColumn::kV));
   }
-  if (has_weight_) {
+  for (std::size_t k = 0; k < table_.attributes.size(); ++k) {
+    table_.attributes[k].values.push_back(values_[kPointColumns + k]);
+  }
+  if (has_weight_ || has_sigma_) {
+    const double sigma = value(PointColumn::kSigma),
+                 weight = has_weight_ ? value(PointColumn::kWeight) : 1 / (sigma * sigma);
     table_.weights.push_back(weight);
+    return weight > 0 && std::isfinite(weight) && (has_weight_ || sigma > 0);
   }
-  return TakeLineEnd(at, end) && (!has_weight_ || weight > 0);
+  return true;
 }
 
 }  // namespace semblance

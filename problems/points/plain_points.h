@@ -16,8 +16,8 @@ namespace semblance {
 // left to ParsePointTable, which takes what it may and says what is wrong with the rest.
 class PlainPoints {
  public:
-  // columns: of a line, which coordinate each is (PointColumn).
-  explicit PlainPoints(std::vector<PointColumn> columns);
+  // columns: of a line, what each is.
+  explicit PlainPoints(PointColumns columns);
 
   // Whole lines; the last need not end. False if one is not plain: then nothing of what was added
   // can be relied on.
@@ -29,9 +29,11 @@ class PlainPoints {
 
  private:
   bool AddLine(const char*& at, const char* end);
+  bool AddPoint();
 
-  std::vector<PointColumn> columns_;
-  bool has_uv_ = false, has_weight_ = false;
+  PointColumns columns_;
+  bool has_uv_ = false, has_weight_ = false, has_sigma_ = false;
+  std::vector<double> values_;  // of a line, by kind
   PointTable table_;
 };
 

@@ -16,6 +16,7 @@
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "problems/output/manifest.h"
 #include "problems/points/plain_points.h"
@@ -23,7 +24,10 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/npy.h"
 #include "surfaces/mesh_files/ply_header.h"
+#include "surfaces/mesh_files/read_obj.h"
+#include "surfaces/mesh_files/read_off.h"
 #include "surfaces/mesh_files/read_ply.h"
+#include "surfaces/mesh_files/read_stl.h"
 #include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
@@ -85,14 +89,28 @@ PointTable ParseXyz(std::string_view text, const std::string& name) {
   return table;
 }
 
+// With all the digits of the points, and the faces, if there are any, as triangles.
 PointTable ParseObj(std::string_view text, const std::string& name) {
   TextLines lines(text, name, {.comment = '#'});
   PointTable table;
+  bool has_faces = false;
   while (lines.NextLine()) {
-    if (lines.NextWord() == "v") {
+    const std::string_view word = lines.NextWord();
+    has_faces = has_faces || word == "f";
+    if (word == "v") {
       table.positions.push_back(NextPosition(lines));
     }
   }
+  if (has_faces) {
+    table.triangles = ReadObj(text, name).triangles;
+  }
+  return table;
+}
+
+PointTable PointsOf(TriMesh mesh) {
+  PointTable table;
+  table.positions = std::move(mesh.points);
+  table.triangles = std::move(mesh.triangles);
   return table;
 }
 
@@ -123,7 +141,49 @@ bool HasProperties(const PlyHeader& header, std::initializer_list<std::string_vi
   });
 }
 
-PointTable ParsePlyPoints(std::string_view bytes, const std::string& name) {
+// Weights of a PLY: its property weight, or of sigma.
+void TakeWeights(const PlyHeader& header, std::string_view bytes, const std::string& name,
+                 PointTable& table) {
+  const bool sigma = HasProperties(header, {"sigma"}), weight = HasProperties(header, {"weight"});
+  if (sigma && weight) {
+    throw InputError(
+        fmt::format("{}: the vertices have 'weight' and 'sigma'; give one of them", name));
+  }
+  if (!sigma && !weight) {
+    return;
+  }
+  table.weights_of_sigma = sigma;
+  table.weights = PlyVertexScalar(bytes, sigma ? "sigma" : "weight", name);
+  for (std::size_t k = 0; k < table.weights.size(); ++k) {
+    double& number = table.weights[k];
+    const bool positive = number > 0;
+    number = sigma ? 1 / (number * number) : number;
+    if (!positive || !std::isfinite(number)) {
+      throw InputError(fmt::format("{}: the {} of vertex {} is not positive and finite", name,
+                                   sigma ? "sigma" : "weight", k));
+    }
+  }
+}
+
+std::vector<double> FiniteScalar(std::string_view bytes, const std::string& scalar,
+                                 const std::string& name) {
+  std::vector<double> values = PlyVertexScalar(bytes, scalar, name);
+  const auto bad =
+      std::find_if_not(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  if (bad != values.end()) {
+    throw InputError(fmt::format("{}: the {} of vertex {} is not finite; leave it out", name,
+                                 scalar, bad - values.begin()));
+  }
+  return values;
+}
+
+bool HasFaces(const PlyHeader& header) {
+  return std::any_of(header.elements.begin(), header.elements.end(),
+                     [](const PlyElement& e) { return e.name == "face" && e.count > 0; });
+}
+
+PointTable ParsePlyPoints(std::string_view bytes, const std::string& name,
+                          std::span<const std::string> attributes) {
   const PlyHeader header = ReadPlyHeader(bytes, name);
   const auto scalar = [&](const char* of) { return PlyVertexScalar(bytes, of, name); };
   const std::vector<double> x = scalar("x"), y = scalar("y"), z = scalar("z");
@@ -141,30 +201,52 @@ PointTable ParsePlyPoints(std::string_view bytes, const std::string& name) {
       table.uv.emplace_back(u[k], v[k]);
     }
   }
+  TakeWeights(header, bytes, name, table);
+  for (const std::string& attribute : attributes) {
+    table.attributes.push_back({attribute, FiniteScalar(bytes, attribute, name)});
+  }
+  if (HasFaces(header)) {
+    table.triangles = ReadPly(bytes, name).triangles;
+  }
   return table;
 }
 
-PointTable Parse(const std::string& bytes, const std::filesystem::path& path) {
-  const std::string name = path.string(), ending = Lower(path.extension().string());
-  if (ending == ".csv" || ending == ".txt" || name == "-") {
-    return ParsePointTable(bytes, name == "-" ? "standard input" : name);
-  }
+PointTable ParseUnnamed(const std::string& bytes, const std::string& ending,
+                        const std::string& name) {
   if (ending == ".xyz") {
-    return NonEmpty(ParseXyz(bytes, name), name);
+    return ParseXyz(bytes, name);
   }
   if (ending == ".npy") {
-    return NonEmpty(ParseNpyPoints(bytes, name), name);
-  }
-  if (ending == ".ply") {
-    return NonEmpty(ParsePlyPoints(bytes, name), name);
+    return ParseNpyPoints(bytes, name);
   }
   if (ending == ".obj") {
-    return NonEmpty(ParseObj(bytes, name), name);
+    return ParseObj(bytes, name);
+  }
+  if (ending == ".stl" || ending == ".off") {
+    return PointsOf(ending == ".stl" ? ReadStl(bytes, name) : ReadOff(bytes, name));
   }
   throw IoError(
-      fmt::format("{}: files of points end in .csv, .txt, .xyz, .npy, .ply or .obj, or in "
-                  "one of these and .gz; or give - for a CSV on standard input",
+      fmt::format("{}: files of points end in .csv, .txt, .xyz, .npy, .ply, .obj, .stl or .off, "
+                  "or in one of these and .gz; or give - for a CSV on standard input",
                   name));
+}
+
+PointTable Parse(const std::string& bytes, const std::filesystem::path& path,
+                 std::span<const std::string> attributes) {
+  const std::string name = path.string(), ending = Lower(path.extension().string());
+  if (ending == ".csv" || ending == ".txt" || name == "-") {
+    return ParsePointTable(bytes, name == "-" ? "standard input" : name, attributes);
+  }
+  if (ending == ".ply") {
+    return NonEmpty(ParsePlyPoints(bytes, name, attributes), name);
+  }
+  PointTable table = NonEmpty(ParseUnnamed(bytes, ending, name), name);
+  if (!attributes.empty()) {
+    throw InputError(
+        fmt::format("{}: it has no '{}', which the option `attributes` names; give a CSV or PLY",
+                    name, attributes.front()));
+  }
+  return table;
 }
 
 bool IsCsv(const std::filesystem::path& path) {
@@ -172,8 +254,21 @@ bool IsCsv(const std::filesystem::path& path) {
   return ending == ".csv" || ending == ".txt";
 }
 
+// As many as there would be, were all lines as long as the first ones, and a few more.
+std::size_t PointsExpected(const std::filesystem::path& path, std::string_view lines) {
+  constexpr double kMore = 1.02;
+  std::error_code unknown;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
+  const auto count = std::count(lines.begin(), lines.end(), '\n');
+  return unknown || count == 0 ? 0
+                               : static_cast<std::size_t>(kMore * static_cast<double>(bytes) *
+                                                          static_cast<double>(count) /
+                                                          static_cast<double>(lines.size()));
+}
+
 // Block by block; nothing if the file cannot be read, or is not as plain as that.
-std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path) {
+std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
+                                      std::span<const std::string> attributes) {
   constexpr std::size_t kBlock = 1 << 22;
   std::ifstream stream(path, std::ios::binary);
   std::string text(kBlock, '\0');
@@ -191,9 +286,12 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path) {
       if (begin == 0) {
         return std::nullopt;
       }
-      points.emplace(PointColumnsOf(all.substr(0, begin - 1), path.string()));
+      points.emplace(PointColumnsOf(all.substr(0, begin - 1), path.string(), attributes));
     }
     const std::size_t end = stream ? std::max(all.rfind('\n') + 1, begin) : all.size();
+    if (begin > 0) {
+      points->Reserve(PointsExpected(path, all.substr(begin, end - begin)));
+    }
     if (!points->Add(all.substr(begin, end - begin))) {
       return std::nullopt;
     }
@@ -208,8 +306,9 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path) {
 
 }  // namespace
 
-PointFile ReadPointFile(const std::filesystem::path& path) {
-  if (auto plain = IsCsv(path) ? ReadPlainCsv(path) : std::nullopt) {
+PointFile ReadPointFile(const std::filesystem::path& path,
+                        std::span<const std::string> attributes) {
+  if (auto plain = IsCsv(path) ? ReadPlainCsv(path, attributes) : std::nullopt) {
     return std::move(*plain);
   }
   const bool piped = path == "-", zipped = Lower(path.extension().string()) == ".gz";
@@ -219,7 +318,7 @@ PointFile ReadPointFile(const std::filesystem::path& path) {
   if (zipped) {
     bytes = Unzipped(bytes, path.string());
   }
-  file.points = Parse(bytes, zipped ? path.parent_path() / path.stem() : path);
+  file.points = Parse(bytes, zipped ? path.parent_path() / path.stem() : path, attributes);
   return file;
 }
 

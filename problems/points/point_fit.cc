@@ -5,22 +5,25 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
+#include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
 #include "problems/points/fit_page.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/residual_files.h"
+#include "problems/points/surface_ply.h"
 #include "problems/report/fit_json.h"
 #include "problems/report/timing_json.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
-#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
 namespace {
@@ -43,8 +46,9 @@ std::string ClosureFault(ParameterSource source, Closure closure) {
   if (source == ParameterSource::kCylinder && closure == Closure::kOpen) {
     return "parameters on a cylinder go round; write closure: periodic_u";
   }
-  if (source == ParameterSource::kPlane && closure == Closure::kPeriodicU) {
-    return "parameters on a plane do not go round; write closure: open";
+  if (closure == Closure::kPeriodicU &&
+      (source == ParameterSource::kPlane || source == ParameterSource::kMesh)) {
+    return fmt::format("parameters on a {} do not go round; write closure: open", NameOf(source));
   }
   return "";
 }
@@ -61,6 +65,8 @@ std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
              ? std::optional(ParameterSource::kPlane)
          : std::holds_alternative<CylinderParameters>(parameters)
              ? std::optional(ParameterSource::kCylinder)
+         : std::holds_alternative<MeshParameters>(parameters)
+             ? std::optional(ParameterSource::kMesh)
              : std::nullopt;
 }
 
@@ -70,6 +76,25 @@ Json VerticesJson(const HSplineSurface& surface) {
                {"by_level", Json::array({coarsest})}};
   for (int level = 1; level <= surface.shape().max_level; ++level) {
     json["by_level"].push_back(surface.Offsets(level).size());
+  }
+  return json;
+}
+
+// Of (u,v) that were not given.
+Json MapJson(const PointFit& result) {
+  return {{"how", result.how},
+          {"folded_share", result.map_faults.folded},
+          {"collapsed_share", result.map_faults.collapsed}};
+}
+
+Json AttributesJson(const PointFit& result) {
+  Json json = Json::array();
+  for (std::size_t k = 0; k < result.attributes.size(); ++k) {
+    const AttributeColumn& column = result.attribute_fit.columns[k];
+    json.push_back({{"name", result.attributes[k].name},
+                    {"rms", column.rms},
+                    {"weight", column.weight},
+                    {"degrees_of_freedom", column.degrees_of_freedom}});
   }
   return json;
 }
@@ -90,6 +115,15 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
                {"control_vertices", VerticesJson(result.fit.surface)},
                {"usable", result.Faults().empty()},
                {"faults", result.Faults()}};
+  if (!result.how.empty()) {
+    json["map"] = MapJson(result);
+  }
+  if (!result.attributes.empty()) {
+    json["attributes"] = AttributesJson(result);
+  }
+  if (std::isfinite(result.sigma_factor)) {
+    json["sigma_factor"] = result.sigma_factor;
+  }
   if (result.fit.automatic) {
     json["automatic"] = AutoJson(*result.fit.automatic);
   }
@@ -104,55 +138,24 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
   return json;
 }
 
-// Of the points' box.
-double DiagonalOf(std::span<const Vec3> positions) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : positions) {
-    box.extend(p);
-  }
-  return box.diagonal().norm();
-}
-
-// Before the fit: what could only be refused after it.
-void CheckChord(const AutoOr<double>& chord_mm, std::span<const Vec3> positions) {
-  constexpr double kFinest = 1e-7;
-  const double least = kFinest * DiagonalOf(positions);
-  if (!chord_mm.automatic && chord_mm.value < least) {
-    throw InputError(fmt::format(
-        "chord_mm: {} is too fine for points that extend over {:.3g} mm: surface.ply would have "
-        "too many triangles; give at least {:.2g}, or auto",
-        chord_mm.value, DiagonalOf(positions), least));
-  }
-}
-
-// `chord_mm`, or as much more as keeps the triangles within a million or so.
-double AffordableChord(const HSplineSurface& surface, double chord_mm) {
-  constexpr double kMostCells = 500'000;
-  while (std::isfinite(chord_mm) && CellsToChord(surface, chord_mm) > kMostCells) {
-    chord_mm *= 2;
-  }
-  return chord_mm;
-}
-
-double ExtentOf(const HSplineSurface& surface) { return DiagonalOf(surface.Net(0).vertices); }
-
-std::string SurfacePly(const HSplineSurface& surface, const AutoOr<double>& chord_mm, int threads) {
-  constexpr double kChords = 5000;
-  const double chord = chord_mm.automatic ? AffordableChord(surface, ExtentOf(surface) / kChords)
-                                          : static_cast<double>(chord_mm);
-  Tessellation tessellation = TessellateToChord(surface, chord, threads);
-  return EncodeMesh(tessellation.mesh, ".ply", {std::move(tessellation.normals), {}, {}});
-}
-
-void WriteResiduals(ResidualFile kind, const FitResult& fit, OutputFolder& folder) {
+void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& folder) {
   constexpr std::size_t kMostAsText = 100'000;
+  const ResidualColumns columns{result.fit, result.attributes, result.attribute_at};
   if (kind == ResidualFile::kAuto) {
-    kind = fit.residual_mm.size() <= kMostAsText ? ResidualFile::kCsv : ResidualFile::kPly;
+    kind = result.fit.residual_mm.size() <= kMostAsText ? ResidualFile::kCsv : ResidualFile::kPly;
   }
   if (kind == ResidualFile::kCsv) {
-    folder.Write("residuals.csv", ResidualsCsv(fit));
+    folder.Write("residuals.csv", ResidualsCsv(columns));
   } else if (kind == ResidualFile::kPly) {
-    folder.Write("residuals.ply", ResidualsPly(fit));
+    folder.Write("residuals.ply", ResidualsPly(columns));
+  }
+}
+
+// Three columns a file.
+void WriteAttributes(const PointFit& result, OutputFolder& folder) {
+  for (std::size_t k = 0; k < result.attribute_fit.surfaces.size(); ++k) {
+    folder.Write(fmt::format("attributes_{}.hspline.json", k + 1),
+                 HSplineToJson(result.attribute_fit.surfaces[k]));
   }
 }
 
@@ -167,6 +170,25 @@ std::string_view WhatIsMissing(const Term& term) {
          : std::holds_alternative<NonPenetrationTerm>(term) ? "bone"
          : std::holds_alternative<SpringTerm>(term)         ? "bone"
                                                             : "";
+}
+
+// Empty if they can be columns of their own.
+std::string AttributesFault(const std::vector<std::string>& names) {
+  static const std::set<std::string> kTaken = {
+      "x",       "y",  "z",  "u",  "v", "weight", "sigma", "residual_mm",
+      "outlier", "nx", "ny", "nz", "s", "t",      "point"};
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    if (kTaken.contains(name) || name.empty() ||
+        name.find_first_of(" \t,\"\n") != std::string::npos) {
+      return fmt::format("'{}' has a meaning of its own, or blanks in it; name another column",
+                         name);
+    }
+    if (!seen.insert(name).second) {
+      return fmt::format("'{}' stands twice; name it once", name);
+    }
+  }
+  return "";
 }
 
 // Whether there is a surface of so many patches; empty if there is.
@@ -188,6 +210,9 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
   }
   if (const std::string fault = ShapeFault(options); !fault.empty()) {
     faults.push_back({"patches_u", fault});
+  }
+  if (const std::string fault = AttributesFault(options.attributes); !fault.empty()) {
+    faults.push_back({"attributes", fault});
   }
   for (std::size_t k = 0; k < options.fit.terms.size(); ++k) {
     const Term& term = options.fit.terms[k];
@@ -212,35 +237,137 @@ std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const
              : std::optional(ToleranceOf(result.fit, adaptive->tolerance_mm, adaptive->finest));
 }
 
-PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
+namespace {
+
+// What a user should know beside the figures.
+std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit& result,
+                                 double chord_mm) {
+  std::vector<std::string> notes;
+  if (!result.how.empty()) {
+    notes.push_back(fmt::format("(u,v) by {}", result.how));
+  }
+  for (std::size_t k = 0; k < result.attributes.size(); ++k) {
+    notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,
+                                result.attribute_fit.columns[k].rms));
+  }
+  if (std::isfinite(result.sigma_factor)) {
+    notes.push_back(fmt::format("the points are off by {:.3g} times the sigma that was given",
+                                result.sigma_factor));
+  }
+  if (!options.chord_mm.automatic && chord_mm > options.chord_mm.value) {
+    notes.push_back(fmt::format(
+        "surface.ply is within {:.3g} mm of the surface, for {} mm would need too many triangles",
+        chord_mm, options.chord_mm.value));
+  }
+  return notes;
+}
+
+// In the order of the options; taken out of the table.
+std::vector<PointAttribute> AttributesAsked(PointTable& table, const PointFitOptions& options) {
+  std::vector<PointAttribute> asked;
+  for (const std::string& name : options.attributes) {
+    const auto found = std::find_if(table.attributes.begin(), table.attributes.end(),
+                                    [&](const PointAttribute& a) { return a.name == name; });
+    if (found == table.attributes.end()) {
+      throw InputError(fmt::format("attributes: the points have no '{}'; leave it out", name));
+    }
+    asked.push_back(std::move(*found));
+  }
+  return asked;
+}
+
+AttributeFit AttributesOver(const PointFit& result, std::span<const double> weights,
+                            const RunContext& context) {
+  std::vector<std::span<const double>> values;
+  for (const PointAttribute& attribute : result.attributes) {
+    values.emplace_back(attribute.values);
+  }
+  const std::vector<std::uint32_t> outliers =
+      result.fit.automatic ? result.fit.automatic->outliers : std::vector<std::uint32_t>();
+  return FitAttributes(result.fit.surface,
+                       {.uv = result.fit.uv, .weights = weights, .columns = values}, outliers,
+                       context.threads);
+}
+
+// The square root of the mean of 1 / sigma^2; NaN for points without sigma.
+double RootOfMeanWeight(const PointTable& table) {
+  double sum = 0;
+  for (const double weight : table.weights) {
+    sum += weight;
+  }
+  return table.weights_of_sigma ? std::sqrt(sum / static_cast<double>(table.weights.size())) : kNaN;
+}
+
+// What is not needed any more is freed on the way.
+Parametrisation ParametersOf(PointTable& table, const PointFitOptions& options) {
+  Parametrisation parameters = Parametrise({.positions = table.positions,
+                                            .given_uv = table.uv,
+                                            .triangles = table.triangles,
+                                            .closure = options.closure},
+                                           options.parameters);
+  table.uv = {};
+  table.triangles = {};
+  CheckClosure(parameters.source, options.closure);
+  return parameters;
+}
+
+FitResult FitOwned(const HSplineSurface& start, OwnedPoints points, const FitOptions& options,
                    const RunContext& context) {
+  if (!IsAlone(options)) {
+    return Fit(start, points.View(), options, context);
+  }
+  CheckFit(start, points.View(), options);
+  return FitAlone(start, std::move(points), std::get<AutoPlan>(options.plan), context);
+}
+
+}  // namespace
+
+PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
   CheckChord(options.chord_mm, table.positions);
+  std::vector<PointAttribute> attributes = AttributesAsked(table, options);
   StepClock step(context);
-  const Parametrisation parameters = step(
-      "parameters", [&] { return Parametrise(table.positions, options.parameters, table.uv); });
-  CheckClosure(parameters.source, options.closure);
+  Parametrisation parameters = step("parameters", [&] { return ParametersOf(table, options); });
   const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
-  PointFit result{.parameters = std::string(NameOf(parameters.source)),
-                  .fit = step("fit",
-                              [&] {
-                                return Fit(start, {table.positions, parameters.uv, table.weights},
-                                           options.fit, context);
-                              }),
-                  .times = {}};
+  CheckChord(options.chord_mm, start, {table.positions, parameters.uv}, context);
+  const double root_weight = RootOfMeanWeight(table);
+  const std::vector<double> weights = attributes.empty() ? std::vector<double>() : table.weights;
+  OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
+                     std::move(table.weights)};
+  PointFit result{
+      .parameters = std::string(NameOf(parameters.source)),
+      .how = std::move(parameters.how),
+      .map_faults = parameters.faults,
+      .fit = step("fit", [&] { return FitOwned(start, std::move(points), options.fit, context); }),
+      .attributes = std::move(attributes),
+      .attribute_at = {},
+      .attribute_fit = {},
+      .times = {}};
+  result.sigma_factor = result.fit.automatic ? result.fit.automatic->noise_mm * root_weight : kNaN;
+  if (!result.Faults().empty()) {
+    result.attributes.clear();
+  }
+  if (!result.attributes.empty()) {
+    result.attribute_fit =
+        step("attributes", [&] { return AttributesOver(result, weights, context); });
+    result.attribute_at = result.attribute_fit.At(result.fit.uv, context.threads);
+  }
   result.times = step.Take();
   return result;
 }
 
-void WritePointFit(const PointFitOptions& options, const PointSource& source,
-                   const PointFit& result, OutputFolder& folder, const RunContext& context) {
+std::vector<std::string> WritePointFit(const PointFitOptions& options, const PointSource& source,
+                                       const PointFit& result, OutputFolder& folder,
+                                       const RunContext& context) {
   context.Report("write");
   // First what can still be refused.
-  const std::string mesh = SurfacePly(result.fit.surface, options.chord_mm, context.threads);
+  const double chord_mm = ChordFor(result.fit.surface, options.chord_mm);
+  const std::string mesh = SurfacePly(result, chord_mm, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
   folder.Write("surface.ply", mesh);
-  WriteResiduals(options.residuals, result.fit, folder);
+  WriteResiduals(options.residuals, result, folder);
+  WriteAttributes(result, folder);
   if (options.report && result.Faults().empty()) {
     folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
   }
@@ -249,6 +376,7 @@ void WritePointFit(const PointFitOptions& options, const PointSource& source,
       "result.json",
       ResultJsonOf(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
           "\n");
+  return NotesOf(options, result, chord_mm);
 }
 
 }  // namespace semblance

@@ -11,6 +11,7 @@
 #include "fitting/fit.h"
 #include "fitting/plan/fit_faults.h"
 #include "fitting/problem/parametrise.h"
+#include "fitting/solve/attribute_fit.h"
 #include "problems/config/config_errors.h"
 #include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
@@ -32,6 +33,7 @@ struct PointFitOptions {
   int patches_v = 8;
   Closure closure = Closure::kOpen;
   Parameters parameters;
+  std::vector<std::string> attributes = {};
   FitOptions fit = {
       .plan = AutoPlan{},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
@@ -52,6 +54,10 @@ void Fields(Visitor& visit, PointFitOptions& o) {
         o.patches_v);
   visit(FieldInfo{.name = "closure", .doc = "periodic_u for surfaces that go round"}, o.closure);
   visit(FieldInfo{.name = "parameters", .doc = "where the points' (u,v) come from"}, o.parameters);
+  visit(FieldInfo{.name = "attributes",
+                  .doc = "further columns of the points (properties of a PLY) that are fitted over "
+                         "the surface, such as [intensity] or [red, green, blue]"},
+        o.attributes);
   visit(FieldInfo{.name = "fit", .doc = "the fit; its finest level is the surface's"}, o.fit);
   visit(
       FieldInfo{.name = "chord_mm",
@@ -77,8 +83,15 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
-  std::string parameters;  // given, plane or cylinder
+  std::string parameters;  // given, plane, cylinder or mesh
+  std::string how;         // which of them, in words; empty of given ones
+  MapFaults map_faults;    // of what was chosen
   FitResult fit;
+  std::vector<PointAttribute> attributes;         // as given
+  std::vector<std::vector<double>> attribute_at;  // fitted, at the points
+  AttributeFit attribute_fit;
+  double sigma_factor = kNaN;  // how many times the sigma that were given the points are off;
+                               // NaN where none were, or by another plan than `auto`
   std::vector<StepTime> times;
 
   // Why the result cannot be used; empty if it can.
@@ -88,19 +101,21 @@ struct PointFit {
 // Of an adaptive fit: whether every point is within its tolerance (fit_maps.h).
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
-// Throws InputError as Parametrise, StartSurface and Fit do, for a closure that does not suit the
-// parameters (a cylinder is periodic, a plane is not), and for a chord so fine against the points'
-// extent that no surface could be written with it.
-PointFit FitPoints(const PointTable& table, const PointFitOptions& options,
-                   const RunContext& context);
+// Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a closure that does
+// not suit the parameters (a cylinder is periodic, a plane and a mesh are not), for attributes that
+// the table has not, and for a chord so fine that a coarse fit of some of the points has already
+// shown surface.ply to be too large.
+PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
-// surface.hspline.json, surface.ply, report.html and timing.json; the same bytes for the same
-// input, timing.json apart. source: what the points came from.
+// surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (three attributes each),
+// report.html and timing.json; the same bytes for the same input, timing.json apart. source: what
+// the points came from. Returns lines that a user should be told.
 struct PointSource {
   std::string name, sha256;
 };
-void WritePointFit(const PointFitOptions& options, const PointSource& source,
-                   const PointFit& result, OutputFolder& folder, const RunContext& context);
+std::vector<std::string> WritePointFit(const PointFitOptions& options, const PointSource& source,
+                                       const PointFit& result, OutputFolder& folder,
+                                       const RunContext& context);
 
 }  // namespace semblance

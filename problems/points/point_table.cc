@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -16,46 +17,73 @@
 namespace semblance {
 namespace {
 
-constexpr std::array<std::string_view, kPointColumns> kNames = {"x", "y", "z", "u", "v", "weight"};
+constexpr std::array<std::string_view, kPointColumns> kNames = {"x", "y",      "z",    "u",
+                                                                "v", "weight", "sigma"};
 
-// Of the file, by kNames.
-using ColumnPlaces = std::array<std::optional<std::size_t>, kPointColumns>;
+// Of the file, by PointColumn and then by attribute.
+using ColumnPlaces = std::vector<std::optional<std::size_t>>;
 
 // In `places` or not.
 const std::optional<std::size_t>& PlaceOf(const ColumnPlaces& places, PointColumn column) {
   return places[static_cast<std::size_t>(column)];
 }
 
-ColumnPlaces PlacesIn(const CsvReader& csv) {
+void CheckPairs(const CsvReader& csv, const ColumnPlaces& places) {
+  const bool u = PlaceOf(places, PointColumn::kU).has_value();
+  if (u != PlaceOf(places, PointColumn::kV).has_value()) {
+    csv.Fail(fmt::format("the column '{}' stands alone; give u and v, or neither", u ? "u" : "v"));
+  }
+  if (PlaceOf(places, PointColumn::kWeight) && PlaceOf(places, PointColumn::kSigma)) {
+    csv.Fail("there are the columns 'weight' and 'sigma'; give one of them");
+  }
+}
+
+// What is neither a coordinate nor asked for.
+void CheckNames(const CsvReader& csv, std::span<const std::string> attributes) {
   for (const std::string& column : csv.Columns()) {
-    if (std::find(kNames.begin(), kNames.end(), column) == kNames.end()) {
+    if (std::find(kNames.begin(), kNames.end(), column) == kNames.end() &&
+        std::find(attributes.begin(), attributes.end(), column) == attributes.end()) {
       csv.Fail(
           fmt::format("'{}' is no column; the first line names the columns, which are x, y, z "
-                      "and, if wanted, u, v, weight",
+                      "and, if wanted, u, v, weight or sigma, and what the option `attributes` "
+                      "names",
                       column));
     }
   }
+}
+
+ColumnPlaces PlacesIn(const CsvReader& csv, std::span<const std::string> attributes) {
+  CheckNames(csv, attributes);
   ColumnPlaces places;
-  for (std::size_t k = 0; k < kNames.size(); ++k) {
-    places[k] = csv.Find(kNames[k]);
+  for (const std::string_view name : kNames) {
+    places.push_back(csv.Find(name));
   }
   for (const std::size_t k : {0, 1, 2}) {
     if (!places[k]) {
       csv.Fail(fmt::format("there is no column '{}'; x, y and z are needed", kNames[k]));
     }
   }
-  const bool u = PlaceOf(places, PointColumn::kU).has_value();
-  if (u != PlaceOf(places, PointColumn::kV).has_value()) {
-    csv.Fail(fmt::format("the column '{}' stands alone; give u and v, or neither", u ? "u" : "v"));
+  for (const std::string& attribute : attributes) {
+    places.push_back(csv.Find(attribute));
+    if (!places.back()) {
+      csv.Fail(
+          fmt::format("there is no column '{}', which the option `attributes` names", attribute));
+    }
   }
+  CheckPairs(csv, places);
   return places;
 }
 
 // Any table that may be, line by line.
 class PointReader {
  public:
-  PointReader(std::string_view text, std::string_view name)
-      : csv_(text, name), places_(PlacesIn(csv_)) {}
+  PointReader(std::string_view text, std::string_view name, std::span<const std::string> attributes)
+      : csv_(text, name), places_(PlacesIn(csv_, attributes)) {
+    for (const std::string& attribute : attributes) {
+      table_.attributes.push_back({attribute, {}});
+    }
+    table_.weights_of_sigma = PlaceOf(places_, PointColumn::kSigma).has_value();
+  }
 
   PointTable Read() {
     while (csv_.NextRow()) {
@@ -75,13 +103,25 @@ class PointReader {
     if (PlaceOf(places_, PointColumn::kU)) {
       table_.uv.emplace_back(number(PointColumn::kU), number(PointColumn::kV));
     }
-    if (PlaceOf(places_, PointColumn::kWeight)) {
-      const double weight = number(PointColumn::kWeight);
-      if (!(weight > 0)) {
-        csv_.Fail(fmt::format("the weight is {}; it must be positive", weight));
+    for (const PointColumn column : {PointColumn::kWeight, PointColumn::kSigma}) {
+      if (PlaceOf(places_, column)) {
+        table_.weights.push_back(WeightOf(column));
       }
-      table_.weights.push_back(weight);
     }
+    for (std::size_t k = 0; k < table_.attributes.size(); ++k) {
+      table_.attributes[k].values.push_back(csv_.Number(*places_[kPointColumns + k]));
+    }
+  }
+
+  double WeightOf(PointColumn column) const {
+    const double number = csv_.Number(*PlaceOf(places_, column));
+    const double weight = column == PointColumn::kWeight ? number : 1 / (number * number);
+    if (!(number > 0) || !std::isfinite(weight)) {
+      csv_.Fail(fmt::format("the {} is {}; it must be positive{}",
+                            kNames[static_cast<std::size_t>(column)], number,
+                            number > 0 ? ", and 1 / sigma^2 a finite number" : ""));
+    }
+    return weight;
   }
 
   CsvReader csv_;
@@ -91,23 +131,30 @@ class PointReader {
 
 }  // namespace
 
-std::vector<PointColumn> PointColumnsOf(std::string_view first_line, std::string_view name) {
+bool PointColumns::Has(PointColumn wanted) const {
+  return std::find(kinds.begin(), kinds.end(), static_cast<std::size_t>(wanted)) != kinds.end();
+}
+
+PointColumns PointColumnsOf(std::string_view first_line, std::string_view name,
+                            std::span<const std::string> attributes) {
   const CsvReader csv(first_line, name);
-  const ColumnPlaces places = PlacesIn(csv);
-  std::vector<PointColumn> columns(csv.Columns().size());
+  const ColumnPlaces places = PlacesIn(csv, attributes);
+  PointColumns columns{.kinds = std::vector<std::size_t>(csv.Columns().size()),
+                       .attributes = {attributes.begin(), attributes.end()}};
   for (std::size_t k = 0; k < places.size(); ++k) {
     if (places[k]) {
-      columns[*places[k]] = static_cast<PointColumn>(k);
+      columns.kinds[*places[k]] = k;
     }
   }
   return columns;
 }
 
-PointTable ParsePointTable(std::string_view text, std::string_view name) {
+PointTable ParsePointTable(std::string_view text, std::string_view name,
+                           std::span<const std::string> attributes) {
   const std::size_t end = std::min(text.find('\n'), text.size());
-  PlainPoints plain(PointColumnsOf(text.substr(0, end), name));
+  PlainPoints plain(PointColumnsOf(text.substr(0, end), name, attributes));
   const bool is_plain = end < text.size() && plain.Add(text.substr(end + 1)) && plain.size() > 0;
-  return is_plain ? plain.Take() : PointReader(text, name).Read();
+  return is_plain ? plain.Take() : PointReader(text, name, attributes).Read();
 }
 
 }  // namespace semblance

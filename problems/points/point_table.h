@@ -1,31 +1,56 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scattered points in a CSV file.
+// Scattered points, and how they stand in a CSV file.
 #pragma once
 
 #include <cstddef>
+#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 
-struct PointTable {
-  std::vector<Vec3> positions;  // mm
-  std::vector<Vec2> uv;         // one per point, or none
-  std::vector<double> weights;  // > 0; one per point, or none
+// A further number of each point, which is fitted too.
+struct PointAttribute {
+  std::string name;
+  std::vector<double> values;  // one per point
 };
 
-enum class PointColumn { kX, kY, kZ, kU, kV, kWeight };
-constexpr std::size_t kPointColumns = 6;
-// What the columns of a table are, by its first line. Throws as ParsePointTable.
-std::vector<PointColumn> PointColumnsOf(std::string_view first_line, std::string_view name);
+struct PointTable {
+  std::vector<Vec3> positions;             // mm
+  std::vector<Vec2> uv;                    // one per point, or none
+  std::vector<double> weights;             // > 0; one per point, or none
+  bool weights_of_sigma = false;           // they are 1 / sigma^2
+  std::vector<PointAttribute> attributes;  // those that were asked for, in that order
+  std::vector<Triangle> triangles;         // between the points, where the file has faces
+};
 
-// The first line names the columns, in any order: x, y and z, and, if wanted, u and v together and
-// weight. Each further line has one decimal number per column, separated by commas. Nothing else is
-// let pass: `name:line: what` as IoError for another column or one twice, a line with more or fewer
-// entries, an empty line before the end, what is not a finite number, a weight that is not
-// positive, or no point at all.
-PointTable ParsePointTable(std::string_view text, std::string_view name);
+enum class PointColumn { kX, kY, kZ, kU, kV, kWeight, kSigma };
+constexpr std::size_t kPointColumns = 7;
+
+// What the columns of a table are: of each its PointColumn, or kPointColumns + the index of an
+// attribute.
+struct PointColumns {
+  std::vector<std::size_t> kinds;
+  std::vector<std::string> attributes;
+
+  std::size_t Kinds() const { return kPointColumns + attributes.size(); }
+  bool Has(PointColumn wanted) const;
+};
+// By the table's first line. Throws as ParsePointTable.
+PointColumns PointColumnsOf(std::string_view first_line, std::string_view name,
+                            std::span<const std::string> attributes = {});
+
+// The first line names the columns, in any order: x, y and z, and, if wanted, u and v together,
+// weight or sigma (the standard deviation of a point's coordinates: the weight is 1 / sigma^2), and
+// the attributes. Each further line has one decimal number per column, separated by commas. Nothing
+// else is let pass: `name:line: what` as IoError for another column or one twice, an attribute that
+// is no column, a line with more or fewer entries, an empty line before the end, what is not a
+// finite number, a weight or sigma that is not positive, or no point at all.
+PointTable ParsePointTable(std::string_view text, std::string_view name,
+                           std::span<const std::string> attributes = {});
 
 }  // namespace semblance

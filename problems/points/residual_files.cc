@@ -33,32 +33,51 @@ void AppendFloat(double value, std::string& bytes) {
 
 }  // namespace
 
-std::string ResidualsCsv(const FitResult& fit) {
+std::string ResidualsCsv(const ResidualColumns& columns) {
+  const FitResult& fit = columns.fit;
   const std::vector<char> outlier = OutliersOf(fit);
-  std::string csv = outlier.empty() ? "point,u,v,residual_mm\n" : "point,u,v,residual_mm,outlier\n";
-  csv.reserve(fit.uv.size() * 64);
+  std::string csv = outlier.empty() ? "point,u,v,residual_mm" : "point,u,v,residual_mm,outlier";
+  for (const PointAttribute& attribute : columns.attributes) {
+    csv += fmt::format(",{0},{0}_residual", attribute.name);
+  }
+  csv += '\n';
+  csv.reserve(fit.uv.size() * (64 + 40 * columns.attributes.size()));
   const auto out = std::back_inserter(csv);
   for (std::size_t k = 0; k < fit.uv.size(); ++k) {
     fmt::format_to(out, FMT_COMPILE("{},{},{},{}"), k, fit.uv[k].x(), fit.uv[k].y(),
                    fit.residual_mm[k]);
-    csv += outlier.empty() ? "\n" : outlier[k] != 0 ? ",1\n" : ",0\n";
+    csv += outlier.empty() ? "" : outlier[k] != 0 ? ",1" : ",0";
+    for (std::size_t c = 0; c < columns.attributes.size(); ++c) {
+      fmt::format_to(out, FMT_COMPILE(",{},{}"), columns.fitted[c][k],
+                     columns.attributes[c].values[k] - columns.fitted[c][k]);
+    }
+    csv += '\n';
   }
   return csv;
 }
 
-std::string ResidualsPly(const FitResult& fit) {
+std::string ResidualsPly(const ResidualColumns& columns) {
+  const FitResult& fit = columns.fit;
   const std::vector<char> outlier = OutliersOf(fit);
   std::string bytes = fmt::format(
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float "
-      "y\nproperty float z\nproperty float residual_mm\nproperty float outlier\nend_header\n",
+      "y\nproperty float z\nproperty float residual_mm\nproperty float outlier\n",
       fit.uv.size());
-  bytes.reserve(bytes.size() + fit.uv.size() * 20);
+  for (const PointAttribute& attribute : columns.attributes) {
+    bytes += fmt::format("property float {0}\nproperty float {0}_residual\n", attribute.name);
+  }
+  bytes += "end_header\n";
+  bytes.reserve(bytes.size() + fit.uv.size() * (20 + 8 * columns.attributes.size()));
   for (std::size_t k = 0; k < fit.uv.size(); ++k) {
     AppendFloat(fit.uv[k].x(), bytes);
     AppendFloat(fit.uv[k].y(), bytes);
     AppendFloat(0, bytes);
     AppendFloat(fit.residual_mm[k], bytes);
     AppendFloat(outlier.empty() ? 0 : outlier[k], bytes);
+    for (std::size_t c = 0; c < columns.attributes.size(); ++c) {
+      AppendFloat(columns.fitted[c][k], bytes);
+      AppendFloat(columns.attributes[c].values[k] - columns.fitted[c][k], bytes);
+    }
   }
   return bytes;
 }

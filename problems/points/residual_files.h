@@ -3,16 +3,26 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "fitting/plan/fit_result.h"
+#include "problems/points/point_table.h"
 
 namespace semblance {
 
-// A line per point, in the order of the table: its number, (u,v), distance, and, of an automatic
-// fit, 1 for an outlier.
-std::string ResidualsCsv(const FitResult& fit);
+// All must outlive it.
+struct ResidualColumns {
+  const FitResult& fit;
+  const std::vector<PointAttribute>& attributes;   // as given
+  const std::vector<std::vector<double>>& fitted;  // each of them, at the points
+};
 
-// The same as binary PLY: vertices at (u, v, 0) with the scalars residual_mm and outlier, floats.
-std::string ResidualsPly(const FitResult& fit);
+// A line per point, in the order of the table: its number, (u,v), distance, of an automatic fit 1
+// for an outlier, and of each attribute the fitted value and what the given one is more.
+std::string ResidualsCsv(const ResidualColumns& columns);
+
+// The same as binary PLY: vertices at (u, v, 0) with the scalars residual_mm, outlier, NAME and
+// NAME_residual, floats.
+std::string ResidualsPly(const ResidualColumns& columns);
 
 }  // namespace semblance

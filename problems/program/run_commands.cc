@@ -141,21 +141,25 @@ PointFitOptions FitOptionsOf(const Arguments& arguments) {
 int FitCommand(const Arguments& arguments) {
   const std::filesystem::path path = arguments.files.at(0);
   const PointFitOptions options = FitOptionsOf(arguments);
-  const PointFile file = ReadPointFile(path);
+  PointFile file = ReadPointFile(path, options.attributes);
   const std::string name = path == "-" ? "standard input" : path.filename().string();
   StagedFolder folder = MakeFolder(
       arguments, fmt::format("out/{}", path == "-" ? "points" : name.substr(0, name.find('.', 1))));
   const RunContext context = MakeContext(arguments);
-  const PointFit result = FitPoints(file.points, options, context);
-  WritePointFit(options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
+  const PointFit result = FitPoints(std::move(file.points), options, context);
+  const std::vector<std::string> notes = WritePointFit(
+      options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
   folder.Publish();
   fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
-             file.points.positions.size(), result.parameters,
+             result.fit.residual_mm.size(), result.parameters,
              result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
              result.fit.point_rms_mm,
              *std::max_element(result.fit.residual_mm.begin(), result.fit.residual_mm.end()));
   if (result.fit.automatic) {
     fmt::print("{}", AutoText(*result.fit.automatic));
+  }
+  for (const std::string& note : notes) {
+    fmt::print("{}\n", note);
   }
   if (const auto tolerance = ToleranceOf(options, result)) {
     fmt::print("{}\n", ToleranceText(*tolerance));
@@ -447,8 +451,9 @@ void DeclareFit(CLI::App& command, CommandLine& line) {
   command
       .add_option(
           "POINTS CONFIG", a.files,
-          "points: .csv with the columns x,y,z and, if known, u,v, weight; .xyz .npy .ply .obj; "
-          "each also .gz; - for a CSV on standard input. YAML file of the fit; without it all "
+          "points: .csv with the columns x,y,z and, if known, u,v, weight or sigma; .xyz .npy .ply "
+          ".obj .stl .off; each also .gz; - for a CSV on standard input. YAML file of the fit; "
+          "without it all "
           "follows from the points")
       ->required()
       ->expected(1, 2);

@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <optional>
+#include <utility>
 
 #include "problems/config/config.h"
 #include "problems/points/point_fit.h"
@@ -16,7 +17,8 @@ namespace py = pybind11;
 
 PointTable TableOf(const Doubles& points, const std::optional<Doubles>& uv,
                    const std::optional<Doubles>& weights) {
-  PointTable table{.positions = Points3(points, "points"), .uv = {}, .weights = {}};
+  PointTable table;
+  table.positions = Points3(points, "points");
   if (uv) {
     table.uv = Points2(*uv, "uv");
   }
@@ -34,12 +36,12 @@ PointTable TableOf(const Doubles& points, const std::optional<Doubles>& uv,
 
 PointFit FitArrays(const Doubles& points, const std::optional<Doubles>& uv,
                    const std::optional<Doubles>& weights, int threads, const py::kwargs& options) {
-  const PointTable table = TableOf(points, uv, weights);
+  PointTable table = TableOf(points, uv, weights);
   const auto chosen = ReadConfigText<PointFitOptions>(OptionText(options), "fit(...)");
   RunContext context;
   context.threads = threads;
   const py::gil_scoped_release release;
-  return FitPoints(table, chosen, context);
+  return FitPoints(std::move(table), chosen, context);
 }
 
 std::string FitDocumentation() {

@@ -16,7 +16,6 @@
 namespace semblance {
 namespace {
 
-constexpr double kMostCells = 1e7;
 constexpr int kDeepest = 16;  // below level 0; halves of its cells are the lattice of the vertices
 
 using Cell = PatchId;  // of any depth, deeper than the finest level too

@@ -6,6 +6,9 @@
 
 namespace semblance {
 
+// The cells that TessellateToChord makes at most.
+inline constexpr double kMostCells = 1e7;
+
 // No point of a triangle is further than chord_mm (> 0) from the surface's point of the same (u,v):
 // guaranteed, by a bound of the second derivatives (Filip et al. 1986). A quadtree of the domain,
 // whose neighbours differ by one level at most and share all their vertices: watertight, also

@@ -7,8 +7,11 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <utility>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
+#include "tests/testing/grid_mesh.h"
 #include "tests/testing/scattered_data.h"
 
 namespace semblance {
@@ -67,6 +70,126 @@ TEST(Parametrise, ACylinderFindsItsAxis) {
   }
 }
 
+// Of count points of the sphere, and of a tube that is closed at its ends by flat lids.
+std::vector<Vec3> OnSphere(int count) {
+  Random random(3);
+  std::vector<Vec3> points;
+  for (int k = 0; k < count; ++k) {
+    points.push_back(40 * Vec3(random.Normal(), random.Normal(), random.Normal()).normalized());
+  }
+  return points;
+}
+
+std::vector<Vec3> Tin(int count) {
+  Random random(3);
+  std::vector<Vec3> points;
+  for (int k = 0; k < count; ++k) {
+    const double turn = 2 * std::numbers::pi * random.Uniform(), place = random.Uniform();
+    const double r = k % 3 == 0 ? 30 * std::sqrt(place) : 30,
+                 z = k % 3 == 0 ? 60.0 * (k % 2) : 60 * place;
+    points.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
+  }
+  return points;
+}
+
+std::string WordsOf(const Scan& scan, const Parameters& parameters) {
+  try {
+    Parametrise(scan, parameters);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+// Steep heights spread most upwards: the plane of least squares folds them, that across z does not.
+TEST(Parametrise, AFoldedPlaneIsLeftForAnAxis) {
+  std::vector<Vec3> points = FrankePoints(4000);
+  for (Vec3& p : points) {
+    p.z() *= 5;
+  }
+  const Parametrisation p = Parametrise(points);
+  EXPECT_EQ(p.how, "the plane across z");
+  EXPECT_LT(p.faults.Sum(), 0.003);
+  for (std::size_t k = 0; k < p.uv.size(); ++k) {
+    EXPECT_NEAR(p.uv[k].x(), points[k].x(), 2e-3);
+  }
+}
+
+TEST(Parametrise, WhatFoldsOverEveryPlaneIsRefusedUnlessAccepted) {
+  const std::vector<Vec3> sphere = OnSphere(3000);
+  for (const Parameters& parameters : {Parameters(AutoParameters{}), Parameters(PlaneParameters{}),
+                                       Parameters(PlaneParameters{.normal = {1, 2, 3}})}) {
+    const std::string words = WordsOf({.positions = sphere}, parameters);
+    EXPECT_THAT(words, HasSubstr("fold over"));
+    EXPECT_THAT(words, HasSubstr("parameters: mesh"));
+  }
+  const Parametrisation accepted = Parametrise(sphere, PlaneParameters{.folds = FoldRule::kAccept});
+  EXPECT_GT(accepted.faults.folded, 0.3);
+}
+
+// Around its own axis the lids of a tin collapse; around another it can be gone round.
+TEST(Parametrise, ACylinderOnWhichLidsCollapseIsRefusedOrLeft) {
+  const std::vector<Vec3> tin = Tin(20000);
+  const CylinderParameters upright{.axis = {0, 0, 1}};
+  EXPECT_THAT(WordsOf({.positions = tin}, upright), HasSubstr("close at its ends"));
+  const Parametrisation other = Parametrise(Scan{.positions = tin, .closure = Closure::kPeriodicU});
+  EXPECT_EQ(other.source, ParameterSource::kCylinder);
+  EXPECT_LT(other.faults.Sum(), 0.02);
+  EXPECT_GT(Parametrise(tin, CylinderParameters{.axis = {0, 0, 1}, .folds = FoldRule::kAccept})
+                .faults.collapsed,
+            0.1);
+}
+
+TEST(Parametrise, OfAClosedSurfaceAutoIsTheCylinder) {
+  std::vector<Vec3> points;
+  for (int k = 0; k < 400; ++k) {
+    points.push_back(OnCylinder(k, Mat3::Identity()));
+  }
+  const Parametrisation p = Parametrise(Scan{.positions = points, .closure = Closure::kPeriodicU});
+  EXPECT_EQ(p.source, ParameterSource::kCylinder);
+}
+
+// Two thirds of a sphere, as a scan: it folds over every plane, and its triangles are laid out. The
+// surface's normal looks as theirs do, whichever way that is.
+TEST(Parametrise, TrianglesThatFoldAreLaidOut) {
+  const auto bowl = [](const Vec2& uv) -> Vec3 {
+    const Vec2 q = 2 * uv - Vec2(1, 1);
+    const double t = 2 * q.cwiseAbs().maxCoeff(), p = std::atan2(q.y(), q.x());
+    return 50 * Vec3(std::sin(t) * std::cos(p), std::sin(t) * std::sin(p), std::cos(t));
+  };
+  TriMesh mesh = testing::GridMesh(bowl, 40);
+  for (const bool inward : {false, true}) {
+    for (Triangle& t : mesh.triangles) {
+      if (inward) {
+        std::swap(t[1], t[2]);
+      }
+    }
+    const Parametrisation p =
+        Parametrise(Scan{.positions = mesh.points, .triangles = mesh.triangles});
+    EXPECT_EQ(p.source, ParameterSource::kMesh);
+    const MapFaults faults = FaultsOfTriangles({mesh.points, p.uv}, mesh.triangles);
+    EXPECT_EQ(faults.folded, 0);
+    EXPECT_FALSE(faults.mirrored);
+  }
+}
+
+// Heights that a plane serves stay on the plane, looking as the triangles do.
+TEST(Parametrise, APlaneLooksAsTheTrianglesDo) {
+  TriMesh mesh = testing::GridMesh(
+      [](const Vec2& uv) { return Vec3(9 * uv.x(), 4 * uv.y(), std::sin(2 * uv.x())); }, 20);
+  for (const bool inward : {false, true}) {
+    for (Triangle& t : mesh.triangles) {
+      if (inward) {
+        std::swap(t[1], t[2]);
+      }
+    }
+    const Parametrisation p =
+        Parametrise(Scan{.positions = mesh.points, .triangles = mesh.triangles});
+    EXPECT_EQ(p.source, ParameterSource::kPlane);
+    EXPECT_FALSE(FaultsOfTriangles({mesh.points, p.uv}, mesh.triangles).mirrored);
+  }
+}
+
 TEST(Parametrise, TheRangeOfGivenParametersIsMapped) {
   const std::vector<Vec3> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<Vec2> uv = {{0, 0}, {9, 0}, {4.5, 9}};
@@ -102,6 +225,10 @@ TEST(Parametrise, WrongInputIsNamed) {
     slanted.push_back(k * Vec3(1, 2, 3));
   }
   EXPECT_THAT(message(slanted, AutoParameters{}, {}), HasSubstr("lie on a line"));
+  EXPECT_THAT(message(points, MeshParameters{}, {}), HasSubstr("needs triangles"));
+  const std::vector<Triangle> triangles = {{0, 1, 3}};
+  EXPECT_THAT(WordsOf({.positions = points, .triangles = triangles}, MeshParameters{}),
+              HasSubstr("has the corner 3"));
 }
 
 }  // namespace

@@ -14,6 +14,8 @@
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh_files/mesh_io.h"
+#include "surfaces/mesh_files/read_ply.h"
+#include "tests/testing/grid_mesh.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
@@ -147,6 +149,74 @@ TEST_F(PointFitCommand, ALargeTableIsReadAsASmallOne) {
   expect_same("blank.csv");
 }
 
+// Triangles in whatever file they stand; without them the same points are refused.
+TEST_F(PointFitCommand, AScanThatFoldsNeedsItsTriangles) {
+  const auto bowl = [](const Vec2& uv) -> Vec3 {
+    const Vec2 q = 2 * uv - Vec2(1, 1);
+    const double t = 2 * q.cwiseAbs().maxCoeff(), p = std::atan2(q.y(), q.x());
+    return 50 * Vec3(std::sin(t) * std::cos(p), std::sin(t) * std::sin(p), std::cos(t));
+  };
+  const TriMesh mesh = testing::GridMesh(bowl, 40);
+  for (const char* ending : {".ply", ".obj", ".stl", ".off"}) {
+    Write(std::string("bowl") + ending, EncodeMesh(mesh, ending));
+    const PointFile file = ReadPointFile(folder_ / (std::string("bowl") + ending));
+    EXPECT_EQ(file.points.triangles.size(), mesh.triangles.size()) << ending;
+    EXPECT_EQ(file.points.positions.size(), mesh.points.size()) << ending;
+  }
+  const auto outcome = Call("fit bowl.ply --out out --quiet");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("(u,v) by the mesh laid out by"));
+  const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "out/result.json"));
+  EXPECT_EQ(json["parameters"], "mesh");
+  EXPECT_EQ(json["map"]["folded_share"], 0);
+  EXPECT_LT(json["rms_mm"], 0.05);  // of a ball of 100 mm
+  std::string csv = "x,y,z\n";
+  for (const Vec3& p : mesh.points) {
+    csv += fmt::format("{},{},{}\n", p.x(), p.y(), p.z());
+  }
+  Write("bowl.csv", csv);
+  const auto refused = Call("fit bowl.csv --out none --quiet");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("fold over every plane"));
+}
+
+// Colours and heat over the surface, each point surer or less sure; out in every file of points.
+TEST_F(PointFitCommand, FurtherColumnsAreFittedOverTheSurface) {
+  Random random(1);
+  std::string csv = "x,y,z,u,v,sigma,red,green,blue,heat\n";
+  for (const FitPoint& p : Scattered(FrankePoint, 4000, 0, 1).points) {
+    const double sigma = p.uv.x() < 0.5 ? 1e-3 : 4e-3;
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", p.position.x(), p.position.y(),
+                       p.position.z() + sigma * random.Normal(), p.uv.x(), p.uv.y(), sigma,
+                       255 * p.uv.x(), 255 * p.uv.y(), 0, 300 + 5 * p.uv.x() + random.Normal());
+  }
+  Write("colours.csv", csv);
+  const std::string names = " --set attributes=[red,green,blue,heat]";
+  const auto outcome = Call("fit colours.csv --out out --quiet" + names);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "out/result.json"));
+  EXPECT_NEAR(json["sigma_factor"], 1, 0.1);
+  EXPECT_NEAR(json["attributes"][3]["rms"], 1, 0.1);
+  EXPECT_LT(json["attributes"][0]["rms"], 0.01);
+  const std::string residuals = ReadFileBytes(folder_ / "out/residuals.csv");
+  EXPECT_THAT(residuals, HasSubstr("outlier,red,red_residual,green,green_residual"));
+  const std::string ply = ReadFileBytes(folder_ / "out/surface.ply");
+  const MeshAttributes carried = ReadPlyAttributes(ply, "surface.ply");
+  ASSERT_EQ(carried.scalars.size(), 1u);
+  EXPECT_EQ(carried.scalars[0].name, "heat");
+  const TriMesh mesh = ReadPly(ply, "surface.ply");
+  for (std::size_t k = 0; k < mesh.points.size(); k += 101) {
+    EXPECT_NEAR(carried.scalars[0].values[k], 300 + 5 * mesh.points[k].x(), 0.5);
+    EXPECT_NEAR(carried.colors[k][0], 255 * mesh.points[k].x(), 1);
+  }
+  EXPECT_EQ(ReadHSpline(folder_ / "out/attributes_2.hspline.json").shape().reference,
+            OffsetReference::kWorld);
+  EXPECT_THAT(Call("fit colours.csv --out none --quiet --set attributes=[red]").err,
+              HasSubstr("'green' is no column"));
+  EXPECT_THAT(Call("fit colours.csv --out none --quiet --set attributes=[x]").err,
+              HasSubstr("attributes: 'x' has a meaning of its own"));
+}
+
 TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
   Write("bad.csv", "x,y,z\n0,0,zero\n");
@@ -164,6 +234,8 @@ TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   refused("none.csv plain.yaml", "none.csv");
   refused("line.csv plain.yaml", "lie on a line");
   refused("good.csv --set chord_mm=1e-9", "chord_mm: 1e-09 is too fine");
+  Write("franke.csv", Csv(Scattered(FrankePoint, 2000, 1e-3, 1), /*with_uv=*/true));
+  refused("franke.csv --set chord_mm=1e-6", "chord_mm: 1e-06 is too fine for these points");
   refused("good.csv cylinder.yaml", "closure: periodic_u");
   refused("good.csv plain.yaml --set parameters=given", "columns u and v");
   refused("good.csv plain.yaml --set fit.terms[1].weight=some", "expected a number");

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
 
 namespace semblance {
 namespace {
@@ -36,6 +37,28 @@ TEST(PointTable, PlainAndOtherLinesGiveTheSame) {
   }
 }
 
+TEST(PointTable, SigmaBecomesAWeight) {
+  for (const char* text : {"x,y,z,sigma\n1,2,3,0.5\n", "x,y,z,sigma\n1,2,3, 0.5\n"}) {
+    const PointTable table = ParsePointTable(text, "p.csv");
+    EXPECT_TRUE(table.weights_of_sigma);
+    EXPECT_EQ(table.weights, std::vector<double>{4});
+  }
+  EXPECT_FALSE(ParsePointTable("x,y,z,weight\n1,2,3,4\n", "p.csv").weights_of_sigma);
+}
+
+TEST(PointTable, AttributesAreThoseThatAreAskedForInTheirOrder) {
+  const std::vector<std::string> names = {"red", "heat"};
+  for (const char* text :
+       {"heat,x,y,z,red\n9,1,2,3,255\n8,1,2,4,0\n", "heat,x,y,z,red\n9,1,2,3, 255\n8,1,2,4,0\n"}) {
+    const PointTable table = ParsePointTable(text, "p.csv", names);
+    ASSERT_EQ(table.attributes.size(), 2u);
+    EXPECT_EQ(table.attributes[0].name, "red");
+    EXPECT_EQ(table.attributes[0].values, (std::vector<double>{255, 0}));
+    EXPECT_EQ(table.attributes[1].values, (std::vector<double>{9, 8}));
+    EXPECT_EQ(table.positions[1], Vec3(1, 2, 4));
+  }
+}
+
 TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
   const auto message = [](std::string_view text) -> std::string {
     try {
@@ -59,6 +82,12 @@ TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
     EXPECT_THAT(message(std::string("x,y,z\n1,2,") + bad + "\n"), HasSubstr("column 'z'")) << bad;
   }
   EXPECT_THAT(message("x,y,z,weight\n1,2,3,0\n"), HasSubstr("weight is 0"));
+  EXPECT_THAT(message("x,y,z,sigma\n1,2,3,-1\n"), HasSubstr("p.csv:2: the sigma is -1"));
+  EXPECT_THAT(message("x,y,z,sigma,weight\n1,2,3,1,1\n"), HasSubstr("give one of them"));
+  EXPECT_THAT(message("x,y,z,heat\n1,2,3,1\n"), HasSubstr("what the option `attributes` names"));
+  const std::vector<std::string> heat = {"heat"};
+  EXPECT_THAT(testing::WordsOf<IoError>([&] { ParsePointTable("x,y,z\n1,2,3\n", "p.csv", heat); }),
+              HasSubstr("no column 'heat'"));
 }
 
 }  // namespace

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/plan/alone_fit.h"
+
+#include <cmath>
+#include <utility>
+#include <variant>
+
+#include "fitting/nested/nested_steps.h"
+
+namespace semblance {
+namespace {
+
+LevelSummary RoundSummary(const NestedRound& round) {
+  return {.level = round.finest,
+          .fraction = 1,
+          .terms = {},
+          .iterations = round.steps,
+          .free_vertices = round.vertices,
+          .auto_weight = round.weight,
+          .solver = "conjugate gradients",
+          .termination = "convergence",
+          .usable = true};
+}
+
+FitResult ResultOf(NestedFitResult fit, std::vector<Vec2> uv) {
+  FitResult result{.surface = std::move(fit.surface),
+                   .uv = std::move(uv),
+                   .residual_mm = std::move(fit.residual_mm),
+                   .point_rms_mm = fit.rms_mm,
+                   .dowel_rms_mm = fit.rms_mm,
+                   .restored_features = 0,
+                   .automatic = std::move(fit.report),
+                   .usable = std::isfinite(fit.rms_mm)};
+  for (const NestedRound& round : result.automatic->rounds) {
+    result.levels.push_back(RoundSummary(round));
+  }
+  result.levels.back().rms_after_mm = fit.rms_mm;
+  return result;
+}
+
+}  // namespace
+
+bool IsAlone(const FitOptions& options) {
+  return std::holds_alternative<AutoPlan>(options.plan) && options.solver == Solver::kFastest;
+}
+
+FitResult FitAlone(const HSplineSurface& start, const ScatteredPoints& points, const AutoPlan& plan,
+                   const RunContext& context) {
+  return ResultOf(FitNested(start, points, plan, context), {points.uv.begin(), points.uv.end()});
+}
+
+FitResult FitAlone(const HSplineSurface& start, OwnedPoints points, const AutoPlan& plan,
+                   const RunContext& context) {
+  CheckNested(start, points.View());
+  NestedPoints nested = DisplacementsFrom(start, points.View(), context.threads);
+  points.positions = {};
+  points.weights = {};
+  return ResultOf(FitNested(start, std::move(nested), plan, context), std::move(points.uv));
+}
+
+}  // namespace semblance

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Whether a map of scattered points to the plane can carry a surface: one place of the surface for
+// each place of the plane.
+#pragma once
+
+#include <span>
+
+#include "surfaces/base/geometry.h"
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// Both in mm, so that lengths can be compared.
+struct PlaneMap {
+  std::span<const Vec3> positions;
+  std::span<const Vec2> at;  // one per position
+  double period_mm = 0;      // along the first coordinate; 0: the map does not go round
+};
+
+// Shares of the surface, 0 to 1.
+struct MapFaults {
+  double folded = 0;      // another sheet of the surface lies at the same place of the plane
+  double collapsed = 0;   // less than a fortieth of its area is left, as of walls seen from above
+  bool mirrored = false;  // most triangles run clockwise on the plane; false without triangles
+
+  double Sum() const { return folded + collapsed; }
+};
+
+// From the points alone, as they are and as means over small cubes: each of some hundred samples
+// looks at the 16 others that the map brings closest. It is folded where these fall into several
+// sheets, three times the samples' spacing apart in space or more, that the map mixes; two on two
+// sides of a line are a cliff. Noise and outliers are no sheets. Of fewer than 32 points nothing is
+// said.
+MapFaults FaultsOfPoints(const PlaneMap& map);
+
+// The same by the triangles over the points, as shares of their area: folded are those that the map
+// turns over against the others. Exact, but for places that two sheets with one orientation share.
+MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> triangles);
+
+}  // namespace semblance

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/problem/one_to_one.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "tests/testing/grid_mesh.h"
+#include "tests/testing/point_sets.h"
+#include "tests/testing/scattered_data.h"
+
+namespace semblance {
+namespace {
+
+constexpr double kNone = 0.01;
+
+struct Cloud {
+  std::vector<Vec3> positions;
+  std::vector<Vec2> at;
+  double period_mm = 0;
+
+  MapFaults Faults() const { return FaultsOfPoints({positions, at, period_mm}); }
+};
+
+// Seen from above.
+Cloud FromAbove(const std::function<Vec3(const Vec2&)>& surface, int count, double noise = 0) {
+  Cloud cloud;
+  for (const FitPoint& p : testing::Scattered(surface, count, noise, 1).points) {
+    cloud.positions.push_back(p.position);
+    cloud.at.emplace_back(p.position.x(), p.position.y());
+  }
+  return cloud;
+}
+
+Vec3 OnSphere(const Vec2& uv) {
+  const double z = 2 * uv.y() - 1, r = std::sqrt(1 - z * z), p = 2 * std::numbers::pi * uv.x();
+  return {r * std::cos(p), r * std::sin(p), z};
+}
+
+TEST(OneToOne, HeightFieldsAreHoweverSteepNoisyOrMany) {
+  for (const double steep : {1.0, 5.0}) {
+    const auto field = [&](const Vec2& uv) -> Vec3 {
+      const Vec3 p = testing::FrankePoint(uv);
+      return {p.x(), p.y(), steep * p.z()};
+    };
+    for (const int count : {300, 5000, 40000}) {
+      EXPECT_LT(FromAbove(field, count).Faults().Sum(), kNone) << steep << ", " << count;
+    }
+  }
+  EXPECT_LT(FromAbove(testing::FrankePoint, 5000, /*noise=*/0.05).Faults().Sum(), kNone);
+  EXPECT_LT(FromAbove(testing::FrankePoint, 40000, /*noise=*/0.03).Faults().Sum(), kNone);
+}
+
+// Every set on which a fit is measured, as it is scattered: crowded, with outliers, with gaps.
+TEST(OneToOne, NoneOfTheHeightFieldsOfTheBenchFolds) {
+  for (const testing::PointSet& set : testing::PointSets()) {
+    if (set.closure == Closure::kOpen) {
+      Random random(7);
+      Cloud cloud;
+      for (int k = 0; k < 20000; ++k) {
+        const Vec2 uv = set.place(random);
+        Vec3 p = set.truth(uv) + Vec3(0, 0, set.noise * random.Normal());
+        p.z() += random.Uniform() < set.outliers ? random.Uniform(set.gross[0], set.gross[1]) : 0;
+        cloud.positions.push_back(p);
+        cloud.at.emplace_back(p.x(), p.y());
+      }
+      EXPECT_LT(cloud.Faults().Sum(), kNone) << set.name;
+    }
+  }
+}
+
+TEST(OneToOne, ASphereSeenFromAboveFolds) {
+  for (const int count : {400, 5000, 60000}) {
+    EXPECT_GT(FromAbove(OnSphere, count).Faults().folded, 0.3) << count;
+  }
+}
+
+// Two terraces with nothing between them are no two sheets.
+TEST(OneToOne, ACliffIsNoFold) {
+  const auto terraces = [](const Vec2& uv) -> Vec3 {
+    return {uv.x(), uv.y(), uv.x() + 0.3 * std::sin(4 * uv.y()) > 0.6 ? 0.5 : 0};
+  };
+  EXPECT_LT(FromAbove(terraces, 5000).Faults().Sum(), 0.01);
+}
+
+// A tube around its axis is one-to-one, also across the seam; its flat lids are not.
+TEST(OneToOne, LidsCollapseOnACylinder) {
+  const auto around = [](bool lids) {
+    Random random(1);
+    Cloud cloud{.positions = {}, .at = {}, .period_mm = 2 * std::numbers::pi};
+    for (int k = 0; k < 20000; ++k) {
+      const bool lid = lids && k % 3 == 0;
+      const double turn = 2 * std::numbers::pi * random.Uniform(), place = random.Uniform();
+      const double r = lid ? std::sqrt(place) : 1, z = lid ? 2.0 * (k % 2) : 2 * place;
+      cloud.positions.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
+      cloud.at.emplace_back(turn, z);
+    }
+    return cloud.Faults();
+  };
+  EXPECT_LT(around(false).Sum(), kNone);
+  EXPECT_GT(around(true).Sum(), 0.15);
+}
+
+// 0.4 of a sheet is folded back over the rest.
+TEST(OneToOne, TrianglesTellTheShareThatIsTurnedOver) {
+  const TriMesh mesh =
+      testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 20);
+  std::vector<Vec2> at;
+  for (const Vec3& p : mesh.points) {
+    at.emplace_back(p.x() <= 0.6 ? p.x() : 1.2 - p.x(), p.y());
+  }
+  const MapFaults faults = FaultsOfTriangles({mesh.points, at}, mesh.triangles);
+  EXPECT_NEAR(faults.folded, 0.4, 1e-12);
+  EXPECT_EQ(faults.collapsed, 0);
+  EXPECT_FALSE(faults.mirrored);
+  for (Vec2& p : at) {
+    p.y() *= -1;
+  }
+  EXPECT_TRUE(FaultsOfTriangles({mesh.points, at}, mesh.triangles).mirrored);
+}
+
+TEST(OneToOne, OfAFewPointsNothingIsSaid) { EXPECT_EQ(FromAbove(OnSphere, 20).Faults().Sum(), 0); }
+
+}  // namespace
+}  // namespace semblance

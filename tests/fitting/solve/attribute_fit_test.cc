@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/solve/attribute_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "fitting/fit.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
+#include "tests/testing/scattered_data.h"
+
+namespace semblance {
+namespace {
+
+struct Coloured {
+  std::vector<Vec2> uv;
+  std::vector<std::vector<double>> values;
+  HSplineSurface surface;
+
+  AttributeColumns Columns() const {
+    return {.uv = uv, .weights = {}, .columns = {values.begin(), values.end()}};
+  }
+};
+
+double Wave(const Vec2& uv) {
+  return 100 + 20 * std::sin(2 * std::numbers::pi * uv.x()) * std::cos(4 * uv.y());
+}
+
+// The head, refined where it has detail, and as many columns as asked for: a constant, a wave with
+// noise, a wave, and so on.
+Coloured ColouredHead(int columns, double noise) {
+  const FitTarget target = testing::Scattered(testing::HeadPoint, 8000, 1e-4, 3);
+  const HSplineShape shape{.max_level = 3, .closure = Closure::kPeriodicU};
+  Coloured head{.uv = {},
+                .values = std::vector<std::vector<double>>(columns),
+                .surface = Fit(testing::PlainStart(shape), target, {},
+                               {.plan = AdaptivePlan{.tolerance_mm = 4e-3, .finest = 3},
+                                .terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-9}},
+                                .solver = Solver::kFastest},
+                               {})
+                               .surface};
+  Random random(5);
+  for (const FitPoint& p : target.points) {
+    head.uv.push_back(p.uv);
+    for (int c = 0; c < columns; ++c) {
+      head.values[c].push_back(c == 0 ? 7.5 : Wave(p.uv) + (c == 1 ? noise * random.Normal() : 0));
+    }
+  }
+  return head;
+}
+
+TEST(AttributeFit, ColumnsComeBackHoweverManyThereAre) {
+  const Coloured head = ColouredHead(5, 3);
+  const AttributeFit fit = FitAttributes(head.surface, head.Columns(), {}, 1);
+  ASSERT_EQ(fit.columns.size(), 5u);
+  ASSERT_EQ(fit.surfaces.size(), 2u);
+  std::vector<Vec2> uv;
+  Random random(9);
+  for (int k = 0; k < 500; ++k) {
+    uv.emplace_back(random.Uniform(), random.Uniform());
+  }
+  const auto values = fit.At(uv, 1);
+  double squares = 0;
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    EXPECT_NEAR(values[0][k], 7.5, 1e-6);
+    for (const int exact : {2, 3, 4}) {
+      EXPECT_NEAR(values[exact][k], Wave(uv[k]), 0.05);
+    }
+    squares += (values[1][k] - Wave(uv[k])) * (values[1][k] - Wave(uv[k]));
+  }
+  EXPECT_LT(std::sqrt(squares / 500), 0.6);  // of the noise of 3, most is averaged out
+  EXPECT_NEAR(fit.columns[1].rms, 3, 0.15);
+  EXPECT_GT(fit.columns[1].weight, fit.columns[2].weight);  // each has its own smoothness
+}
+
+// The functions are in the surface's own space: no vertex is added.
+TEST(AttributeFit, VerticesAreThoseOfTheSurface) {
+  const Coloured head = ColouredHead(2, 0);
+  ASSERT_GT(head.surface.Offsets().size(), 50u);
+  const AttributeFit fit = FitAttributes(head.surface, head.Columns(), {}, 1);
+  for (const auto& [vertex, offset] : fit.surfaces[0].Offsets()) {
+    EXPECT_TRUE(head.surface.Offsets().contains(vertex));
+  }
+  EXPECT_EQ(fit.surfaces[0].shape().closure, Closure::kPeriodicU);
+}
+
+// Any linear function of the columns is fitted as the columns are, at the same weight; here a unit
+// and an offset, which choose the same one.
+TEST(AttributeFit, TheUnitOfAColumnDoesNotMatter) {
+  Coloured head = ColouredHead(2, 3);
+  const AttributeFit before = FitAttributes(head.surface, head.Columns(), {}, 1);
+  for (double& value : head.values[1]) {
+    value = 1e-3 * value - 40;
+  }
+  const AttributeFit after = FitAttributes(head.surface, head.Columns(), {}, 1);
+  EXPECT_NEAR(after.columns[1].weight / before.columns[1].weight, 1, 1e-9);
+  const auto a = before.At(head.uv, 1), b = after.At(head.uv, 1);
+  for (std::size_t k = 0; k < head.uv.size(); k += 37) {
+    EXPECT_NEAR(b[1][k], 1e-3 * a[1][k] - 40, 1e-9);
+  }
+}
+
+TEST(AttributeFit, PointsThatAreLeftOutDoNotCount) {
+  Coloured head = ColouredHead(3, 0);
+  std::vector<std::uint32_t> wild;
+  for (std::uint32_t k = 0; k < head.uv.size(); k += 20) {
+    wild.push_back(k);
+    head.values[2][k] = 1e6;
+  }
+  const AttributeFit fit = FitAttributes(head.surface, head.Columns(), wild, 1);
+  EXPECT_LT(fit.columns[2].rms, 0.05);
+}
+
+TEST(AttributeFit, WrongColumnsAreRefused) {
+  Coloured head = ColouredHead(2, 0);
+  head.values[1].pop_back();
+  EXPECT_THROW(FitAttributes(head.surface, head.Columns(), {}, 1), InputError);
+  head.values[1].push_back(kNaN);
+  EXPECT_THROW(FitAttributes(head.surface, head.Columns(), {}, 1), InputError);
+}
+
+}  // namespace
+}  // namespace semblance
