@@ -24,6 +24,9 @@ void RunPeers();
 // and FITPACK at their best.
 void RunHeldOut();
 
+// The share of a surface within the intervals of an adaptive fit that should hold 90 % of it.
+void RunCoverage();
+
 // Points whose (u,v) are off, until the surface is where it should be.
 void RunRelaxation();
 

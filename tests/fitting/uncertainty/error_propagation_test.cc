@@ -12,6 +12,7 @@
 #include "fitting/uncertainty/pivoted_root.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "tests/testing/adaptive_coverage.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
@@ -291,6 +292,15 @@ TEST(ErrorPropagation, OfAnAdaptiveFitItIsHowFarItsNoiseTakesIt) {
     EXPECT_NEAR(std::sqrt(squares[k]), sigma[k], 0.15 * sigma[k]) << k;
     EXPECT_NEAR(std::sqrt(sampled[k]), sigma[k], 0.15 * sigma[k]) << k;
   }
+}
+
+// With a tolerance as small as the noise the vertices are enough, and only the noise is left; with
+// several times as much, what the vertices cannot follow is in no interval.
+TEST(ErrorPropagation, IntervalsOfAnAdaptiveFitHoldWhereItsToleranceIsTheNoise) {
+  const double fine = testing::AdaptiveCoverage(1, 16), coarse = testing::AdaptiveCoverage(5, 4);
+  EXPECT_GT(fine, 0.88);
+  EXPECT_LT(fine, 0.92);
+  EXPECT_LT(coarse, fine);
 }
 
 TEST(ErrorPropagation, WhereNothingIsSaidThereIsNoNumber) {
