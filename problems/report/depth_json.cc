@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "problems/metrics/face_metrics_json.h"
+#include "problems/subject/sites.h"
 
 namespace semblance {
 namespace {
@@ -59,7 +60,8 @@ Json ErrorsToJson(const DepthErrors& errors) {
 DepthScores ScoresIn(const std::string& part, const CrossValidation& result) {
   std::vector<double> errors_mm, sds_mm;
   for (const LeftOut& out : result.left_out) {
-    if (kFaceParts[FacePartOfSite(out.site)] == part) {
+    // A dowel of the experiment's own belongs to no part.
+    if (IsStandardSite(out.site) && kFaceParts[FacePartOfSite(out.site)] == part) {
       errors_mm.push_back(out.error_mm);
       sds_mm.push_back(out.sd_mm);
     }

@@ -198,9 +198,9 @@ std::string LeftOutCsv(const DepthResult& result) {
                  "sd_mm", "within_90", "status"});
   for (const auto& [kind, left_out] : result.left_out) {
     for (const LeftOut& out : left_out.left_out) {
-      csv.Row(kind, out.site, WithoutSide(out.site), kFaceParts[FacePartOfSite(out.site)],
-              out.depth_mm, out.predicted_mm, out.error_mm, out.sd_mm, out.within_90,
-              InWords(out.status));
+      const char* const part = IsStandardSite(out.site) ? kFaceParts[FacePartOfSite(out.site)] : "";
+      csv.Row(kind, out.site, WithoutSide(out.site), part, out.depth_mm, out.predicted_mm,
+              out.error_mm, out.sd_mm, out.within_90, InWords(out.status));
     }
   }
   return csv.Text();
