@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # Headings of the contents, and the documents below each. Those that are in none stand under the last one.
 PARTS = [
     ("Start", ["README", "first-face", "workbench", "gallery"]),
-    ("Use", ["real-heads", "landmarks", "sites", "reading-results", "studies", "python", "mistakes", "reliability", "security"]),
+    ("Use", ["real-heads", "landmarks", "sites", "reading-results", "studies", "populations", "python", "mistakes", "reliability", "security"]),
     ("The method", ["interpolation", "implicit", "hspline", "fit", "relaxation", "prior", "bust", "mathematics"]),
     ("The code", ["architecture", "extending", "glossary"]),
 ]

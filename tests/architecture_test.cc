@@ -64,7 +64,7 @@ const std::map<std::string, Layers> kRooms = {
       {"inputs"},
       {kHall},
       {"report"},
-      {"command_line", "exports", "points", "study", "workbench"},
+      {"command_line", "exports", "points", "population", "study", "workbench"},
       {"compare", "serving", "study_report"},
       {"program", "python"}}},
 };

@@ -16,6 +16,7 @@
 #include "problems/program/failure.h"
 #include "problems/program/landmark_commands.h"
 #include "problems/program/phantom_commands.h"
+#include "problems/program/population_command.h"
 #include "problems/program/run_commands.h"
 #include "problems/program/shell_commands.h"
 #include "problems/program/stop_signals.h"
@@ -47,7 +48,7 @@ int ParseAndRun(int argc, char** argv) {
   CommandLine line{.stop = StopOnSignals(), .chosen = {}};
   for (const auto& commands :
        {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(), TemplateCommands(),
-        PhantomCommands(), WorkbenchCommands(), ShellCommands()}) {
+        PopulationCommands(), PhantomCommands(), WorkbenchCommands(), ShellCommands()}) {
     Declare(commands, app, line);
   }
   try {

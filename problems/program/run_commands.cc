@@ -28,6 +28,7 @@
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
+#include "problems/population/population_file.h"
 #include "problems/program/evaluate.h"
 #include "problems/program/exit_code.h"
 #include "problems/program/failure.h"
@@ -230,10 +231,27 @@ CheckFindings CheckExperiment(const std::string& file, const Arguments& argument
   return findings;
 }
 
+CheckFindings CheckPopulation(const std::string& file, const Arguments& arguments) {
+  if (!arguments.overrides.empty()) {
+    throw InputError(
+        fmt::format("{}: --set is for experiments and fits; write it into the population", file));
+  }
+  ReadChecked<PopulationFile>(file, arguments, &NamedInputsOf);
+  CheckFindings findings;
+  if (!arguments.without_inputs) {
+    findings.warnings = ReadPopulation(file).notes;
+  }
+  return findings;
+}
+
 // The keys at the top tell what a file is for: an experiment, where no other fits better.
 CheckFindings CheckConfig(const std::string& file, const Arguments& arguments, InputCheck& inputs) {
-  if (OwnKeys<StudyFile>(file) > OwnKeys<Experiment>(file)) {
+  const int of_study = OwnKeys<StudyFile>(file), of_population = OwnKeys<PopulationFile>(file);
+  if (of_study > OwnKeys<Experiment>(file) && of_study >= of_population) {
     return CheckStudy(file, arguments, inputs);
+  }
+  if (of_population > OwnKeys<Experiment>(file)) {
+    return CheckPopulation(file, arguments);
   }
   if (KnownKeys<PointFitOptions>(file) > KnownKeys<Experiment>(file)) {
     ReadChecked<PointFitOptions>(file, arguments, &NamedFiles<PointFitOptions>);
@@ -288,9 +306,10 @@ std::string OptionsText(bool schema) {
 
 int OptionsCommand(const Arguments& arguments) {
   const bool schema = arguments.schema;
-  fmt::print("{}", arguments.options_of == "study" ? OptionsText<StudyFile>(schema)
-                   : arguments.options_of == "fit" ? OptionsText<PointFitOptions>(schema)
-                                                   : OptionsText<Experiment>(schema));
+  fmt::print("{}", arguments.options_of == "population" ? OptionsText<PopulationFile>(schema)
+                   : arguments.options_of == "study"    ? OptionsText<StudyFile>(schema)
+                   : arguments.options_of == "fit"      ? OptionsText<PointFitOptions>(schema)
+                                                        : OptionsText<Experiment>(schema));
   return kDone;
 }
 
@@ -506,8 +525,9 @@ void DeclareCheck(CLI::App& command, CommandLine& line) {
 
 void DeclareOptions(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &OptionsCommand);
-  command.add_option("KIND", a.options_of, "the kind of file: experiment, study or fit")
-      ->check(CLI::IsMember({"experiment", "study", "fit"}))
+  command
+      .add_option("KIND", a.options_of, "the kind of file: experiment, study, population or fit")
+      ->check(CLI::IsMember({"experiment", "study", "population", "fit"}))
       ->capture_default_str();
   command.add_flag("--schema", a.schema, "as a JSON Schema for editors");
 }

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/population/leave_one_out.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "problems/subject/sites.h"
+
+namespace semblance {
+namespace {
+
+using Eigen::Index;
+
+struct Forecast {
+  double mean_mm = kNaN, sd_mm = kNaN;
+};
+using Forecasts = std::map<std::string, Forecast>;  // by site
+
+bool IsSite(const std::string& name) { return IsStandardSite(name) || IsFurtherSite(name); }
+
+bool IsKnownSite(const PopulationFile& file, const std::string& site) {
+  return std::ranges::any_of(
+      file.known, [&](const std::string& code) { return WithoutSide(code) == WithoutSide(site); });
+}
+
+JointSample Without(const JointSample& sample, Index subject) {
+  JointSample rest{sample.names, Eigen::MatrixXd(sample.values.rows() - 1, sample.values.cols())};
+  rest.values.topRows(subject) = sample.values.topRows(subject);
+  rest.values.bottomRows(rest.values.rows() - subject) =
+      sample.values.bottomRows(rest.values.rows() - subject);
+  return rest;
+}
+
+// What the subject's row knows, of the covariates or of the depths at the known sites.
+std::vector<KnownValue> KnownOf(const PopulationFile& file, const JointSample& sample,
+                                Index subject, const JointNormal& joint, bool person, bool depths) {
+  std::vector<KnownValue> known;
+  for (Index j = 0; j < std::ssize(sample.names); ++j) {
+    const std::string& name = sample.names[j];
+    const bool wanted = IsSite(name) ? depths && IsKnownSite(file, name) : person;
+    if (wanted && std::isfinite(sample.values(subject, j)) && joint.Find(name)) {
+      known.push_back({name, sample.values(subject, j)});
+    }
+  }
+  return known;
+}
+
+Forecasts ForecastsOf(const JointNormal& joint, const std::vector<KnownValue>& known) {
+  const ConditionalNormal expected = Condition(joint, known);
+  Forecasts forecasts;
+  for (std::size_t k = 0; k < joint.names.size(); ++k) {
+    if (IsSite(joint.names[k])) {
+      const auto at = static_cast<Index>(k);
+      forecasts[joint.names[k]] = {expected.mean[at], expected.sd[at]};
+    }
+  }
+  return forecasts;
+}
+
+Forecasts ForecastsOf(const TissueTable& table, const PopulationSubject& person,
+                      const JointSample& sample) {
+  Forecasts forecasts;
+  for (const std::string& name : sample.names) {
+    const auto depth = FindDepth(table, person.sex.value_or(Sex::kMale),
+                                 person.build.value_or(Build::kNormal), name);
+    if (IsSite(name) && depth) {
+      forecasts[name] = {depth->mean_mm, depth->sd_mm.value_or(kNaN)};
+    }
+  }
+  return forecasts;
+}
+
+class Judge {
+ public:
+  Judge(const PopulationFile& file, const std::vector<CountedSubject>& subjects,
+        const JointSample& sample)
+      : file_(file), subjects_(subjects), sample_(sample) {
+    for (const std::filesystem::path& path : file.tables) {
+      tables_.push_back(ReadTissueTable(path));
+    }
+    for (const std::string& name : sample.names) {
+      has_person_ = has_person_ || !IsSite(name);
+    }
+  }
+
+  // By name, the ways in their order.
+  std::vector<std::pair<std::string, Forecasts>> Of(Index subject) const {
+    const JointNormal joint =
+        FitPopulation(Without(sample_, subject), file_.correlation, file_.shrinkage);
+    std::vector<std::pair<std::string, Forecasts>> ways;
+    const auto add = [&](const char* name, bool person, bool depths) {
+      ways.emplace_back(
+          name, ForecastsOf(joint, KnownOf(file_, sample_, subject, joint, person, depths)));
+    };
+    add("mean", false, false);
+    if (has_person_) {
+      add("person", true, false);
+    }
+    add("known", false, true);
+    if (has_person_) {
+      add("person_known", true, true);
+    }
+    for (const TissueTable& table : tables_) {
+      ways.emplace_back(table.id, ForecastsOf(table, subjects_[subject].person, sample_));
+    }
+    return ways;
+  }
+
+  // Whether all ways foresee the site and the subject has it.
+  bool Counts(Index subject, Index column,
+              const std::vector<std::pair<std::string, Forecasts>>& ways) const {
+    const std::string& site = sample_.names[column];
+    return IsSite(site) && !IsKnownSite(file_, site) &&
+           std::isfinite(sample_.values(subject, column)) &&
+           std::ranges::all_of(ways, [&](const auto& way) { return way.second.contains(site); });
+  }
+
+ private:
+  const PopulationFile& file_;
+  const std::vector<CountedSubject>& subjects_;
+  const JointSample& sample_;
+  std::vector<TissueTable> tables_;
+  bool has_person_ = false;
+};
+
+void Score(int subjects, Foresight& way) {
+  std::vector<double> errors, sds, sums(subjects, 0), counts(subjects, 0);
+  for (const ForeseenDepth& depth : way.depths) {
+    errors.push_back(depth.foreseen_mm - depth.depth_mm);
+    sds.push_back(depth.sd_mm);
+    sums[depth.subject] += std::abs(errors.back());
+    counts[depth.subject] += 1;
+  }
+  way.scores = ScoreDepths(errors, sds);
+  for (int subject = 0; subject < subjects; ++subject) {
+    way.mae_mm.push_back(counts[subject] > 0 ? sums[subject] / counts[subject] : kNaN);
+  }
+}
+
+void CompareWithMean(std::vector<Foresight>& ways) {
+  for (Foresight& way : ways) {
+    std::vector<double> differences;
+    for (std::size_t subject = 0; subject < way.mae_mm.size(); ++subject) {
+      const double difference = way.mae_mm[subject] - ways.front().mae_mm[subject];
+      if (std::isfinite(difference)) {
+        differences.push_back(difference);
+      }
+    }
+    way.against_mean_mm = Summarize(differences);
+  }
+}
+
+}  // namespace
+
+std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
+                                   const std::vector<CountedSubject>& subjects,
+                                   const JointSample& sample) {
+  constexpr Index kFewest = 3;
+  std::vector<Foresight> result;
+  if (sample.values.rows() < kFewest) {
+    return result;
+  }
+  const Judge judge(file, subjects, sample);
+  for (Index subject = 0; subject < sample.values.rows(); ++subject) {
+    const auto ways = judge.Of(subject);
+    result.resize(ways.size());
+    for (Index j = 0; j < sample.values.cols(); ++j) {
+      if (!judge.Counts(subject, j, ways)) {
+        continue;
+      }
+      for (std::size_t w = 0; w < ways.size(); ++w) {
+        const Forecast& forecast = ways[w].second.at(sample.names[j]);
+        result[w].depths.push_back({static_cast<int>(subject), sample.names[j],
+                                    sample.values(subject, j), forecast.mean_mm, forecast.sd_mm});
+      }
+    }
+    for (std::size_t w = 0; w < ways.size(); ++w) {
+      result[w].name = ways[w].first;
+    }
+  }
+  for (Foresight& way : result) {
+    Score(static_cast<int>(sample.values.rows()), way);
+  }
+  CompareWithMean(result);
+  return result;
+}
+
+}  // namespace semblance

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files that a population comes to.
+#pragma once
+
+#include "problems/output/files.h"
+#include "problems/population/population_result.h"
+
+namespace semblance {
+
+// table.yaml, depths.csv, subjects.csv, outliers.csv, leave_one_out.csv, dense.csv, dense.ply,
+// population.json and report.html; the same bytes for the same result.
+void WritePopulation(const PopulationResult& result, OutputFolder& folder);
+
+}  // namespace semblance

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/population/population_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "interp/evaluation/calibration.h"
+#include "problems/pictures/image.h"
+#include "problems/pictures/pictures.h"
+#include "problems/plots/heat_map.h"
+#include "problems/plots/svg_plot.h"
+#include "problems/population/dense_mesh.h"
+#include "problems/report/report.h"
+#include "problems/subject/sites.h"
+
+namespace semblance {
+namespace {
+
+std::string WayInWords(const std::string& name) {
+  constexpr std::array<std::array<const char*, 2>, 4> kWords = {
+      {{"mean", "mean of the others"},
+       {"person", "given sex, build, age, body mass"},
+       {"known", "given a few measured depths"},
+       {"person_known", "given both"}}};
+  const auto at = std::ranges::find_if(kWords, [&](const auto& pair) { return pair[0] == name; });
+  return at == kWords.end() ? "table " + name : (*at)[1];
+}
+
+const Foresight* BestOf(const PopulationResult& result) {
+  const auto best = std::ranges::min_element(
+      result.foresights, {}, [](const Foresight& way) { return way.scores.mae_mm; });
+  return best == result.foresights.end() ? nullptr : &*best;
+}
+
+std::vector<ReportTile> Tiles(const PopulationResult& result) {
+  std::vector<ReportTile> tiles = {
+      {"subjects", std::to_string(result.counted.size()), "",
+       fmt::format("{} failed, {} missing", result.Count("failed"), result.Count("missing"))},
+      {"sites", std::to_string(result.table.rows.size()), "", ""},
+      {"outliers", std::to_string(result.outliers.size()), "",
+       result.file.outliers.leave_out ? "left out" : "listed, not left out"},
+      {"correlations", fmt::format("{:.0f}", 100 * (1 - result.joint.shrinkage)), "%",
+       "the subjects' own; the rest is a model's"}};
+  if (!result.foresights.empty()) {
+    tiles.push_back({"a subject left out",
+                     fmt::format("{:.2f}", result.foresights[0].scores.mae_mm), "mm",
+                     "mean absolute error of the others' mean"});
+    tiles.push_back({"at best", fmt::format("{:.2f}", BestOf(result)->scores.mae_mm), "mm",
+                     WayInWords(BestOf(result)->name)});
+  }
+  return tiles;
+}
+
+ReportTable ForesightTable(const PopulationResult& result) {
+  ReportTable table{
+      .caption = "Each subject foreseen by the others, mm",
+      .header = {"way", "depths", "MAE", "RMSE", "bias", "CRPS", "interval score", "within 50 %",
+                 "90 %", "95 %", "sd stated", "MAE less the mean's, 95 %"},
+      .rows = {}};
+  for (const Foresight& way : result.foresights) {
+    const DepthScores& s = way.scores;
+    const SampleSummary& d = way.against_mean_mm;
+    table.rows.push_back(
+        {WayInWords(way.name), std::to_string(s.points), TableNumber(s.mae_mm),
+         TableNumber(s.rmse_mm), TableNumber(s.bias_mm), TableNumber(s.crps_mm),
+         TableNumber(s.interval_score_90_mm), TableNumber(s.coverage_50),
+         TableNumber(s.coverage_90), TableNumber(s.coverage_95), TableNumber(s.mean_sd_mm),
+         std::isfinite(d.mean_95.low)
+             ? fmt::format("{:+.3f} ({:+.3f} to {:+.3f})", d.mean, d.mean_95.low, d.mean_95.high)
+             : fmt::format("{:+.3f}", d.mean)});
+  }
+  return table;
+}
+
+// One row per way: each subject's mean absolute error, or how often the stated sd held.
+std::vector<BoxRow> ErrorRows(const PopulationResult& result) {
+  std::vector<BoxRow> rows;
+  for (const Foresight& way : result.foresights) {
+    BoxRow& row = rows.emplace_back(BoxRow{WayInWords(way.name), {}, {}});
+    for (std::size_t k = 0; k < way.mae_mm.size(); ++k) {
+      if (std::isfinite(way.mae_mm[k])) {
+        row.values.push_back(way.mae_mm[k]);
+        row.names.push_back(result.subjects[result.counted[k]].person.name);
+      }
+    }
+  }
+  return rows;
+}
+
+std::vector<BoxRow> CoverageRows(const PopulationResult& result) {
+  std::vector<BoxRow> rows;
+  for (const Foresight& way : result.foresights) {
+    std::vector<double> errors, sds;
+    for (const ForeseenDepth& depth : way.depths) {
+      errors.push_back(depth.foreseen_mm - depth.depth_mm);
+      sds.push_back(depth.sd_mm);
+    }
+    if (way.scores.stated > 0) {
+      rows.push_back({WayInWords(way.name), Coverage(errors, sds), {}});
+    }
+  }
+  return rows;
+}
+
+ReportSection ForesightSection(const PopulationResult& result) {
+  ReportSection section{.heading = "How well a person is foreseen"};
+  section.paragraphs = {fmt::format(
+      "Each subject is left out, the table is found from the others, and the subject's depths are "
+      "compared with it, at the sites that every way foresees. The few measured depths are those "
+      "at "
+      "{}, which with their other sides are in no score.",
+      fmt::join(result.file.known, ", "))};
+  section.tables = {ForesightTable(result)};
+  section.images = {{BoxPlotSvg(ErrorRows(result), "mean absolute error of a subject, mm"),
+                     "One dot per subject.", "box plot of each subject's mean absolute error"}};
+  if (const auto rows = CoverageRows(result); !rows.empty()) {
+    section.images.push_back({CalibrationPlotSvg(rows, "share within the stated interval"),
+                              "On the diagonal the stated deviation is right; below it, too bold.",
+                              "calibration of the stated deviations"});
+  }
+  return section;
+}
+
+ReportSection TableSection(const PopulationResult& result) {
+  ReportTable table{.caption = "Tissue depths, mm (table.yaml)",
+                    .header = {"site", "name", "mean", "sd", "subjects"},
+                    .rows = {},
+                    .filter = true};
+  for (const TissueRow& row : result.table.rows) {
+    const TissueCell& cell = row.values.at("adult");
+    table.rows.push_back({row.site, row.name, TableNumber(cell.mean.value_or(kNaN)),
+                          TableNumber(cell.sd.value_or(kNaN)), std::to_string(cell.n.value_or(0))});
+  }
+  HeatMap map{.rows = result.joint.names,
+              .columns = result.joint.names,
+              .values = {},
+              .title = "correlation"};
+  for (Eigen::Index i = 0; i < result.joint.correlation.rows(); ++i) {
+    const auto row = result.joint.correlation.row(i);
+    map.values.emplace_back(row.begin(), row.end());
+  }
+  return {
+      .heading = "The table and its correlations",
+      .paragraphs = {fmt::format("{:.1f} % of each correlation is the model's: {}.",
+                                 100 * result.joint.shrinkage, "what so many subjects leave open")},
+      .images = {{HeatMapSvg(map), "Over people: sites, then what else is known of a person.",
+                  "heat map of correlations between sites"}},
+      .tables = {table}};
+}
+
+ReportSection OutlierSection(const PopulationResult& result) {
+  ReportTable table{.caption = "Depths and subjects unlike the others",
+                    .header = {"subject", "site", "depth (mm)", "expected (mm)", "z"},
+                    .rows = {},
+                    .filter = true};
+  for (const Outlier& outlier : result.outliers) {
+    table.rows.push_back({result.subjects[outlier.subject].person.name,
+                          outlier.site.empty() ? "all of it" : SiteInWords(outlier.site),
+                          TableNumber(outlier.depth_mm), TableNumber(outlier.expected_mm),
+                          TableNumber(outlier.z)});
+  }
+  ReportSection section{.heading = "Outliers"};
+  section.paragraphs = {
+      result.file.outliers.leave_out
+          ? "They are left out of the table, the modes (whole subjects) and the scores."
+          : "They are listed alone; outliers.leave_out takes them out of all else."};
+  if (!table.rows.empty()) {
+    section.tables = {table};
+  }
+  return section;
+}
+
+std::string MapPicture(const DenseMesh& mesh, const std::vector<double>& by_cell,
+                       const Legend& legend, const std::string& title) {
+  constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
+  const RenderOptions options{.width = 300, .height = 330, .lighting = Lighting::kEven};
+  return EncodePng(RenderViews({{MappedObject(mesh.mesh, OnVertices(mesh, by_cell), legend.map)}},
+                               Bounds(mesh.mesh), kViews, {title, {}, legend}, options,
+                               /*threads=*/1));
+}
+
+ReportSection DenseSection(const PopulationResult& result) {
+  constexpr double kDeepest_mm = 25, kWidest_mm = 6, kLargest_mm = 5;
+  ReportSection section{.heading = "Depth all over the skull"};
+  const DenseMesh mesh = MeshOf(result.dense);
+  if (mesh.mesh.triangles.empty()) {
+    section.paragraphs = {"No cell of the grid has a depth."};
+    return section;
+  }
+  section.paragraphs = {
+      "The generic face's (u,v), laid on each skull by its landmarks; the places are the subjects' "
+      "mean, in the frame of an average skull. A mode is what one standard deviation of it adds."};
+  section.images = {
+      {MapPicture(mesh, result.dense.mean_mm, {SequentialMap(0, kDeepest_mm), "mean depth"}, ""),
+       "", "mean depth over the skull"},
+      {MapPicture(mesh, result.dense.sd_mm, {SequentialMap(0, kWidest_mm), "standard deviation"},
+                  ""),
+       "", "standard deviation of depth over the skull"}};
+  for (std::size_t k = 0; k < result.dense.modes_mm.size(); ++k) {
+    section.images.push_back(
+        {MapPicture(
+             mesh, result.dense.modes_mm[k], {DivergingMap(kLargest_mm), "change of depth"},
+             fmt::format("mode {}: {:.1f} % of the variance", k + 1, 100 * result.dense.share[k])),
+         "", fmt::format("mode {} of depth over the skull", k + 1)});
+  }
+  return section;
+}
+
+ReportSection SubjectSection(const PopulationResult& result) {
+  ReportTable table{.caption = "Subjects",
+                    .header = {"subject", "status", "landmarks", "sites", "why"},
+                    .rows = {},
+                    .filter = true};
+  for (const MeasuredSubject& subject : result.subjects) {
+    const auto sites = std::ranges::count_if(
+        subject.depths.sites, [](const SiteDepth& site) { return std::isfinite(site.depth_mm); });
+    table.rows.push_back({subject.person.name, subject.status,
+                          subject.status != "done"  ? ""
+                          : subject.depths.proposed ? "proposed"
+                                                    : "placed",
+                          std::to_string(sites), subject.reason});
+  }
+  return {.heading = "Who was measured", .tables = {table}, .folded = true};
+}
+
+}  // namespace
+
+std::string PopulationReport(const PopulationResult& result) {
+  Report report;
+  report.title = result.file.title;
+  report.subtitle = fmt::format("A population of {} subjects", result.counted.size());
+  report.notes = result.notes;
+  report.tiles = Tiles(result);
+  if (!result.foresights.empty()) {
+    report.sections.push_back(ForesightSection(result));
+  }
+  report.sections.push_back(TableSection(result));
+  report.sections.push_back(DenseSection(result));
+  report.sections.push_back(OutlierSection(result));
+  report.sections.push_back(SubjectSection(result));
+  report.footer = "semblance " SEMBLANCE_VERSION;
+  return ReportHtml(report);
+}
+
+}  // namespace semblance

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/population/population_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
+#include "surfaces/base/parallel.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+fs::path FileOf(const fs::path& folder, const std::string& id) {
+  return folder / "subjects" / (id + ".json");
+}
+
+// Nothing if it is not there, cut short or another subject's.
+std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id) {
+  const fs::path file = FileOf(folder, id);
+  if (!fs::exists(file)) {
+    return std::nullopt;
+  }
+  try {
+    Json json = ParseJson(ReadFileBytes(file), file.string());
+    const bool whole = json.is_object() && json.value("id", Json()) == id &&
+                       json.contains("status") && json["status"].is_string();
+    return whole ? std::optional(std::move(json)) : std::nullopt;
+  } catch (const IoError&) {
+    return std::nullopt;
+  }
+}
+
+class PopulationRunner {
+ public:
+  PopulationRunner(const PopulationPlan& plan, fs::path folder, const PopulationRunOptions& options,
+                   const RunContext& context)
+      : plan_(plan), folder_(std::move(folder)), options_(options), context_(context) {}
+
+  PopulationRunSummary Run() {
+    fs::create_directories(folder_ / "subjects");
+    for (std::size_t n = 0; n < plan_.entries.size(); ++n) {
+      if (static_cast<int>(n % options_.shards) == options_.shard) {
+        ++summary_.subjects;
+        IsThere(plan_.entries[n].id) ? void(++summary_.skipped) : queue_.push_back(n);
+      }
+    }
+    ParallelFor(queue_.size(), options_.jobs, 1, [this](std::size_t k) {
+      context_.ThrowIfStopped();
+      Measure(plan_.entries[queue_[k]]);
+    });
+    return summary_;
+  }
+
+ private:
+  bool IsThere(const std::string& id) const {
+    const auto json = ReadSubject(folder_, id);
+    return json && !(options_.rerun_failed && (*json)["status"] != "done");
+  }
+
+  // Made once, when the first subject without landmarks asks.
+  std::span<const ReferenceHead> References() {
+    const std::lock_guard lock(references_mutex_);
+    if (!references_) {
+      std::vector<ReferenceHead> heads;
+      for (const ReferenceFiles& files : plan_.file.measure.references) {
+        heads.push_back(ReadReference(files.skull, files.landmarks, context_.threads));
+      }
+      references_ = std::move(heads);
+    }
+    return *references_;
+  }
+
+  bool NeedsReferences(const PopulationSubject& subject) const {
+    const auto* files = std::get_if<FileSubject>(&subject.subject);
+    const auto* ct = std::get_if<CtSubject>(&subject.subject);
+    return (files != nullptr && files->landmarks.empty()) ||
+           (ct != nullptr && ct->landmarks.empty());
+  }
+
+  Json TryToMeasure(const PopulationEntry& entry) {
+    Json json = {{"id", entry.id}, {"status", "done"}};
+    try {
+      const RunContext quiet{
+          .on_event = {}, .stop_token = context_.stop_token, .threads = context_.threads};
+      const auto references =
+          NeedsReferences(entry.subject) ? References() : std::span<const ReferenceHead>();
+      json["depths"] = ToJson(MeasureSubject(entry.subject, plan_.file.measure, references, quiet));
+    } catch (const Error& error) {
+      json["status"] = "failed";
+      json["reason"] = error.what();
+    } catch (const std::bad_alloc&) {
+      json["status"] = "failed";
+      json["reason"] = "there is not enough memory for it; fewer --jobs need less";
+    }
+    return json;
+  }
+
+  void Measure(const PopulationEntry& entry) {
+    const Json json = TryToMeasure(entry);
+    WriteFileAtomically(FileOf(folder_, entry.id), json.dump() + "\n", Durability::kUnsynced);
+    const std::lock_guard lock(mutex_);
+    const auto status = json["status"].get<std::string>();
+    ++(status == "done" ? summary_.done : summary_.failed);
+    if (options_.on_progress) {
+      options_.on_progress(summary_.done + summary_.failed, static_cast<int>(queue_.size()),
+                           entry.subject.name, status);
+    }
+  }
+
+  const PopulationPlan& plan_;
+  fs::path folder_;
+  const PopulationRunOptions& options_;
+  const RunContext& context_;
+  std::vector<std::size_t> queue_;
+  std::mutex mutex_, references_mutex_;
+  PopulationRunSummary summary_;
+  std::optional<std::vector<ReferenceHead>> references_;
+};
+
+}  // namespace
+
+PopulationRunSummary MeasurePopulation(const PopulationPlan& plan, const fs::path& folder,
+                                       const PopulationRunOptions& options,
+                                       const RunContext& context) {
+  return PopulationRunner(plan, folder, options, context).Run();
+}
+
+std::vector<MeasuredSubject> ReadMeasured(const PopulationPlan& plan, const fs::path& folder) {
+  std::vector<MeasuredSubject> measured;
+  for (const PopulationEntry& entry : plan.entries) {
+    MeasuredSubject& subject =
+        measured.emplace_back(MeasuredSubject{.person = entry.subject, .id = entry.id});
+    const auto json = ReadSubject(folder, entry.id);
+    if (!json) {
+      continue;
+    }
+    subject.status = (*json)["status"].get<std::string>();
+    subject.reason = json->value("reason", "");
+    if (subject.status == "done") {
+      subject.depths = SubjectDepthsOf((*json)["depths"]);
+    }
+  }
+  return measured;
+}
+
+int GatherSubjects(const PopulationPlan& plan, const fs::path& folder,
+                   const std::vector<fs::path>& others) {
+  int taken = 0;
+  fs::create_directories(folder / "subjects");
+  for (const PopulationEntry& entry : plan.entries) {
+    for (const fs::path& other : others) {
+      if (!ReadSubject(folder, entry.id) && ReadSubject(other, entry.id)) {
+        WriteFileAtomically(FileOf(folder, entry.id), ReadFileBytes(FileOf(other, entry.id)));
+        ++taken;
+      }
+    }
+  }
+  return taken;
+}
+
+}  // namespace semblance

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/population/leave_one_out.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "problems/conditional/site_correlation.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/random.h"
+
+namespace semblance {
+namespace {
+
+// People of a known distribution, whose body mass index goes with the mean of their depths.
+std::vector<CountedSubject> People(int count) {
+  const std::vector<std::string> sites = StandardSiteCodes();
+  const Eigen::MatrixXd root = ModelledCorrelation({}, sites).llt().matrixL();
+  Random random(21);
+  std::vector<CountedSubject> people;
+  for (int k = 0; k < count; ++k) {
+    Eigen::VectorXd z(32);
+    for (double& value : z) {
+      value = random.Normal();
+    }
+    const Eigen::VectorXd depths = Eigen::VectorXd::Constant(32, 10) + 2 * root * z;
+    CountedSubject& person = people.emplace_back();
+    FileSubject files;  // not a phantom, whose body mass index is made up
+    person.person.subject = files;
+    person.person.bmi = 25 + 2 * (depths.mean() - 10) + random.Normal();
+    for (Eigen::Index j = 0; j < 32; ++j) {
+      person.depths.sites.push_back(
+          {.site = sites[j], .depth_mm = depths[j], .confidence = 1, .why_not = ""});
+    }
+  }
+  return people;
+}
+
+const Foresight& Way(const std::vector<Foresight>& ways, const std::string& name) {
+  return *std::ranges::find(ways, name, &Foresight::name);
+}
+
+TEST(LeaveOneOut, WhatIsKnownHelpsAndTheStatedIntervalsHold) {
+  const auto people = People(60);
+  PopulationFile file;
+  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  ASSERT_EQ(ways.size(), 4u);
+  EXPECT_LT(Way(ways, "person").scores.mae_mm, Way(ways, "mean").scores.mae_mm);
+  EXPECT_LT(Way(ways, "known").scores.mae_mm, Way(ways, "person").scores.mae_mm);
+  EXPECT_LT(Way(ways, "known").against_mean_mm.mean_95.high, 0);
+  for (const Foresight& way : ways) {
+    EXPECT_NEAR(way.scores.coverage_90, 0.9, 0.04) << way.name;  // shrunk: a little cautious
+    EXPECT_EQ(way.scores.points, 60 * (32 - 6)) << way.name;     // g, pg, zy and go know themselves
+  }
+}
+
+// The oracle: with the mean alone, that of the others.
+TEST(LeaveOneOut, TheSubjectIsNotInItsOwnMean) {
+  auto people = People(5);
+  for (CountedSubject& person : people) {
+    person.person.bmi.reset();
+  }
+  const JointSample sample = SampleOf(people, 0);
+  const auto ways = LeaveOneOut({}, people, sample);
+  ASSERT_EQ(ways.size(), 2u);
+  const ForeseenDepth& depth = ways[0].depths.front();
+  const auto at = std::ranges::find(sample.names, depth.site) - sample.names.begin();
+  EXPECT_EQ(depth.site, "sg");
+  EXPECT_NEAR(depth.foreseen_mm, (sample.values.col(at).sum() - depth.depth_mm) / 4, 1e-9);
+}
+
+TEST(LeaveOneOut, ScoresAPublishedTableBesideThem) {
+  const auto people = People(12);
+  PopulationFile file;
+  file.tables = {SEMBLANCE_SOURCE_DIR "/configs/tables/t_table_2023.yaml"};
+  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  EXPECT_EQ(ways.back().name, "t_table_2023");
+  EXPECT_EQ(ways.back().scores.points, ways.front().scores.points);
+}
+
+}  // namespace
+}  // namespace semblance
