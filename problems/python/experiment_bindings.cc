@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "problems/pipeline/experiment_config.h"
 #include "problems/python/arrays.h"
 #include "problems/python/bindings.h"
+#include "problems/python/interruptible.h"
 #include "problems/python/option_text.h"
 #include "problems/report/run_folder.h"
 #include "problems/run.h"
@@ -41,25 +43,25 @@ py::object FromJson(const std::string& text) {
 py::dict RunConfig(const std::string& config, const py::dict& set,
                    const std::optional<std::string>& out, bool force, int threads) {
   const auto experiment = ReadConfig<Experiment>(config, Overrides(set));
-  RunContext context;
-  context.threads = threads;
-  std::optional<RunResult> result;
-  {
-    const py::gil_scoped_release release;
+  const RunResult result = Interruptible([&](const std::stop_token& stop) {
+    RunContext context;
+    context.threads = threads;
+    context.stop_token = stop;
     std::optional<StagedFolder> folder;
     if (out) {
       folder.emplace(*out, Asked(force));
     }
-    result = Run(experiment, context);
+    RunResult found = Run(experiment, context);
     if (folder) {
-      WriteRun(experiment, *result, folder->Files(), context);
+      WriteRun(experiment, found, folder->Files(), context);
       folder->Publish();
     }
-  }
+    return found;
+  });
   py::dict answer;
-  answer["result"] = FromJson(ResultJson(experiment, *result).dump());
-  answer["surface"] = result->fit.surface;
-  answer["faults"] = result->Faults();
+  answer["result"] = FromJson(ResultJson(experiment, result).dump());
+  answer["surface"] = result.fit.surface;
+  answer["faults"] = result.Faults();
   return answer;
 }
 
@@ -82,12 +84,13 @@ py::object RunStudyFile(const std::string& path, const std::string& out, int job
   const StudyPlan plan = ReadStudy(path);
   StudyRunOptions options;
   options.jobs = jobs;
-  {
-    const py::gil_scoped_release release;
-    RunStudy(plan, out, options, {});
+  Interruptible([&](const std::stop_token& stop) {
+    RunContext context;
+    context.stop_token = stop;
+    RunStudy(plan, out, options, context);
     OutputFolder folder(out, WhenNotEmpty::kReplaceFiles);
     WriteStudyTables(folder);
-  }
+  });
   return TableOf(fs::path(out) / "trials.csv");
 }
 

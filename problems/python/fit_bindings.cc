@@ -2,12 +2,14 @@
 #include <pybind11/stl.h>
 
 #include <optional>
+#include <stop_token>
 #include <utility>
 
 #include "problems/config/config.h"
 #include "problems/points/point_fit.h"
 #include "problems/python/arrays.h"
 #include "problems/python/bindings.h"
+#include "problems/python/interruptible.h"
 #include "problems/python/option_text.h"
 
 namespace semblance {
@@ -38,10 +40,12 @@ PointFit FitArrays(const Doubles& points, const std::optional<Doubles>& uv,
                    const std::optional<Doubles>& weights, int threads, const py::kwargs& options) {
   PointTable table = TableOf(points, uv, weights);
   const auto chosen = ReadConfigText<PointFitOptions>(OptionText(options), "fit(...)");
-  RunContext context;
-  context.threads = threads;
-  const py::gil_scoped_release release;
-  return FitPoints(std::move(table), chosen, context);
+  return Interruptible([&](const std::stop_token& stop) {
+    RunContext context;
+    context.threads = threads;
+    context.stop_token = stop;
+    return FitPoints(std::move(table), chosen, context);
+  });
 }
 
 std::string FitDocumentation() {

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Python module against closed forms, and against what it reads back."""
 import os
+import signal
 import sys
 import tempfile
 import threading
+import time
 import unittest
 
 import numpy as np
@@ -190,6 +192,24 @@ class Experiments(unittest.TestCase):
         rows = table if isinstance(table, list) else table.to_dict("records")
         self.assertEqual({row["interp"] for row in rows}, {"nearest", "mean"})
         self.assertTrue(all(row["status"] == "done" for row in rows))
+
+    def test_ctrl_c_ends_a_study_between_its_trials(self):
+        with tempfile.TemporaryDirectory() as folder:
+            study, out = os.path.join(folder, "study.yaml"), os.path.join(folder, "out")
+            with open(study, "w") as file:
+                file.write("base: %s\njob: depth\ngrid: {subject.random_seed: %s}\nset: {subject.rings: 24}\n"
+                           "metric: depth_truth.along_direction.rms_mm\n" % (os.path.join(SOURCE, "configs", "phantom.yaml"), list(range(1, 401))))
+            trials = os.path.join(out, "trials")
+
+            def interrupt_after_the_first():
+                while not os.path.isdir(trials) or not os.listdir(trials):
+                    time.sleep(0.01)
+                os.kill(os.getpid(), signal.SIGINT)
+
+            threading.Thread(target=interrupt_after_the_first, daemon=True).start()
+            with self.assertRaises(KeyboardInterrupt):
+                semblance.study(study, out)
+            self.assertLess(len(os.listdir(trials)), 400)
 
 
 if __name__ == "__main__":
