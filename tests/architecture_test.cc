@@ -333,7 +333,8 @@ TEST(Architecture, OnlyTheAgreedEntriesStandAtTheTop) {
       ".clang-tidy", ".gitignore", ".ci", "docs", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md",
       // not part of the project, and ignored by git
       ".git", "build", "build-debug", "build-sanitize", "build-quick", "build-tidy", "build-fuzz",
-      "build-threads", "build-coverage", "build-clang", "build-256", "build-128", "out", ".cache"};
+      "build-threads", "build-coverage", "build-clang", "build-units", "build-256", "build-128",
+      "out", ".cache"};
   for (const auto& entry : fs::directory_iterator(SEMBLANCE_SOURCE_DIR)) {
     EXPECT_TRUE(allowed.contains(entry.path().filename().string())) << entry.path();
   }
