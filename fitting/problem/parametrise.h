@@ -17,9 +17,9 @@
 
 namespace semblance {
 
-// Those that are given, if there are any. Else, of a surface that goes round, the cylinder's; of an
-// open one a plane's, and, where every plane folds and there are triangles, those of the mesh laid
-// out.
+// The parameters that are given, if there are any. Otherwise a surface that goes round takes the
+// cylinder's, and an open one a plane's. Where every plane folds and there are triangles, the mesh
+// is laid out.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };

@@ -48,10 +48,11 @@ struct StudySummary {
 // trials have in common is made once.
 //
 // The study may have changed since: a trial that is there and still in the plan is taken as it is
-// (its trial.json told the axes of now), unless it lacks the files that `keep` asks for now; one
-// that is no longer in the plan stays where it is and is in no table. Throws IoError if the folder
-// cannot be written or holds a plan that shares no trial with this one, InputError as TrialsThat or
-// for a part of a search, Cancelled on request (after the trials at hand).
+// (its trial.json then lists the axes of the changed study), unless it lacks the files that `keep`
+// asks for now; one that is no longer in the plan stays where it is and is in no table. Throws
+// IoError if the folder cannot be written or holds a plan that shares no trial with this one,
+// InputError as TrialsThat or for a part of a search, Cancelled on request (after the trials at
+// hand).
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);
 
