@@ -19,8 +19,6 @@ struct Forecast {
 };
 using Forecasts = std::map<std::string, Forecast>;  // by site
 
-bool IsSite(const std::string& name) { return IsStandardSite(name) || IsFurtherSite(name); }
-
 bool IsKnownSite(const PopulationFile& file, const std::string& site) {
   return std::ranges::any_of(
       file.known, [&](const std::string& code) { return WithoutSide(code) == WithoutSide(site); });

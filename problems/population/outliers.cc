@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/subject/sites.h"
+#include "problems/metrics/quantile.h"
 
 namespace semblance {
 namespace {
@@ -16,15 +16,6 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kFewest = 8;
 constexpr double kNormalFactor = 1.4826;  // of the median absolute deviation
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  if (values.size() % 2 == 1) {
-    return *middle;
-  }
-  return (*middle + *std::max_element(values.begin(), middle)) / 2;
-}
 
 // (value - median) / robust deviation of the finite ones; NaN elsewhere, and for too few.
 std::vector<double> RobustZ(const std::vector<double>& values, double least_deviation) {
@@ -38,18 +29,16 @@ std::vector<double> RobustZ(const std::vector<double>& values, double least_devi
   if (there.size() < kFewest) {
     return z;
   }
-  const double median = Median(there);
+  const double median = Quantile(there, 0.5);
   for (const double value : there) {
     off.push_back(std::abs(value - median));
   }
-  const double deviation = std::max(kNormalFactor * Median(off), least_deviation);
+  const double deviation = std::max(kNormalFactor * Quantile(off, 0.5), least_deviation);
   for (std::size_t k = 0; k < values.size(); ++k) {
     z[k] = (values[k] - median) / deviation;
   }
   return z;
 }
-
-bool IsSite(const std::string& name) { return IsStandardSite(name) || IsFurtherSite(name); }
 
 // Columns of the sample as the joint distribution has them.
 std::vector<Index> ColumnsOf(const JointSample& sample, const JointNormal& joint) {

@@ -104,6 +104,8 @@ JointSample SampleOf(const std::vector<CountedSubject>& subjects, double least_c
   return sample;
 }
 
+bool IsSite(const std::string& name) { return IsStandardSite(name) || IsFurtherSite(name); }
+
 JointSample Varying(const JointSample& sample) {
   JointSample varying;
   std::vector<Index> columns;

@@ -27,6 +27,9 @@ std::map<std::string, double> CovariatesOf(const CountedSubject& subject);
 // covariate. Depths at proposed landmarks of less than least_confidence are NaN.
 JointSample SampleOf(const std::vector<CountedSubject>& subjects, double least_confidence);
 
+// Whether a column is a site's depth, not a covariate.
+bool IsSite(const std::string& name);
+
 // Without the columns that fewer than two subjects have, or that are the same for all.
 JointSample Varying(const JointSample& sample);
 
