@@ -34,12 +34,6 @@ struct PopulationArguments {
   std::stop_token stop;
 };
 
-// Names of subjects come from files.
-template <class... Values>
-void Tell(fmt::format_string<Values...> words, Values&&... values) {
-  fmt::print("{}", ForTerminal(fmt::format(words, std::forward<Values>(values)...)));
-}
-
 int PrintPlan(const PopulationPlan& plan) {
   for (const PopulationEntry& entry : plan.entries) {
     Tell("{} {}\n", entry.id, entry.subject.name);
@@ -121,14 +115,15 @@ void DeclarePopulation(CLI::App& command, CommandLine& line) {
   command.add_flag("--quiet", a.quiet, "no progress");
 }
 
-constexpr std::array kCommands = {
-    ProgramCommand{"population",
-                   "make a tissue table with correlations, and modes of depth, of many subjects",
-                   &DeclarePopulation},
-};
-
 }  // namespace
 
-std::span<const ProgramCommand> PopulationCommands() { return kCommands; }
+std::span<const ProgramCommand> PopulationCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"population",
+                     "make a tissue table with correlations, and modes of depth, of many subjects",
+                     &DeclarePopulation},
+  };
+  return kCommands;
+}
 
 }  // namespace semblance

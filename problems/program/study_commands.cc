@@ -39,12 +39,6 @@ struct StudyArguments {
   std::stop_token stop;
 };
 
-// Names of subjects, axes and studies come from files.
-template <class... Values>
-void Tell(fmt::format_string<Values...> words, Values&&... values) {
-  fmt::print("{}", ForTerminal(fmt::format(words, std::forward<Values>(values)...)));
-}
-
 int PrintPlan(const StudyPlan& plan, const std::string& only) {
   const std::vector<bool> chosen = TrialsThat(plan, only);
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
