@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "problems/config/terminal_text.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/landmark_files/site_page.h"
 #include "problems/landmark_files/site_picture.h"
@@ -37,9 +38,9 @@ struct LandmarkArguments {
   bool force = false;
 };
 
-void Tell(const std::vector<std::string>& lines, const char* what) {
+void TellEach(const std::vector<std::string>& lines, const char* what) {
   for (const std::string& line : lines) {
-    fmt::print(stderr, "{}: {}\n", what, line);
+    fmt::print(stderr, "{}", ForTerminal(fmt::format("{}: {}\n", what, line)));
   }
 }
 
@@ -54,8 +55,8 @@ int Convert(const LandmarkArguments& a) {
   CheckFree(a.out, a.force);
   const LandmarkReading reading = ReadLandmarks(a.in, a.reading);
   const std::string bytes = EncodeLandmarks(reading.file, a.out);
-  Tell(reading.notes, "note");
-  Tell(LostIn(reading.file, a.out), "not kept in this kind of file");
+  TellEach(reading.notes, "note");
+  TellEach(LostIn(reading.file, a.out), "not kept in this kind of file");
   WriteFileAtomically(a.out, bytes);
   fmt::print("{}: {} landmarks, mm, LPS\n", a.out, reading.file.landmarks.size());
   return kDone;
@@ -135,7 +136,7 @@ void TellDifferences(const ProposeArguments& a, LandmarkFile file) {
 
 void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
   const std::string bytes = EncodeLandmarks(file, out);
-  Tell(LostIn(file, out), "not kept in this kind of file");
+  TellEach(LostIn(file, out), "not kept in this kind of file");
   if (const fs::path folder = fs::path(out).parent_path(); !folder.empty()) {
     fs::create_directories(folder);
   }
@@ -160,7 +161,7 @@ int Propose(const ProposeArguments& a) {
     context.on_event = ProgressPrinter(stderr);
   }
   const Proposal proposal = ProposeLandmarks(ReadMesh(a.skull), a.skull, ReferencesOf(a), context);
-  Tell(proposal.notes, "note");
+  TellEach(proposal.notes, "note");
   const LandmarkFile file = ProposalFile(proposal, fs::path(a.skull).stem().string());
   if (!a.compare.empty()) {
     TellDifferences(a, file);
