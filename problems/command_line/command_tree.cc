@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/command_line/command_tree.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 
 namespace semblance {
 namespace {
@@ -35,6 +38,21 @@ CommandNode TreeOf(const CLI::App& app) {
     node.commands.push_back(TreeOf(*command));
   }
   return node;
+}
+
+std::string OptionWithoutValue(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_positional() && std::ranges::count(option->results(), std::string()) > 0) {
+      return fmt::format("{}: {} is given an empty value; name one, or leave the option out",
+                         app.get_name(), option->get_name());
+    }
+  }
+  for (const CLI::App* command : app.get_subcommands()) {
+    if (std::string words = OptionWithoutValue(*command); !words.empty()) {
+      return words;
+    }
+  }
+  return "";
 }
 
 }  // namespace semblance

@@ -28,4 +28,8 @@ struct CommandNode {
 // Of a command and all below it, in the order in which they were declared.
 CommandNode TreeOf(const CLI::App& app);
 
+// After a line was read: the first option that it gives an empty value, in a sentence; empty where
+// there is none. A shell makes such a line of a variable that is not set.
+std::string OptionWithoutValue(const CLI::App& app);
+
 }  // namespace semblance

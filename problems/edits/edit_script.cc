@@ -43,9 +43,8 @@ Changes EditsByVertex(const std::vector<VertexEdit>& edits) {
   for (const VertexEdit& edit : edits) {
     const VertexId vertex{edit.level, edit.i, edit.j};
     if (!changes.emplace(vertex, ToVec3(edit.offset)).second) {
-      throw InputError(
-          fmt::format("edit script: vertex ({}, {}) of level {} stands twice; keep one", edit.i,
-                      edit.j, edit.level));
+      throw InputError(fmt::format("vertex ({}, {}) of level {} stands twice; keep one", edit.i,
+                                   edit.j, edit.level));
     }
   }
   return changes;
@@ -72,7 +71,13 @@ void MoveVertex(const VertexId& vertex, const std::optional<Vec3>& offset, Contr
 }  // namespace
 
 EditScript ReadEditScript(const std::filesystem::path& path) {
-  return ReadConfig<EditScript>(path);
+  EditScript script = ReadConfig<EditScript>(path);
+  try {
+    EditsByVertex(script.edits);
+  } catch (const InputError& e) {
+    throw InputError(fmt::format("{}: {}", path.string(), e.what()));
+  }
+  return script;
 }
 
 EditScript ApplyEdits(const EditScript& script, HSplineSurface& surface) {

@@ -232,12 +232,9 @@ CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
 
 CheckFindings InputCheck::Look(const Experiment& experiment) {
   CheckFindings findings;
-  const bool has_network = !experiment.network.empty();
   findings.Add(Once("network " + experiment.network.string(), [&](CheckFindings&) {
-    has_network ? ReadNetworkPlan(experiment.network)
-                : throw InputError(
-                      "network: no file is named; give the path of a dowel network "
-                      "(configs/networks/ has the standard one)");
+    CheckNetworkNamed(experiment);
+    ReadNetworkPlan(experiment.network);
   }));
   findings.Add(LookAtSubject(experiment));
   findings.Add(LookAtTissue(experiment));

@@ -202,14 +202,6 @@ NetworkPlan PlanFor(const Experiment& experiment, const LandmarkFile& landmarks)
   return WithoutSites(std::move(plan), gone, points);
 }
 
-void CheckFilesNamed(const Experiment& experiment) {
-  if (experiment.network.empty()) {
-    throw InputError(
-        "network: no file is named; give the path of a dowel network (configs/networks/ has the "
-        "standard one)");
-  }
-}
-
 // The subject with its dowels on bone, which have no depth yet.
 Case CaseOf(const SubjectData& data, const Experiment& experiment, const MeshQuery& query) {
   const bool measured = !std::holds_alternative<PhantomOptions>(experiment.subject);
@@ -274,6 +266,15 @@ void AppendInputs(const Experiment& experiment, Case& subject) {
 
 }  // namespace
 
+void CheckNetworkNamed(const Experiment& experiment, const std::filesystem::path& config) {
+  if (experiment.network.empty()) {
+    throw InputError(fmt::format(
+        "{}network: no file is named; give the path of a dowel network (configs/networks/ has the "
+        "standard one)",
+        config.empty() ? "" : config.string() + ": "));
+  }
+}
+
 SubjectData LoadSubject(const Subject& subject, const RunContext& context,
                         Landmarking landmarking) {
   SubjectData data;
@@ -287,7 +288,7 @@ std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOpt
 }
 
 Case MakeCase(const SubjectData& data, const Experiment& experiment) {
-  CheckFilesNamed(experiment);
+  CheckNetworkNamed(experiment);
   const MeshQuery query(data.skull);
   Case subject = CaseOf(data, experiment, query);
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);

@@ -52,6 +52,9 @@ SubjectData LoadSubject(const Subject& subject, const RunContext& context,
 // may be meant so, a line each; throws InputError, a line for each mistake.
 std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOptions& options);
 
+// Throws InputError where the experiment names no network; `config` is the file that should.
+void CheckNetworkNamed(const Experiment& experiment, const std::filesystem::path& config = {});
+
 // Places the dowels on the bone and gives them their depths and network. Throws as LoadSubject and
 // CheckSubject.
 Case MakeCase(const SubjectData& subject, const Experiment& experiment);

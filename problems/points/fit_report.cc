@@ -55,9 +55,14 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
 }
 
 std::string AutoText(const AutoReport& r) {
-  std::string text =
-      fmt::format("noise {:.3g} mm a coordinate (between neighbours {:.3g}); held out {:.3g}\n",
-                  r.noise_mm, r.neighbour_noise_mm, r.held_out_rms_mm);
+  std::string text = fmt::format("noise {:.3g} mm a coordinate", r.noise_mm);
+  if (std::isfinite(r.neighbour_noise_mm)) {  // few points have no neighbours to compare
+    text += fmt::format(" (between neighbours {:.3g})", r.neighbour_noise_mm);
+  }
+  if (std::isfinite(r.held_out_rms_mm)) {
+    text += fmt::format("; held out {:.3g}", r.held_out_rms_mm);
+  }
+  text += '\n';
   if (!r.outliers.empty()) {
     text += fmt::format("{} outliers left out; residuals and result.json list them\n",
                         r.outliers.size());

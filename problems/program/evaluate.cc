@@ -40,6 +40,7 @@ struct Truth {
 
 Truth OfExperiment(const EvaluateOptions& options, const RunContext& context) {
   const auto experiment = ReadConfig<Experiment>(options.config, options.overrides);
+  CheckNetworkNamed(experiment, options.config);
   Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
   if (!options.truth.empty()) {
     subject.skin = ReadChecked(options.truth);

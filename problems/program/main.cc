@@ -62,6 +62,9 @@ int ParseAndRun(int argc, char** argv) {
         Shortened(fmt::format("{}; --help tells more", unknown.empty() ? e.what() : unknown)),
         kBadInput);
   }
+  if (const std::string words = OptionWithoutValue(app); !words.empty()) {
+    return Complain(words, kBadInput);
+  }
   return line.chosen();
 }
 

@@ -98,6 +98,7 @@ void PrintFaceError(const char* what, const FaceMetrics& m) {
 int RunCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
+  CheckNetworkNamed(experiment, config);
   StagedFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
   const RunContext context = MakeContext(arguments);
   const std::vector<NamedExperiment> named = AlternativesOf(experiment, config.parent_path());
@@ -123,6 +124,7 @@ int RunCommand(const Arguments& arguments) {
 int DepthCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
+  CheckNetworkNamed(experiment, config);
   StagedFolder folder = MakeFolder(arguments, "out/" + config.stem().string() + "_depth");
   const RunContext context = MakeContext(arguments);
   const DepthResult result = MeasureDepth(experiment, context);

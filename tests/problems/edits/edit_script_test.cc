@@ -95,7 +95,7 @@ TEST(EditScript, FaultsAreNamedAndNothingChanges) {
     return "accepted";
   };
   const std::string good = "  - {level: 1, i: 5, j: 6, offset: [9, 9, 9]}\n";
-  EXPECT_THAT(complaint(good + good), HasSubstr("stands twice"));
+  EXPECT_THAT(complaint(good + good), AllOf(HasSubstr("script.yaml: "), HasSubstr("stands twice")));
   EXPECT_THAT(complaint(good + "  - {level: 0, i: 99, j: 6, offset: [0, 0, 0]}\n"),
               HasSubstr("i is 0..6, j is 0..7"));
   EXPECT_THAT(complaint(good + "  - {level: 0, i: 1, j: 6}\n"), HasSubstr("give an offset"));

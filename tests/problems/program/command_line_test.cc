@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -354,6 +355,29 @@ TEST_F(CommandLine, OptionsNameEveryKeyAndTheSchemaIsJson) {
   const auto schema = nlohmann::json::parse(Call("options study --schema").out);
   EXPECT_EQ(schema["properties"]["keep"]["enum"], nlohmann::json({"summary", "view", "run"}));
   EXPECT_THAT(Call("options fit").out, HasSubstr("patches_u:"));
+}
+
+TEST_F(CommandLine, AnEmptyConfigurationIsNamedInItsRefusal) {
+  Write("empty.yaml", "");
+  ExpectRefused("run empty.yaml --out out --quiet", "empty.yaml: network: no file is named");
+  ExpectRefused("depth empty.yaml --out out --quiet", "empty.yaml: network: no file is named");
+}
+
+TEST_F(CommandLine, AnOptionWithAnEmptyValueIsNotTakenForOneThatIsLeftOut) {
+  Write("points.csv", "x,y,z\n0,0,0\n");
+  ExpectRefused("fit points.csv --out ''", "--out is given an empty value");
+  ExpectRefused("evaluate a.ply b.ply --landmarks ''", "--landmarks is given an empty value");
+}
+
+TEST_F(CommandLine, AFitOfFewPointsPrintsNoFigureThatItDoesNotHave) {
+  std::string points = "x,y,z\n";
+  for (int k = 0; k < 35; ++k) {
+    points += fmt::format("{},{},{}\n", k % 7, k / 7, 0.1 * std::sin(k));
+  }
+  Write("points.csv", points);
+  const Outcome outcome = Call("fit points.csv --out out --quiet");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("35 points"), Not(HasSubstr("nan"))));
 }
 
 TEST_F(CommandLine, EvaluateMeasuresAnyTwoMeshes) {
