@@ -21,6 +21,45 @@ std::size_t Offset(const Image& image, int x, int y) {
   return 3 * (static_cast<std::size_t>(y) * image.width + x);
 }
 
+// For libpng, into a string that has room enough.
+void Append(png_structp png, png_bytep data, png_size_t size) {
+  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<char*>(data), size);
+}
+
+void Flush(png_structp) {}
+
+// All filters at level 4: a third of the time of libpng's default, and a tenth more bytes. libpng
+// leaves by longjmp, so nothing here has a destructor.
+bool WriteRows(png_structp png, png_infop info, const Image& image) {
+  if (setjmp(png_jmpbuf(png)) != 0) {
+    return false;
+  }
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width),
+               static_cast<png_uint_32>(image.height), 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_ALL_FILTERS);
+  png_set_compression_level(png, 4);
+  png_write_info(png, info);
+  for (int row = 0; row < image.height; ++row) {
+    png_write_row(png, &image.rgb[3 * static_cast<std::size_t>(row) * image.width]);
+  }
+  png_write_end(png, info);
+  return true;
+}
+
+// False where libpng has no memory.
+bool WritePng(const Image& image, std::string& bytes) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  if (info != nullptr) {
+    png_set_write_fn(png, &bytes, Append, Flush);
+  }
+  const bool written = info != nullptr && WriteRows(png, info, image);
+  png_destroy_write_struct(&png, &info);
+  return written;
+}
+
 bool IsInside(const Image& image, int x, int y) {
   return x >= 0 && y >= 0 && x < image.width && y < image.height;
 }
@@ -88,19 +127,16 @@ std::string EncodePng(const Image& image) {
     throw InputError(fmt::format("picture of {} x {} pixels with {} bytes: it has no valid pixels",
                                  image.width, image.height, image.rgb.size()));
   }
-  png_image png{};
-  png.version = PNG_IMAGE_VERSION;
-  png.width = static_cast<png_uint_32>(image.width);
-  png.height = static_cast<png_uint_32>(image.height);
-  png.format = PNG_FORMAT_RGB;
-  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
-  std::string bytes(size, '\0');
-  // Convert to 8 bit: no, the bytes are 8 bit already; row stride and colour map: the defaults.
-  if (png_image_write_to_memory(&png, bytes.data(), &size, 0, image.rgb.data(), 0, nullptr) == 0) {
-    throw InputError(fmt::format("picture of {} x {} pixels: libpng: {}", image.width, image.height,
-                                 png.message));
+  std::string bytes;
+  png_image largest{};
+  largest.width = static_cast<png_uint_32>(image.width);
+  largest.height = static_cast<png_uint_32>(image.height);
+  largest.format = PNG_FORMAT_RGB;
+  bytes.reserve(PNG_IMAGE_PNG_SIZE_MAX(largest));  // so that Append takes no memory
+  if (!WritePng(image, bytes)) {
+    throw InputError(fmt::format("picture of {} x {} pixels: libpng cannot write it", image.width,
+                                 image.height));
   }
-  bytes.resize(size);
   return bytes;
 }
 

@@ -224,6 +224,9 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
     *missing[i].second = MapOf(flat, casts, box, missing[i].first);
   });
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
+    if (!flat.is_seen.empty() && !flat.is_seen[v]) {
+      return;
+    }
     LightVertex(scene.objects[flat.object_of_vertex[v]].material, lights, map_of_light,
                 flat.vertices[v]);
   });

@@ -43,6 +43,7 @@ struct FlatScene {
   std::vector<SceneVertex> vertices;
   std::vector<SceneTriangle> triangles;
   std::vector<int> object_of_vertex;
+  std::vector<bool> is_seen;  // one per vertex; none: all are
 };
 
 // What is nearest to a light, seen from it.
@@ -57,8 +58,9 @@ struct ShadowMaps {
   Box3 box;                                                 // of what casts these shadows
 };
 
-// Sets light and key of every vertex. Only opaque objects cast shadows. maps: of the same opaque
-// meshes; those that are missing are added. Throws std::logic_error if they are of others.
+// Sets light and key of every vertex that is seen. Only opaque objects cast shadows. maps: of the
+// same opaque meshes; those that are missing are added. Throws std::logic_error if they are of
+// others.
 void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
                    ShadowMaps& maps, FlatScene& flat);
 

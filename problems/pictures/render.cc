@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -103,7 +104,7 @@ struct Layer {
   std::vector<float> depth;
   std::vector<std::int32_t> triangle;  // -1: none
 
-  explicit Layer(std::size_t samples)
+  explicit Layer(std::size_t samples = 0)
       : depth(samples, std::numeric_limits<float>::infinity()), triangle(samples, -1) {}
   void Offer(std::size_t sample, float sample_depth, std::int32_t index) {
     if (sample_depth < depth[sample]) {
@@ -111,6 +112,10 @@ struct Layer {
       triangle[sample] = index;
     }
   }
+};
+
+struct Layers {
+  Layer opaque, sheer;
 };
 
 // All that the bands share, set up once a picture.
@@ -122,48 +127,87 @@ class Painter {
         options_(options),
         to_viewer_(camera.view_from_world.row(2)),
         lights_(LightRig(options.lighting, camera.view_from_world)),
-        flat_(Flatten(scene)) {
+        flat_(Flatten(scene)),
+        has_sheer_(std::ranges::any_of(scene.objects,
+                                       [](const SceneObject& o) { return o.opacity < 1; })) {
     const int s = options.supersampling;
     projection_ = {.view_from_world = camera.view_from_world,
                    .centre = camera.centre,
                    .samples_per_mm = s * options.height / camera.height_mm,
                    .width = static_cast<double>(s) * options.width,
                    .height = static_cast<double>(s) * options.height};
-    LightVertices(scene, lights_, threads, shadows, flat_);
     SetHighlight();
     points_.resize(flat_.vertices.size());
     ParallelFor(points_.size(), threads, 4096,
                 [&](std::size_t v) { points_[v] = projection_ * flat_.vertices[v].position; });
     FillBands();
+    layers_.resize(Bands());
+    ParallelFor(Bands(), threads, 1, [&](std::size_t band) { layers_[band] = Seen(band); });
+    MarkSeen();
+    LightVertices(scene, lights_, threads, shadows, flat_);
   }
 
   std::size_t Bands() const { return triangles_of_band_.size(); }
 
   void PaintBand(std::size_t band, Image& image) const {
-    const int s = options_.supersampling, columns = s * options_.width;
-    const int first = static_cast<int>(band) * kBandRows * s;
-    const int end = std::min(first + kBandRows * s, s * options_.height);
-    Layer opaque(static_cast<std::size_t>(columns) * (end - first));
-    Layer sheer = opaque;
-    for (const std::int32_t t : triangles_of_band_[band]) {
-      const auto& c = flat_.triangles[t].corners;
-      const bool is_opaque = scene_.objects[flat_.triangles[t].object].opacity >= 1;
-      VisitSamples(points_[c[0]], points_[c[1]], points_[c[2]], {0, columns, first, end},
-                   [&](const Coverage& sample) {
-                     (is_opaque ? opaque : sheer)
-                         .Offer(static_cast<std::size_t>(sample.y - first) * columns + sample.x,
-                                sample.depth, t);
-                   });
-    }
+    const int s = options_.supersampling, first = FirstRow(band), end = EndRow(band);
     for (int row = first / s; row < end / s; ++row) {
       const Rgb background = Background(row);
       for (int column = 0; column < options_.width; ++column) {
-        SetPixel(image, column, row, PixelLight(opaque, sheer, first, column, row, background));
+        SetPixel(image, column, row, PixelLight(layers_[band], first, column, row, background));
       }
     }
   }
 
  private:
+  // Rows of samples of a band.
+  int FirstRow(std::size_t band) const {
+    return static_cast<int>(band) * kBandRows * options_.supersampling;
+  }
+  int EndRow(std::size_t band) const {
+    const int s = options_.supersampling;
+    return std::min(FirstRow(band) + kBandRows * s, s * options_.height);
+  }
+
+  // What is nearest at each sample of a band.
+  Layers Seen(std::size_t band) const {
+    const int columns = options_.supersampling * options_.width;
+    const int first = FirstRow(band), end = EndRow(band);
+    const auto samples = static_cast<std::size_t>(columns) * (end - first);
+    Layers seen{Layer(samples), Layer(has_sheer_ ? samples : 0)};
+    for (const std::int32_t t : triangles_of_band_[band]) {
+      const auto& c = flat_.triangles[t].corners;
+      const bool is_opaque = scene_.objects[flat_.triangles[t].object].opacity >= 1;
+      VisitSamples(points_[c[0]], points_[c[1]], points_[c[2]], {0, columns, first, end},
+                   [&](const Coverage& sample) {
+                     (is_opaque ? seen.opaque : seen.sheer)
+                         .Offer(static_cast<std::size_t>(sample.y - first) * columns + sample.x,
+                                sample.depth, t);
+                   });
+    }
+    return seen;
+  }
+
+  void MarkCorners(std::int32_t triangle) {
+    for (const std::int32_t corner : flat_.triangles[triangle].corners) {
+      flat_.is_seen[corner] = true;
+    }
+  }
+
+  // The corners of what is seen: most of a head is hidden, and needs no light.
+  void MarkSeen() {
+    flat_.is_seen.assign(flat_.vertices.size(), false);
+    for (const Layers& layers : layers_) {
+      for (const Layer* layer : {&layers.opaque, &layers.sheer}) {
+        for (const std::int32_t t : layer->triangle) {
+          if (t >= 0) {
+            MarkCorners(t);
+          }
+        }
+      }
+    }
+  }
+
   // A triangle is listed in each band of rows that its box meets.
   void FillBands() {
     const int rows = kBandRows * options_.supersampling;
@@ -192,8 +236,9 @@ class Painter {
   }
 
   // The mean over the samples of a pixel.
-  Rgb PixelLight(const Layer& opaque, const Layer& sheer, int first_row, int column, int row,
+  Rgb PixelLight(const Layers& seen, int first_row, int column, int row,
                  const Rgb& background) const {
+    const auto& [opaque, sheer] = seen;
     const int s = options_.supersampling, columns = s * options_.width;
     Rgb sum = Rgb::Zero();
     for (int k = 0; k < s * s; ++k) {
@@ -203,7 +248,7 @@ class Painter {
       if (opaque.triangle[i] >= 0) {
         colour = Shade(opaque.triangle[i], x, y).colour;
       }
-      if (sheer.triangle[i] >= 0 && sheer.depth[i] < opaque.depth[i]) {
+      if (has_sheer_ && sheer.triangle[i] >= 0 && sheer.depth[i] < opaque.depth[i]) {
         const Shaded sheet = Shade(sheer.triangle[i], x, y);
         colour = sheet.alpha * sheet.colour + (1 - sheet.alpha) * colour;
       }
@@ -278,11 +323,13 @@ class Painter {
   Vec3 to_viewer_;
   std::vector<Light> lights_;
   FlatScene flat_;
+  bool has_sheer_;
   Projection projection_;
   Vec3 half_way_ = Vec3::Zero();
   Rgb key_light_ = Rgb::Zero();
   std::vector<RasterPoint> points_;
   std::vector<std::vector<std::int32_t>> triangles_of_band_;
+  std::vector<Layers> layers_;  // one per band
 };
 
 Vec3 DirectionToViewer(View view) {
