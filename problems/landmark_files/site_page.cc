@@ -103,6 +103,58 @@ std::string Rows(const std::vector<Site>& sites, std::span<const TissueTable> ta
   return text;
 }
 
+constexpr const char* kBeforeSites = R"md(# The sites
+
+A site is a point of the skull by which tissue depth is known: there a dowel stands. Left and right are the subject's. A landmarks' file names a site
+by its code, its number with the side (`18l`), or a name (`left gonion`); upper and lower case make no difference.
+
+This page is made by `semblance landmarks page configs/tables/*.yaml --out docs --force`; a test holds it and the program against each other.
+
+![the sites on a phantom's skull, by number]({})
+
+The skull is a phantom's, drawn by formula: it shows where the sites lie to each other, not what the bone looks like there.
+
+## The 32 of the network
+
+Numbers and names are those of the thesis's tables (Rhine).
+
+)md";
+
+constexpr const char* kBetweenSites = R"md(
+## Further sites of tables
+
+The standard network and the generic face lack them. A landmark may stand at one: its table gives the depth, the dowel joins the network, and the ray
+of the dowel tells where it meets the generic face. An experiment can also place one, or a site of its own:
+
+```yaml
+sites:
+  mn: {near: [n, rhi]}                    # the bone nearest to the middle of two landmarks; the table's depth
+  scar: {near: [31.5, -80, 12], depth: 7.5}  # nearest to a point, in mm (LPS)
+  cheek: {uv: [0.7, 0.45], depth: auto}   # under a point of the generic face, as deep as interpolated: for the fit alone
+  n: {uv: [0.5, 0.62], hold: true}        # where nasion lies on the generic face, set by hand; relaxation leaves it there
+```
+
+)md";
+
+constexpr const char* kAfterTables = R"md(
+"(part)": some builds or one sex have no depth there. `tissue: {fill_from: ...}` takes them from another table.
+
+## Where the definitions come from
+
+In our own words, after Caple and Stephan (2016), A standardized nomenclature for craniofacial and facial anthropometry, Int J Legal Med 130:863-879,
+for the points that they name. `sg`, `fe`, `im`, `lo` and `sgl` are not among those: for them, and for the directions of dowels, after the usual
+instructions for Rhine's set of points.
+)md";
+
+std::string TableList(std::span<const TissueTable> tables) {
+  std::string text;
+  for (const TissueTable& table : tables) {
+    text += fmt::format("- `{}`: {}; {}. {}\n", table.id, table.title, table.population_label,
+                        table.citation);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string_view SiteDefinition(std::string_view landmark) {
@@ -114,50 +166,8 @@ std::string_view SiteDefinition(std::string_view landmark) {
 }
 
 std::string SitePage(std::span<const TissueTable> tables, const std::string& picture) {
-  std::string page =
-      "# The sites\n\n"
-      "A site is a point of the skull by which tissue depth is known: there a dowel stands. Left "
-      "and "
-      "right are the subject's. A landmarks' file names a site\nby its code, its number with the "
-      "side (`18l`), or a name (`left gonion`); upper and lower case make no difference.\n\n"
-      "This page is made by `semblance landmarks page configs/tables/*.yaml --out docs --force`; a "
-      "test holds it and the program against each other.\n\n";
-  page += fmt::format("![the sites on a phantom's skull, by number]({})\n\n", picture);
-  page +=
-      "The skull is a phantom's, drawn by formula: it shows where the sites lie to each other, not "
-      "what the bone looks like there.\n\n"
-      "## The 32 of the network\n\nNumbers and names are those of the thesis's tables (Rhine).\n\n";
-  page += Rows(StandardSites(), tables);
-  page +=
-      "\n## Further sites of tables\n\n"
-      "The standard network and the generic face lack them. A landmark may stand at one: its table "
-      "gives the depth, the dowel joins the network, and the ray\nof the dowel tells where it "
-      "meets "
-      "the generic face. An experiment can also place one, or a site of its own:\n\n"
-      "```yaml\nsites:\n"
-      "  mn: {near: [n, rhi]}                    # the bone nearest to the middle of two "
-      "landmarks; "
-      "the table's depth\n"
-      "  scar: {near: [31.5, -80, 12], depth: 7.5}  # nearest to a point, in mm (LPS)\n"
-      "  cheek: {uv: [0.7, 0.45], depth: auto}   # under a point of the generic face, as deep as "
-      "interpolated: for the fit alone\n"
-      "  n: {uv: [0.5, 0.62], hold: true}        # where nasion lies on the generic face, set by "
-      "hand; relaxation leaves it there\n```\n\n";
-  page += Rows(FurtherSites(), tables);
-  page += "\n## The tables\n\n";
-  for (const TissueTable& table : tables) {
-    page += fmt::format("- `{}`: {}; {}. {}\n", table.id, table.title, table.population_label,
-                        table.citation);
-  }
-  page +=
-      "\n\"(part)\": some builds or one sex have no depth there. `tissue: {fill_from: ...}` takes "
-      "them from another table.\n\n"
-      "## Where the definitions come from\n\n"
-      "In our own words, after Caple and Stephan (2016), A standardized nomenclature for "
-      "craniofacial and facial anthropometry, Int J Legal Med 130:863-879,\nfor the points that "
-      "they name. `sg`, `fe`, `im`, `lo` and `sgl` are not among those: for them, and for the "
-      "directions of dowels, after the usual\ninstructions for Rhine's set of points.\n";
-  return page;
+  return fmt::format(kBeforeSites, picture) + Rows(StandardSites(), tables) + kBetweenSites +
+         Rows(FurtherSites(), tables) + "\n## The tables\n\n" + TableList(tables) + kAfterTables;
 }
 
 }  // namespace semblance

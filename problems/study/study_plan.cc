@@ -305,16 +305,45 @@ NamedValues ValuesOf(const StudyPlan& plan, const StudyTrial& trial) {
   return values;
 }
 
+void AddGallery(const fs::path& file, std::initializer_list<const std::vector<SubjectTree>*> groups,
+                StudyPlan& plan, TrialFaults& faults) {
+  for (const auto* people : groups) {
+    for (const SubjectTree& person : *people) {
+      AddToGallery(file, person, plan, faults);
+    }
+  }
+}
+
+// Whether someone is left, with what the metric needs.
+void CheckSubjects(const fs::path& file, const ConfigNode& tree, const StudyPlan& plan,
+                   TrialFaults& faults) {
+  if (plan.trials.empty()) {
+    faults.Add(
+        fmt::format("{}: no subject is left; all are optional and lack files", file.string()));
+  } else if (NeedsTrueSkin(plan.metric) && NoneHasSkin(plan)) {
+    faults.Add(fmt::format(
+        "{}: metric: '{}' is measured against the true skin, which no subject has; name the skins "
+        "(subject.skin), or another metric",
+        ToText(PlaceOf(tree, "metric")), plan.metric));
+  }
+}
+
+// The file as it stands, of a size that can be planned.
+StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& errors) {
+  StudyFile study = ReadStudyFile(file, tree, errors);
+  if (const std::string complaint = ComplaintAboutSize(study); !complaint.empty()) {
+    errors.Add(tree.place, "", complaint);
+    errors.ThrowIfAny();
+  }
+  return study;
+}
+
 }  // namespace
 
 StudyPlan ReadStudy(const fs::path& file) {
   ConfigErrors errors;
   ConfigNode tree;
-  const StudyFile study = ReadStudyFile(file, tree, errors);
-  if (const std::string complaint = ComplaintAboutSize(study); !complaint.empty()) {
-    errors.Add(tree.place, "", complaint);
-    errors.ThrowIfAny();
-  }
+  const StudyFile study = ReadSizedFile(file, tree, errors);
   const ConfigNode defaults = ConfigTreeOf(Experiment{});
   CheckMetric(study, tree, errors);
   TrialFaults faults;
@@ -345,22 +374,10 @@ StudyPlan ReadStudy(const fs::path& file) {
   }
   if (study.job == StudyJob::kIdentify) {
     plan.identify = study.identify.value_or(IdentifyOptions{});
-    for (const auto* people : {&subjects, &others}) {
-      for (const SubjectTree& person : *people) {
-        AddToGallery(file, person, plan, faults);
-      }
-    }
+    AddGallery(file, {&subjects, &others}, plan, faults);
   }
   faults.ThrowIfAny();
-  if (plan.trials.empty()) {
-    faults.Add(
-        fmt::format("{}: no subject is left; all are optional and lack files", file.string()));
-  } else if (NeedsTrueSkin(plan.metric) && NoneHasSkin(plan)) {
-    faults.Add(fmt::format(
-        "{}: metric: '{}' is measured against the true skin, which no subject has; name the skins "
-        "(subject.skin), or another metric",
-        ToText(PlaceOf(tree, "metric")), plan.metric));
-  }
+  CheckSubjects(file, tree, plan, faults);
   NameTrials(file, plan, faults);
   faults.ThrowIfAny();
   return plan;
