@@ -38,6 +38,10 @@ struct ArchiveCloser {
 };
 
 std::string Unzipped(const std::string& bytes, const std::string& name) {
+  if (!bytes.starts_with("\x1f\x8b")) {
+    throw IoError(
+        fmt::format("{}: it is not what gzip makes; compress it, or take .gz off its name", name));
+  }
   const std::unique_ptr<archive, ArchiveCloser> a(archive_read_new());
   archive_read_support_filter_gzip(a.get());
   archive_read_support_format_raw(a.get());

@@ -112,6 +112,20 @@ LIST_DEFAULTS = {"experiment": {"fit.terms": [{"type": "points"}, {"type": "smoo
                  "fit": {"fit.terms": [{"type": "points"}, {"type": "smoothness", "weight": 1e-4}]}}
 
 
+def scan(draw):
+    """A mesh of 11 x 11 points, for what needs triangles."""
+    n = 11
+    points = [f"{i / 10} {j / 10} {math.sin(0.3 * i) * j / 10 + draw.gauss(0, 0.01):.6f}" for j in range(n) for i in range(n)]
+    faces = []
+    for j in range(n - 1):
+        for i in range(n - 1):
+            a = n * j + i
+            faces += [f"3 {a} {a + 1} {a + n + 1}", f"3 {a} {a + n + 1} {a + n}"]
+    head = ["ply", "format ascii 1.0", f"element vertex {len(points)}", "property double x", "property double y", "property double z",
+            f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    return "\n".join(head + points + faces) + "\n"
+
+
 class ShareIsUsed(Exception):
     """No call is begun after the share's seconds."""
 
@@ -169,6 +183,7 @@ class Runner:
                 u, v = draw.random(), draw.random()
                 rows.append(f"{u:.6f},{v:.6f},{math.sin(3 * u) * v + draw.gauss(0, 0.01):.6f},{u:.6f},{v:.6f}")
             (self.folder / "points.csv").write_text("\n".join(rows) + "\n")
+            (self.folder / "scan.ply").write_text(scan(draw))
             return {"configs": self.configs, "first": first}
         code, said, _ = call([self.program, "run", "base.yaml", "--out", "first", "--quiet"], self.folder)
         if code != 0:
@@ -180,6 +195,9 @@ class Runner:
         return {"configs": self.configs, "first": first}
 
     def write(self, tree):
+        parameters = tree.get("parameters")
+        kind = parameters.get("type") if isinstance(parameters, dict) else parameters
+        self.points = "scan.ply" if kind == "mesh" else "points.csv"
         (self.folder / "case.yaml").write_text(yaml({"base": "base.yaml", **tree}))
 
     def check(self, trees):
@@ -191,11 +209,17 @@ class Runner:
         for name, tree in zip(names, trees):
             (self.folder / name).write_text(yaml({"base": "../base.yaml", **tree}))
         code, said, _ = call([self.program, "check", *names], self.folder, LIMIT_S + len(names), self.until_s)
-        lines = {name: [] for name in names}
+        lines, of_base = {name: [] for name in names}, []
         for line in said.splitlines():
             name = line[:len(names[0])]
             if name in lines and not line.endswith(": no fault found") and ": warning: " not in line:
                 lines[name].append(line)
+            elif "base.yaml:" in line.split(" ")[0]:
+                of_base.append(line)  # a fault between the case and what stands in the base: of which case?
+        if of_base and len(trees) == 1:
+            return [of_base + lines[names[0]]]
+        if of_base:
+            return self.check(trees[:len(trees) // 2]) + self.check(trees[len(trees) // 2:])
         if code not in (0, 2) or (code == 0) != (not any(lines.values())):
             if len(trees) == 1:
                 return [[f"check ends with {code}: {said}"]]
@@ -206,7 +230,7 @@ class Runner:
         """"done", "said" or "SHORT", what was said, processor seconds"""
         subprocess.run(["rm", "-rf", "out"], cwd=self.folder, check=True)
         if self.kind == "fit":
-            command = [self.program, "fit", "points.csv", "case.yaml", "--out", "out", "--quiet", "--threads", "1"]
+            command = [self.program, "fit", self.points, "case.yaml", "--out", "out", "--quiet", "--threads", "1"]
             result = self.folder / "out" / "result.json"
         else:
             command = [self.program, "study", "study.yaml", "--out", "out", "--quiet"]

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Law: the same points are the same table in whatever kind of file they come.
+#include "problems/points/point_files.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
+
+namespace semblance {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+using testing::WordsOf;
+
+constexpr int kCount = 12;
+
+// Numbers that a float cannot hold.
+Vec3 PointAt(int k) { return {k + 0.1, k * k / 7.0, -1.0 / (k + 3)}; }
+Vec2 UvAt(int k) { return {k / 13.0, (kCount - k) / 17.0}; }
+
+template <class Line>
+std::string Lines(Line&& line) {
+  std::string text;
+  for (int k = 0; k < kCount; ++k) {
+    text += line(PointAt(k), UvAt(k)) + "\n";
+  }
+  return text;
+}
+
+std::string Numbers(const Vec3& p, const char* between) {
+  return fmt::format("{1}{0}{2}{0}{3}", between, p.x(), p.y(), p.z());
+}
+
+std::string Csv() {
+  return "x,y,z\n" + Lines([](const Vec3& p, const Vec2&) { return Numbers(p, ","); });
+}
+
+std::string Npy(int columns) {
+  std::string head = fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {}), }}",
+                                 kCount, columns);
+  head.append(63 - (10 + head.size()) % 64, ' ');
+  head += '\n';
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  bytes += static_cast<char>(head.size() & 255);
+  bytes += static_cast<char>(head.size() >> 8);
+  bytes += head;
+  for (int k = 0; k < kCount; ++k) {
+    const Vec3 p = PointAt(k);
+    const double row[5] = {p.x(), p.y(), p.z(), UvAt(k).x(), UvAt(k).y()};
+    bytes.append(reinterpret_cast<const char*>(row), sizeof(double) * columns);
+  }
+  return bytes;
+}
+
+// With further properties of type double, `values` a vertex.
+template <class Values>
+std::string Ply(const std::vector<std::string>& properties, Values&& values,
+                const std::string& faces = "") {
+  std::string text = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double "
+      "y\nproperty double z\n",
+      kCount);
+  for (const std::string& property : properties) {
+    text += fmt::format("property double {}\n", property);
+  }
+  if (!faces.empty()) {
+    text += "element face 1\nproperty list uchar int vertex_indices\n";
+  }
+  text += "end_header\n";
+  for (int k = 0; k < kCount; ++k) {
+    text += fmt::format("{} {}\n", Numbers(PointAt(k), " "), values(k));
+  }
+  return text + faces;
+}
+
+std::string PlainPly(const std::string& faces = "") {
+  return Ply(
+      {}, [](int) { return ""; }, faces);
+}
+
+std::string OneScalarPly(const std::string& name, double value, double last) {
+  return Ply({name}, [&](int k) { return fmt::format("{}", k + 1 < kCount ? value : last); });
+}
+
+std::string Obj(const std::string& faces = "") {
+  return "# a comment\n" +
+         Lines([](const Vec3& p, const Vec2&) { return "v " + Numbers(p, " "); }) + faces;
+}
+
+std::string Off() {
+  return fmt::format("OFF\n{} 1 0\n", kCount) +
+         Lines([](const Vec3& p, const Vec2&) { return Numbers(p, " "); }) + "3 0 1 2\n";
+}
+
+std::string Xyz() {
+  return "# x y z\n" + Lines([](const Vec3& p, const Vec2&) { return Numbers(p, " ") + " 7"; });
+}
+
+class PointFiles : public ::testing::Test {
+ protected:
+  PointTable Read(const std::string& name, const std::string& bytes,
+                  const std::vector<std::string>& attributes = {}) {
+    WriteFileAtomically(folder_ / name, bytes);
+    return ReadPointFile(folder_ / name, attributes).points;
+  }
+
+  std::string Refusal(const std::string& name, const std::string& bytes,
+                      const std::vector<std::string>& attributes = {}) {
+    return WordsOf<Error>([&] { Read(name, bytes, attributes); });
+  }
+
+  ScratchFolder folder_;
+};
+
+TEST_F(PointFiles, EveryKindGivesTheSamePoints) {
+  const std::map<std::string, std::string> files = {
+      {"a.csv", Csv()},  {"a.txt", Csv()},      {"a.xyz", Xyz()},
+      {"a.npy", Npy(3)}, {"a.ply", PlainPly()}, {"a.obj", Obj()},
+      {"a.off", Off()},  {"A.XYZ", Xyz()},      {"b.obj", Obj("f 1 2 3\n")}};
+  for (const auto& [name, bytes] : files) {
+    SCOPED_TRACE(name);
+    const PointTable table = Read(name, bytes);
+    ASSERT_EQ(table.positions.size(), std::size_t{kCount});
+    for (int k = 0; k < kCount; ++k) {
+      const bool single = name.ends_with(".off");
+      EXPECT_EQ(table.positions[k],
+                single ? Vec3(PointAt(k).cast<float>().cast<double>()) : PointAt(k))
+          << k;
+    }
+    EXPECT_TRUE(table.uv.empty());
+    EXPECT_TRUE(table.weights.empty());
+  }
+}
+
+TEST_F(PointFiles, WhatIsCompressedIsTheSameFile) {
+  for (const auto& [name, bytes] : std::map<std::string, std::string>{
+           {"a.csv", Csv()}, {"a.npy", Npy(5)}, {"a.ply", PlainPly()}, {"a.xyz", Xyz()}}) {
+    SCOPED_TRACE(name);
+    const PointTable plain = Read(name, bytes);
+    const std::string path = (folder_ / name).string();
+    ASSERT_EQ(std::system(("gzip -kf '" + path + "'").c_str()), 0);
+    const PointTable zipped = ReadPointFile(path + ".gz").points;
+    EXPECT_EQ(zipped.positions, plain.positions);
+    EXPECT_EQ(zipped.uv, plain.uv);
+  }
+  EXPECT_THAT(Refusal("broken.csv.gz", "this is no gzip"), HasSubstr("broken.csv.gz"));
+}
+
+TEST_F(PointFiles, ParametersComeWithTheKindsThatHaveThem) {
+  const auto both = [](int k) { return fmt::format("{} {}", UvAt(k).x(), UvAt(k).y()); };
+  for (const auto& [name, bytes] :
+       std::map<std::string, std::string>{{"five.npy", Npy(5)},
+                                          {"uv.ply", Ply({"u", "v"}, both)},
+                                          {"st.ply", Ply({"s", "t"}, both)}}) {
+    SCOPED_TRACE(name);
+    const PointTable table = Read(name, bytes);
+    ASSERT_EQ(table.uv.size(), std::size_t{kCount});
+    for (int k = 0; k < kCount; ++k) {
+      EXPECT_EQ(table.uv[k], UvAt(k)) << k;
+    }
+  }
+}
+
+TEST_F(PointFiles, FacesBecomeTrianglesBetweenThePoints) {
+  for (const auto& [name, bytes] : std::map<std::string, std::string>{
+           {"a.ply", PlainPly("3 0 1 2\n")}, {"a.obj", Obj("f 1 2 3\n")}, {"a.off", Off()}}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(Read(name, bytes).triangles, (std::vector<Triangle>{{0, 1, 2}}));
+  }
+}
+
+TEST_F(PointFiles, EqualCornersOfAnStlAreOnePoint) {
+  const PointTable table = Read("a.stl",
+                                "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 "
+                                "0\nvertex 0 1 0\nendloop\nendfacet\nfacet normal 0 0 1\nouter "
+                                "loop\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 "
+                                "0\nendloop\nendfacet\nendsolid s\n");
+  EXPECT_EQ(table.positions.size(), 4u);
+  EXPECT_EQ(table.triangles.size(), 2u);
+}
+
+TEST_F(PointFiles, WeightAndSigmaOfAPlyAreThoseOfATable) {
+  const PointTable weight = Read("w.ply", OneScalarPly("weight", 4, 4)),
+                   sigma = Read("s.ply", OneScalarPly("sigma", 0.5, 0.5));
+  EXPECT_FALSE(weight.weights_of_sigma);
+  EXPECT_TRUE(sigma.weights_of_sigma);
+  EXPECT_EQ(weight.weights, std::vector<double>(kCount, 4));
+  EXPECT_EQ(sigma.weights, weight.weights);
+  EXPECT_THAT(Refusal("both.ply", Ply({"weight", "sigma"}, [](int) { return "1 1"; })),
+              HasSubstr("give one of them"));
+  for (const char* bad : {"weight", "sigma"}) {
+    EXPECT_THAT(Refusal("bad.ply", OneScalarPly(bad, 1, 0)),
+                HasSubstr(fmt::format("the {} of vertex {} is not positive", bad, kCount - 1)));
+  }
+}
+
+TEST_F(PointFiles, AttributesAreOfATableOrAPly) {
+  const PointTable table = Read("a.ply", OneScalarPly("warmth", 3, 5), {"warmth"});
+  ASSERT_EQ(table.attributes.size(), 1u);
+  EXPECT_EQ(table.attributes[0].name, "warmth");
+  EXPECT_EQ(table.attributes[0].values.back(), 5);
+  EXPECT_THAT(Refusal("a.xyz", Xyz(), {"warmth"}), HasSubstr("'warmth'"));
+  EXPECT_THAT(Refusal("b.ply", PlainPly(), {"warmth"}), HasSubstr("warmth"));
+  EXPECT_THAT(Refusal("c.ply", OneScalarPly("warmth", 3, std::numeric_limits<double>::infinity()),
+                      {"warmth"}),
+              HasSubstr("c.ply: "));
+}
+
+TEST_F(PointFiles, WhatIsNotOfItsKindIsRefusedByName) {
+  EXPECT_THAT(Refusal("a.pcd", "1 2 3"), HasSubstr("files of points end in"));
+  EXPECT_THAT(Refusal("a.npy", Npy(4)), HasSubstr("neither n x 3"));
+  EXPECT_THAT(Refusal("a.xyz", "1 2\n"), HasSubstr("a.xyz"));
+  EXPECT_THAT(Refusal("b.xyz", "1 2 inf\n"), HasSubstr("b.xyz"));
+  EXPECT_THAT(Refusal("c.xyz", "# nothing\n"), HasSubstr("there is no point"));
+  EXPECT_THAT(Refusal("a.obj", "v 1 2 nan\n"), HasSubstr("a.obj"));
+  EXPECT_THAT(Refusal("b.obj", "vn 0 0 1\n"), HasSubstr("there is no point"));
+  EXPECT_THAT(Refusal("a.ply", "ply\nformat ascii 1.0\nend_header\n"), HasSubstr("a.ply"));
+  EXPECT_THAT(WordsOf<Error>([&] { ReadPointFile(folder_ / "missing.csv"); }),
+              HasSubstr("missing.csv"));
+}
+
+}  // namespace
+}  // namespace semblance
