@@ -4,6 +4,7 @@ when the folder is opened again.
 
 usage: workbench_kills.py PROGRAM CONFIG COUNT SEED     prints how many kills fell short
 """
+import http.client
 import json
 import os
 import random
@@ -43,7 +44,7 @@ def work_until_killed(process, url, host, first, after_s):
         for step in range(1000):
             try:
                 answer = ask(url + "api/act", host, {"do": "set", "path": "tissue.set_mm.g", "value": first + step / 1000})
-            except (OSError, ValueError):
+            except (OSError, ValueError, http.client.HTTPException):  # an answer that the kill cut off was not given
                 return
             done[0] = depth_in(answer)
 
