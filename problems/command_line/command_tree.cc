@@ -5,12 +5,29 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <sstream>
 
 namespace semblance {
 namespace {
 
+// CLI11 tells a choice in the name of its type: "TEXT:{failed,unusable,all}".
+std::vector<std::string> ChoicesOf(const std::string& type) {
+  const std::size_t begin = type.find('{'), end = type.rfind('}');
+  std::vector<std::string> choices;
+  if (begin == std::string::npos || end == std::string::npos || end < begin) {
+    return choices;
+  }
+  std::istringstream list(type.substr(begin + 1, end - begin - 1));
+  for (std::string word; std::getline(list, word, ',');) {
+    choices.push_back(word);
+  }
+  return choices;
+}
+
 OptionText TextOf(const CLI::Option& option) {
-  OptionText text{.names = {}, .value = {}, .purpose = option.get_description()};
+  const std::string type = option.get_type_name();
+  OptionText text{
+      .names = {}, .value = {}, .choices = ChoicesOf(type), .purpose = option.get_description()};
   for (const std::string& name : option.get_snames()) {
     text.names.push_back("-" + name);
   }
@@ -21,7 +38,7 @@ OptionText TextOf(const CLI::Option& option) {
     text.positional = true;
     text.names.push_back(option.get_name());
   } else if (option.get_items_expected_max() > 0) {
-    text.value = option.get_type_name().substr(0, option.get_type_name().find(':'));
+    text.value = type.substr(0, type.find(':'));
   }
   return text;
 }

@@ -12,8 +12,9 @@ class App;
 namespace semblance {
 
 struct OptionText {
-  std::vector<std::string> names;  // with their dashes; of a positional its one name
-  std::string value;               // what it takes, e.g. TEXT; empty: a flag
+  std::vector<std::string> names;         // with their dashes; of a positional its one name
+  std::string value;                      // what it takes, e.g. TEXT; empty: a flag
+  std::vector<std::string> choices = {};  // the words that it takes, where it takes no others
   std::string purpose;
   bool positional = false;
 };

@@ -2,6 +2,7 @@
 #include "problems/command_line/shell_completion.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <functional>
 
@@ -26,84 +27,186 @@ std::string Quoted(const std::string& text) {
   return quoted + "'";
 }
 
-std::string WordsAfter(const CommandNode& node) {
-  std::string words;
+// A word that may follow, and what it is.
+struct NextWord {
+  std::string word;
+  std::string purpose;
+};
+
+// Commands, words of a positional that takes no others, options.
+std::vector<NextWord> WordsAfter(const CommandNode& node) {
+  std::vector<NextWord> words;
   for (const CommandNode& below : node.commands) {
-    words += below.name + " ";
+    words.push_back({below.name, below.purpose});
   }
   for (const OptionText& option : node.options) {
-    for (std::size_t k = 0; !option.positional && k < option.names.size(); ++k) {
-      words += option.names[k] + " ";
+    for (const std::string& name : option.positional ? option.choices : option.names) {
+      words.push_back({name, option.purpose});
     }
   }
-  return words.substr(0, words.size() - (words.empty() ? 0 : 1));
+  return words;
 }
 
-// The shell's `case` of how words lead from one command to the next, and that of what may follow.
+std::string BashList(const std::vector<NextWord>& words) {
+  std::string list;
+  for (const NextWord& next : words) {
+    list += (list.empty() ? "" : " ") + next.word;
+  }
+  return Quoted(list);
+}
+
+// Of `word:what it is`.
+std::string ZshList(const std::vector<NextWord>& words) {
+  std::string list = "(";
+  for (const NextWord& next : words) {
+    list += (list.size() == 1 ? "" : " ") + Quoted(next.word + ":" + next.purpose);
+  }
+  return list + ")";
+}
+
+// The shell's cases: how words lead from one command to the next; what may follow a command; what
+// an option takes: words, or, where it names none, files.
 struct Cases {
   std::string steps;
   std::string words;
+  std::string values;
 };
 
-Cases CasesOf(const CommandNode& program) {
+void AddValues(const CommandNode& node, const std::string& path, std::string& values) {
+  for (const OptionText& option : node.options) {
+    for (std::size_t k = 0; !option.value.empty() && k < option.names.size(); ++k) {
+      values += fmt::format("    {}) value={} ;;\n", Quoted(path + ":" + option.names[k]),
+                            option.choices.empty()
+                                ? std::string("files")
+                                : Quoted(fmt::format("{}", fmt::join(option.choices, " "))));
+    }
+  }
+}
+
+Cases CasesOf(const CommandNode& program,
+              const std::function<std::string(const std::vector<NextWord>&)>& list) {
   Cases cases;
   ForEachCommand(program, "", [&](const CommandNode& node, const std::string& path) {
-    cases.words += fmt::format("    {}) next={} ;;\n", Quoted(path), Quoted(WordsAfter(node)));
+    cases.words += fmt::format("    {}) next={} ;;\n", Quoted(path), list(WordsAfter(node)));
     for (const CommandNode& below : node.commands) {
       cases.steps += fmt::format("      {}) at={} ;;\n", Quoted(path + ":" + below.name),
                                  Quoted(path.empty() ? below.name : path + " " + below.name));
     }
+    AddValues(node, path, cases.values);
   });
   return cases;
+}
+
+// One option of fish; what it takes are words, else files.
+std::string FishOption(const OptionText& option) {
+  std::string text;
+  for (const std::string& name : option.names) {
+    text += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
+  }
+  if (!option.choices.empty()) {
+    return text + " -x -a " + Quoted(fmt::format("{}", fmt::join(option.choices, " ")));
+  }
+  return text + (option.value.empty() ? "" : " -r");
 }
 
 }  // namespace
 
 std::string BashCompletion(const CommandNode& program) {
-  const Cases cases = CasesOf(program);
+  const Cases cases = CasesOf(program, &BashList);
   return fmt::format(
-      "# bash completion of {0}\n_{0}() {{\n  local current=\"${{COMP_WORDS[COMP_CWORD]}}\" at='' "
-      "next='' word\n  for word in \"${{COMP_WORDS[@]:1:COMP_CWORD-1}}\"; do\n    case "
-      "\"$at:$word\" in\n{1}    esac\n  done\n  case \"$at\" in\n{2}  esac\n"
-      "  mapfile -t COMPREPLY < <(compgen -W \"$next\" -- \"$current\"; "
-      "[[ -z $at || $current == -* ]] || compgen -f -- \"$current\")\n}}\n"
-      "complete -o filenames -F _{0} {0}\n",
-      program.name, cases.steps, cases.words);
+      R"(# bash completion of {0}
+_{0}() {{
+  local current="${{COMP_WORDS[COMP_CWORD]}}" at='' next='' value='' word
+  for word in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
+    case "$at:$word" in
+{1}    esac
+  done
+  case "$at:${{COMP_WORDS[COMP_CWORD-1]}}" in
+{3}  esac
+  case "$at" in
+{2}  esac
+  if [[ -n $value && $value != files ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$value" -- "$current")
+  elif [[ -n $value ]]; then
+    mapfile -t COMPREPLY < <(compgen -f -- "$current")
+  else
+    mapfile -t COMPREPLY < <(compgen -W "$next" -- "$current"
+      [[ -z $at || $current == -* ]] || compgen -f -- "$current")
+  fi
+}}
+complete -o filenames -F _{0} {0}
+)",
+      program.name, cases.steps, cases.words, cases.values);
 }
 
 std::string ZshCompletion(const CommandNode& program) {
-  const Cases cases = CasesOf(program);
+  const Cases cases = CasesOf(program, &ZshList);
   return fmt::format(
-      "#compdef {0}\n_{0}() {{\n  local at='' next='' word\n  for word in "
-      "\"${{(@)words[2,CURRENT-1]}}\"; do\n    case \"$at:$word\" in\n{1}    esac\n  done\n  case "
-      "\"$at\" in\n{2}  esac\n  compadd -- ${{=next}}\n  [[ -z $at ]] || _files\n}}\n"
-      "compdef _{0} {0}\n",
-      program.name, cases.steps, cases.words);
+      R"(#compdef {0}
+_{0}() {{
+  local at='' value='' word
+  local -a next values
+  for word in "${{(@)words[2,CURRENT-1]}}"; do
+    case "$at:$word" in
+{1}    esac
+  done
+  case "$at:${{words[CURRENT-1]}}" in
+{3}  esac
+  case "$at" in
+{2}  esac
+  if [[ $value == files ]]; then
+    _files
+  elif [[ -n $value ]]; then
+    values=(${{=value}})
+    compadd -a values
+  else
+    _describe '{0}' next
+    [[ -z $at || $PREFIX == -* ]] || _files
+  fi
+}}
+# Read by zsh's own loader, it is asked at once; sourced, it is only made known.
+if [[ "${{funcstack[1]}}" == _{0} ]]; then
+  _{0} "$@"
+else
+  compdef _{0} {0}
+fi
+)",
+      program.name, cases.steps, cases.words, cases.values);
 }
 
 std::string FishCompletion(const CommandNode& program) {
-  std::string text = fmt::format("# fish completion of {}\n", program.name);
+  std::string steps, lines;
   ForEachCommand(program, "", [&](const CommandNode& node, const std::string& path) {
-    const std::string last = path.substr(path.rfind(' ') + 1);
-    const std::string when = path.empty() ? "__fish_use_subcommand"
-                                          : fmt::format("__fish_seen_subcommand_from {}", last);
+    const std::string add = fmt::format("complete -c {0} -n {1}", program.name,
+                                        Quoted(fmt::format("__{}_at '{}'", program.name, path)));
     for (const CommandNode& below : node.commands) {
-      text += fmt::format("complete -c {} -n {} -a {} -d {}\n", program.name, Quoted(when),
-                          below.name, Quoted(below.purpose));
+      const std::string next = path.empty() ? below.name : path + " " + below.name;
+      steps +=
+          fmt::format("      case {}; set at {}\n", Quoted(path + ":" + below.name), Quoted(next));
+      lines += fmt::format("{} -f -a {} -d {}\n", add, below.name, Quoted(below.purpose));
     }
     for (const OptionText& option : node.options) {
-      if (option.positional) {
-        continue;
+      if (!option.positional) {
+        lines += fmt::format("{}{} -d {}\n", add, FishOption(option), Quoted(option.purpose));
+      } else if (!option.choices.empty()) {
+        lines += fmt::format("{} -f -a {}\n", add,
+                             Quoted(fmt::format("{}", fmt::join(option.choices, " "))));
       }
-      std::string names;
-      for (const std::string& name : option.names) {
-        names += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
-      }
-      text += fmt::format("complete -c {} -n {}{}{} -d {}\n", program.name, Quoted(when), names,
-                          option.value.empty() ? "" : " -r", Quoted(option.purpose));
     }
   });
-  return text;
+  return fmt::format(
+      R"(# fish completion of {0}
+function __{0}_at
+  set -l at ''
+  for word in (commandline -opc)[2..-1]
+    switch "$at:$word"
+{1}    end
+  end
+  test "$at" = "$argv[1]"
+end
+complete -c {0} -n '__{0}_at ""' -f
+{2})",
+      program.name, steps, lines);
 }
 
 }  // namespace semblance

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -19,23 +20,28 @@ namespace {
 CommandNode Sample() {
   const OptionText help{.names = {"-h", "--help"}, .value = {}, .purpose = "Print help"};
   const OptionText out{.names = {"--out"}, .value = "TEXT", .purpose = "it's the user's folder"};
+  const OptionText again{.names = {"--again"},
+                         .value = "TEXT",
+                         .choices = {"failed", "all"},
+                         .purpose = "what: failed or all"};
   const OptionText file{.names = {"FILE"}, .value = {}, .purpose = ".a file\\", .positional = true};
-  return {.name = "tool",
-          .purpose = "Does things.",
-          .options = {help},
-          .commands = {
-              {.name = "run", .purpose = "run it", .options = {help, out, file}, .commands = {}},
-              {.name = "marks",
-               .purpose = "of a skull",
-               .options = {help},
-               .commands = {{.name = "convert",
-                             .purpose = "from form to form",
-                             .options = {help, out},
-                             .commands = {}},
-                            {.name = "propose",
-                             .purpose = "where they may be",
-                             .options = {help},
-                             .commands = {}}}}}};
+  return {
+      .name = "tool",
+      .purpose = "Does things.",
+      .options = {help},
+      .commands = {
+          {.name = "run", .purpose = "run it", .options = {help, out, again, file}, .commands = {}},
+          {.name = "marks",
+           .purpose = "of a skull",
+           .options = {help},
+           .commands = {{.name = "convert",
+                         .purpose = "from form to form",
+                         .options = {help, out},
+                         .commands = {}},
+                        {.name = "propose",
+                         .purpose = "where they may be",
+                         .options = {help},
+                         .commands = {}}}}}};
 }
 
 // What a shell command prints.
@@ -66,6 +72,52 @@ TEST(ShellCompletion, BashOffersWhatMayFollow) {
   EXPECT_EQ(Offered(script, "tool marks convert --"), "--help --out\n");
   EXPECT_EQ(Offered(script, "tool run file.yaml --o"), "--out\n");
   EXPECT_EQ(Offered(script, "tool propose --o"), "\n");  // no command of the program itself
+  EXPECT_EQ(Offered(script, "tool run --again \"\""), "failed all\n");
+  EXPECT_EQ(Offered(script, "tool run --out \"\""), "\n");  // files, and there are none
+}
+
+// As its own loader reads it, with what zsh gives to a completion in the place of what shows it.
+std::string OfferedByZsh(const std::string& script, const std::string& words) {
+  testing::ScratchFolder folder;
+  std::ofstream(folder.Path() / "_tool") << script;
+  return Said("cd '" + folder.Path().string() +
+              "' && zsh -f -c 'fpath=($PWD $fpath); autoload -U _tool; words=(" + words +
+              "); CURRENT=${#words}; PREFIX=${words[-1]};"
+              "_describe() { print -r -- ${(P)2%%:*} }; _files() { print files };"
+              "compadd() { print -r -- ${(P)2} }; _tool'");
+}
+
+TEST(ShellCompletion, ZshOffersWhatMayFollowAtTheFirstTime) {
+  if (std::system("command -v zsh > /dev/null") != 0) {
+    GTEST_SKIP() << "zsh is not installed";
+  }
+  const std::string script = ZshCompletion(Sample());
+  EXPECT_EQ(OfferedByZsh(script, "tool \"\""), "run marks -h --help\n");
+  EXPECT_EQ(OfferedByZsh(script, "tool marks convert --o"), "-h --help --out\n");
+  EXPECT_EQ(OfferedByZsh(script, "tool run \"\""), "-h --help --out --again\nfiles\n");
+  EXPECT_EQ(OfferedByZsh(script, "tool run --again \"\""), "failed all\n");
+  EXPECT_EQ(OfferedByZsh(script, "tool run --out \"\""), "files\n");
+}
+
+std::string OfferedByFish(const std::string& script, const std::string& line) {
+  testing::ScratchFolder folder;
+  std::ofstream(folder.Path() / "script") << script;
+  return Said("cd '" + folder.Path().string() + "' && mkdir empty && cd empty && HOME=" +
+              folder.Path().string() + " fish -N -c 'source ../script; complete -C \"" + line +
+              "\" | cut -f 1 | tr \"\\n\" \" \"'");
+}
+
+TEST(ShellCompletion, FishOffersWhatMayFollow) {
+  if (std::system("command -v fish > /dev/null") != 0) {
+    GTEST_SKIP() << "fish is not installed";
+  }
+  const std::string script = FishCompletion(Sample());
+  EXPECT_EQ(OfferedByFish(script, "tool "), "marks run ");
+  EXPECT_EQ(OfferedByFish(script, "tool marks "), "convert propose ");
+  EXPECT_EQ(OfferedByFish(script, "tool marks convert --o"), "--out ");
+  EXPECT_EQ(OfferedByFish(script, "tool run --again "), "all failed ");
+  EXPECT_EQ(OfferedByFish(script, "tool run marks --o"), "--out ");  // a file called marks
+  EXPECT_EQ(OfferedByFish(script, "tool propose --o"), "");
 }
 
 TEST(ShellCompletion, EveryShellKnowsEveryCommandAndOption) {
