@@ -10,16 +10,17 @@
 namespace semblance {
 namespace {
 
-// CLI11 tells a choice in the name of its type: "TEXT:{failed,unusable,all}".
+// CLI11 tells a choice in the name of its type: "TEXT:{failed,unusable,all}", and of words that
+// become values "ENUM:value in {LPS->0,RAS->1} OR {0,1}".
 std::vector<std::string> ChoicesOf(const std::string& type) {
-  const std::size_t begin = type.find('{'), end = type.rfind('}');
+  const std::size_t begin = type.find('{'), end = type.find('}');
   std::vector<std::string> choices;
   if (begin == std::string::npos || end == std::string::npos || end < begin) {
     return choices;
   }
   std::istringstream list(type.substr(begin + 1, end - begin - 1));
   for (std::string word; std::getline(list, word, ',');) {
-    choices.push_back(word);
+    choices.push_back(word.substr(0, word.find("->")));
   }
   return choices;
 }

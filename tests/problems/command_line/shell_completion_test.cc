@@ -4,13 +4,17 @@
 
 #include <gtest/gtest.h>
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "problems/command_line/command_tree.h"
 #include "problems/command_line/manual_page.h"
 #include "tests/testing/scratch_folder.h"
 
@@ -130,6 +134,23 @@ TEST(ShellCompletion, EveryShellKnowsEveryCommandAndOption) {
     EXPECT_EQ(text.find("FILE"), std::string::npos);  // a positional is no word to type
   }
   EXPECT_NE(FishCompletion(program).find("-d 'it'\\''s the user'\\''s folder'"), std::string::npos);
+}
+
+TEST(CommandTree, TellsTheWordsThatAnOptionTakes) {
+  enum class Side { kLeft, kRight };
+  const std::map<std::string, Side> sides = {{"left", Side::kLeft}, {"right", Side::kRight}};
+  CLI::App app("Does things.", "tool");
+  std::string word, file;
+  Side side = Side::kLeft;
+  app.add_option("--word", word, "one of two")->check(CLI::IsMember({"a", "b c"}));
+  app.add_option("--side", side, "of the head")->transform(CLI::CheckedTransformer(sides));
+  app.add_option("--file", file, "any");
+  const CommandNode tool = TreeOf(app);
+  using Words = std::vector<std::string>;
+  ASSERT_EQ(tool.options.size(), 4U);  // the first is --help
+  EXPECT_EQ(tool.options[1].choices, (Words{"a", "b c"}));
+  EXPECT_EQ(tool.options[2].choices, (Words{"left", "right"}));
+  EXPECT_EQ(tool.options[3].choices, Words{});
 }
 
 TEST(ManualPage, HasEachCommandWithItsOptions) {
