@@ -63,6 +63,13 @@ const pictureOf = (code) => {
   return pictures.get(code);
 };
 
+// Its picture is made when it is opened first.
+const allSites = element('details', {ontoggle: () => {
+  if (allSites.open && allSites.children.length === 1) {
+    allSites.append(element('img', {src: 'api/sites.png', alt: 'the sites on a made-up skull, by number'}));
+  }
+}}, element('summary', {textContent: 'All sites by their numbers'}));
+
 function detail(code) {
   if (!code) {
     return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. A ball that is there is chosen by a click on it.'})];
@@ -85,8 +92,7 @@ function detail(code) {
       if (await act('rename', {site: code, name})) { choose(name); }
     })) : element('p', {className: 'hint', textContent: 'Click on the bone where it lies.'}),
     landmark ? remarks(landmark) : null,
-    element('details', {}, element('summary', {textContent: 'All sites by their numbers'}),
-            element('img', {src: 'api/sites.png', alt: 'the sites on a made-up skull, by number', loading: 'lazy'}))
+    allSites
   ].filter((part) => part);
 }
 

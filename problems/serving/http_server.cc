@@ -9,6 +9,7 @@
 #include <array>
 #include <charconv>
 #include <cstdint>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
@@ -118,6 +119,18 @@ struct HttpServer::Impl {
     return posts ? CheckBody(request, *path) : std::nullopt;
   }
 
+  // As it is: a body that is set as content would be compressed with Brotli, which takes a browser
+  // on this machine longer than making the face does.
+  static void SetBody(httplib::Response& response, const std::string& text,
+                      const std::string& type) {
+    const auto body = std::make_shared<const std::string>(text);
+    response.set_content_provider(
+        body->size(), type,
+        [body](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+          return sink.write(body->data() + offset, length);
+        });
+  }
+
   void Reply(const httplib::Request& request, httplib::Response& response) {
     BenchRequest asked{request.method, *BelowToken(request.path), {}, request.body};
     for (const auto& [key, value] : request.params) {
@@ -133,7 +146,7 @@ struct HttpServer::Impl {
       response.set_header("Content-Disposition",
                           fmt::format("attachment; filename=\"{}\"", reply.download_name));
     }
-    response.set_content(reply.body, reply.type);
+    SetBody(response, reply.body, reply.type);
   }
 
   void Prepare() {

@@ -102,6 +102,17 @@ class WorkbenchServer : public ::testing::Test {
   std::jthread serving_;
 };
 
+TEST_F(WorkbenchServer, NothingIsCompressedForABrowserOnThisMachine) {
+  const std::string path = "/" + Token() + "/api/schema";
+  const auto body = [](const std::string& answer) {
+    return answer.substr(answer.find("\r\n\r\n"));
+  };
+  const std::string answer = Get(path, "Accept-Encoding: gzip, deflate, br\r\n");
+  EXPECT_THAT(answer, AllOf(StartsWith("HTTP/1.1 200"), Not(HasSubstr("Content-Encoding"))));
+  EXPECT_EQ(body(answer), body(Get(path)));
+  EXPECT_GT(answer.size(), 10000U);
+}
+
 TEST_F(WorkbenchServer, ThePageAndItsStateComeWithTheToken) {
   EXPECT_THAT(GetBelow(""), AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("<!DOCTYPE html>"),
                                   HasSubstr("Content-Security-Policy: default-src 'none'"),
