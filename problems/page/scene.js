@@ -21,12 +21,12 @@ export class Scene {
   constructor(root) {
     this.root = root;
     this.blobs = {};
-    this.shared = {layers: new Map(), mapped: false, range_mm: 4, exaggeration: 1, camera: null};
+    this.drawSoon = () => this.draw();
+    this.shared = {layers: new Map(), mapped: false, range_mm: 4, exaggeration: 1, camera: null, drawSoon: this.drawSoon};
     for (const id of Object.keys(LAYERS)) {
       this.shared.layers.set(id, {shown: id !== 'skin', opacity: id === 'face' ? 0.75 : id === 'skin' ? 0.4 : 1});
     }
     this.due = false;
-    this.drawSoon = () => this.draw();
     this.frames = element('div', {className: 'view3d-frames'});
     this.main = this.makeFrame('');
     this.others = [];

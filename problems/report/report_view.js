@@ -31,7 +31,7 @@
 
   const stages = [];
   let due = false;
-  const drawSoon = () => {
+  const drawSoon = shared.drawSoon = () => {
     if (!due) {
       due = true;
       requestAnimationFrame(() => {

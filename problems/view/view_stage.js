@@ -2,7 +2,7 @@
 // One canvas of the 3-D view with one scene on it.
 'use strict';
 class SemblanceStage {
-  // settings: what the panel says, shared by all stages; see report_view.js.
+  // shared: what the panel says, of all stages, and drawSoon(), which draws them all; see report_view.js.
   constructor(canvas, tip, shared) {
     this.canvas = canvas;
     this.tip = tip;
@@ -129,7 +129,7 @@ class SemblanceStage {
       }
       if (layer.mesh) { this.paint(layer, object); }
     }
-    this.draw();
+    this.shared.drawSoon();  // once for all that changes before the next picture: without a graphics card each takes long
   }
 
   // What a surface is coloured by: {values, map}, or nothing. A difference from another stage goes before its own map.

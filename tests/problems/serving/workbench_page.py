@@ -306,7 +306,7 @@ def run_in_browser(folders, pictures, work_in):
     subprocess.run(["rm", "-rf", *folders], check=True)
     try:
         # A small window is drawn sooner: all is drawn without a graphics card.
-        browser = webdriver.Browser(*((1440, 900) if pictures else (1000, 640)))
+        browser = webdriver.Browser(1440, 900) if pictures else webdriver.Browser(1000, 560, rough=True)
     except webdriver.CannotStart as error:
         print(f"skipped: Chromium does not start here: {error}")
         return SKIPPED
