@@ -471,7 +471,7 @@ void DeclareFit(CLI::App& command, CommandLine& line) {
   Arguments& a = DeclareJob(command, line, &FitCommand);
   command
       .add_option(
-          "POINTS CONFIG", a.files,
+          "POINTS [CONFIG]", a.files,
           "points: .csv with the columns x,y,z and, if known, u,v, weight or sigma; .xyz .npy .ply "
           ".obj .stl .off; each also .gz; - for a CSV on standard input. YAML file of the fit; "
           "without it all "

@@ -51,6 +51,7 @@ std::stop_token StopOnSignals() {
   const std::stop_token token = StopSource().get_token();  // made before a handler can ask for it
   Handle(SIGALRM, &EndAtOnce);
   Handle(SIGTERM, &Stop);
+  Handle(SIGXFSZ, SIG_IGN);  // a file that grows beyond `ulimit -f` is then told like a full disk
   if (!IsIgnored(SIGINT)) {
     Handle(SIGINT, &Stop);
   }

@@ -80,7 +80,9 @@ py::object TableOf(const fs::path& csv) {
   return rows;
 }
 
-py::object RunStudyFile(const std::string& path, const std::string& out, int jobs) {
+py::object RunStudyFile(const std::string& path, const std::optional<std::string>& given,
+                        int jobs) {
+  const fs::path out = given ? fs::path(*given) : "out" / fs::path(path).stem();
   const StudyPlan plan = ReadStudy(path);
   StudyRunOptions options;
   options.jobs = jobs;
@@ -91,7 +93,7 @@ py::object RunStudyFile(const std::string& path, const std::string& out, int job
     OutputFolder folder(out, WhenNotEmpty::kReplaceFiles);
     WriteStudyTables(folder);
   });
-  return TableOf(fs::path(out) / "trials.csv");
+  return TableOf(out / "trials.csv");
 }
 
 }  // namespace
@@ -103,10 +105,11 @@ void BindExperiments(py::module_& module) {
              "{'implicit.resolution': 60}. Returns {'result': result.json, 'surface': HSpline, "
              "'faults': why it cannot be used, or []}; with `out` the files of a run are written "
              "there too.");
-  module.def(
-      "study", &RunStudyFile, py::arg("path"), py::arg("out"), py::arg("jobs") = 1,
-      "Runs a study, or what is left of it, into the folder `out`, and returns trials.csv in "
-      "long form: a pandas.DataFrame where pandas is installed, else a list of dictionaries.");
+  module.def("study", &RunStudyFile, py::arg("path"), py::arg("out") = py::none(),
+             py::arg("jobs") = 1,
+             "Runs a study, or what is left of it, into the folder `out` (left out: out/NAME, as "
+             "`semblance study NAME.yaml` does), and returns trials.csv in long form: a "
+             "pandas.DataFrame where pandas is installed, else a list of dictionaries.");
 }
 
 }  // namespace semblance

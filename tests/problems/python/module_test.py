@@ -189,6 +189,14 @@ class Experiments(unittest.TestCase):
                 file.write("base: %s\njob: depth\ngrid: {interp: [nearest, mean]}\nset: {subject.rings: 24}\n"
                            "metric: depth_truth.along_direction.rms_mm\n" % os.path.join(SOURCE, "configs", "phantom.yaml"))
             table = semblance.study(study, os.path.join(folder, "out"))
+            here = os.getcwd()
+            os.chdir(folder)  # where out/study lies
+            try:
+                again = semblance.study("study.yaml")
+                self.assertTrue(os.path.isfile("out/study/trials.csv"))
+            finally:
+                os.chdir(here)
+        self.assertEqual(len(again), len(table))
         rows = table if isinstance(table, list) else table.to_dict("records")
         self.assertEqual({row["interp"] for row in rows}, {"nearest", "mean"})
         self.assertTrue(all(row["status"] == "done" for row in rows))
