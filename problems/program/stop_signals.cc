@@ -14,7 +14,8 @@ namespace {
 constexpr unsigned kGrace_s = 1;
 
 std::stop_source& StopSource() {
-  static std::stop_source source;  // a signal handler has no other way in
+  // A signal handler has no other way in. Never destroyed: a signal may come while the program ends.
+  static std::stop_source& source = *new std::stop_source;
   return source;
 }
 
@@ -27,10 +28,13 @@ void EndAtOnce(int) {
 }
 
 void Stop(int) {
-  if (!StopSource().request_stop()) {
+  static volatile std::sig_atomic_t asked = 0;
+  if (asked != 0) {
     EndAtOnce(0);
   }
-  ::alarm(kGrace_s);
+  asked = 1;
+  ::alarm(kGrace_s);  // before what may wait for a lock that the interrupted code holds
+  StopSource().request_stop();
 }
 
 void Handle(int signal, void (*handler)(int)) {
