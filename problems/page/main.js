@@ -73,14 +73,12 @@ function takeKeys(show) {
 }
 
 async function main() {
-  let scene;
-  try {
-    scene = new Scene(byId('view'));
-  } catch (error) {
+  if (!SemblanceGuides.canShow()) {
     byId('view').replaceChildren(element('p', {className: 'empty',
-      textContent: `This browser shows no 3-D pictures (WebGL): ${error.message}. The workbench needs them.`}));
+      textContent: 'This browser shows no 3-D pictures: WebGL is off in it, or this machine has none. The workbench needs it.'}));
     return;
   }
+  const scene = new Scene(byId('view'));
   const bench = {scene, faces: new Faces(scene), store, opener: new Opener(byId('opening'))};
   window.semblance = bench;  // for a look from the console, and for tests
   const job = new Job(byId('job'), byId('run'));

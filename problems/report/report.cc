@@ -82,16 +82,15 @@ bool IsNumeric(const std::string& cell) {
   return (starts_with_digit && !is_list && cell.size() <= 24) || cell == "NaN" || cell == "inf";
 }
 
-// Columns whose cells, where there are any, are all numbers.
+// Columns whose cells are numbers or empty.
 std::vector<bool> NumericColumns(const ReportTable& table) {
   std::vector<bool> numeric(table.header.size(), false);
   for (std::size_t c = 0; c < numeric.size(); ++c) {
-    bool has_number = false, has_text = false;
+    bool has_text = table.rows.empty();
     for (const auto& row : table.rows) {
-      has_number |= IsNumeric(row[c]);
       has_text |= !row[c].empty() && row[c] != "-" && row[c] != "\u2013" && !IsNumeric(row[c]);
     }
-    numeric[c] = has_number && !has_text;
+    numeric[c] = !has_text;
   }
   return numeric;
 }

@@ -2,6 +2,7 @@
 #include "problems/study_report/study_ranking.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -42,6 +43,13 @@ double MeanSeconds(const StudyResults& results, const Treatment& treatment) {
   return count > 0 ? sum / count : kNaN;
 }
 
+std::string WordsOfNames(const StudyResults& results) {
+  const bool has_titles = std::ranges::find(results.axes, "title") != results.axes.end();
+  return results.axes.empty() || has_titles
+             ? std::string()
+             : fmt::format("; named by {}", fmt::join(results.axes, ", "));
+}
+
 std::string RankingText(const StudyResults& results) {
   constexpr std::size_t kMost = 20;
   std::vector<Treatment> ranked = Ranked(results);
@@ -49,8 +57,9 @@ std::string RankingText(const StudyResults& results) {
   if (ranked.empty()) {
     return {};
   }
-  std::string text = fmt::format("{}, best mean first{}:\n", WordsOfMetric(results.metric),
-                                 results.higher_is_better ? " (higher is better)" : "");
+  std::string text =
+      fmt::format("{}, best mean first{}{}:\n", WordsOfMetric(results.metric),
+                  results.higher_is_better ? " (higher is better)" : "", WordsOfNames(results));
   for (std::size_t n = 0; n < std::min(ranked.size(), kMost); ++n) {
     const double seconds = MeanSeconds(results, ranked[n]);
     const auto subjects = static_cast<long long>(ranked[n].by_subject.size());

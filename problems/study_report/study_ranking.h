@@ -19,6 +19,10 @@ std::vector<Treatment> Ranked(const StudyResults& results);
 // another trial did for one is not in it.
 double MeanSeconds(const StudyResults& results, const Treatment& treatment);
 
+// What the parts of a treatment's name are, for the head of a list of them: "; named by interp,
+// rounds". Empty where the study names its treatments itself, or has one alone.
+std::string WordsOfNames(const StudyResults& results);
+
 // A line a treatment for a terminal: rank, mean, subjects, seconds and label; the first twenty, and
 // how many more there are. Empty where no trial has a value.
 std::string RankingText(const StudyResults& results);

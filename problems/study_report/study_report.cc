@@ -50,8 +50,8 @@ std::string Seconds(double seconds) {
 // Each treatment leads to the first of its trials.
 ReportTable RankingTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportTable table{
-      fmt::format("Treatments by {}, best mean first{}", WordsOfMetric(results.metric),
-                  results.higher_is_better ? " (higher is better)" : ""),
+      fmt::format("Treatments by {}, best mean first{}{}", WordsOfMetric(results.metric),
+                  results.higher_is_better ? " (higher is better)" : "", WordsOfNames(results)),
       {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median", "min", "max",
        "mean seconds"},
       {}};

@@ -202,6 +202,15 @@ class SemblanceMeasure {
     this.mark(stage, hit.point, `${straight.toFixed(this.digits)} mm${along}`, isFinite(length) ? way : [start.hit.point, hit.point]);
   }
 
+  // The first point of a surface on the ray, from whichever side: glass is drawn, and met, from outside alone.
+  static meets(ray, object) {
+    const {material} = object, side = material.side;
+    material.side = THREE.DoubleSide;
+    const [first] = ray.intersectObject(object);
+    material.side = side;
+    return first;
+  }
+
   // From bone along its normal to each face that is shown.
   depth(stage, hit) {
     const geometry = hit.object.geometry, normals = geometry.attributes.normal.array, normal = new THREE.Vector3();
@@ -212,7 +221,7 @@ class SemblanceMeasure {
     let end = hit.point.clone().addScaledVector(normal, 5);
     for (const id of ['face', 'skin', 'implicit']) {
       const found = stage.layers.get(id);
-      const far = found && found.object.visible ? ray.intersectObject(found.object)[0] : null;
+      const far = found && found.object.visible ? SemblanceMeasure.meets(ray, found.object) : null;
       if (far) {
         parts.push(`${found.layer.label.toLowerCase()} ${far.distance.toFixed(1)} mm`);
         if (parts.length === 1) { end = far.point; }

@@ -274,6 +274,11 @@ def work(browser, program, config, folder, pictures):
         text = browser.wait("const l = document.querySelector('.view3d-label'); return l && l.textContent")
         straight, along = (float(number) for number in re.findall(r"([\d.]+) mm", text))
         assert 80 < straight < along < 2 * straight, text
+        browser.click("[data-tool=depth]")
+        browser.click_at(*browser.run(PLACE, *points["g"]))
+        text = browser.wait("const l = document.querySelectorAll('.view3d-label'); return l.length === 2 && l[1].textContent")
+        found = re.search(r"depth: face ([\d.]+) mm", text)
+        assert found and 1 < float(found[1]) < 15, text  # through glass
         picture("measure")
         assert browser.run(PLANE) < 0.03
 
@@ -287,6 +292,7 @@ def work(browser, program, config, folder, pictures):
             if tab == "landmarks":
                 expect_site_picture(browser, "go_r")
             picture("small-" + tab)
+        expect_reports_on_a_phone(browser, program, bench.url, folder)
         complaints = browser.complaints()
         assert not complaints, complaints
         assert again.wait(200) == 0
@@ -296,6 +302,21 @@ def work(browser, program, config, folder, pictures):
         if again:
             again.kill()
     expect_same_files(folder)
+
+
+def expect_reports_on_a_phone(browser, program, url, folder):
+    """The report of the run, and that of a fit: what stands open and what is folded, and nothing to scroll sideways."""
+    points = os.path.join(os.path.dirname(__file__), "..", "..", "..", "configs", "fit", "points.csv")
+    fit = os.path.abspath(os.path.join(os.path.dirname(folder), "fit"))
+    subprocess.run([program, "fit", points, "--out", fit, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    for report, heads in ((url + "run/report.html", ["In three dimensions", "In figures"]),
+                          (f"file://{fit}/report.html", ["In three dimensions", "In figures", "How far the points are off"])):
+        browser.open(report)
+        browser.wait("return document.querySelector('#view3d canvas')")
+        wide = browser.run("return document.documentElement.scrollWidth")
+        assert wide <= 400, f"{report}: {wide} pixels wide"
+        shown = browser.run("return [...document.querySelectorAll('main h2')].filter((h) => !h.closest('details')).map((h) => h.textContent)")
+        assert [head for head in shown if head in heads] == heads, shown
 
 
 def run_in_browser(folders, pictures, work_in):
@@ -318,7 +339,8 @@ def run_in_browser(folders, pictures, work_in):
 def main():
     program, config, folder, *rest = sys.argv[1:]
     pictures = rest[0] if rest else None
-    return run_in_browser([folder, os.path.join(os.path.dirname(folder), "again")], pictures,
+    made = [folder, *(os.path.join(os.path.dirname(folder), name) for name in ("again", "fit"))]
+    return run_in_browser(made, pictures,
                           lambda browser: work(browser, program, config, folder, pictures))
 
 

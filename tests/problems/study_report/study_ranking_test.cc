@@ -46,7 +46,7 @@ StudyResults Results() {
 
 TEST(StudyRanking, TheBestMeanComesFirst) {
   const std::string text = RankingText(Results());
-  EXPECT_THAT(text, HasSubstr("face.rms_mm), best mean first:\n"));
+  EXPECT_THAT(text, HasSubstr("face.rms_mm), best mean first; named by interp, weight:\n"));
   EXPECT_THAT(text, HasSubstr("   1         1.5  2 subjects  b, 1\n"));  // no time was told
   EXPECT_THAT(text, HasSubstr("   4           5  2 subjects, 4.0 s  a, 10\n"));
   StudyResults none = Results();
