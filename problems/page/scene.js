@@ -28,9 +28,9 @@ export class Scene {
     }
     this.due = false;
     this.frames = element('div', {className: 'view3d-frames'});
+    root.append(this.frames);  // first: a canvas takes its ground from the page's style
     this.main = this.makeFrame('');
     this.others = [];
-    root.append(this.frames);
     this.marks = new THREE.Group();
     this.main.stage.extra.add(this.marks);
     this.onPick = null;  // (hitOf, ray, among) of a click

@@ -88,6 +88,10 @@ class Browser:
         self._order("Emulation.setDeviceMetricsOverride",
                     {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
 
+    def darken(self):
+        """As for a person who likes it dark."""
+        self._order("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
+
     def _order(self, command, parameters):
         """One of Chromium's own, beyond the protocol."""
         self._call("POST", self.session + "/goog/cdp/execute", {"cmd": command, "params": parameters})

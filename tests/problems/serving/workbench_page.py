@@ -27,6 +27,9 @@ FACE = "return window.semblance.faces.kind;"
 STATE = "return window.semblance.store.state;"
 TURN = "return window.semblance.scene.shared.camera.turn;"
 
+# The view's ground, and that of the page's style.
+GROUND = """const {renderer, canvas} = window.semblance.scene.main.stage;
+return [renderer.getClearColor().getHex(), new THREE.Color(getComputedStyle(canvas).backgroundColor).getHex()];"""
 
 # The worst relative error of distances along a plane, where they are straight, over pairs of triangles.
 PLANE = """
@@ -259,9 +262,12 @@ def work(browser, program, config, folder, pictures):
         bench.kill()
         bench = Workbench(program, [folder])
         browser.complaints()  # the page has asked a dead program
+        browser.darken()
         browser.open(bench.url)
         browser.wait("return window.semblance && window.semblance.faces.kind === 'full'")
         assert state(browser)["edited_vertices"] == vertices
+        ground, page = browser.run(GROUND)
+        assert ground == page != 0xffffff, (hex(ground), hex(page))
         assert state(browser)["face"]["saved"]
         again = run_again(program, folder)
         assert browser.run("return document.querySelectorAll('.depth').length") > 20
