@@ -30,7 +30,9 @@ console.error = console.warn = (...words) => faults.push(words.join(' '));
 constexpr const char* kPress = R"js(<script>
 addEventListener('load', () => setTimeout(() => {
   const canvases = [...document.querySelectorAll('.view3d-stage canvas')];
+  const due = [];  // what waits for the next picture: made when it is read
   const picture = (canvas) => {
+    for (const draw of due.splice(0)) { draw(); }
     const copy = Object.assign(document.createElement('canvas'), {width: canvas.width, height: canvas.height});
     const pen = copy.getContext('2d');
     pen.drawImage(canvas, 0, 0);
@@ -38,7 +40,7 @@ addEventListener('load', () => setTimeout(() => {
   };
   const inked = (data) => { let n = 0; for (let k = 0; k < data.length; k += 4) { n += data[k] < 250; } return n; };
   const changed = (a, b) => { let n = 0; for (let k = 0; k < a.length; ++k) { n += a[k] !== b[k]; } return n; };
-  window.requestAnimationFrame = (draw) => { draw(); return 0; };  // the first picture is there; each is read at once
+  window.requestAnimationFrame = (draw) => { due.push(draw); return 0; };  // the first picture is there
   const out = {canvases: canvases.length, inked: canvases.map((c) => inked(picture(c))), toggles: {}};
   for (const box of document.querySelectorAll('input[data-layer]')) {
     const before = picture(canvases[0]);
