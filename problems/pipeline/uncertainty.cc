@@ -288,9 +288,12 @@ SigmaCoverage MeasureCoverage(const TrueSkin& skin, const TriMesh& face,
   const std::vector<double> areas = VertexAreas(skin.mesh);
   SigmaCoverage coverage{.curve = Coverage(skin.signed_mm, sigma, areas), .area_cm2 = 0};
   coverage.at_90 = CoverageAt90(coverage.curve);
+  std::vector<double> errors(sigma.size(), kNaN);
   for (std::size_t v = 0; v < sigma.size(); ++v) {
     coverage.area_cm2 += std::isfinite(sigma[v]) ? areas[v] / 100 : 0;
+    errors[v] = std::isfinite(sigma[v]) ? skin.signed_mm[v] : kNaN;
   }
+  coverage.scores = ScoreDepths(errors, sigma, areas);
   for (std::size_t part = 0; !skin.part.empty() && part < kFaceParts.size(); ++part) {
     const double share = CoverageOfPart(skin, static_cast<int>(part), sigma, areas);
     if (std::isfinite(share)) {

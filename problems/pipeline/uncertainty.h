@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "interp/evaluation/scores.h"
 #include "problems/metrics/face_region.h"
 #include "problems/pipeline/experiment.h"
 #include "problems/pipeline/skull_stage.h"
@@ -22,6 +23,7 @@ struct SigmaCoverage {
   double at_90 = kNaN;                         // 0.9 where sigma is true
   double area_cm2 = kNaN;                      // of the skin that counts
   std::map<std::string, double> of_part = {};  // at_90 of each part of the face that counts
+  DepthScores scores = {};                     // by area; proper ones, as for depths
 };
 
 struct FaceUncertainty {

@@ -18,22 +18,6 @@ int CountStatus(const DepthField& field, DepthStatus status) {
   return static_cast<int>(std::count(field.status.begin(), field.status.end(), status));
 }
 
-Json ScoresToJson(const DepthScores& s) {
-  return {{"n", s.points},
-          {"stated", s.stated},
-          {"mae_mm", s.mae_mm},
-          {"rmse_mm", s.rmse_mm},
-          {"bias_mm", s.bias_mm},
-          {"crps_mm", s.crps_mm},
-          {"log_score", s.log_score},
-          {"interval_score_90_mm", s.interval_score_90_mm},
-          {"coverage_50", s.coverage_50},
-          {"coverage_90", s.coverage_90},
-          {"coverage_95", s.coverage_95},
-          {"mean_sd_mm", s.mean_sd_mm},
-          {"pit", s.pit}};
-}
-
 Json ErrorsToJson(const DepthErrors& errors) {
   Json json = SummaryToJson(errors.all);
   json["coverage_90"] = errors.coverage_90;
@@ -83,6 +67,22 @@ Json RegionsToJson(const CrossValidation& result) {
 }
 
 }  // namespace
+
+Json ScoresToJson(const DepthScores& s) {
+  return {{"n", s.points},
+          {"stated", s.stated},
+          {"mae_mm", s.mae_mm},
+          {"rmse_mm", s.rmse_mm},
+          {"bias_mm", s.bias_mm},
+          {"crps_mm", s.crps_mm},
+          {"log_score", s.log_score},
+          {"interval_score_90_mm", s.interval_score_90_mm},
+          {"coverage_50", s.coverage_50},
+          {"coverage_90", s.coverage_90},
+          {"coverage_95", s.coverage_95},
+          {"mean_sd_mm", s.mean_sd_mm},
+          {"pit", s.pit}};
+}
 
 Json DepthToJson(const DepthField& depth, const Case& subject) {
   std::vector<double> assigned;

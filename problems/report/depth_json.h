@@ -5,9 +5,13 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "interp/evaluation/cross_validation.h"
+#include "interp/evaluation/scores.h"
 #include "problems/pipeline/depth_comparison.h"
 
 namespace semblance {
+
+// n, stated, the errors, the proper scores, coverage_50, _90, _95, mean_sd_mm and pit.
+nlohmann::ordered_json ScoresToJson(const DepthScores& scores);
 
 // Counts of vertices by status, range and mean of the assigned depths, dowels and areas; shares{}
 // of an average of schemes.

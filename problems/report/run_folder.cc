@@ -95,6 +95,7 @@ Json UncertaintyJson(const RunResult& result) {
   json["coverage_90_of"] = result.truth ? Json(result.truth->sigma.of_part) : Json(nullptr);
   json["coverage_area_cm2"] = result.truth ? Json(result.truth->sigma.area_cm2) : Json(nullptr);
   json["coverage"] = result.truth ? Json(result.truth->sigma.curve) : Json(nullptr);
+  json["scores"] = result.truth ? ScoresToJson(result.truth->sigma.scores) : Json(nullptr);
   return json;
 }
 

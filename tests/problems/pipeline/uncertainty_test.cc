@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+#include "interp/evaluation/scores.h"
 #include "problems/config/config.h"
 #include "problems/run.h"
 #include "tests/testing/shapes.h"
@@ -74,6 +75,8 @@ TEST(Uncertainty, CoverageIsTheShareOfTheSkinWithin) {
   EXPECT_EQ(all.curve[13], 1);  // 70 %
   EXPECT_NEAR(all.area_cm2, Area(skin) / 100, 1e-9);
   EXPECT_TRUE(all.of_part.empty());
+  EXPECT_NEAR(all.scores.crps_mm, GaussianCrps_mm(1.5, 2), 1e-9);
+  EXPECT_NEAR(all.scores.interval_score_90_mm, GaussianIntervalScore_mm(1.5, 2, 0.9), 1e-9);
   const std::vector<Sphere> mask = {{.center = {0, 0, 81.5}, .radius_mm = 200}};
   EXPECT_TRUE(std::isnan(MeasureCoverage({skin, apart}, face, sigma, mask, {}).at_90));
 }
