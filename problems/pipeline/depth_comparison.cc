@@ -71,6 +71,18 @@ std::vector<double> TipErrors(const DepthStage& stage, const DepthComparison& co
   return error;
 }
 
+void MakeVariogram(const DepthStage& stage, const std::vector<double>& areas_mm2,
+                   DepthComparison& comparison) {
+  constexpr double kBin_mm = 5, kReach_mm = 60;
+  std::vector<double> depth_mm = comparison.truth.along_direction.depth_mm;
+  for (std::size_t v = 0; v < depth_mm.size(); ++v) {
+    depth_mm[v] = comparison.region.scored[v] ? depth_mm[v] : kNaN;
+  }
+  comparison.variogram =
+      EmpiricalVariogram(stage.shell.points, depth_mm, areas_mm2, kBin_mm, kReach_mm);
+  comparison.variogram_model = FitVariogram(comparison.variogram);
+}
+
 }  // namespace
 
 DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
@@ -85,6 +97,7 @@ DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& st
   comparison.along_direction =
       ErrorsAgainst(comparison.truth.along_direction, comparison.region, depth, areas);
   comparison.closest = ErrorsAgainst(comparison.truth.closest, comparison.region, depth, areas);
+  MakeVariogram(stage, areas, comparison);
   comparison.tips = SummarizeDistances(TipErrors(stage, comparison, context), areas,
                                        [](std::size_t) { return true; });
   return comparison;

@@ -8,6 +8,7 @@
 
 #include "interp/evaluation/depth_truth.h"
 #include "interp/evaluation/scores.h"
+#include "interp/evaluation/variogram.h"
 #include "problems/metrics/face_metrics.h"
 #include "problems/pipeline/skull_stage.h"
 
@@ -31,6 +32,8 @@ struct DepthComparison {
   std::vector<Vec3> directions;  // of the depths (Experiment::direction)
   DepthTruth truth;
   DepthErrors along_direction, closest;
+  std::vector<VariogramBin> variogram;  // of the true depth along the direction, up to 60 mm
+  VariogramModel variogram_model;       // fitted to it
   DistanceSummary tips;  // from p + depth * direction to the closest skin, signed as the above
 };
 

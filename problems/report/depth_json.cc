@@ -66,6 +66,20 @@ Json RegionsToJson(const CrossValidation& result) {
   return json;
 }
 
+Json VariogramToJson(const DepthComparison& comparison) {
+  const VariogramModel& model = comparison.variogram_model;
+  Json json = {{"nugget_mm2", model.nugget_mm2},
+               {"sill_mm2", model.sill_mm2},
+               {"length_mm", model.length_mm},
+               {"bins", Json::array()}};
+  for (const VariogramBin& bin : comparison.variogram) {
+    json["bins"].push_back({{"distance_mm", bin.distance_mm},
+                            {"semivariance_mm2", bin.semivariance_mm2},
+                            {"pairs", bin.pairs}});
+  }
+  return json;
+}
+
 }  // namespace
 
 Json ScoresToJson(const DepthScores& s) {
@@ -115,6 +129,7 @@ Json DepthToJson(const DepthField& depth, const Case& subject) {
 Json ComparisonToJson(const DepthComparison& comparison) {
   return {{"along_direction", ErrorsToJson(comparison.along_direction)},
           {"closest", ErrorsToJson(comparison.closest)},
+          {"variogram", VariogramToJson(comparison)},
           {"tips", SummaryToJson(comparison.tips)}};
 }
 

@@ -19,7 +19,8 @@ nlohmann::ordered_json DepthToJson(const DepthField& depth, const Case& subject)
 
 // along_direction{...}, closest{...}: each a distance summary with regions{}, coverage_90, the
 // counts of scored vertices by what the truth says there, and scores{all{}, scheme{}}: of all that
-// is scored, and where the scheme itself answers; tips{...}.
+// is scored, and where the scheme itself answers; variogram{...} of the truth along the direction,
+// with its model and bins[]; tips{...}.
 nlohmann::ordered_json ComparisonToJson(const DepthComparison& comparison);
 
 // The summary, coverage_90, scores{all{}, scheme{}}, regions{} and sites{}: the error of each

@@ -67,6 +67,22 @@ std::string TruthText(const DepthComparison& truth) {
   return text + SummaryLine("  the depth's end", truth.tips);
 }
 
+// Of the true depth, by distance, and the model fitted to it.
+std::string VariogramText(const DepthComparison& truth) {
+  std::string distances, values;
+  for (const VariogramBin& bin : truth.variogram) {
+    distances += fmt::format(" {:5.0f}", bin.distance_mm);
+    values += fmt::format(" {:5.1f}", bin.semivariance_mm2);
+  }
+  const VariogramModel& model = truth.variogram_model;
+  return distances.empty()
+             ? ""
+             : fmt::format(
+                   "variogram of the true depth, mm {}\n                           mm²  {}\n"
+                   "  fitted: {:.1f} + {:.1f} (1 - exp(-h / {:.0f} mm)) mm²\n",
+                   distances, values, model.nugget_mm2, model.sill_mm2, model.length_mm);
+}
+
 std::string SharesText(const DepthField& depth) {
   std::string text;
   for (const SchemeShare& share : depth.shares) {
@@ -209,7 +225,7 @@ std::string LeftOutCsv(const DepthResult& result) {
 std::string DepthText(const DepthResult& result) {
   std::string text = SharesText(result.depth);
   if (result.truth) {
-    text += TruthText(*result.truth);
+    text += TruthText(*result.truth) + VariogramText(*result.truth);
   }
   if (!result.left_out.empty()) {
     text += "dowels left out                  RMS   mean    max  signed  predicted  within 90 %\n";
