@@ -177,6 +177,28 @@ std::vector<double> Holm(std::span<const double> p) {
   return adjusted;
 }
 
+std::vector<double> MeanRanks(const std::vector<double>& values) { return RankAll(values).rank; }
+
+double Spearman(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.size() != b.size()) {
+    throw InputError(
+        fmt::format("rank correlation of {} values with {}; give as many of one as of the other",
+                    a.size(), b.size()));
+  }
+  if (a.size() < 3) {
+    return kNaN;
+  }
+  const std::vector<double> x = MeanRanks(a), y = MeanRanks(b);
+  const double middle = 0.5 * static_cast<double>(a.size() + 1);
+  double xx = 0, yy = 0, xy = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    xx += (x[k] - middle) * (x[k] - middle);
+    yy += (y[k] - middle) * (y[k] - middle);
+    xy += (x[k] - middle) * (y[k] - middle);
+  }
+  return xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : kNaN;
+}
+
 FriedmanResult Friedman(const std::vector<std::vector<double>>& values) {
   CheckTable(values);
   FriedmanResult r;

@@ -42,6 +42,13 @@ WilcoxonResult Wilcoxon(std::span<const double> differences);
 // p-values adjusted for all of them being looked at (Holm 1979), in the order given.
 std::vector<double> Holm(std::span<const double> p);
 
+// Ranks from 1, smallest first; equals get their mean rank.
+std::vector<double> MeanRanks(const std::vector<double>& values);
+
+// Spearman's rank correlation: Pearson's of the mean ranks. NaN below three values and where all of
+// one side are equal. Throws InputError where there are not as many of one side as of the other.
+double Spearman(const std::vector<double>& a, const std::vector<double>& b);
+
 // values[subject][treatment]; lower is better. Ranks within each subject, ties get mean ranks
 // (values rounded to 1e-9 first).
 struct FriedmanResult {

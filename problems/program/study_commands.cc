@@ -13,6 +13,7 @@
 
 #include "problems/command_line/shard.h"
 #include "problems/compare/comparison_files.h"
+#include "problems/compare/rank_agreement.h"
 #include "problems/config/terminal_text.h"
 #include "problems/output/staged_folder.h"
 #include "problems/program/exit_code.h"
@@ -33,7 +34,7 @@ struct StudyArguments {
   std::string out, shard;
   std::string rerun, metric, better;
   bool force = false;
-  bool quiet = false, list = false, slurm = false;
+  bool quiet = false, list = false, slurm = false, ranks = false;
   StudyRunOptions run;
   SubmitOptions submit;
   std::stop_token stop;
@@ -193,8 +194,14 @@ int CompareCommand(const StudyArguments& a) {
   if (!a.better.empty()) {
     options.better = a.better == "higher" ? Better::kHigher : Better::kLower;
   }
-  const StudyComparison comparison =
-      CompareStudies(ReadStudies({a.files.begin(), a.files.end()}), options);
+  const std::vector<NamedStudy> studies = ReadStudies({a.files.begin(), a.files.end()});
+  if (a.ranks) {
+    for (std::size_t k = 1; k < studies.size(); ++k) {
+      Tell("{}", RankText(CompareRanks(studies.front(), studies[k], options)));
+    }
+    return kDone;
+  }
+  const StudyComparison comparison = CompareStudies(studies, options);
   Tell("{}", ComparisonText(comparison));
   if (!a.out.empty()) {
     StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
@@ -293,7 +300,13 @@ void DeclareCompare(CLI::App& compare, CommandLine& line) {
                   "which values of the metric are better; else as the studies took it, or as its "
                   "name says: higher for shares within a distance, lower for all others")
       ->check(CLI::IsMember({"lower", "higher"}));
-  compare.add_option("--out", a.out, "folder for pairs.csv, values.csv and report.html");
+  CLI::Option* const out =
+      compare.add_option("--out", a.out, "folder for pairs.csv, values.csv and report.html");
+  compare
+      .add_flag("--ranks", a.ranks,
+                "print instead how alike the studies order the treatments that they share, each "
+                "over its own subjects, which may be others")
+      ->excludes(out);
   compare.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");
 }

@@ -80,6 +80,17 @@ TEST(Wilcoxon, ZerosAreDroppedAndTiesAreNotExact) {
 }
 
 // Worked by hand: 0.01 * 3, then 0.03 * 2, then 0.04 is lifted to the one before.
+// Without ties it is 1 - 6 sum d^2 / (n (n^2 - 1)); only the order counts.
+TEST(Spearman, IsTheCorrelationOfRanks) {
+  EXPECT_NEAR(Spearman({1, 2, 3, 4, 5}, {2, 1, 4, 3, 5}), 1 - 6 * 4.0 / (5 * 24), 1e-12);
+  EXPECT_NEAR(Spearman({1, 2, 3}, {10, 1000, 1e6}), 1, 1e-12);
+  EXPECT_NEAR(Spearman({1, 2, 3}, {3, 2, 1}), -1, 1e-12);
+  EXPECT_NEAR(Spearman({1, 2, 2, 3}, {1, 2, 3, 4}), 4.5 / std::sqrt(4.5 * 5), 1e-12);
+  EXPECT_TRUE(std::isnan(Spearman({1, 2}, {1, 2})));
+  EXPECT_TRUE(std::isnan(Spearman({1, 1, 1}, {1, 2, 3})));
+  EXPECT_THROW(Spearman({1, 2, 3}, {1, 2}), InputError);
+}
+
 TEST(Holm, StepsDownAndNeverFalls) {
   EXPECT_THAT(
       Holm(std::vector<double>{0.04, 0.01, 0.03}),

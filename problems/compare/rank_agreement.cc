@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/compare/rank_agreement.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+#include "problems/study/study_metrics.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using BySubject = std::map<std::string, double>;
+
+std::map<std::string, BySubject> ByLabel(const NamedStudy& study, const std::string& metric) {
+  std::map<std::string, BySubject> treatments;
+  for (const Treatment& treatment : Treatments(study.results, metric)) {
+    if (!treatment.by_subject.empty()) {
+      treatments[treatment.label] = treatment.by_subject;
+    }
+  }
+  return treatments;
+}
+
+// Over the subjects that have all of the treatments.
+std::vector<double> Means(const std::map<std::string, BySubject>& treatments,
+                          const std::vector<std::string>& labels, const NamedStudy& study) {
+  std::map<std::string, std::size_t> have;
+  for (const std::string& label : labels) {
+    for (const auto& [subject, value] : treatments.at(label)) {
+      ++have[subject];
+    }
+  }
+  std::erase_if(have, [&](const auto& one) { return one.second < labels.size(); });
+  if (have.empty()) {
+    throw InputError(
+        fmt::format("{}: no subject has all of the treatments that are compared; "
+                    "run the trials that are missing",
+                    study.name));
+  }
+  std::vector<double> means;
+  for (const std::string& label : labels) {
+    double sum = 0;
+    for (const auto& [subject, count] : have) {
+      sum += treatments.at(label).at(subject);
+    }
+    means.push_back(sum / static_cast<double>(have.size()));
+  }
+  return means;
+}
+
+}  // namespace
+
+RankAgreement CompareRanks(const NamedStudy& reference, const NamedStudy& other,
+                           const CompareOptions& options) {
+  RankAgreement agreement{
+      .metric = options.metric.empty() ? reference.results.metric : options.metric,
+      .reference = reference.name,
+      .study = other.name,
+      .treatments = {}};
+  const auto first = ByLabel(reference, agreement.metric),
+             second = ByLabel(other, agreement.metric);
+  std::vector<std::string> labels;
+  for (const auto& [label, values] : first) {
+    if (second.contains(label)) {
+      labels.push_back(label);
+    }
+  }
+  if (labels.size() < 3) {
+    throw InputError(fmt::format(
+        "{} and {} have {} treatments in common that have the number '{}'; an order takes three",
+        reference.name, other.name, labels.size(), agreement.metric));
+  }
+  const Better better = options.better ? *options.better : BetterOf(agreement.metric);
+  std::array<std::vector<double>, 2> means = {Means(first, labels, reference),
+                                              Means(second, labels, other)},
+                                     ranks;
+  for (std::size_t s = 0; s < 2; ++s) {
+    std::vector<double> cost = means[s];
+    for (double& value : cost) {
+      value = better == Better::kHigher ? -value : value;
+    }
+    ranks[s] = MeanRanks(cost);
+  }
+  agreement.spearman = Spearman(means[0], means[1]);
+  for (std::size_t k = 0; k < labels.size(); ++k) {
+    agreement.treatments.push_back({labels[k], means[0][k], means[1][k], ranks[0][k], ranks[1][k]});
+  }
+  std::ranges::stable_sort(agreement.treatments, {}, &RankedTreatment::reference_rank);
+  return agreement;
+}
+
+std::string RankText(const RankAgreement& agreement) {
+  std::size_t width = 9;
+  for (const RankedTreatment& t : agreement.treatments) {
+    width = std::max(width, t.label.size());
+  }
+  std::string text =
+      fmt::format("{} of {} and of {}\n{:<{}}  rank       mean  rank       mean\n",
+                  agreement.metric, agreement.reference, agreement.study, "treatment", width);
+  for (const RankedTreatment& t : agreement.treatments) {
+    text += fmt::format("{:<{}} {:5.1f} {:10.4g} {:5.1f} {:10.4g}\n", t.label, width,
+                        t.reference_rank, t.reference_mean, t.rank, t.mean);
+  }
+  return text + fmt::format("Spearman's rank correlation over {} treatments: {:.2f}\n",
+                            agreement.treatments.size(), agreement.spearman);
+}
+
+}  // namespace semblance
