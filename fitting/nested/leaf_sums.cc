@@ -26,8 +26,7 @@ Matrix16 GramOf(const Pairs& sums) {
 
 // A leaf's points, and where in it they are.
 struct PointsOfLeaf {
-  const double *x, *y, *weight;
-  const double* value[3];
+  const NestedPoints& points;
   const std::uint32_t* indices;
   std::size_t count;
   double scale, first_u, first_v;
@@ -35,10 +34,7 @@ struct PointsOfLeaf {
 
 PointsOfLeaf Of(const NestedPoints& points, const LeafPatch& leaf,
                 std::span<const std::uint32_t> indices) {
-  return {.x = points.x.data(),
-          .y = points.y.data(),
-          .weight = points.weight.data(),
-          .value = {points.value[0].data(), points.value[1].data(), points.value[2].data()},
+  return {.points = points,
           .indices = indices.data(),
           .count = indices.size(),
           .scale = static_cast<double>(1 << leaf.level),
@@ -69,9 +65,9 @@ SEMBLANCE_INLINE void AddPoints(const PointsOfLeaf& leaf, Pairs& sums, LeafSums&
   double pairs_u[kRoom] = {}, pairs_v[kPairs], u[4], v[4], both[16];
   for (std::size_t n = 0; n < leaf.count; ++n) {
     const std::uint32_t k = leaf.indices[n];
-    const double w = leaf.weight[k];
-    WeightsAt(leaf.x[k] * leaf.scale - leaf.first_u, u);
-    WeightsAt(leaf.y[k] * leaf.scale - leaf.first_v, v);
+    const double w = leaf.points.Weight(k);
+    WeightsAt(leaf.points.X(k) * leaf.scale - leaf.first_u, u);
+    WeightsAt(leaf.points.Y(k) * leaf.scale - leaf.first_v, v);
     PairsOf(u, 1, pairs_u);
     PairsOf(v, w, pairs_v);
     for (int r = 0; r < kPairs; ++r) {
@@ -83,8 +79,9 @@ SEMBLANCE_INLINE void AddPoints(const PointsOfLeaf& leaf, Pairs& sums, LeafSums&
       both[m] = u[m % 4] * v[m / 4];
     }
     for (int c = 0; c <= channels; ++c) {
-      const double value = c < channels ? w * leaf.value[c][k] : std::sqrt(w) * ProbeSign(k);
-      all.squares += c < channels ? value * leaf.value[c][k] : 0;
+      const bool probe = c == channels;
+      const double value = probe ? std::sqrt(w) * ProbeSign(k) : w * leaf.points.value[k][c];
+      all.squares += probe ? 0 : value * leaf.points.value[k][c];
       for (int m = 0; m < 16; ++m) {
         all.right[c][m] += value * both[m];
       }
@@ -108,8 +105,8 @@ SEMBLANCE_WIDE void Leave(const PointsOfLeaf& leaf, const LeafVertices& vertices
   double u[4], v[4];
   for (std::size_t n = 0; n < leaf.count; ++n) {
     const std::uint32_t k = leaf.indices[n];
-    WeightsAt(leaf.x[k] * leaf.scale - leaf.first_u, u);
-    WeightsAt(leaf.y[k] * leaf.scale - leaf.first_v, v);
+    WeightsAt(leaf.points.X(k) * leaf.scale - leaf.first_u, u);
+    WeightsAt(leaf.points.Y(k) * leaf.scale - leaf.first_v, v);
     for (int c = 0; c < channels; ++c) {
       double along[4] = {};
       for (int b = 0; b < 4; ++b) {
@@ -117,8 +114,8 @@ SEMBLANCE_WIDE void Leave(const PointsOfLeaf& leaf, const LeafVertices& vertices
           along[a] += v[b] * vertices[c][a + 4 * b];
         }
       }
-      residuals[n].along[c] = leaf.value[c][k] - ((u[0] * along[0] + u[1] * along[1]) +
-                                                  (u[2] * along[2] + u[3] * along[3]));
+      residuals[n].along[c] = leaf.points.value[k][c] - ((u[0] * along[0] + u[1] * along[1]) +
+                                                         (u[2] * along[2] + u[3] * along[3]));
     }
   }
 }

@@ -22,8 +22,8 @@ class Neighbourhood {
                       end = std::min(n + window + 1, indices_.size());
     std::vector<std::pair<double, std::uint32_t>> near;
     for (std::size_t k = begin; k < end; ++k) {
-      const double dx = points_.x[indices_[k]] - points_.x[indices_[n]],
-                   dy = points_.y[indices_[k]] - points_.y[indices_[n]];
+      const double dx = points_.X(indices_[k]) - points_.X(indices_[n]),
+                   dy = points_.Y(indices_[k]) - points_.Y(indices_[n]);
       near.emplace_back(dx * dx + dy * dy, indices_[k]);
     }
     const std::size_t taken = std::min(count + 1, near.size());
@@ -46,17 +46,17 @@ double LeftOver(const NestedPoints& points, const std::vector<std::uint32_t>& ne
   Eigen::MatrixXd rows(count, terms), values(count, points.channels);
   double scale = 1e-300;
   for (const std::uint32_t k : near) {
-    scale = std::max({scale, std::abs(points.x[k] - points.x[near[0]]),
-                      std::abs(points.y[k] - points.y[near[0]])});
+    scale = std::max({scale, std::abs(points.X(k) - points.X(near[0])),
+                      std::abs(points.Y(k) - points.Y(near[0]))});
   }
   for (Eigen::Index r = 0; r < count; ++r) {
     const std::uint32_t k = near[r];
-    const double x = (points.x[k] - points.x[near[0]]) / scale,
-                 y = (points.y[k] - points.y[near[0]]) / scale;
+    const double x = (points.X(k) - points.X(near[0])) / scale,
+                 y = (points.Y(k) - points.Y(near[0])) / scale;
     const std::array<double, 6> row = {1, x, y, x * x, x * y, y * y};
     rows.row(r) = Eigen::Map<const Eigen::RowVectorXd>(row.data(), terms);
     for (int c = 0; c < points.channels; ++c) {
-      values(r, c) = points.value[c][k];
+      values(r, c) = points.value[k][c];
     }
   }
   const Eigen::MatrixXd left = values - rows * rows.colPivHouseholderQr().solve(values);
@@ -86,41 +86,15 @@ double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t>
   return std::sqrt(*middle / std::pow(1 - 2 / (9 * freedom), 3));
 }
 
-namespace {
-
-class PairSums {
- public:
-  void Add(const NestedResidual& a, const NestedResidual& b) {
+void NeighbourPairs::Add(const NestedResidual& residual) {
+  if (begun_) {
     for (int c = 0; c < 3; ++c) {
-      together_ += a.along[c] * b.along[c];
+      together_ += last_.along[c] * residual.along[c];
     }
-    squares_ += (a.Square() + b.Square()) / 2;
-    ++count_;
+    squares_ += (last_.Square() + residual.Square()) / 2;
   }
-  PairCorrelation Correlation() const {
-    return {.value = squares_ > 0 ? together_ / squares_ : 0, .count = count_};
-  }
-
- private:
-  double together_ = 0, squares_ = 0;
-  std::size_t count_ = 0;
-};
-
-}  // namespace
-
-double NeighbourCorrelation(std::span<const NestedResidual> residuals,
-                            std::span<const char> left_out) {
-  PairSums pairs;
-  const NestedResidual* last = nullptr;
-  for (std::size_t n = 0; n < residuals.size(); ++n) {
-    if (left_out.empty() || left_out[n] == 0) {
-      if (last != nullptr) {
-        pairs.Add(*last, residuals[n]);
-      }
-      last = &residuals[n];
-    }
-  }
-  return pairs.Correlation().value;
+  begun_ = true;
+  last_ = residual;
 }
 
 PairCorrelation ClosestCorrelation(const NestedPoints& points,
@@ -129,8 +103,8 @@ PairCorrelation ClosestCorrelation(const NestedPoints& points,
   constexpr std::ptrdiff_t kOneIn = 10;
   std::vector<double> apart;
   for (std::size_t n = 0; n + 1 < indices.size(); ++n) {
-    const double dx = points.x[indices[n]] - points.x[indices[n + 1]],
-                 dy = points.y[indices[n]] - points.y[indices[n + 1]];
+    const double dx = points.X(indices[n]) - points.X(indices[n + 1]),
+                 dy = points.Y(indices[n]) - points.Y(indices[n + 1]);
     apart.push_back(dx * dx + dy * dy);
   }
   if (apart.empty()) {
@@ -139,13 +113,19 @@ PairCorrelation ClosestCorrelation(const NestedPoints& points,
   std::vector<double> sorted = apart;
   const auto tenth = sorted.begin() + std::ssize(sorted) / kOneIn;
   std::nth_element(sorted.begin(), tenth, sorted.end());
-  PairSums pairs;
+  PairCorrelation pairs;
+  double together = 0, squares = 0;
   for (std::size_t n = 0; n + 1 < indices.size(); ++n) {
     if (apart[n] <= *tenth) {
-      pairs.Add(residuals[n], residuals[n + 1]);
+      for (int c = 0; c < 3; ++c) {
+        together += residuals[n].along[c] * residuals[n + 1].along[c];
+      }
+      squares += (residuals[n].Square() + residuals[n + 1].Square()) / 2;
+      ++pairs.count;
     }
   }
-  return pairs.Correlation();
+  pairs.value = squares > 0 ? together / squares : 0;
+  return pairs;
 }
 
 }  // namespace semblance

@@ -18,11 +18,18 @@ enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
 double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
                       NeighbourModel model);
 
-// Of residuals along the curve: the sum of e_a . e_b over that of |e|^2, b being next to a. 0 for
-// errors that do not know of each other. left_out: of each residual, not 0 for one that does not
-// count; or none.
-double NeighbourCorrelation(std::span<const NestedResidual> residuals,
-                            std::span<const char> left_out = {});
+// Of residuals along the curve, one after the other: the sum of e_a . e_b over that of |e|^2, b
+// being next to a. 0 for errors that do not know of each other.
+class NeighbourPairs {
+ public:
+  void Add(const NestedResidual& residual);
+  double Correlation() const { return squares_ > 0 ? together_ / squares_ : 0; }
+
+ private:
+  NestedResidual last_;
+  bool begun_ = false;
+  double together_ = 0, squares_ = 0;
+};
 
 // The same of that tenth of the pairs whose points are closest to each other in (u,v).
 struct PairCorrelation {

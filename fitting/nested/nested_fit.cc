@@ -8,6 +8,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "fitting/nested/neighbour_noise.h"
@@ -42,22 +43,23 @@ bool IsHeld(std::uint32_t k) {
 }
 
 // The finest level on which a patch with points has more than one of them on the mean.
-int FinestByDensity(const NestedPoints& points, const Indices& indices, const GridLayout& level0,
+int FinestByDensity(const NestedPoints& points, std::size_t every, const GridLayout& level0,
                     int finest) {
   constexpr double kPointsPerPatch = 1.3;
   constexpr std::size_t kMostPatchesPerPoint = 4;
+  const std::size_t count = (points.size() + every - 1) / every;
   GridLayout layout = level0;
   for (int level = 1; level <= finest; ++level) {
     layout = layout.Finer();
     std::size_t occupied = 0, last = layout.Patches();
-    for (const std::uint32_t k : indices) {
-      const auto [i, j] = PatchOn(layout.grid, level, points.x[k], points.y[k]);
+    for (std::size_t k = 0; k < points.size(); k += every) {
+      const auto [i, j] = PatchOn(layout.grid, level, points.X(k), points.Y(k));
       const std::size_t patch = layout.Patch(i, j);
       occupied += patch != last ? 1 : 0;
       last = patch;
     }
-    if (static_cast<double>(indices.size()) < kPointsPerPatch * static_cast<double>(occupied) ||
-        layout.Patches() > kMostPatchesPerPoint * indices.size()) {
+    if (static_cast<double>(count) < kPointsPerPatch * static_cast<double>(occupied) ||
+        layout.Patches() > kMostPatchesPerPoint * count) {
       return level - 1;
     }
   }
@@ -87,7 +89,7 @@ class NestedFitter {
     while ((std::max(start.shape().patches_u, start.shape().patches_v) << cap_) > kMostPatches) {
       --cap_;
     }
-    finest_ = FinestByDensity(points_, All(), space_[0].layout, cap_);
+    finest_ = FinestByDensity(points_, 1, space_[0].layout, cap_);
   }
 
   NestedFitResult Run() {
@@ -115,24 +117,39 @@ class NestedFitter {
       return;
     }
     every_ = every;
-    looked_.clear();
-    for (std::size_t k = 0; k < points_.size(); k += every) {
-      looked_.push_back(static_cast<std::uint32_t>(k));
+    finest_seen_ = FinestByDensity(points_, every_, space_[0].layout, finest_);
+  }
+
+  template <class Visit>
+  void ForEachLooked(const Visit& visit) const {
+    for (std::size_t k = 0, n = 0; k < points_.size(); k += every_, ++n) {
+      visit(n, static_cast<std::uint32_t>(k));
     }
-    finest_seen_ = FinestByDensity(points_, looked_, space_[0].layout, finest_);
   }
 
-  Indices All() const {
-    Indices all(points_.size());
-    std::iota(all.begin(), all.end(), 0u);
-    return all;
-  }
-
-  template <class Wanted>
-  Indices Those(const Wanted& wanted) const {
+  Indices Kept() const {
     Indices indices;
-    std::copy_if(looked_.begin(), looked_.end(), std::back_inserter(indices), wanted);
+    indices.reserve(points_.size() / every_ + 1);
+    ForEachLooked([&](std::size_t, std::uint32_t k) {
+      if (outlier_[k] == 0) {
+        indices.push_back(k);
+      }
+    });
     return indices;
+  }
+
+  // One point in `every_`, but for outliers and those held out.
+  PointChoice Fitted() const {
+    PointChoice choice{.every = every_, .left_out = outlier_};
+    ForEachLooked([&](std::size_t, std::uint32_t k) { choice.left_out[k] |= IsHeld(k) ? 1 : 0; });
+    return choice;
+  }
+
+  // Of those that are looked at.
+  ResidualsBetween Residuals() const {
+    return [this](std::size_t begin, std::size_t end) {
+      return std::span(residuals_).subspan(begin, end - begin);
+    };
   }
 
   // The displacements themselves tell the grossest outliers, which would bend the first surface.
@@ -140,20 +157,20 @@ class NestedFitter {
     if (plan_.outliers == OutlierRule::kKeep) {
       return;
     }
-    std::vector<Residual> residuals(looked_.size());
-    for (std::size_t n = 0; n < looked_.size(); ++n) {
-      for (int c = 0; c < points_.channels; ++c) {
-        residuals[n].along[c] = points_.value[c][looked_[n]];
-      }
-    }
-    FindOutliers(points_, looked_, residuals, 0, outlier_);
+    residuals_.clear();
+    ForEachLooked([&](std::size_t, std::uint32_t k) {
+      const Vec3& value = points_.value[k];
+      residuals_.push_back({{value[0], value[1], value[2]}});
+    });
+    FindOutliers(points_, every_, Residuals(), 0, outlier_);
   }
 
   void FitRound() {
     Look();
-    const Indices fitted = Those([&](std::uint32_t k) { return !IsHeld(k) && outlier_[k] == 0; });
-    solve_.Begin(space_, fitted);
-    NestedWeightSearch search(fitted.size(), solve_, least_gain_);
+    PointChoice fitted = Fitted();
+    const std::size_t count = fitted.Count(points_);
+    solve_.Begin(space_, std::move(fitted));
+    NestedWeightSearch search(count, solve_, least_gain_);
     if (std::isnan(weight_)) {
       search.Scan();
       search.Climb(4, search.Finish().weight);
@@ -171,18 +188,18 @@ class NestedFitter {
 
   // By the points held out.
   void Judge(const NestedWeight& chosen, int steps) {
-    residuals_ = solve_.ResidualsOf(looked_);
+    residuals_ = solve_.ResidualsOf({.every = every_});
     std::vector<double> squares;
-    for (std::size_t n = 0; n < looked_.size(); ++n) {
-      if (IsHeld(looked_[n]) && outlier_[looked_[n]] == 0) {
+    ForEachLooked([&](std::size_t n, std::uint32_t k) {
+      if (IsHeld(k) && outlier_[k] == 0) {
         squares.push_back(residuals_[n].Square());
       }
-    }
+    });
     const double held = squares.empty() ? kNaN
                                         : std::accumulate(squares.begin(), squares.end(), 0.0) /
                                               std::ssize(squares) / points_.channels;
     if (plan_.outliers == OutlierRule::kDrop) {
-      outliers_ = FindOutliers(points_, looked_, residuals_, HeldSd(std::move(squares)), outlier_);
+      outliers_ = FindOutliers(points_, every_, Residuals(), HeldSd(std::move(squares)), outlier_);
     }
     report_.rounds.push_back({.finest = space_.finest(),
                               .vertices = space_.Vertices(),
@@ -215,12 +232,12 @@ class NestedFitter {
   bool Refine() {
     Indices fitted;
     std::vector<Residual> residuals;
-    for (std::size_t n = 0; n < looked_.size(); ++n) {
-      if (!IsHeld(looked_[n]) && outlier_[looked_[n]] == 0) {
-        fitted.push_back(looked_[n]);
+    ForEachLooked([&](std::size_t n, std::uint32_t k) {
+      if (!IsHeld(k) && outlier_[k] == 0) {
+        fitted.push_back(k);
         residuals.push_back(residuals_[n]);
       }
-    }
+    });
     const int vertices = space_.Vertices();
     const UnresolvedDetail detail =
         FindUnresolvedDetail(points_, space_, finest_seen_, fitted, residuals);
@@ -246,20 +263,19 @@ class NestedFitter {
   // Detail finer than the points are apart shows in those that chance has put close together, and
   // noise does not.
   bool ClosestAgree() const {
-    const Indices kept = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
-    const PairCorrelation pairs = ClosestCorrelation(points_, kept, KeptResiduals());
+    const PairCorrelation pairs = ClosestCorrelation(points_, Kept(), KeptResiduals());
     return pairs.value * std::sqrt(static_cast<double>(pairs.count)) > kSure;
   }
 
   // Of the points looked at that are no outliers.
   std::vector<Residual> KeptResiduals() const {
     std::vector<Residual> kept;
-    kept.reserve(looked_.size());
-    for (std::size_t n = 0; n < looked_.size(); ++n) {
-      if (outlier_[looked_[n]] == 0) {
+    kept.reserve(residuals_.size());
+    ForEachLooked([&](std::size_t n, std::uint32_t k) {
+      if (outlier_[k] == 0) {
         kept.push_back(residuals_[n]);
       }
-    }
+    });
     return kept;
   }
 
@@ -275,40 +291,54 @@ class NestedFitter {
     return level;
   }
 
-  // All points, with the smoothness in finer steps.
+  // All points, with the smoothness in finer steps. What is left of them is looked at some at a
+  // time.
   NestedFitResult Finish() {
     Snapshot best = std::move(*best_);
+    best_.reset();
+    residuals_ = {};
+    every_ = 1;
     space_ = std::move(best.space);
-    looked_ = All();
     solve_.Enter(space_);
     solve_.SetSolution(best.solution);
     report_.chosen_round = best.round;
     report_.held_out_rms_mm = std::sqrt(best.held_square);
     weight_ = best.weight;
-    residuals_ = solve_.ResidualsOf(looked_);
     DropOutliers(report_.held_out_rms_mm);
     NestedWeight chosen = FitAll();
     if (DropOutliers(std::sqrt(chosen.score))) {
       chosen = FitAll();
     }
     Report(chosen);
-    NestedFitResult result{.surface = Surface(), .report = {}, .residual_mm = {}};
+    NestedFitResult result{.surface = Surface(), .report = {}, .uv = {}, .residual_mm = {}};
     Measure(result);
     result.report = std::move(report_);
+    result.uv = UvAsGiven(std::move(points_));
     return result;
   }
 
-  // In the order of the curve, so that the sum does not depend on that as given.
-  void Measure(NestedFitResult& result) const {
+  // In the order of the curve, so that the sums do not depend on that as given.
+  void Measure(NestedFitResult& result) {
+    constexpr std::size_t kAtOnce = 1 << 14;
     double sum = 0, weights = 0;
     result.residual_mm.resize(points_.size());
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-      const double square = residuals_[k].Square();
-      result.residual_mm[points_.given[k]] = std::sqrt(square);
-      sum += points_.weight[k] * square;
-      weights += points_.weight[k];
+    NestedResiduals residuals(solve_);
+    NeighbourPairs pairs;
+    for (std::size_t begin = 0; begin < points_.size(); begin += kAtOnce) {
+      const std::size_t end = std::min(begin + kAtOnce, points_.size());
+      const std::span<const Residual> some = residuals.Of(begin, end);
+      for (std::size_t k = begin; k < end; ++k) {
+        const double square = some[k - begin].Square();
+        result.residual_mm[points_.given[k]] = std::sqrt(square);
+        sum += points_.Weight(k) * square;
+        weights += points_.Weight(k);
+        if (outlier_[k] == 0) {
+          pairs.Add(some[k - begin]);
+        }
+      }
     }
     result.rms_mm = std::sqrt(sum / weights);
+    report_.neighbour_correlation = pairs.Correlation();
   }
 
   // Whether others than before are outliers.
@@ -317,30 +347,33 @@ class NestedFitter {
       return false;
     }
     const std::vector<char> before = outlier_;
-    FindOutliers(points_, looked_, residuals_, least_sd_mm, outlier_);
+    NestedResiduals residuals(solve_);
+    const ResidualsBetween between = [&](std::size_t begin, std::size_t end) {
+      return residuals.Of(begin, end);
+    };
+    FindOutliers(points_, every_, between, least_sd_mm, outlier_);
     return before != outlier_;
   }
 
   NestedWeight FitAll() {
-    const Indices fitted = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
-    solve_.Begin(space_, fitted);
-    NestedWeightSearch search(fitted.size(), solve_, least_gain_);
+    PointChoice kept{.left_out = outlier_};
+    const std::size_t count = kept.Count(points_);
+    solve_.Begin(space_, std::move(kept));
+    NestedWeightSearch search(count, solve_, least_gain_);
     search.Climb(2, weight_);
     const NestedWeight chosen = search.Finish();
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
-    residuals_ = solve_.ResidualsOf(looked_);
     return chosen;
   }
 
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
     report_.limited_by_density = finest_ < cap_ && FinestOfMost() >= finest_;
-    const Indices kept = Those([&](std::uint32_t k) { return outlier_[k] == 0; });
+    const Indices kept = Kept();
     const double left = 1 - chosen.degrees_of_freedom / static_cast<double>(kept.size());
     report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, 0.02));
     report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
     report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
-    report_.neighbour_correlation = NeighbourCorrelation(residuals_, outlier_);
     for (std::uint32_t k = 0; k < points_.size(); ++k) {
       if (outlier_[k] != 0) {
         report_.outliers.push_back(points_.given[k]);
@@ -409,10 +442,9 @@ class NestedFitter {
   int cap_;  // level
   std::vector<char> outlier_;
   int finest_ = 0, outliers_ = 0;
-  std::size_t every_ = 0;  // point of the curve is looked at
-  int finest_seen_ = 0;    // level on which those show something
-  Indices looked_;
-  std::vector<Residual> residuals_;  // of `looked_`
+  std::size_t every_ = 0;            // point of the curve is looked at
+  int finest_seen_ = 0;              // level on which those show something
+  std::vector<Residual> residuals_;  // of those that are looked at
   double weight_ = kNaN, least_gain_ = 0;
   bool densified_ = false;
   std::optional<Snapshot> best_;

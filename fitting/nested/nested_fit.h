@@ -43,6 +43,7 @@ struct AutoReport {
 struct NestedFitResult {
   HSplineSurface surface;  // its finest level is the finest that has vertices
   AutoReport report;
+  std::vector<Vec2> uv;             // per point as given
   std::vector<double> residual_mm;  // per point as given: its distance from the surface
   double rms_mm = kNaN;             // of the distances, weighted
 };

@@ -3,10 +3,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <cmath>
+#include <span>
+#include <utility>
 
 #include "fitting/space/point_cloud.h"
-#include "surfaces/hspline/bspline_basis.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
 namespace semblance {
@@ -18,35 +18,37 @@ HSplineShape WithLevels(HSplineShape shape) {
   return shape;
 }
 
-// From the start, along x, y and z; a bounded number of points at once.
-void SetDisplacements(const HSplineSurface& start, const ScatteredPoints& given, int threads,
-                      NestedPoints& points) {
-  constexpr std::size_t kAtOnce = 1 << 16;
-  const HSplineBatch batch(start);
-  std::vector<Vec2> uv;
-  for (std::size_t begin = 0; begin < points.size(); begin += kAtOnce) {
-    const std::size_t end = std::min(begin + kAtOnce, points.size());
-    uv.clear();
-    for (std::size_t k = begin; k < end; ++k) {
-      uv.push_back(given.uv[points.given[k]]);
+// In place: what is at order[k] goes to k. One column at a time, so that it takes little memory.
+template <class Row>
+void SortBy(std::span<const std::uint32_t> order, std::vector<Row>& rows) {
+  std::vector<double> column(rows.size());
+  for (Eigen::Index c = 0; c < Row::RowsAtCompileTime; ++c) {
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      column[k] = rows[order[k]][c];
     }
-    const std::vector<Vec3> on_start = batch.Points(uv, threads);
-    for (std::size_t k = begin; k < end; ++k) {
-      const Vec3 off = given.positions[points.given[k]] - on_start[k - begin];
-      for (int c = 0; c < 3; ++c) {
-        points.value[c][k] = off[c];
-      }
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      rows[k][c] = column[k];
     }
   }
 }
 
-Vec3 ValueAt(const NestedPoints& points, std::size_t k) {
-  return {points.value[0][k], points.value[1][k], points.value[2][k]};
+// Positions become displacements from the start; a bounded number of points at once.
+void SubtractStart(const HSplineSurface& start, std::span<const Vec2> uv, int threads,
+                   std::vector<Vec3>& positions) {
+  constexpr std::size_t kAtOnce = 1 << 16;
+  const HSplineBatch batch(start);
+  for (std::size_t begin = 0; begin < uv.size(); begin += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, uv.size() - begin);
+    const std::vector<Vec3> on_start = batch.Points(uv.subspan(begin, count), threads);
+    for (std::size_t k = 0; k < count; ++k) {
+      positions[begin + k] -= on_start[k];
+    }
+  }
 }
 
-double Extent(const ScatteredPoints& points) {
+double Extent(std::span<const Vec3> positions) {
   double largest = 0;
-  for (const Vec3& p : points.positions) {
+  for (const Vec3& p : positions) {
     largest = std::max(largest, p.cwiseAbs().maxCoeff());
   }
   return largest;
@@ -56,14 +58,13 @@ double Extent(const ScatteredPoints& points) {
 Eigen::Matrix<double, 3, Eigen::Dynamic> AxesOf(const NestedPoints& points, double extent) {
   constexpr double kRounding = 1e-12;
   Mat3 moments = Mat3::Zero();
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const Vec3 d = ValueAt(points, k);
+  for (const Vec3& d : points.value) {
     moments += d * d.transpose();
   }
   const Mat3 all = Eigen::SelfAdjointEigenSolver<Mat3>(moments).eigenvectors();
   Vec3 largest = Vec3::Zero();
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    largest = largest.cwiseMax((all.transpose() * ValueAt(points, k)).cwiseAbs());
+  for (const Vec3& d : points.value) {
+    largest = largest.cwiseMax((all.transpose() * d).cwiseAbs());
   }
   int channels = 1;
   while (channels < 3 && largest[2 - channels] > kRounding * extent) {
@@ -74,50 +75,62 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> AxesOf(const NestedPoints& points, doub
 
 // From along x, y and z to along the axes.
 void TurnToAxes(NestedPoints& points) {
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const Vec3 d = ValueAt(points, k);
+  for (Vec3& value : points.value) {
+    const Vec3 d = value;
+    value.setZero();
     for (int c = 0; c < points.channels; ++c) {
-      points.value[c][k] = points.axes.col(c).dot(d);
+      value[c] = points.axes.col(c).dot(d);
     }
-  }
-  for (int c = points.channels; c < 3; ++c) {
-    points.value[c] = {};
   }
 }
 
 }  // namespace
 
-NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoints& given,
-                               int threads) {
+NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, int threads) {
   const HSplineShape shape = WithLevels(start.shape());
+  const double extent = Extent(given.positions);
   NestedPoints points;
-  points.given = CurveOrder(shape, given);
-  points.x.reserve(given.size());
-  points.y.reserve(given.size());
-  points.weight.reserve(given.size());
-  for (const std::uint32_t k : points.given) {
-    const PatchPoint at = PatchPointAt(shape, 0, given.uv[k]);
-    points.x.push_back(at.patch.i + at.s);
-    points.y.push_back(at.patch.j + at.t);
-    points.weight.push_back(given.Weight(k));
+  points.patches = Vec2(shape.patches_u, shape.patches_v);
+  points.periodic_u = shape.closure == Closure::kPeriodicU;
+  points.given = CurveOrder(shape, given.View());
+  SubtractStart(start, given.uv, threads, given.positions);
+  points.value = std::move(given.positions);
+  points.uv = std::move(given.uv);
+  SortBy(points.given, points.value);
+  SortBy(points.given, points.uv);
+  points.weight.reserve(given.weights.size());
+  for (std::size_t k = 0; k < given.weights.size(); ++k) {
+    points.weight.push_back(given.weights[points.given[k]]);
   }
-  for (std::vector<double>& value : points.value) {
-    value.resize(given.size());
-  }
-  SetDisplacements(start, given, threads, points);
-  points.axes = AxesOf(points, Extent(given));
+  points.axes = AxesOf(points, extent);
   points.channels = static_cast<int>(points.axes.cols());
   TurnToAxes(points);
   return points;
 }
 
-NestedPlace PlaceOn(const PatchGrid& grid, int level, double x, double y) {
-  const auto [i, j] = PatchOn(grid, level, x, y);
-  const double scale = 1 << level;
-  return {.i = i,
-          .j = j,
-          .along_u = CubicWeights(x * scale - i, 0),
-          .along_v = CubicWeights(y * scale - j, 0)};
+NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoints& given,
+                               int threads) {
+  return TakeDisplacements(
+      start,
+      OwnedPoints{.positions = {given.positions.begin(), given.positions.end()},
+                  .uv = {given.uv.begin(), given.uv.end()},
+                  .weights = {given.weights.begin(), given.weights.end()}},
+      threads);
+}
+
+std::vector<Vec2> UvAsGiven(NestedPoints points) {
+  points.value = {};
+  points.weight = {};
+  std::vector<double> column(points.size());
+  for (const int c : {0, 1}) {
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      column[points.given[k]] = points.uv[k][c];
+    }
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      points.uv[k][c] = column[k];
+    }
+  }
+  return std::move(points.uv);
 }
 
 }  // namespace semblance

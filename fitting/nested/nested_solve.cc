@@ -87,7 +87,7 @@ void NestedSolve::Enter(const NestedSpace& space) {
   absolute_ = Zeros();
 }
 
-void NestedSolve::Begin(const NestedSpace& space, std::vector<std::uint32_t> used) {
+void NestedSolve::Begin(const NestedSpace& space, PointChoice used) {
   Enter(space);
   used_ = std::move(used);
   levels_.clear();
@@ -119,26 +119,35 @@ void NestedSolve::Begin(const NestedSpace& space, std::vector<std::uint32_t> use
 
 // Points of one leaf follow each other. visit(leaf, indices).
 template <class Visit>
-void NestedSolve::ForEachLeaf(std::span<const std::uint32_t> indices, const Visit& visit) const {
-  std::size_t begin = 0;
-  while (begin < indices.size()) {
-    const int level = space_->LeafLevel(points_.x[indices[begin]], points_.y[indices[begin]]);
-    const PatchGrid& grid = (*space_)[level].layout.grid;
-    const auto place = [&](std::size_t k) {
-      return PatchOn(grid, level, points_.x[indices[k]], points_.y[indices[k]]);
-    };
-    const auto first = place(begin);
-    std::size_t end = begin + 1;
-    while (end < indices.size() && place(end) == first) {
-      ++end;
+void NestedSolve::ForEachLeaf(std::size_t begin, std::size_t end, const PointChoice& choice,
+                              const Visit& visit) const {
+  std::vector<std::uint32_t> of_leaf;
+  LeafPatch leaf;
+  for (std::size_t k = begin; k < end; k += choice.every) {
+    if (!choice.Has(k)) {
+      continue;
     }
-    visit(LeafPatch{level, first[0], first[1]}, indices.subspan(begin, end - begin));
-    begin = end;
+    const double x = points_.X(k), y = points_.Y(k);
+    if (of_leaf.empty() || PatchOn((*space_)[leaf.level].layout.grid, leaf.level, x, y) !=
+                               std::array{leaf.i, leaf.j}) {
+      if (!of_leaf.empty()) {
+        visit(leaf, of_leaf);
+      }
+      of_leaf.clear();
+      leaf.level = space_->LeafLevel(x, y);
+      const auto [i, j] = PatchOn((*space_)[leaf.level].layout.grid, leaf.level, x, y);
+      leaf.i = i;
+      leaf.j = j;
+    }
+    of_leaf.push_back(static_cast<std::uint32_t>(k));
+  }
+  if (!of_leaf.empty()) {
+    visit(leaf, of_leaf);
   }
 }
 
 void NestedSolve::AddPoints(Shares& data_shares) {
-  ForEachLeaf(used_, [&](const LeafPatch& leaf, std::span<const std::uint32_t> indices) {
+  const auto add = [&](const LeafPatch& leaf, std::span<const std::uint32_t> indices) {
     const GridLayout& layout = (*space_)[leaf.level].layout;
     const LeafSums sums = SumsOver(points_, leaf, indices);
     levels_[leaf.level].matrix.AddPatch(leaf.i, leaf.j, sums.gram);
@@ -148,7 +157,8 @@ void NestedSolve::AddPoints(Shares& data_shares) {
     for (int c = 0; c < Channels(); ++c) {
       Scatter(layout, leaf.i, leaf.j, sums.right[c], 1, right_[leaf.level].Channel(c));
     }
-  });
+  };
+  ForEachLeaf(0, points_.size(), used_, add);
 }
 
 // What each vertex of each level would see of points and energy, were the level alone.
@@ -339,9 +349,18 @@ double NestedSolve::MeanSquare() {
   double sum = SumOfSquares();
   if (!(sum > kEnough * square_sum_)) {
     sum = 0;
-    const std::vector<NestedResidual> residuals = ResidualsOf(used_);
-    for (std::size_t n = 0; n < used_.size(); ++n) {
-      sum += points_.weight[used_[n]] * residuals[n].Square();
+    Absolute(solution_);
+    constexpr std::size_t kAtOnce = 1 << 14;
+    std::vector<NestedResidual> residuals;
+    const std::size_t step = kAtOnce * used_.every;
+    for (std::size_t begin = 0; begin < points_.size(); begin += step) {
+      const std::size_t end = std::min(begin + step, points_.size());
+      residuals.clear();
+      AddResiduals(begin, end, used_, residuals);
+      auto residual = residuals.begin();
+      for (std::size_t k = begin; k < end; k += used_.every) {
+        sum += used_.Has(k) ? points_.Weight(k) * (residual++)->Square() : 0;
+      }
     }
   }
   return sum / weight_sum_ / points_.channels;
@@ -385,18 +404,33 @@ const NestedValues& NestedSolve::Displacements() {
   return absolute_;
 }
 
-std::vector<NestedResidual> NestedSolve::ResidualsOf(std::span<const std::uint32_t> indices) {
-  Absolute(solution_);
-  std::vector<NestedResidual> residuals(indices.size());
+// The displacements must be there.
+void NestedSolve::AddResiduals(std::size_t begin, std::size_t end, const PointChoice& choice,
+                               std::vector<NestedResidual>& residuals) const {
   LeafVertices vertices{};
-  ForEachLeaf(indices, [&](const LeafPatch& leaf, std::span<const std::uint32_t> of_leaf) {
-    for (int c = 0; c < points_.channels; ++c) {
-      Gather(absolute_[leaf.level], c, leaf.i, leaf.j, vertices[c]);
-    }
-    ResidualsOver(points_, leaf, vertices, of_leaf,
-                  residuals.data() + (of_leaf.data() - indices.data()));
-  });
+  ForEachLeaf(begin, end, choice,
+              [&](const LeafPatch& leaf, std::span<const std::uint32_t> of_leaf) {
+                for (int c = 0; c < points_.channels; ++c) {
+                  Gather(absolute_[leaf.level], c, leaf.i, leaf.j, vertices[c]);
+                }
+                const std::size_t before = residuals.size();
+                residuals.resize(before + of_leaf.size());
+                ResidualsOver(points_, leaf, vertices, of_leaf, residuals.data() + before);
+              });
+}
+
+std::vector<NestedResidual> NestedSolve::ResidualsOf(const PointChoice& choice) {
+  Absolute(solution_);
+  std::vector<NestedResidual> residuals;
+  residuals.reserve(choice.Count(points_));
+  AddResiduals(0, points_.size(), choice, residuals);
   return residuals;
+}
+
+std::span<const NestedResidual> NestedResiduals::Of(std::size_t begin, std::size_t end) {
+  some_.clear();
+  solve_.AddResiduals(begin, end, {}, some_);
+  return some_;
 }
 
 }  // namespace semblance

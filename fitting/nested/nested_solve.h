@@ -29,9 +29,9 @@ class NestedSolve {
   // Takes the space as it is linked; it must outlive what is asked of it. What was solved for
   // before is kept as the start of the next solve; the space must hold it.
   void Enter(const NestedSpace& space);
-  // Enters it, and takes those points whose index is in `used` (ascending). With one more channel,
-  // a random sign per point, for the trace.
-  void Begin(const NestedSpace& space, std::vector<std::uint32_t> used);
+  // Enters it, and takes the points of a choice. With one more channel, a random sign per point,
+  // for the trace.
+  void Begin(const NestedSpace& space, PointChoice used);
   // The weight of the thin-plate energy, mm^2 per energy.
   void SetWeight(double weight);
   // Until what is left to gain is below `least_gain` of the sum of w |e|^2 (0: far below rounding).
@@ -54,8 +54,8 @@ class NestedSolve {
   // The absolute displacements of every level's vertices, halos filled; until the next call of
   // anything else.
   const NestedValues& Displacements();
-  // One per index, which must ascend.
-  std::vector<NestedResidual> ResidualsOf(std::span<const std::uint32_t> indices);
+  // Of the points of a choice, in their order.
+  std::vector<NestedResidual> ResidualsOf(const PointChoice& choice);
 
  private:
   struct LevelSystem {
@@ -68,8 +68,12 @@ class NestedSolve {
   const GridRuns& Runs(int level) const { return (*space_)[level].runs; }
   int Finest() const { return space_->finest(); }
   NestedValues Zeros() const;
+  friend class NestedResiduals;
   template <class Visit>
-  void ForEachLeaf(std::span<const std::uint32_t> indices, const Visit& visit) const;
+  void ForEachLeaf(std::size_t begin, std::size_t end, const PointChoice& choice,
+                   const Visit& visit) const;
+  void AddResiduals(std::size_t begin, std::size_t end, const PointChoice& choice,
+                    std::vector<NestedResidual>& residuals) const;
   void AddPoints(std::vector<std::vector<double>>& data_shares);
   void MakeDiagonals(std::vector<std::vector<double>> data_shares);
   void Multiply(const NestedValues& x, NestedValues& product);
@@ -83,10 +87,24 @@ class NestedSolve {
   const NestedPoints& points_;
   Vec2 lengths_mm_;
   const NestedSpace* space_ = nullptr;
-  std::vector<std::uint32_t> used_;
+  PointChoice used_;
   std::vector<LevelSystem> levels_;
   NestedValues right_, solution_, absolute_, direction_, product_, residual_;
   double weight_ = 0, weight_sum_ = 0, square_sum_ = 0, even_weight_ = kNaN;
+};
+
+// What the last solution of a solve leaves of its points, some of them at a time: all of them would
+// need half as much memory as the points. Until the solve is asked for anything else.
+class NestedResiduals {
+ public:
+  explicit NestedResiduals(NestedSolve& solve) : solve_(solve) { solve_.Displacements(); }
+
+  // Of points begin .. end - 1; until the next call.
+  std::span<const NestedResidual> Of(std::size_t begin, std::size_t end);
+
+ private:
+  NestedSolve& solve_;
+  std::vector<NestedResidual> some_;
 };
 
 }  // namespace semblance

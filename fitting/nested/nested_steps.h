@@ -10,7 +10,7 @@ namespace semblance {
 // Throws InputError as FitNested does.
 void CheckNested(const HSplineSurface& start, const ScatteredPoints& points);
 
-// points: by DisplacementsFrom, of points that CheckNested lets pass.
+// points: by DisplacementsFrom or TakeDisplacements, of points that CheckNested lets pass.
 NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
                           const RunContext& context);
 

@@ -17,30 +17,65 @@ constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
 
 class OutlierSearch {
  public:
-  OutlierSearch(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                std::span<const NestedResidual> residuals, double least_sd_mm)
-      : points_(points), indices_(indices), residuals_(residuals), least_sd_mm_(least_sd_mm) {}
+  OutlierSearch(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
+                double least_sd_mm)
+      : points_(points),
+        every_(every),
+        count_(static_cast<std::ptrdiff_t>((points.size() + every - 1) / every)),
+        all_(residuals),
+        least_sd_mm_(least_sd_mm) {}
 
-  // Of each of the indices.
-  std::vector<char> Pass(const std::vector<char>& before) {
+  std::ptrdiff_t count() const { return count_; }
+
+  // What follows from `before`, whose last pass has given `found` but where `stale` says that
+  // `before` has changed in a block or next to it. Returns the blocks that it changed.
+  std::vector<char> Pass(const std::vector<char>& before, const std::vector<char>& stale,
+                         std::vector<char>& found) {
     before_ = &before;
-    std::vector<char> found(indices_.size(), 0);
-    const std::ptrdiff_t count = std::ssize(indices_);
-    for (std::ptrdiff_t begin = 0; begin < count; begin += kBlock) {
-      const std::ptrdiff_t end = std::min(begin + kBlock, count);
-      if (IsCalm(std::max<std::ptrdiff_t>(begin - kBlock / 2, 0),
-                 std::min(end + kBlock / 2, count))) {
+    std::vector<char> changed(stale.size(), 0);
+    const std::ptrdiff_t blocks = std::ssize(stale);
+    for (std::ptrdiff_t first = 0; first < blocks; first += kBlocksAtOnce) {
+      const std::ptrdiff_t last = std::min(first + kBlocksAtOnce, blocks);
+      if (std::find(stale.begin() + first, stale.begin() + last, 1) == stale.begin() + last) {
         continue;
       }
-      Look(std::max<std::ptrdiff_t>(begin - kBlock / 2, 0), std::min(end + kBlock / 2, count));
-      for (std::ptrdiff_t k = begin; k < end; ++k) {
-        found[k] = Off(k) > far_ && !HasCompany(k) ? 1 : 0;
+      Read(first * kBlock, std::min(last * kBlock, count_));
+      for (std::ptrdiff_t block = first; block < last; ++block) {
+        changed[block] = stale[block] != 0 && PassBlock(block * kBlock, found) ? 1 : 0;
       }
     }
-    return found;
+    return changed;
   }
 
  private:
+  static constexpr std::ptrdiff_t kBlocksAtOnce = 512;
+
+  // The residuals around some blocks.
+  void Read(std::ptrdiff_t begin, std::ptrdiff_t end) {
+    first_ = std::max<std::ptrdiff_t>(begin - kWindow, 0);
+    residuals_ = all_(first_, std::min(end + kWindow, count_));
+  }
+
+  const NestedResidual& ResidualOf(std::ptrdiff_t k) const { return residuals_[k - first_]; }
+
+  // Whether it changes anything.
+  bool PassBlock(std::ptrdiff_t begin, std::vector<char>& found) {
+    const std::ptrdiff_t end = std::min(begin + kBlock, count_),
+                         around = std::max<std::ptrdiff_t>(begin - kBlock / 2, 0),
+                         behind = std::min(end + kBlock / 2, count_);
+    const bool calm = IsCalm(around, behind);
+    if (!calm) {
+      Look(around, behind);
+    }
+    bool changed = false;
+    for (std::ptrdiff_t k = begin; k < end; ++k) {
+      const char is = !calm && Off(k) > far_ && !HasCompany(k) ? 1 : 0;
+      changed = changed || is != found[k];
+      found[k] = is;
+    }
+    return changed;
+  }
+
   static double Median(std::vector<double>& values) {
     const auto middle = values.begin() + std::ssize(values) / 2;
     std::nth_element(values.begin(), middle, values.end());
@@ -71,13 +106,13 @@ class OutlierSearch {
     double largest = 0;
     char voteless = 0;
     for (std::ptrdiff_t k = begin; k < end; ++k) {
-      const std::array<double, 3>& e = residuals_[k].along;
+      const std::array<double, 3>& e = ResidualOf(k).along;
       voteless |= (*before_)[k];
       for (int c = 0; c < 3; ++c) {
         sum[c] += e[c];
         squares[c] += e[c] * e[c];
       }
-      largest = std::max(largest, residuals_[k].Square());
+      largest = std::max(largest, ResidualOf(k).Square());
     }
     const auto count = static_cast<double>(end - begin);
     double middle = 0;
@@ -92,7 +127,7 @@ class OutlierSearch {
 
   void Look(std::ptrdiff_t begin, std::ptrdiff_t end) {
     for (int c = 0; c < points_.channels; ++c) {
-      middle_[c] = MedianOf(begin, end, [&](std::ptrdiff_t k) { return residuals_[k].along[c]; });
+      middle_[c] = MedianOf(begin, end, [&](std::ptrdiff_t k) { return ResidualOf(k).along[c]; });
     }
     const double sd = kSdOfMedian[points_.channels] *
                       MedianOf(begin, end, [&](std::ptrdiff_t k) { return Off(k); });
@@ -102,7 +137,7 @@ class OutlierSearch {
   double Off(std::ptrdiff_t k) const {
     double square = 0;
     for (int c = 0; c < points_.channels; ++c) {
-      const double off = residuals_[k].along[c] - middle_[c];
+      const double off = ResidualOf(k).along[c] - middle_[c];
       square += off * off;
     }
     return std::sqrt(square);
@@ -112,7 +147,7 @@ class OutlierSearch {
   bool Alike(std::ptrdiff_t a, std::ptrdiff_t b) const {
     double apart = 0;
     for (int c = 0; c < points_.channels; ++c) {
-      const double d = residuals_[a].along[c] - residuals_[b].along[c];
+      const double d = ResidualOf(a).along[c] - ResidualOf(b).along[c];
       apart += d * d;
     }
     return std::sqrt(apart) < kAlike * Off(a);
@@ -121,11 +156,11 @@ class OutlierSearch {
   // Among the points that stand next to it along the curve.
   bool HasCompany(std::ptrdiff_t k) {
     near_.clear();
-    const std::ptrdiff_t end = std::min(k + kWindow + 1, std::ssize(indices_));
+    const std::ptrdiff_t end = std::min(k + kWindow + 1, count_);
     for (std::ptrdiff_t q = std::max<std::ptrdiff_t>(k - kWindow, 0); q < end; ++q) {
       if (q != k) {
-        const double dx = points_.x[indices_[q]] - points_.x[indices_[k]],
-                     dy = points_.y[indices_[q]] - points_.y[indices_[k]];
+        const double dx = points_.X(q * every_) - points_.X(k * every_),
+                     dy = points_.Y(q * every_) - points_.Y(k * every_);
         near_.emplace_back(dx * dx + dy * dy, q);
       }
     }
@@ -138,8 +173,11 @@ class OutlierSearch {
   }
 
   const NestedPoints& points_;
-  std::span<const std::uint32_t> indices_;
-  std::span<const NestedResidual> residuals_;
+  std::size_t every_;
+  std::ptrdiff_t count_;
+  const ResidualsBetween& all_;
+  std::span<const NestedResidual> residuals_;  // from `first_` on
+  std::ptrdiff_t first_ = 0;
   double least_sd_mm_;
   const std::vector<char>* before_ = nullptr;
   std::array<double, 3> middle_{};
@@ -150,23 +188,38 @@ class OutlierSearch {
 
 }  // namespace
 
-int FindOutliers(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                 std::span<const NestedResidual> residuals, double least_sd_mm,
-                 std::vector<char>& outlier) {
-  OutlierSearch search(points, indices, residuals, least_sd_mm);
-  std::vector<char> found(indices.size());
-  for (std::size_t k = 0; k < indices.size(); ++k) {
-    found[k] = outlier[indices[k]];
+namespace {
+
+// Of each block, whether it or one beside it has changed.
+std::vector<char> BesideThose(const std::vector<char>& changed) {
+  std::vector<char> beside = changed;
+  for (std::size_t b = 0; b < changed.size(); ++b) {
+    beside[b] |= (b > 0 ? changed[b - 1] : 0) | (b + 1 < changed.size() ? changed[b + 1] : 0);
   }
+  return beside;
+}
+
+}  // namespace
+
+// A pass looks again only where what the one before has found is news.
+int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
+                 double least_sd_mm, std::vector<char>& outlier) {
+  static_assert(kWindow < kBlock);
+  OutlierSearch search(points, every, residuals, least_sd_mm);
+  std::vector<char> found(search.count());
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    found[k] = outlier[k * every];
+  }
+  std::vector<char> stale((found.size() + kBlock - 1) / kBlock, 1);
   for (int pass = 0; pass < kPasses; ++pass) {
-    std::vector<char> next = search.Pass(found);
-    if (next == found) {
+    const std::vector<char> before = found;
+    stale = BesideThose(search.Pass(before, stale, found));
+    if (before == found) {
       break;
     }
-    found.swap(next);
   }
-  for (std::size_t k = 0; k < indices.size(); ++k) {
-    outlier[indices[k]] = found[k];
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    outlier[k * every] = found[k];
   }
   return static_cast<int>(std::count(found.begin(), found.end(), 1));
 }

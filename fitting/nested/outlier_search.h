@@ -2,7 +2,8 @@
 // Points that agree with nobody.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -10,14 +11,17 @@
 
 namespace semblance {
 
-// Says of each of `indices` whether it is an outlier: its residual, less the median of the points
-// around it, is more than six standard deviations of theirs (by their median, so that up to a third
-// of them may be outliers too) and of `least_sd_mm`, and fewer than half of the eight points
-// nearest to it have one like it. So detail that the surface does not follow yet, which neighbours
-// share, is none, and the width falls with the residuals as the surface gets finer. outlier: per
-// point; what stands there when it begins has no vote. Returns how many there are.
-int FindOutliers(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                 std::span<const NestedResidual> residuals, double least_sd_mm,
-                 std::vector<char>& outlier);
+// Residuals begin .. end - 1 of the points that are looked at, in their order; until the next call.
+using ResidualsBetween =
+    std::function<std::span<const NestedResidual>(std::size_t begin, std::size_t end)>;
+
+// Says of one point in `every` whether it is an outlier: its residual, less the median of the
+// points around it, is more than six standard deviations of theirs (by their median, so that up to
+// a third of them may be outliers too) and of `least_sd_mm`, and fewer than half of the eight
+// points nearest to it have one like it. So detail that the surface does not follow yet, which
+// neighbours share, is none, and the width falls with the residuals as the surface gets finer.
+// outlier: per point; what stands there when it begins has no vote. Returns how many there are.
+int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
+                 double least_sd_mm, std::vector<char>& outlier);
 
 }  // namespace semblance

@@ -52,9 +52,9 @@ SEMBLANCE_INLINE void SumPatch(const EvidencePoints& of, const PatchOfPoints& pa
   double u[4], v[4], both[16];
   for (std::size_t n = patch.begin; n < patch.end; ++n) {
     const std::uint32_t k = of.indices[n];
-    WeightsAt(of.points.x[k] * patch.scale - patch.i, u);
-    WeightsAt(of.points.y[k] * patch.scale - patch.j, v);
-    const double w = of.points.weight[k];
+    WeightsAt(of.points.X(k) * patch.scale - patch.i, u);
+    WeightsAt(of.points.Y(k) * patch.scale - patch.j, v);
+    const double w = of.points.Weight(k);
     for (int m = 0; m < 16; ++m) {
       both[m] = w * u[m % 4] * v[m / 4];
     }
@@ -90,7 +90,7 @@ void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridVa
   constexpr void (*kSum[])(const EvidencePoints&, const PatchOfPoints&, PatchSums&) = {
       SumPatchOf1, SumPatchOf2, SumPatchOf3};
   const auto patch_of = [&](std::size_t n) {
-    return PatchOn(layout.grid, level, of.points.x[of.indices[n]], of.points.y[of.indices[n]]);
+    return PatchOn(layout.grid, level, of.points.X(of.indices[n]), of.points.Y(of.indices[n]));
   };
   for (std::size_t begin = 0, end = 0; begin < of.indices.size(); begin = end) {
     const auto [i, j] = patch_of(begin);
@@ -237,7 +237,7 @@ int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
   const GridLayout layout = space[level].layout;
   std::vector<int> counts(layout.Patches(), 0);
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const auto [i, j] = PatchOn(layout.grid, level, points.x[k], points.y[k]);
+    const auto [i, j] = PatchOn(layout.grid, level, points.X(k), points.Y(k));
     ++counts[layout.Patch(i, j)];
   }
   int added = 0;

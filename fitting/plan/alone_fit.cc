@@ -22,9 +22,9 @@ LevelSummary RoundSummary(const NestedRound& round) {
           .usable = true};
 }
 
-FitResult ResultOf(NestedFitResult fit, std::vector<Vec2> uv) {
+FitResult ResultOf(NestedFitResult fit) {
   FitResult result{.surface = std::move(fit.surface),
-                   .uv = std::move(uv),
+                   .uv = std::move(fit.uv),
                    .residual_mm = std::move(fit.residual_mm),
                    .point_rms_mm = fit.rms_mm,
                    .dowel_rms_mm = fit.rms_mm,
@@ -46,16 +46,14 @@ bool IsAlone(const FitOptions& options) {
 
 FitResult FitAlone(const HSplineSurface& start, const ScatteredPoints& points, const AutoPlan& plan,
                    const RunContext& context) {
-  return ResultOf(FitNested(start, points, plan, context), {points.uv.begin(), points.uv.end()});
+  return ResultOf(FitNested(start, points, plan, context));
 }
 
 FitResult FitAlone(const HSplineSurface& start, OwnedPoints points, const AutoPlan& plan,
                    const RunContext& context) {
   CheckNested(start, points.View());
-  NestedPoints nested = DisplacementsFrom(start, points.View(), context.threads);
-  points.positions = {};
-  points.weights = {};
-  return ResultOf(FitNested(start, std::move(nested), plan, context), std::move(points.uv));
+  return ResultOf(FitNested(start, TakeDisplacements(start, std::move(points), context.threads),
+                            plan, context));
 }
 
 }  // namespace semblance

@@ -2,8 +2,7 @@
 // The auto plan without any other term: nothing is to be driven between its solves.
 #pragma once
 
-#include <vector>
-
+#include "fitting/nested/nested_points.h"
 #include "fitting/plan/fit_options.h"
 #include "fitting/plan/fit_result.h"
 #include "fitting/problem/fit_target.h"
@@ -13,15 +12,6 @@ namespace semblance {
 
 // Whether options ask for it.
 bool IsAlone(const FitOptions& options);
-
-// Points that a fit may take apart.
-struct OwnedPoints {
-  std::vector<Vec3> positions;       // mm
-  std::vector<Vec2> uv;              // in [0,1] x [0,1], one per point
-  std::vector<double> weights = {};  // > 0, one per point; or none: all 1
-
-  ScatteredPoints View() const { return {positions, uv, weights}; }
-};
 
 // Only the surface as it ends is measured. Throw as FitNested does. Of points that it owns the
 // positions and weights are freed as soon as their displacements are known, and the result gets the

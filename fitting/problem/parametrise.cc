@@ -72,29 +72,7 @@ Parametrisation ParametersOf(const Scan& points, const GivenParameters& given) {
         "type 'given' needs each point's (u,v) (of a table, the columns u and v); give them, or "
         "take 'plane' or 'cylinder'");
   }
-  const std::array<std::array<double, 2>, 2> ranges = {given.u_range, given.v_range};
-  for (const auto& [low, high] : ranges) {
-    if (!(high > low)) {
-      Fail(fmt::format("the range [{}, {}] is empty; give the lower bound first", low, high));
-    }
-  }
-  Parametrisation result{.uv = {}, .source = ParameterSource::kGiven};
-  result.uv.reserve(points.given_uv.size());
-  for (std::size_t k = 0; k < points.given_uv.size(); ++k) {
-    Vec2 uv;
-    for (const int c : {0, 1}) {
-      uv[c] = (points.given_uv[k][c] - ranges[c][0]) / (ranges[c][1] - ranges[c][0]);
-    }
-    if (!(uv.minCoeff() >= 0 && uv.maxCoeff() <= 1)) {
-      Fail(
-          fmt::format("point {} has (u,v) = ({}, {}) outside [{}, {}] x [{}, {}]; widen u_range "
-                      "and v_range",
-                      k, points.given_uv[k].x(), points.given_uv[k].y(), ranges[0][0], ranges[0][1],
-                      ranges[1][0], ranges[1][1]));
-    }
-    result.uv.push_back(uv);
-  }
-  return result;
+  return TakeGiven({points.given_uv.begin(), points.given_uv.end()}, given);
 }
 
 // Directions of u and v, unit.
@@ -401,6 +379,30 @@ Parametrisation ParametersOf(const Scan& points, const AutoParameters&) {
 }
 
 }  // namespace
+
+Parametrisation TakeGiven(std::vector<Vec2> given_uv, const GivenParameters& given) {
+  const std::array<std::array<double, 2>, 2> ranges = {given.u_range, given.v_range};
+  for (const auto& [low, high] : ranges) {
+    if (!(high > low)) {
+      Fail(fmt::format("the range [{}, {}] is empty; give the lower bound first", low, high));
+    }
+  }
+  for (std::size_t k = 0; k < given_uv.size(); ++k) {
+    Vec2 uv;
+    for (const int c : {0, 1}) {
+      uv[c] = (given_uv[k][c] - ranges[c][0]) / (ranges[c][1] - ranges[c][0]);
+    }
+    if (!(uv.minCoeff() >= 0 && uv.maxCoeff() <= 1)) {
+      Fail(
+          fmt::format("point {} has (u,v) = ({}, {}) outside [{}, {}] x [{}, {}]; widen u_range "
+                      "and v_range",
+                      k, given_uv[k].x(), given_uv[k].y(), ranges[0][0], ranges[0][1], ranges[1][0],
+                      ranges[1][1]));
+    }
+    given_uv[k] = uv;
+  }
+  return {.uv = std::move(given_uv), .source = ParameterSource::kGiven};
+}
 
 Parametrisation Parametrise(const Scan& scan, const Parameters& parameters) {
   if (scan.positions.empty()) {

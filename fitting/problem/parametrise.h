@@ -122,6 +122,9 @@ struct Scan {
   Closure closure = Closure::kOpen;          // of the surface that is wanted, for AutoParameters
 };
 
+// `given` in the memory of the (u,v). Throws InputError as Parametrise does.
+Parametrisation TakeGiven(std::vector<Vec2> given_uv, const GivenParameters& given);
+
 // du x dv looks where the triangles look. Whatever is chosen is one-to-one, but for given (u,v) and
 // where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are
 // any. Throws InputError for no points, `given` without given_uv, a number of given_uv that is not

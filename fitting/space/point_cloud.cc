@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <numeric>
 #include <tuple>
 
 namespace semblance {
@@ -121,11 +123,57 @@ CloudPoint MakePoint(const HSplineShape& shape, const auto& p) {
 
 }  // namespace
 
+namespace {
+
+// Indices in the order of their keys, first by the leading bits alone; starts: of each such bucket.
+std::vector<std::uint32_t> IntoBuckets(std::span<const std::uint64_t> keys, int shift,
+                                       std::vector<std::size_t>& starts) {
+  const std::uint64_t largest = *std::max_element(keys.begin(), keys.end());
+  starts.assign((largest >> shift) + 2, 0);
+  for (const std::uint64_t key : keys) {
+    ++starts[(key >> shift) + 1];
+  }
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  std::vector<std::size_t> next(starts.begin(), starts.end() - 1);
+  std::vector<std::uint32_t> order(keys.size());
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    order[next[keys[k] >> shift]++] = static_cast<std::uint32_t>(k);
+  }
+  return order;
+}
+
+int ShiftTo16Bits(std::uint64_t bits) {
+  return std::max(static_cast<int>(std::bit_width(bits)) - 16, 0);
+}
+
+}  // namespace
+
+// Twelve bytes a point while it is sorted.
 std::vector<std::uint32_t> CurveOrder(const HSplineShape& shape, const ScatteredPoints& points) {
-  std::vector<std::uint32_t> order;
-  order.reserve(points.size());
-  for (const Key& key : SortedKeys(shape, RowsOf(points))) {
-    order.push_back(key.index);
+  std::vector<std::uint64_t> keys(points.size());
+  std::uint64_t all = 0;
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    keys[k] = KeyOf(shape, points.uv[k], k).value;
+    all |= keys[k];
+  }
+  if (keys.empty()) {
+    return {};
+  }
+  std::vector<std::size_t> starts;
+  std::vector<std::uint32_t> order = IntoBuckets(keys, ShiftTo16Bits(all), starts);
+  std::vector<Key> bucket;
+  for (std::size_t b = 0; b + 1 < starts.size(); ++b) {
+    bucket.clear();
+    for (std::size_t n = starts[b]; n < starts[b + 1]; ++n) {
+      bucket.push_back({keys[order[n]], order[n]});
+    }
+    std::sort(bucket.begin(), bucket.end(), [](const Key& a, const Key& c) {
+      return std::tie(a.value, a.index) < std::tie(c.value, c.index);
+    });
+    SortTies(RowsOf(points), bucket);
+    for (std::size_t n = starts[b]; n < starts[b + 1]; ++n) {
+      order[n] = bucket[n - starts[b]].index;
+    }
   }
   return order;
 }

@@ -8,7 +8,9 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "problems/pictures/lighting.h"
 #include "problems/pictures/pictures.h"
 #include "problems/report/scene_blobs.h"
 #include "problems/report/scene_json.h"
@@ -159,8 +161,12 @@ std::string SurfacePng(const FitGrid& fine, int threads) {
   Scene plain, mapped;
   plain.objects = {{.mesh = grid.mesh, .material = PlasticMaterial({0.62, 0.70, 0.78})}};
   mapped.objects = {MappedObject(grid.mesh, grid.rms_mm, DistanceColours(grid))};
-  const std::array<Image, 2> pictures = {Render(plain, camera, Options(Lighting::kStudio), threads),
-                                         Render(mapped, camera, Options(Lighting::kEven), threads)};
+  ShadowMaps shadows;  // of one mesh
+  const auto render = [&](const Scene& scene, Lighting lighting) {
+    return std::move(RenderAll(scene, {&camera, 1}, Options(lighting), shadows, threads).front());
+  };
+  const std::array<Image, 2> pictures = {render(plain, Lighting::kStudio),
+                                         render(mapped, Lighting::kEven)};
   return EncodePng(ContactSheet(pictures, {.title = "",
                                            .captions = {"the surface", "distance of the points"},
                                            .legend = DistanceLegend(grid)}));

@@ -123,8 +123,7 @@ TEST(NestedFit, TheClosestPairsTellDetailFromNoise) {
   std::vector<NestedResidual> shared, alone;
   Random random(4);
   for (std::uint32_t k = 0; k < 4000; ++k) {
-    points.x.push_back(k / 2 + 0.1 * (k % 2));
-    points.y.push_back(0);
+    points.uv.emplace_back(k / 2 + 0.1 * (k % 2), 0);
     indices.push_back(k);
     alone.push_back({{random.Normal(), 0, 0}});
     shared.push_back(k % 2 == 0 ? NestedResidual{{random.Normal(), 0, 0}} : shared.back());
@@ -133,7 +132,11 @@ TEST(NestedFit, TheClosestPairsTellDetailFromNoise) {
                         apart = ClosestCorrelation(points, indices, alone);
   EXPECT_GT(together.value, 0.9);
   EXPECT_LT(std::abs(apart.value) * std::sqrt(static_cast<double>(apart.count)), 4);
-  EXPECT_NEAR(NeighbourCorrelation(shared), 0.5, 0.1);
+  NeighbourPairs pairs;
+  for (const NestedResidual& residual : shared) {
+    pairs.Add(residual);
+  }
+  EXPECT_NEAR(pairs.Correlation(), 0.5, 0.1);
 }
 
 // What a fit says of each point is its distance from the surface, as given; a target is no

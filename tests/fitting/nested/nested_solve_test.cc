@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "fitting/solve/level_fit.h"
 #include "surfaces/base/random.h"
@@ -181,9 +180,7 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
     space.Link();
     constexpr double kWeight = 1e-5;
     NestedSolve solve(points, MeanLengths(start));
-    std::vector<std::uint32_t> all(points.size());
-    std::iota(all.begin(), all.end(), 0u);
-    solve.Begin(space, all);
+    solve.Begin(space, {});
     solve.SetWeight(kWeight);
     solve.Solve(0);
     const std::vector<Term> terms = {PointTerm{},
@@ -215,9 +212,9 @@ TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
   space.Overlay(0, 0, 3);
   space.Link();
   NestedSolve solve(points, MeanLengths(start));
-  std::vector<std::uint32_t> used;
-  for (std::uint32_t k = 0; k < points.size(); k += 2) {
-    used.push_back(k);
+  PointChoice used{.every = 2, .left_out = std::vector<char>(points.size(), 0)};
+  for (std::size_t k = 0; k < points.size(); k += 14) {
+    used.left_out[k] = 1;
   }
   solve.Begin(space, used);
   for (const double weight : {1e-3, 1e-7}) {
@@ -227,7 +224,7 @@ TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
     for (const NestedResidual& residual : solve.ResidualsOf(used)) {
       sum += residual.Square();
     }
-    const double expected = sum / static_cast<double>(used.size()) / points.channels;
+    const double expected = sum / static_cast<double>(used.Count(points)) / points.channels;
     EXPECT_NEAR(solve.MeanSquare(), expected, 1e-9 * expected);
   }
 }
@@ -240,20 +237,18 @@ TEST(NestedSolve, ASolutionComesBackAsItWas) {
   space.Overlay(0, 2, 3);
   space.Link();
   NestedSolve solve(points, MeanLengths(start));
-  std::vector<std::uint32_t> all(points.size());
-  std::iota(all.begin(), all.end(), 0u);
-  solve.Begin(space, all);
+  solve.Begin(space, {});
   solve.SetWeight(1e-5);
   solve.Solve(0);
   const NestedSolve::Packed packed = solve.Solution();
   const double before = solve.MeanSquare();
   solve.SetWeight(10);
   solve.Solve(0);
-  EXPECT_GT(solve.ResidualsOf(all)[7].Square(), 0);
+  EXPECT_GT(solve.ResidualsOf({})[7].Square(), 0);
   solve.SetSolution(packed);
   EXPECT_EQ(solve.Solution(), packed);
   double sum = 0;
-  for (const NestedResidual& residual : solve.ResidualsOf(all)) {
+  for (const NestedResidual& residual : solve.ResidualsOf({})) {
     sum += residual.Square();
   }
   EXPECT_NEAR(sum / 500 / points.channels, before, 1e-9 * before);
@@ -266,9 +261,7 @@ TEST(NestedSolve, TheTraceIsTheNumberOfVerticesWithoutSmoothness) {
   const NestedPoints points = DisplacementsOf(start, Scattered(HeadPoint, 20000, 0, 4));
   const NestedSpace space(shape);
   NestedSolve solve(points, MeanLengths(start));
-  std::vector<std::uint32_t> all(points.size());
-  std::iota(all.begin(), all.end(), 0u);
-  solve.Begin(space, all);
+  solve.Begin(space, {});
   solve.SetWeight(1e-14);
   solve.Solve(0);
   // One probe: the standard deviation is sqrt(2 * 121).
