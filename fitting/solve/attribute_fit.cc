@@ -22,11 +22,7 @@
 #include "surfaces/hspline_query/hspline_batch.h"
 
 namespace semblance {
-namespace {
 
-constexpr int kTogether = 3;  // columns of a surface
-
-// The same vertices, with nothing in them.
 HSplineSurface EmptyLike(const HSplineSurface& surface) {
   HSplineShape shape = surface.shape();
   shape.reference = OffsetReference::kWorld;
@@ -41,6 +37,10 @@ HSplineSurface EmptyLike(const HSplineSurface& surface) {
   empty.SetOffsets(offsets);
   return empty;
 }
+
+namespace {
+
+constexpr int kTogether = 3;  // columns of a surface
 
 // Columns that are points of one space.
 struct ColumnGroup {

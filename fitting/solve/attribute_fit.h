@@ -27,6 +27,9 @@ struct AttributeColumn {
   double rms = kNaN;                 // of what the points are off, in the column's own unit
 };
 
+// The same vertices of level 0 and offsets, along the axes, with nothing in them.
+HSplineSurface EmptyLike(const HSplineSurface& surface);
+
 // Functions in the very space of the surface: its vertices of level 0 and its offsets.
 struct AttributeFit {
   std::vector<AttributeColumn> columns;

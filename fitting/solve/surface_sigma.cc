@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fitting/solve/surface_sigma.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "fitting/solve/selected_inverse.h"
+#include "fitting/solve/space_system.h"
+#include "fitting/space/hierarchical_spline_space.h"
+#include "fitting/space/point_cloud.h"
+#include "fitting/space/spline_element.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+std::vector<Observation> PointsThatCount(const AttributeColumns& points,
+                                         std::span<const std::uint32_t> left_out) {
+  std::vector<Observation> observations;
+  observations.reserve(points.uv.size());
+  auto next = left_out.begin();
+  for (std::uint32_t k = 0; k < points.uv.size(); ++k) {
+    if (next != left_out.end() && *next == k) {
+      ++next;
+    } else {
+      observations.push_back(
+          {.uv = points.uv[k], .position = Vec3::Zero(), .weight = points.Weight(k)});
+    }
+  }
+  if (observations.empty()) {
+    throw InputError("sigma: no point is left that counts; give some");
+  }
+  return observations;
+}
+
+// Of the sixteen vertices of a patch, from that of all unknowns.
+Matrix16 CovarianceOf(const SplineElement& element, const SelectedInverse& inverse) {
+  const auto count = static_cast<Eigen::Index>(element.dofs.size());
+  Eigen::MatrixXd of_dofs(count, count);
+  for (Eigen::Index a = 0; a < count; ++a) {
+    for (Eigen::Index b = 0; b <= a; ++b) {
+      of_dofs(a, b) = of_dofs(b, a) = inverse.At(element.dofs[a], element.dofs[b]);
+    }
+  }
+  return element.IsIdentity()
+             ? Matrix16(of_dofs)
+             : Matrix16(element.extraction * of_dofs * element.extraction.transpose());
+}
+
+// Where finer vertices hang on coarser ones, some surfaces can be written in several ways, which
+// leaves the matrix without an inverse. A little on its diagonal chooses one of them; the functions
+// at a place do not see which.
+SparseMatrix Raised(SparseMatrix lower) {
+  constexpr double kShift = 1e-10;
+  const double shift = kShift * std::max(lower.diagonal().mean(), 1e-300);
+  for (int k = 0; k < lower.rows(); ++k) {
+    lower.coeffRef(k, k) += shift;
+  }
+  return lower;
+}
+
+}  // namespace
+
+struct SurfaceSigma::Model {
+  Model(const HSplineSurface& surface, std::vector<Observation> points, const SigmaOptions& options)
+      : empty(EmptyLike(surface)),
+        cloud(surface.shape(), points),
+        space(empty, empty, cloud),
+        elements(space) {
+    const auto count = static_cast<double>(points.size());
+    points = {};
+    space.Measure({}, /*threads=*/1, nullptr);
+    const double scale = 1 / cloud.weight_sum();
+    const std::vector<Term> smooth = {
+        SmoothnessTerm{.weight = options.weight, .of = SmoothnessOf::kSurface, .length_mm = 1}};
+    const SparseMatrix of_points = Assemble(space, scale, {}).lower;
+    const SparseMatrix energy =
+        Assemble(space, 0, StiffnessByLevel(space.shape(), smooth, options.lengths_mm)).lower;
+    const SelectedInverse inverse(Raised(of_points + energy));
+    if (!inverse.usable()) {
+      throw InputError("sigma: rounding leaves no factor of the fit's matrix; write sigma: false");
+    }
+    for (int e = 0; e < elements.size(); ++e) {
+      covariances.push_back(CovarianceOf(elements[e], inverse));
+    }
+    variance = options.noise_mm * options.noise_mm / count;
+    for (int k = 0; k < of_points.outerSize(); ++k) {
+      for (SparseMatrix::InnerIterator entry(of_points, k); entry; ++entry) {
+        const double both = entry.row() == entry.col() ? 1 : 2;
+        determined += both * entry.value() *
+                      inverse.At(static_cast<int>(entry.row()), static_cast<int>(entry.col()));
+      }
+    }
+  }
+
+  HSplineSurface empty;
+  PointCloud cloud;
+  HierarchicalSplineSpace space;
+  SplineElements elements;
+  std::vector<Matrix16> covariances;  // of each element's vertices, for a noise of 1
+  double variance = kNaN, determined = 0;
+};
+
+SurfaceSigma::SurfaceSigma(const HSplineSurface& surface, const AttributeColumns& points,
+                           std::span<const std::uint32_t> left_out, const SigmaOptions& options) {
+  if (!std::isfinite(options.noise_mm) || !(options.weight >= 0) ||
+      !options.lengths_mm.allFinite()) {
+    throw InputError("sigma: the fit has found no noise or smoothness; write sigma: false");
+  }
+  model_ = std::make_unique<Model>(surface, PointsThatCount(points, left_out), options);
+}
+
+SurfaceSigma::~SurfaceSigma() = default;
+SurfaceSigma::SurfaceSigma(SurfaceSigma&&) noexcept = default;
+SurfaceSigma& SurfaceSigma::operator=(SurfaceSigma&&) noexcept = default;
+
+std::vector<double> SurfaceSigma::At(std::span<const Vec2> uv) const {
+  std::vector<double> sigma;
+  sigma.reserve(uv.size());
+  for (const Vec2& at : uv) {
+    const int element = model_->elements.At(at);
+    const int level = model_->elements[element].patch.level;
+    const std::array<double, 16> weights =
+        PatchWeights(model_->space.shape(), PatchPointAt(model_->space.shape(), level, at));
+    const Eigen::Map<const Eigen::Matrix<double, 16, 1>> n(weights.data());
+    sigma.push_back(std::sqrt(std::max(
+        model_->variance * n.dot(model_->covariances[static_cast<std::size_t>(element)] * n),
+        0.0)));
+  }
+  return sigma;
+}
+
+double SurfaceSigma::degrees_of_freedom() const { return model_->determined; }
+
+}  // namespace semblance

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a fit may be off, against dense algebra and against the truth.
+#include "fitting/solve/surface_sigma.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "fitting/least_squares/patch_energy.h"
+#include "fitting/nested/nested_fit.h"
+#include "fitting/problem/start_surface.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/random.h"
+#include "tests/testing/scattered_data.h"
+
+namespace semblance {
+namespace {
+
+using testing::FrankePoint;
+
+struct Points {
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+  std::vector<double> weights;
+
+  AttributeColumns Columns() const { return {.uv = uv, .weights = weights, .columns = {}}; }
+};
+
+Points PointsAt(int count, std::uint64_t seed) {
+  Random random(seed);
+  Points points;
+  for (int k = 0; k < count; ++k) {
+    points.uv.emplace_back(random.Uniform(), random.Uniform());
+    points.positions.push_back(FrankePoint(points.uv.back()));
+    points.weights.push_back(random.Uniform(0.5, 2));
+  }
+  return points;
+}
+
+// Two levels, and each unknown's function as a surface that is 1 where it is.
+HSplineSurface Refined(Closure closure) {
+  HSplineSurface surface =
+      testing::PlainStart({.patches_u = 5, .patches_v = 3, .max_level = 1, .closure = closure});
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  for (int j = 2; j < 6; ++j) {
+    for (int i = 0; i < 4; ++i) {
+      offsets[{1, i, j}] = Vec3(0.1, 0, 0.01 * i);
+    }
+  }
+  surface.SetOffsets(offsets);
+  return surface;
+}
+
+std::vector<HSplineSurface> Functions(const HSplineSurface& surface) {
+  const HSplineSurface empty = EmptyLike(surface);
+  std::vector<HSplineSurface> functions;
+  for (std::size_t k = 0; k < empty.Net(0).vertices.size(); ++k) {
+    ControlNet net = empty.Net(0);
+    net.vertices[k].x() = 1;
+    functions.push_back(empty);
+    functions.back().SetNet(0, net);
+  }
+  for (const auto& [vertex, offset] : empty.Offsets()) {
+    functions.push_back(empty);
+    functions.back().SetOffset(vertex, Vec3::UnitX());
+  }
+  return functions;
+}
+
+TEST(SurfaceSigma, IsThatOfDenseLeastSquares) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+    const HSplineSurface surface = Refined(closure);
+    const std::vector<HSplineSurface> functions = Functions(surface);
+    const Points points = PointsAt(600, 3);
+    const auto row = [&](const Vec2& uv) {
+      Eigen::VectorXd n(static_cast<Eigen::Index>(functions.size()));
+      for (Eigen::Index k = 0; k < n.size(); ++k) {
+        n[k] = functions[static_cast<std::size_t>(k)].Point(uv).x();
+      }
+      return n;
+    };
+    const std::vector<std::uint32_t> left_out = {0, 17, 599};
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(std::ssize(functions), std::ssize(functions));
+    double weights = 0;
+    for (std::uint32_t k = 0; k < 600; ++k) {
+      if (k != 0 && k != 17 && k != 599) {
+        const Eigen::VectorXd n = row(points.uv[k]);
+        normal += points.weights[k] * n * n.transpose();
+        weights += points.weights[k];
+      }
+    }
+    constexpr double kNoise = 0.02;
+    const SurfaceSigma sigma(surface, points.Columns(), left_out,
+                             {.noise_mm = kNoise, .weight = 0, .lengths_mm = {1, 1}});
+    // Some of the functions are sums of others.
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> dense(normal.rows(), normal.cols());
+    dense.setThreshold(1e-11);
+    dense.compute(normal);
+    EXPECT_NEAR(sigma.degrees_of_freedom(), static_cast<double>(dense.rank()), 0.05);
+    const Eigen::MatrixXd inverse = dense.pseudoInverse();
+    const std::vector<Vec2> at = PointsAt(50, 8).uv;
+    const std::vector<double> found = sigma.At(at);
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      const Eigen::VectorXd n = row(at[k]);
+      const double expected = kNoise * std::sqrt(weights / 597 * n.dot(inverse * n));
+      EXPECT_NEAR(found[k], expected, 1e-3 * expected);
+    }
+  }
+}
+
+// A fit by other means says how many parameters its smoothness leaves: its one random probe is off
+// by sqrt(2 of them) at most.
+TEST(SurfaceSigma, CountsTheParametersOfTheFitAndHoldsTheTruth) {
+  constexpr int kCount = 20000;
+  constexpr double kNoise = 1e-3;
+  Points points = PointsAt(kCount, 5);
+  points.weights.clear();
+  Random random(6);
+  for (Vec3& position : points.positions) {
+    position.z() += kNoise * random.Normal();
+  }
+  const HSplineSurface start =
+      StartSurface({.patches_u = 8, .patches_v = 8, .max_level = 0}, points.positions, points.uv);
+  const NestedFitResult fit = FitNested(start, {points.positions, points.uv}, {}, {});
+  const SurfaceSigma sigma(fit.surface, points.Columns(), fit.report.outliers,
+                           {.noise_mm = fit.report.noise_mm,
+                            .weight = fit.report.weight,
+                            .lengths_mm = MeanLengths(start)});
+  const double freedom =
+      fit.report.rounds[static_cast<std::size_t>(fit.report.chosen_round)].degrees_of_freedom;
+  EXPECT_NEAR(sigma.degrees_of_freedom(), freedom, 4 * std::sqrt(2 * freedom) + 0.2 * freedom);
+  const std::vector<Vec2> at = PointsAt(4000, 9).uv;
+  const std::vector<double> sd = sigma.At(at);
+  int within = 0;
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    const double off = fit.surface.Point(at[k]).z() - FrankePoint(at[k]).z();
+    within += std::abs(off) < 1.6449 * sd[k] ? 1 : 0;
+  }
+  EXPECT_NEAR(within / 4000.0, 0.90, 0.06);
+}
+
+TEST(SurfaceSigma, WhatIsNotDeterminedIsLarge) {
+  const HSplineSurface surface = Refined(Closure::kOpen);
+  const SigmaOptions options{.noise_mm = 1, .weight = 0, .lengths_mm = {1, 1}};
+  const std::vector<Vec2> middle = {{0.5, 0.5}};
+  const SurfaceSigma few(surface, PointsAt(10, 1).Columns(), {}, options),
+      many(surface, PointsAt(600, 1).Columns(), {}, options);
+  EXPECT_GT(few.At(middle)[0], 100 * many.At(middle)[0]);
+  const Points one = PointsAt(1, 1);
+  const std::vector<std::uint32_t> all = {0};
+  EXPECT_THROW(SurfaceSigma(surface, one.Columns(), all, options), InputError);
+  EXPECT_THROW(SurfaceSigma(surface, PointsAt(600, 1).Columns(), {}, {}), InputError);
+}
+
+}  // namespace
+}  // namespace semblance
