@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <set>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "fitting/plan/fit_driver.h"
 #include "fitting/solve/auto_weight.h"
 #include "fitting/solve/space_solve.h"
+#include "surfaces/base/error.h"
 #include "surfaces/hspline_files/feature.h"
 
 namespace semblance {
@@ -98,6 +100,30 @@ std::vector<Term> TermsOf(const FitOptions& options, const HSplineSurface& rest,
     terms.emplace_back(PriorTerm{.weight = weight, .held_only = true});
   }
   return terms;
+}
+
+// The same surface, of levels 0..max_level, which must hold its offsets.
+HSplineSurface WithLevels(const HSplineSurface& surface, int max_level) {
+  HSplineShape shape = surface.shape();
+  shape.max_level = max_level;
+  HSplineSurface same(shape, surface.Net(0));
+  same.SetOffsets({surface.Offsets().begin(), surface.Offsets().end()});
+  return same;
+}
+
+// Throws InputError for exact points that the surface does not meet.
+void CheckMet(const SpaceSolve& all, const FitTarget& target) {
+  const std::vector<double> misses = all.ExactMisses();
+  const auto worst = std::max_element(misses.begin(), misses.end());
+  if (worst == misses.end() || *worst <= all.LeastMiss_mm()) {
+    return;
+  }
+  const Vec2& uv = target.exact[static_cast<std::size_t>(worst - misses.begin())].uv;
+  throw InputError(
+      fmt::format("fit: the exact point at (u,v) = ({:.6g}, {:.6g}) is missed by {:.3g} mm: it "
+                  "contradicts others, or they are closer together than vertices; leave some out, "
+                  "or give more patches or finer levels",
+                  uv.x(), uv.y(), *worst));
 }
 
 // Those that were not left out, with their anchors.
@@ -266,6 +292,7 @@ class Fitter {
     }
     driver_.Solve({.solve = [&](std::span<const Term>) {
       LevelSummary summary = all.Settle();
+      CheckMet(all, driver_.target());
       if (Take(all, features)) {
         summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
       }
@@ -273,7 +300,7 @@ class Fitter {
     }});
   }
 
-  // With Ceres; without, nothing is to be driven (FitAlone).
+  // With Ceres or exact points; without, nothing is to be driven (FitAlone).
   void Follow(const AutoPlan&) {
     const ControlNet start = result_.surface.Net(0);
     const PointColumns points(driver_.target());
@@ -284,28 +311,47 @@ class Fitter {
     for (const LevelSummary& level : alone.levels) {
       driver_.Solve({.solve = [&](std::span<const Term>) { return level; }});
     }
-    driver_.Solve({.solve = [&](std::span<const Term> terms) {
-      return SettleByCeres(terms, HSplineSurface(result_.surface.shape(), start));
-    }});
+    driver_.Solve(
+        {.solve = [&](std::span<const Term> terms) { return SettleAlone(terms, start); }});
   }
 
   // The minimum of all terms in the space that the auto plan has found, with its smoothness and
-  // without its outliers.
-  LevelSummary SettleByCeres(std::span<const Term> terms, const HSplineSurface& rest) {
+  // without its outliers; with finer vertices where exact points ask for them.
+  LevelSummary SettleAlone(std::span<const Term> terms, const ControlNet& rest) {
     context_.Report("fit", "all terms");
     const FitTarget kept = Without(result_.automatic->outliers, driver_.target());
     const std::vector<Term> weighed = WithSmoothness(terms, result_.automatic->weight);
-    SpaceSolve all({.start = result_.surface,
-                    .rest = rest,
+    const bool exact = !kept.exact.empty();
+    const HSplineSurface start =
+        exact ? WithLevels(result_.surface, MostLevels(result_.surface.shape())) : result_.surface;
+    const HSplineSurface flat(start.shape(), rest);
+    SpaceSolve all({.start = start,
+                    .rest = flat,
                     .target = kept,
                     .terms = weighed,
-                    .solver = Solver::kCeres,
+                    .solver = options_.solver,
                     .threads = context_.threads,
                     .settled = true});
     LevelSummary summary = all.Settle();
-    result_.surface = all.Surface();
+    const AdaptivePlan where_unmet{.tolerance_mm = std::numeric_limits<double>::infinity(),
+                                   .finest = start.shape().max_level};
+    while (exact && all.Refine(where_unmet)) {
+      summary = all.Settle();
+    }
+    CheckMet(all, kept);
+    result_.surface = exact ? WithLevels(all.Surface(), all.finest()) : all.Surface();
     summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
     return summary;
+  }
+
+  // As many as a surface may have, and the plan allows.
+  int MostLevels(const HSplineShape& shape) const {
+    constexpr int kMostPatches = 8192;  // along one side (HSplineShape)
+    int levels = std::get<AutoPlan>(options_.plan).finest;
+    while ((std::max(shape.patches_u, shape.patches_v) << levels) > kMostPatches) {
+      --levels;
+    }
+    return std::max(levels, shape.max_level);
   }
 
   void SeePoints(SpaceSolve& all) const {
@@ -340,7 +386,7 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context) {
   CheckFit(start, rest, target, features, options);
-  if (IsAlone(options)) {
+  if (IsAlone(options) && target.exact.empty()) {
     return FitAlone(start, PointColumns(target).Points(), std::get<AutoPlan>(options.plan),
                     context);
   }

@@ -91,7 +91,17 @@ class FaultFinder {
     Level("plan.finest", plan.finest);
     Fraction("plan.fraction", plan.fraction);
   }
-  void Plan(const AdaptivePlan& plan) { Level("plan.finest", plan.finest); }
+  void Plan(const AdaptivePlan& plan) {
+    Level("plan.finest", plan.finest);
+    for (std::size_t k = 0; k < plan.regions.size(); ++k) {
+      const ToleranceRegion& region = plan.regions[k];
+      if (!(region.u[0] < region.u[1] && region.v[0] < region.v[1])) {
+        Add(fmt::format("plan.regions[{}]", k),
+            fmt::format("[{}, {}] x [{}, {}] holds nothing; give the lower bound first",
+                        region.u[0], region.u[1], region.v[0], region.v[1]));
+      }
+    }
+  }
   void Plan(const AutoPlan&) {}  // the surface takes the levels that it needs
 
   // What the auto plan chooses by itself is not to be asked for. Ceres takes other terms too, in
@@ -209,6 +219,35 @@ void CheckOptions(const FitOptions& options, int max_level) {
 
 }  // namespace
 
+namespace {
+
+void CheckExact(std::span<const ExactPoint> exact, const FitOptions& options) {
+  constexpr std::size_t kMost = 500;
+  if (exact.empty()) {
+    return;
+  }
+  const bool at_once = std::holds_alternative<AdaptivePlan>(options.plan) ||
+                       std::holds_alternative<AutoPlan>(options.plan);
+  if (!at_once || options.solver != Solver::kFastest || !SeparableButForLoss(options.terms) ||
+      !std::holds_alternative<NoRelaxation>(options.relaxation)) {
+    Fail(
+        "exact points need plan: auto or adaptive, solver: fastest, terms that treat x, y and z "
+        "alike, and relaxation: none");
+  }
+  if (exact.size() > kMost) {
+    Fail(fmt::format("{} exact points are more than {}; leave some out", exact.size(), kMost));
+  }
+  for (const ExactPoint& point : exact) {
+    if (!point.position.allFinite() || !point.normal.allFinite() ||
+        !((point.uv.array() >= 0).all() && (point.uv.array() <= 1).all())) {
+      Fail(fmt::format("the exact point at (u,v) = ({}, {}) is not finite, or outside the domain",
+                       point.uv.x(), point.uv.y()));
+    }
+  }
+}
+
+}  // namespace
+
 void CheckFit(const HSplineSurface& start, const ScatteredPoints& points,
               const FitOptions& options) {
   if (points.size() == 0) {
@@ -227,6 +266,7 @@ void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
     Fail("the target has no point; give dowels or seed some");
   }
   CheckTarget(target);
+  CheckExact(target.exact, options);
   CheckOptions(options, start.shape().max_level);
   CheckFeatures(features, start.shape());
   if (std::holds_alternative<AutoPlan>(options.plan) && !features.empty()) {

@@ -126,6 +126,28 @@ void Fields(Visitor& visit, UntilPlan& o) {
   LevelwiseFields(visit, o.sweeps, o.aim);
 }
 
+// A part of the domain with a tolerance of its own.
+struct ToleranceRegion {
+  std::array<double, 2> u = {0, 1};
+  std::array<double, 2> v = {0, 1};
+  double tolerance_mm = 0.5;
+
+  bool Holds(double at_u, double at_v) const {
+    return at_u >= u[0] && at_u <= u[1] && at_v >= v[0] && at_v <= v[1];
+  }
+};
+template <class Visitor>
+void Fields(Visitor& visit, ToleranceRegion& o) {
+  visit(FieldInfo{.name = "u", .min = 0, .max = 1, .doc = "from and to; both belong to it"}, o.u);
+  visit(FieldInfo{.name = "v", .min = 0, .max = 1, .doc = "from and to; both belong to it"}, o.v);
+  visit(FieldInfo{.name = "tolerance_mm",
+                  .unit = "mm",
+                  .min = 1e-9,
+                  .max = 1e3,
+                  .doc = "in place of the plan's, of points in this part of the domain"},
+        o.tolerance_mm);
+}
+
 // All levels at once, and finer ones only where they are needed: the surface is solved for as one
 // linear least-squares problem in the vertices of level 0 and the edited ones of finer levels;
 // where a patch then has a point farther off than the tolerance, it is overlaid with vertices of
@@ -133,9 +155,19 @@ void Fields(Visitor& visit, UntilPlan& o) {
 struct AdaptivePlan {
   static constexpr std::string_view kName = "adaptive";
   double tolerance_mm = 0.5;
+  std::vector<ToleranceRegion> regions = {};
   int finest = 4;
   int margin = 0;
   int min_points = 9;
+
+  // Of a point at (u,v): that of the last region that holds it, or else the plan's.
+  double ToleranceAt(double u, double v) const {
+    double tolerance = tolerance_mm;
+    for (const ToleranceRegion& region : regions) {
+      tolerance = region.Holds(u, v) ? region.tolerance_mm : tolerance;
+    }
+    return tolerance;
+  }
 };
 template <class Visitor>
 void Fields(Visitor& visit, AdaptivePlan& o) {
@@ -146,6 +178,11 @@ void Fields(Visitor& visit, AdaptivePlan& o) {
                   .doc = "a patch with a point farther from the surface than this gets finer "
                          "vertices; at least about five times the points' noise"},
         o.tolerance_mm);
+  visit(FieldInfo{.name = "regions",
+                  .doc = "parts of the domain with tolerances of their own, such as [{u: [0.4, "
+                         "0.6], v: [0.3, 0.5], tolerance_mm: 0.1}]; where several hold a point, "
+                         "the last counts"},
+        o.regions);
   visit(FieldInfo{.name = "finest",
                   .min = 0,
                   .max = 8,

@@ -34,10 +34,18 @@ struct ShapePoint {
   double share = 1;                      // > 0: of the surface that it stands for, relative
 };
 
+// What the surface must meet whatever else it does.
+struct ExactPoint {
+  Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
+  Vec3 position = Vec3::Constant(kNaN);  // mm
+  Vec3 normal = Vec3::Zero();            // of any length: it is across the surface there; or zero
+};
+
 struct FitTarget {
   std::vector<FitPoint> points;
   std::vector<BoneAnchor> anchors = {};  // one per point, or none
   std::vector<ShapePoint> shape = {};    // where there is a prior
+  std::vector<ExactPoint> exact = {};    // plans adaptive and auto, solver fastest
 };
 
 // Scattered points as columns; what they refer to must outlive them.

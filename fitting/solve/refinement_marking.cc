@@ -73,16 +73,40 @@ class PatchCounts {
   std::map<Key, std::size_t> counts_;
 };
 
+// Whether some point of a leaf is farther off than it may be.
+bool Misses(const HSplineShape& shape, const QuadtreeNode& leaf, const AdaptivePlan& plan,
+            const PointCloud& cloud, std::span<const double> squares) {
+  if (plan.regions.empty()) {
+    return leaf.sums.largest > plan.tolerance_mm * plan.tolerance_mm;
+  }
+  for (std::size_t k = leaf.range.begin; k < leaf.range.end; ++k) {
+    const CloudPoint& point = cloud.points()[k];
+    const double tolerance_mm =
+        plan.ToleranceAt(point.x / shape.patches_u, point.y / shape.patches_v);
+    if (squares[k] > tolerance_mm * tolerance_mm) {
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
-                                        const AdaptivePlan& plan) {
-  const double most = plan.tolerance_mm * plan.tolerance_mm;
+                                        const AdaptivePlan& plan, const PointCloud& cloud,
+                                        std::span<const double> squares,
+                                        std::span<const Vec2> unmet) {
+  std::set<int> asked;  // leaves
+  for (const Vec2& uv : unmet) {
+    asked.insert(space.LeafAt(uv));
+  }
   const PatchCounts counts(space);
   std::set<VertexId> finer;
-  for (const QuadtreeNode& leaf : space.nodes()) {
-    if (leaf.children >= 0 || !(leaf.sums.largest > most) ||
-        leaf.range.size() < static_cast<std::size_t>(plan.min_points)) {
+  for (int node = 0; node < std::ssize(space.nodes()); ++node) {
+    const QuadtreeNode& leaf = space.nodes()[node];
+    const bool enough = leaf.range.size() >= static_cast<std::size_t>(plan.min_points);
+    if (leaf.children >= 0 ||
+        !((enough && Misses(space.shape(), leaf, plan, cloud, squares)) || asked.contains(node))) {
       continue;
     }
     for (int level = 0; level <= leaf.patch.level && level < plan.finest; ++level) {

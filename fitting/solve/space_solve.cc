@@ -11,6 +11,7 @@
 
 #include "fitting/solve/auto_weight.h"
 #include "fitting/solve/coupled_solver.h"
+#include "fitting/solve/exact_points.h"
 #include "fitting/solve/refinement_marking.h"
 #include "fitting/terms/robust_loss.h"
 #include "fitting/terms/term_cost.h"
@@ -207,7 +208,11 @@ void SpaceSolve::SeePoints() {
 }
 
 bool SpaceSolve::Refine(const AdaptivePlan& plan) {
-  const std::vector<VertexId> finer = MarkForRefinement(space_, plan);
+  std::vector<double> squares;
+  if (!plan.regions.empty()) {
+    space_.Measure({}, threads_, &squares);
+  }
+  const std::vector<VertexId> finer = MarkForRefinement(space_, plan, cloud_, squares, Unmet());
   if (finer.empty()) {
     return false;
   }
@@ -216,6 +221,25 @@ bool SpaceSolve::Refine(const AdaptivePlan& plan) {
   Begin();
   Measure();
   return true;
+}
+
+std::vector<double> SpaceSolve::ExactMisses() const {
+  return HasExact() ? ExactEquations(space_, target_->exact).MissesOf(space_.Values())
+                    : std::vector<double>();
+}
+
+double SpaceSolve::LeastMiss_mm() const { return 1e-10 * NetSize(space_); }
+
+// Places of exact points that the vertices cannot hold.
+std::vector<Vec2> SpaceSolve::Unmet() const {
+  std::vector<Vec2> unmet;
+  const std::vector<double> misses = ExactMisses();
+  for (std::size_t k = 0; k < misses.size(); ++k) {
+    if (misses[k] > LeastMiss_mm()) {
+      unmet.push_back(target_->exact[k].uv);
+    }
+  }
+  return unmet;
 }
 
 // Then a patch's mirror image is a patch too.
@@ -377,8 +401,7 @@ SolverOutcome SpaceSolve::Descend(SolveTolerance until) {
       factor.emplace(system.lower, Shift(system));
     }
     ++outcome.iterations;
-    const Eigen::MatrixX3d step =
-        factor->usable() ? Eigen::MatrixX3d(factor->Solve(system.right)) : Eigen::MatrixX3d();
+    const Eigen::MatrixX3d step = StepBy(*factor, system);
     outcome.usable = factor->usable() && step.allFinite();
     if (!outcome.usable) {
       outcome.termination = "failure";
@@ -391,6 +414,16 @@ SolverOutcome SpaceSolve::Descend(SolveTolerance until) {
     }
   }
   return outcome;
+}
+
+// Empty by a factor that cannot be used. Exact points hold after it.
+Eigen::MatrixX3d SpaceSolve::StepBy(const SparseFactor& factor, const NormalSystem& system) const {
+  if (!factor.usable()) {
+    return {};
+  }
+  const Eigen::MatrixX3d step = factor.Solve(system.right);
+  return HasExact() ? ExactEquations(space_, target_->exact).Bend(factor, space_.Values(), step)
+                    : step;
 }
 
 // How far a step takes the surface, of its size. Of a level: by the vertices, so that those which

@@ -50,9 +50,13 @@ class SpaceSolve {
   void SeePoints();
   // Chooses `weight: auto`, then goes to the minimum.
   LevelSummary Solve(SolveTolerance until);
-  // Adds the vertices that the plan asks for, and with a term that pairs vertices their mirrors;
-  // false if there are none.
+  // Adds the vertices that the plan asks for, those over exact points that are not met, and with a
+  // term that pairs vertices their mirrors; false if there are none.
   bool Refine(const AdaptivePlan& plan);
+  // Of the target's exact points: how far the unknowns are from holding them (exact_points.h).
+  std::vector<double> ExactMisses() const;
+  // More than rounding of so large a net: 1e-10 of its size.
+  double LeastMiss_mm() const;
   // The last solve, tight, with what the points determine of it. From now on a loss is as wide as
   // its term has it; before, where the surface is still far from most points, at least three times
   // their median distance, so that it does not take them for outliers.
@@ -87,10 +91,13 @@ class SpaceSolve {
   double Move(const Eigen::MatrixX3d& step, const Eigen::MatrixX3d& right);
   double Take(const ControlNet& net);
   SolverOutcome Descend(SolveTolerance until);
+  Eigen::MatrixX3d StepBy(const SparseFactor& factor, const NormalSystem& system) const;
   SolverOutcome SolveAtOnce();
   SolverOutcome SolveWithCeres(SolveTolerance until);
   SolverOutcome Reweigh(double least_move);
   bool GoesDirectly() const;
+  bool HasExact() const { return target_ != nullptr && !target_->exact.empty(); }
+  std::vector<Vec2> Unmet() const;
   void Measure();
   std::vector<double> FactorsOf(const std::vector<double>& squares) const;
   std::vector<int> HeldRows() const;
