@@ -126,8 +126,9 @@ std::vector<FitCell> CellsOf(const FitResult& fit) {
   return cells;
 }
 
-ToleranceReport ToleranceOf(const FitResult& fit, double tolerance_mm, int finest) {
-  ToleranceReport report{.tolerance_mm = tolerance_mm};
+ToleranceReport ToleranceOf(const FitResult& fit, const AdaptivePlan& plan) {
+  ToleranceReport report{.tolerance_mm = plan.tolerance_mm,
+                         .regions = static_cast<int>(plan.regions.size())};
   const std::vector<char> counted = CountedPoints(fit);
   const PatchTree tree(fit.surface);
   std::set<std::int32_t> cells;
@@ -137,28 +138,32 @@ ToleranceReport ToleranceOf(const FitResult& fit, double tolerance_mm, int fines
     }
     ++report.points;
     report.largest_mm = std::max(report.largest_mm, fit.residual_mm[k]);
-    if (!(fit.residual_mm[k] <= tolerance_mm)) {
+    if (!(fit.residual_mm[k] <= plan.ToleranceAt(fit.uv[k].x(), fit.uv[k].y()))) {
       ++report.beyond;
       cells.insert(tree.LeafAt(tree.IntoDomain(fit.uv[k])));
     }
   }
   report.cells = static_cast<int>(cells.size());
   report.at_finest = static_cast<int>(std::ranges::count_if(cells, [&](std::int32_t cell) {
-    return tree.leaves()[static_cast<std::size_t>(cell)].level >= finest;
+    return tree.leaves()[static_cast<std::size_t>(cell)].level >= plan.finest;
   }));
   return report;
 }
 
 std::string ToleranceText(const ToleranceReport& r) {
+  const std::string own = r.regions == 0
+                              ? ""
+                              : fmt::format(" (or that of {}, where one holds a point)",
+                                            r.regions == 1 ? "the region" : "the regions");
   if (r.Met()) {
     return fmt::format(
-        "the tolerance of {:.4g} mm is met: every one of {} points is within {:.4g} mm",
-        r.tolerance_mm, r.points, r.largest_mm);
+        "the tolerance of {:.4g} mm{} is met: every one of {} points is within {:.4g} mm",
+        r.tolerance_mm, own, r.points, r.largest_mm);
   }
   std::string text = fmt::format(
-      "THE TOLERANCE WAS MISSED: {} of {} points ({:.2g} %) are farther off than {:.4g} mm, the "
-      "farthest {:.4g} mm; they lie in {} {}",
-      r.beyond, r.points, 100.0 * r.beyond / r.points, r.tolerance_mm, r.largest_mm, r.cells,
+      "THE TOLERANCE WAS MISSED: {} of {} points ({:.2g} %) are farther off than {:.4g} mm{}, "
+      "the farthest {:.4g} mm; they lie in {} {}",
+      r.beyond, r.points, 100.0 * r.beyond / r.points, r.tolerance_mm, own, r.largest_mm, r.cells,
       r.cells == 1 ? "cell" : "cells");
   if (r.at_finest > 0) {
     text +=

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fitting/plan/fit_result.h"
+#include "fitting/problem/fit_schedule.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
@@ -36,9 +37,11 @@ struct FitCell {
 };
 std::vector<FitCell> CellsOf(const FitResult& fit);
 
-// Which points are farther off than the tolerance of an adaptive fit; outliers apart.
+// Which points are farther off than the tolerance of an adaptive fit where they are; outliers
+// apart.
 struct ToleranceReport {
   double tolerance_mm = kNaN;
+  int regions = 0;    // with tolerances of their own
   int points = 0;     // all that count
   int beyond = 0;     // of them, farther off
   int cells = 0;      // in which those lie
@@ -47,7 +50,7 @@ struct ToleranceReport {
 
   bool Met() const { return beyond == 0; }
 };
-ToleranceReport ToleranceOf(const FitResult& fit, double tolerance_mm, int finest);
+ToleranceReport ToleranceOf(const FitResult& fit, const AdaptivePlan& plan);
 
 // "the tolerance of 0.5 mm is met by all 1000 points", or by how much it was missed, and why.
 std::string ToleranceText(const ToleranceReport& report);

@@ -24,6 +24,7 @@ PlainPoints::PlainPoints(PointColumns columns)
       has_uv_(columns_.Has(PointColumn::kU)),
       has_weight_(columns_.Has(PointColumn::kWeight)),
       has_sigma_(columns_.Has(PointColumn::kSigma)),
+      has_exact_(columns_.Has(PointColumn::kExact)),
       values_(columns_.Kinds(), 0.0) {
   table_.weights_of_sigma = has_sigma_;
   for (const std::string& attribute : columns_.attributes) {
@@ -66,12 +67,24 @@ bool PlainPoints::AddLine(const char*& at, const char* end) {
   return AddPoint() && TakeLineEnd(at, end);
 }
 
+bool PlainPoints::AddExactness() {
+  const auto value = [&](PointColumn column) { return values_[static_cast<std::size_t>(column)]; };
+  const double exact = value(PointColumn::kExact);
+  if (exact == 1) {
+    AddExact(table_, {value(PointColumn::kNx), value(PointColumn::kNy), value(PointColumn::kNz)});
+  }
+  return exact == 0 || exact == 1;
+}
+
 bool PlainPoints::AddPoint() {
   const auto value = [&](PointColumn column) { return values_[static_cast<std::size_t>(column)]; };
   table_.positions.emplace_back(value(PointColumn::kX), value(PointColumn::kY),
                                 value(PointColumn::kZ));
   if (has_uv_) {
     table_.uv.emplace_back(value(PointColumn::kU), value(PointColumn::kV));
+  }
+  if (has_exact_ && !AddExactness()) {
+    return false;
   }
   for (std::size_t k = 0; k < table_.attributes.size(); ++k) {
     table_.attributes[k].values.push_back(values_[kPointColumns + k]);

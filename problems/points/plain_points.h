@@ -30,9 +30,10 @@ class PlainPoints {
  private:
   bool AddLine(const char*& at, const char* end);
   bool AddPoint();
+  bool AddExactness();
 
   PointColumns columns_;
-  bool has_uv_ = false, has_weight_ = false, has_sigma_ = false;
+  bool has_uv_ = false, has_weight_ = false, has_sigma_ = false, has_exact_ = false;
   std::vector<double> values_;  // of a line, by kind
   PointTable table_;
 };

@@ -12,10 +12,12 @@
 #include <set>
 #include <utility>
 
+#include "fitting/least_squares/patch_energy.h"
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
+#include "problems/metrics/quantile.h"
 #include "problems/points/fit_page.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/residual_files.h"
@@ -99,6 +101,24 @@ Json AttributesJson(const PointFit& result) {
   return json;
 }
 
+Json SigmaJson(const PointFit& result) {
+  std::vector<double> at_points = result.sigma_mm;
+  return {{"median_mm", Quantile(at_points, 0.5)},
+          {"degrees_of_freedom", result.sigma->degrees_of_freedom()}};
+}
+
+Json ToleranceJson(const ToleranceReport& tolerance) {
+  Json json = {{"tolerance_mm", tolerance.tolerance_mm},
+               {"met", tolerance.Met()},
+               {"points_beyond", tolerance.beyond},
+               {"cells", tolerance.cells},
+               {"cells_on_finest_level", tolerance.at_finest}};
+  if (tolerance.regions > 0) {
+    json["regions"] = tolerance.regions;
+  }
+  return json;
+}
+
 Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
                   const PointFit& result) {
   const DistanceQuantiles distance = QuantilesOf(result.fit);
@@ -124,15 +144,14 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
   if (std::isfinite(result.sigma_factor)) {
     json["sigma_factor"] = result.sigma_factor;
   }
+  if (result.sigma) {
+    json["sigma"] = SigmaJson(result);
+  }
   if (result.fit.automatic) {
     json["automatic"] = AutoJson(*result.fit.automatic);
   }
   if (const auto tolerance = ToleranceOf(options, result)) {
-    json["tolerance"] = {{"tolerance_mm", tolerance->tolerance_mm},
-                         {"met", tolerance->Met()},
-                         {"points_beyond", tolerance->beyond},
-                         {"cells", tolerance->cells},
-                         {"cells_on_finest_level", tolerance->at_finest}};
+    json["tolerance"] = ToleranceJson(*tolerance);
   }
   json.update(StepsToJson(result.fit));
   return json;
@@ -140,7 +159,8 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
 
 void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& folder) {
   constexpr std::size_t kMostAsText = 100'000;
-  const ResidualColumns columns{result.fit, result.attributes, result.attribute_at};
+  const ResidualColumns columns{result.fit, result.attributes, result.attribute_at,
+                                result.sigma_mm};
   if (kind == ResidualFile::kAuto) {
     kind = result.fit.residual_mm.size() <= kMostAsText ? ResidualFile::kCsv : ResidualFile::kPly;
   }
@@ -175,8 +195,8 @@ std::string_view WhatIsMissing(const Term& term) {
 // Empty if they can be columns of their own.
 std::string AttributesFault(const std::vector<std::string>& names) {
   static const std::set<std::string> kTaken = {
-      "x",       "y",  "z",  "u",  "v", "weight", "sigma", "residual_mm",
-      "outlier", "nx", "ny", "nz", "s", "t",      "point"};
+      "x",  "y",  "z",  "u", "v", "weight", "sigma",    "residual_mm", "outlier",
+      "nx", "ny", "nz", "s", "t", "point",  "sigma_mm", "exact"};
   std::set<std::string> seen;
   for (const std::string& name : names) {
     if (kTaken.contains(name) || name.empty() ||
@@ -211,6 +231,11 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
   if (const std::string fault = ShapeFault(options); !fault.empty()) {
     faults.push_back({"patches_u", fault});
   }
+  if (options.sigma && !IsAlone(options.fit)) {
+    faults.push_back({"sigma",
+                      "it follows from the noise and smoothness that plan: auto finds with solver: "
+                      "fastest; take those, or write sigma: false"});
+  }
   if (const std::string fault = AttributesFault(options.attributes); !fault.empty()) {
     faults.push_back({"attributes", fault});
   }
@@ -234,7 +259,7 @@ std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const
   const auto* adaptive = std::get_if<AdaptivePlan>(&options.fit.plan);
   return adaptive == nullptr || !result.Faults().empty()
              ? std::nullopt
-             : std::optional(ToleranceOf(result.fit, adaptive->tolerance_mm, adaptive->finest));
+             : std::optional(ToleranceOf(result.fit, *adaptive));
 }
 
 namespace {
@@ -289,6 +314,16 @@ AttributeFit AttributesOver(const PointFit& result, std::span<const double> weig
                        context.threads);
 }
 
+std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const HSplineSurface& start,
+                                              std::span<const double> weights) {
+  const AutoReport& report = *result.fit.automatic;
+  const SigmaOptions options{
+      .noise_mm = report.noise_mm, .weight = report.weight, .lengths_mm = MeanLengths(start)};
+  return std::make_shared<const SurfaceSigma>(
+      result.fit.surface, AttributeColumns{.uv = result.fit.uv, .weights = weights, .columns = {}},
+      report.outliers, options);
+}
+
 // The square root of the mean of 1 / sigma^2; NaN for points without sigma.
 double RootOfMeanWeight(const PointTable& table) {
   double sum = 0;
@@ -300,6 +335,11 @@ double RootOfMeanWeight(const PointTable& table) {
 
 // What is not needed any more is freed on the way.
 Parametrisation ParametersOf(PointTable& table, const PointFitOptions& options) {
+  const auto* const given = std::get_if<GivenParameters>(&options.parameters);
+  const bool automatic = std::holds_alternative<AutoParameters>(options.parameters);
+  if (!table.uv.empty() && table.triangles.empty() && (automatic || given != nullptr)) {
+    return TakeGiven(std::move(table.uv), automatic ? GivenParameters{} : *given);
+  }
   Parametrisation parameters = Parametrise({.positions = table.positions,
                                             .given_uv = table.uv,
                                             .triangles = table.triangles,
@@ -311,13 +351,49 @@ Parametrisation ParametersOf(PointTable& table, const PointFitOptions& options) 
   return parameters;
 }
 
-FitResult FitOwned(const HSplineSurface& start, OwnedPoints points, const FitOptions& options,
-                   const RunContext& context) {
+std::vector<ExactPoint> ExactOf(const PointTable& table, std::span<const Vec2> uv) {
+  std::vector<ExactPoint> exact;
+  for (std::size_t k = 0; k < table.exact.size(); ++k) {
+    const std::uint32_t point = table.exact[k];
+    exact.push_back(
+        {.uv = uv[point], .position = table.positions[point], .normal = table.exact_normals[k]});
+  }
+  return exact;
+}
+
+FitResult FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
+                   const FitOptions& options, const RunContext& context) {
+  if (!exact.empty()) {
+    FitTarget target = TargetOf(points.positions, points.uv, points.weights);
+    target.exact = std::move(exact);
+    return Fit(start, target, {}, options, context);
+  }
   if (!IsAlone(options)) {
     return Fit(start, points.View(), options, context);
   }
   CheckFit(start, points.View(), options);
   return FitAlone(start, std::move(points), std::get<AutoPlan>(options.plan), context);
+}
+
+}  // namespace
+
+namespace {
+
+// For what is found after the fit, which takes the points apart.
+std::vector<double> WeightsKept(const PointTable& table, const PointFitOptions& options) {
+  return options.sigma || !options.attributes.empty() ? table.weights : std::vector<double>();
+}
+
+void AddAttributes(std::span<const double> weights, const RunContext& context, StepClock& step,
+                   PointFit& result) {
+  if (!result.Faults().empty()) {
+    result.attributes.clear();
+  }
+  if (!result.attributes.empty()) {
+    result.attribute_fit =
+        step("attributes", [&] { return AttributesOver(result, weights, context); });
+    result.attribute_at = result.attribute_fit.At(result.fit.uv, context.threads);
+  }
 }
 
 }  // namespace
@@ -331,26 +407,29 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
   CheckChord(options.chord_mm, start, {table.positions, parameters.uv}, context);
   const double root_weight = RootOfMeanWeight(table);
-  const std::vector<double> weights = attributes.empty() ? std::vector<double>() : table.weights;
+  const std::vector<double> weights = WeightsKept(table, options);
+  std::vector<ExactPoint> exact = ExactOf(table, parameters.uv);
   OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
                      std::move(table.weights)};
-  PointFit result{
-      .parameters = std::string(NameOf(parameters.source)),
-      .how = std::move(parameters.how),
-      .map_faults = parameters.faults,
-      .fit = step("fit", [&] { return FitOwned(start, std::move(points), options.fit, context); }),
-      .attributes = std::move(attributes),
-      .attribute_at = {},
-      .attribute_fit = {},
-      .times = {}};
+  PointFit result{.parameters = std::string(NameOf(parameters.source)),
+                  .how = std::move(parameters.how),
+                  .map_faults = parameters.faults,
+                  .fit = step("fit",
+                              [&] {
+                                return FitOwned(start, std::move(points), std::move(exact),
+                                                options.fit, context);
+                              }),
+                  .attributes = std::move(attributes),
+                  .attribute_at = {},
+                  .attribute_fit = {},
+                  .sigma = nullptr,
+                  .sigma_mm = {},
+                  .times = {}};
   result.sigma_factor = result.fit.automatic ? result.fit.automatic->noise_mm * root_weight : kNaN;
-  if (!result.Faults().empty()) {
-    result.attributes.clear();
-  }
-  if (!result.attributes.empty()) {
-    result.attribute_fit =
-        step("attributes", [&] { return AttributesOver(result, weights, context); });
-    result.attribute_at = result.attribute_fit.At(result.fit.uv, context.threads);
+  AddAttributes(weights, context, step, result);
+  if (options.sigma && result.Faults().empty()) {
+    result.sigma = step("sigma", [&] { return SigmaOver(result, start, weights); });
+    result.sigma_mm = result.sigma->At(result.fit.uv);
   }
   result.times = step.Take();
   return result;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 #include "fitting/plan/fit_faults.h"
 #include "fitting/problem/parametrise.h"
 #include "fitting/solve/attribute_fit.h"
+#include "fitting/solve/surface_sigma.h"
 #include "problems/config/config_errors.h"
 #include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
@@ -40,6 +42,7 @@ struct PointFitOptions {
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);
   ResidualFile residuals = ResidualFile::kAuto;
+  bool sigma = false;
   bool report = true;
 };
 template <class Visitor>
@@ -72,6 +75,11 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                          "binary, faster and smaller; none: nothing; auto: csv of up to 100000 "
                          "points, ply of more"},
         o.residuals);
+  visit(FieldInfo{.name = "sigma",
+                  .doc = "whether the standard deviation of the surface along one axis is written, "
+                         "at each point (sigma_mm of residuals.csv or .ply) and each vertex of "
+                         "surface.ply: what noise and smoothness leave open; needs plan: auto"},
+        o.sigma);
   visit(FieldInfo{.name = "report",
                   .doc = "whether report.html is written: the surface, the points' distances and "
                          "the refinement, as one page"},
@@ -90,6 +98,8 @@ struct PointFit {
   std::vector<PointAttribute> attributes;         // as given
   std::vector<std::vector<double>> attribute_at;  // fitted, at the points
   AttributeFit attribute_fit;
+  std::shared_ptr<const SurfaceSigma> sigma;  // of the surface; null where it was not asked for
+  std::vector<double> sigma_mm;               // at the points
   double sigma_factor = kNaN;  // how many times the sigma that were given the points are off;
                                // NaN where none were, or by another plan than `auto`
   std::vector<StepTime> times;

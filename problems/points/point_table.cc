@@ -17,8 +17,8 @@
 namespace semblance {
 namespace {
 
-constexpr std::array<std::string_view, kPointColumns> kNames = {"x", "y",      "z",    "u",
-                                                                "v", "weight", "sigma"};
+constexpr std::array<std::string_view, kPointColumns> kNames = {
+    "x", "y", "z", "u", "v", "weight", "sigma", "exact", "nx", "ny", "nz"};
 
 // Of the file, by PointColumn and then by attribute.
 using ColumnPlaces = std::vector<std::optional<std::size_t>>;
@@ -36,6 +36,13 @@ void CheckPairs(const CsvReader& csv, const ColumnPlaces& places) {
   if (PlaceOf(places, PointColumn::kWeight) && PlaceOf(places, PointColumn::kSigma)) {
     csv.Fail("there are the columns 'weight' and 'sigma'; give one of them");
   }
+  const auto normal = {PlaceOf(places, PointColumn::kNx).has_value(),
+                       PlaceOf(places, PointColumn::kNy).has_value(),
+                       PlaceOf(places, PointColumn::kNz).has_value()};
+  const auto some = std::count(normal.begin(), normal.end(), true);
+  if (some != 0 && (some != 3 || !PlaceOf(places, PointColumn::kExact))) {
+    csv.Fail("the columns nx, ny and nz are of exact points; give all three and 'exact', or none");
+  }
 }
 
 // What is neither a coordinate nor asked for.
@@ -45,8 +52,8 @@ void CheckNames(const CsvReader& csv, std::span<const std::string> attributes) {
         std::find(attributes.begin(), attributes.end(), column) == attributes.end()) {
       csv.Fail(
           fmt::format("'{}' is no column; the first line names the columns, which are x, y, z "
-                      "and, if wanted, u, v, weight or sigma, and what the option `attributes` "
-                      "names",
+                      "and, if wanted, u, v, weight or sigma, exact, nx, ny, nz, and what the "
+                      "option `attributes` names",
                       column));
     }
   }
@@ -108,8 +115,26 @@ class PointReader {
         table_.weights.push_back(WeightOf(column));
       }
     }
+    if (PlaceOf(places_, PointColumn::kExact)) {
+      ReadExact();
+    }
     for (std::size_t k = 0; k < table_.attributes.size(); ++k) {
       table_.attributes[k].values.push_back(csv_.Number(*places_[kPointColumns + k]));
+    }
+  }
+
+  void ReadExact() {
+    const auto number = [&](PointColumn column) { return csv_.Number(*PlaceOf(places_, column)); };
+    const double exact = number(PointColumn::kExact);
+    if (exact != 0 && exact != 1) {
+      csv_.Fail(
+          fmt::format("exact is {}; write 1 for a point that is to be met exactly, else 0", exact));
+    }
+    if (exact == 1) {
+      const bool normal = PlaceOf(places_, PointColumn::kNx).has_value();
+      AddExact(table_, normal ? Vec3(number(PointColumn::kNx), number(PointColumn::kNy),
+                                     number(PointColumn::kNz))
+                              : Vec3::Zero());
     }
   }
 
@@ -130,6 +155,11 @@ class PointReader {
 };
 
 }  // namespace
+
+void AddExact(PointTable& table, const Vec3& normal) {
+  table.exact.push_back(static_cast<std::uint32_t>(table.positions.size() - 1));
+  table.exact_normals.push_back(normal);
+}
 
 bool PointColumns::Has(PointColumn wanted) const {
   return std::find(kinds.begin(), kinds.end(), static_cast<std::size_t>(wanted)) != kinds.end();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,11 +26,16 @@ struct PointTable {
   std::vector<double> weights;             // > 0; one per point, or none
   bool weights_of_sigma = false;           // they are 1 / sigma^2
   std::vector<PointAttribute> attributes;  // those that were asked for, in that order
+  std::vector<std::uint32_t> exact;        // indices of points that are to be met exactly
+  std::vector<Vec3> exact_normals;         // one per exact point: zero where it does not matter
   std::vector<Triangle> triangles;         // between the points, where the file has faces
 };
 
-enum class PointColumn { kX, kY, kZ, kU, kV, kWeight, kSigma };
-constexpr std::size_t kPointColumns = 7;
+// Makes the last point of a table exact.
+void AddExact(PointTable& table, const Vec3& normal);
+
+enum class PointColumn { kX, kY, kZ, kU, kV, kWeight, kSigma, kExact, kNx, kNy, kNz };
+constexpr std::size_t kPointColumns = 11;
 
 // What the columns of a table are: of each its PointColumn, or kPointColumns + the index of an
 // attribute.
@@ -45,11 +51,14 @@ PointColumns PointColumnsOf(std::string_view first_line, std::string_view name,
                             std::span<const std::string> attributes = {});
 
 // The first line names the columns, in any order: x, y and z, and, if wanted, u and v together,
-// weight or sigma (the standard deviation of a point's coordinates: the weight is 1 / sigma^2), and
-// the attributes. Each further line has one decimal number per column, separated by commas. Nothing
+// weight or sigma (the standard deviation of a point's coordinates: the weight is 1 / sigma^2),
+// exact (1 for a point that the surface is to meet exactly, else 0) and beside it nx, ny and nz
+// together (of an exact point what the surface is to be across, of any length, or 0, 0, 0), and the
+// attributes. Each further line has one decimal number per column, separated by commas. Nothing
 // else is let pass: `name:line: what` as IoError for another column or one twice, an attribute that
 // is no column, a line with more or fewer entries, an empty line before the end, what is not a
-// finite number, a weight or sigma that is not positive, or no point at all.
+// finite number, a weight or sigma that is not positive, an exact that is neither 0 nor 1, or no
+// point at all.
 PointTable ParsePointTable(std::string_view text, std::string_view name,
                            std::span<const std::string> attributes = {});
 

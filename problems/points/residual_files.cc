@@ -37,6 +37,7 @@ std::string ResidualsCsv(const ResidualColumns& columns) {
   const FitResult& fit = columns.fit;
   const std::vector<char> outlier = OutliersOf(fit);
   std::string csv = outlier.empty() ? "point,u,v,residual_mm" : "point,u,v,residual_mm,outlier";
+  csv += columns.sigma_mm.empty() ? "" : ",sigma_mm";
   for (const PointAttribute& attribute : columns.attributes) {
     csv += fmt::format(",{0},{0}_residual", attribute.name);
   }
@@ -47,6 +48,9 @@ std::string ResidualsCsv(const ResidualColumns& columns) {
     fmt::format_to(out, FMT_COMPILE("{},{},{},{}"), k, fit.uv[k].x(), fit.uv[k].y(),
                    fit.residual_mm[k]);
     csv += outlier.empty() ? "" : outlier[k] != 0 ? ",1" : ",0";
+    if (!columns.sigma_mm.empty()) {
+      fmt::format_to(out, FMT_COMPILE(",{}"), columns.sigma_mm[k]);
+    }
     for (std::size_t c = 0; c < columns.attributes.size(); ++c) {
       fmt::format_to(out, FMT_COMPILE(",{},{}"), columns.fitted[c][k],
                      columns.attributes[c].values[k] - columns.fitted[c][k]);
@@ -63,6 +67,7 @@ std::string ResidualsPly(const ResidualColumns& columns) {
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float "
       "y\nproperty float z\nproperty float residual_mm\nproperty float outlier\n",
       fit.uv.size());
+  bytes += columns.sigma_mm.empty() ? "" : "property float sigma_mm\n";
   for (const PointAttribute& attribute : columns.attributes) {
     bytes += fmt::format("property float {0}\nproperty float {0}_residual\n", attribute.name);
   }
@@ -74,6 +79,9 @@ std::string ResidualsPly(const ResidualColumns& columns) {
     AppendFloat(0, bytes);
     AppendFloat(fit.residual_mm[k], bytes);
     AppendFloat(outlier.empty() ? 0 : outlier[k], bytes);
+    if (!columns.sigma_mm.empty()) {
+      AppendFloat(columns.sigma_mm[k], bytes);
+    }
     for (std::size_t c = 0; c < columns.attributes.size(); ++c) {
       AppendFloat(columns.fitted[c][k], bytes);
       AppendFloat(columns.attributes[c].values[k] - columns.fitted[c][k], bytes);

@@ -84,6 +84,9 @@ MeshAttributes AttributesOf(const PointFit& result, std::span<const Vec2> uv, in
       attributes.scalars.push_back({result.attributes[k].name, values[k]});
     }
   }
+  if (result.sigma) {
+    attributes.scalars.push_back({"sigma_mm", result.sigma->At(uv)});
+  }
   for (std::size_t k = 0; coloured && k < uv.size(); ++k) {
     attributes.colors.push_back(
         {AsColour(values[rgb[0]][k]), AsColour(values[rgb[1]][k]), AsColour(values[rgb[2]][k])});

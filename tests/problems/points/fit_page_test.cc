@@ -81,7 +81,7 @@ TEST(FitMaps, QuantilesAreThoseOfAllFigures) {
 
 TEST(FitMaps, AMissedToleranceIsSaidWithWhatMayHelp) {
   const PointFit coarse = FitPoints(Points(2000), Adaptive(0.004, 0), {});
-  const ToleranceReport missed = ToleranceOf(coarse.fit, 0.004, 0);
+  const ToleranceReport missed = ToleranceOf(coarse.fit, {.tolerance_mm = 0.004, .finest = 0});
   const auto beyond =
       std::ranges::count_if(coarse.fit.residual_mm, [](double r) { return r > 0.004; });
   EXPECT_EQ(missed.beyond, beyond);
@@ -89,7 +89,7 @@ TEST(FitMaps, AMissedToleranceIsSaidWithWhatMayHelp) {
   EXPECT_EQ(missed.at_finest, missed.cells);
   EXPECT_THAT(ToleranceText(missed), AllOf(HasSubstr("THE TOLERANCE WAS MISSED"),
                                            HasSubstr("of 2000 points"), HasSubstr("finest")));
-  const ToleranceReport met = ToleranceOf(coarse.fit, 10, 0);
+  const ToleranceReport met = ToleranceOf(coarse.fit, {.tolerance_mm = 10, .finest = 0});
   EXPECT_TRUE(met.Met());
   EXPECT_THAT(ToleranceText(met), HasSubstr("is met"));
 }

@@ -11,6 +11,7 @@
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
 #include "problems/points/point_files.h"
+#include "problems/points/residual_files.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -275,6 +276,51 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
   }
 }
 
+// Noise of 1e-3 and twenty points a parameter or so: sigma is a fraction of it, and more at
+// borders.
+TEST(PointFit, SigmaIsKnownWhereItIsAskedFor) {
+  PointFitOptions options;
+  options.sigma = true;
+  const PointTable table =
+      ParsePointTable(Csv(Scattered(FrankePoint, 3000, 1e-3, 1), /*with_uv=*/true), "test");
+  const PointFit result = FitPoints(table, options, {});
+  ASSERT_EQ(result.sigma_mm.size(), 3000u);
+  EXPECT_EQ(result.sigma->At(result.fit.uv), result.sigma_mm);
+  const std::vector<Vec2> places = {{0.5, 0.5}, {0, 0}};
+  const std::vector<double> sigma = result.sigma->At(places);
+  EXPECT_GT(sigma[0], 1e-5);
+  EXPECT_LT(sigma[0], 6e-4);
+  EXPECT_GT(sigma[1], sigma[0]);
+  EXPECT_THAT(ResidualsCsv({result.fit, {}, {}, result.sigma_mm}),
+              ::testing::StartsWith("point,u,v,residual_mm,outlier,sigma_mm\n"));
+  EXPECT_THAT(ResidualsPly({result.fit, {}, {}, result.sigma_mm}),
+              HasSubstr("property float sigma_mm"));
+  options.sigma = false;
+  const PointFit plain = FitPoints(table, options, {});
+  EXPECT_EQ(plain.fit.residual_mm, result.fit.residual_mm);
+  EXPECT_THAT(plain.sigma_mm, ::testing::IsEmpty());
+}
+
+// Every hundredth point lifted, and to be met all the same.
+TEST(PointFit, ExactPointsOfATableAreMet) {
+  const FitTarget target = Scattered(FrankePoint, 2000, 1e-3, 1);
+  std::string csv = "x,y,z,u,v,exact,nx,ny,nz\n";
+  for (std::size_t k = 0; k < target.points.size(); ++k) {
+    const FitPoint& p = target.points[k];
+    csv += fmt::format("{},{},{},{},{},{},0,0,{}\n", p.position.x(), p.position.y(),
+                       p.position.z() + (k % 100 == 0 ? 0.01 : 0), p.uv.x(), p.uv.y(),
+                       k % 100 == 0 ? 1 : 0, k == 0 ? 1 : 0);
+  }
+  const PointTable table = ParsePointTable(csv, "test");
+  ASSERT_EQ(table.exact.size(), 20u);
+  const PointFit result = FitPoints(table, PointFitOptions(), {});
+  for (const std::uint32_t k : table.exact) {
+    EXPECT_LT((result.fit.surface.Point(table.uv[k]) - table.positions[k]).norm(), 1e-9);
+  }
+  EXPECT_LT(std::abs(result.fit.surface.Frame(table.uv[0]).du.z()), 1e-9);
+  EXPECT_LT(ErrorAgainst(FrankePoint, result.fit.surface, 50).rms, 0.01);
+}
+
 TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   const auto read = [](const std::string& text) {
     return testing::WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
@@ -292,6 +338,9 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   }
   EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
+  EXPECT_THAT(read("fit: {plan: {type: adaptive, regions: [{u: [0.5, 0.2]}]}}\n"),
+              HasSubstr("fit.plan.regions[0]"));
+  EXPECT_THAT(read("sigma: true\nfit: {plan: adaptive}\n"), HasSubstr("sigma: it follows"));
 }
 
 TEST(PointFit, ConfigurationRoundTrips) {

@@ -59,6 +59,18 @@ TEST(PointTable, AttributesAreThoseThatAreAskedForInTheirOrder) {
   }
 }
 
+// A blank sends the second table to the general reader.
+TEST(PointTable, ExactPointsAreKnownByTheirIndex) {
+  for (const char* text :
+       {"x,y,z,exact,nx,ny,nz\n1,2,3,0,0,0,1\n4,5,6,1,0,1,0\n7,8,9,1,0,0,0\n",
+        "x,y,z,exact,nx,ny,nz\n1,2,3,0,0,0,1\n4, 5,6,1,0,1,0\n7,8,9,1,0,0,0\n"}) {
+    const PointTable table = ParsePointTable(text, "p.csv");
+    EXPECT_EQ(table.exact, (std::vector<std::uint32_t>{1, 2})) << text;
+    EXPECT_EQ(table.exact_normals, (std::vector<Vec3>{Vec3(0, 1, 0), Vec3(0, 0, 0)}));
+  }
+  EXPECT_EQ(ParsePointTable("x,y,z,exact\n1,2,3,1\n", "p.csv").exact.size(), 1u);
+}
+
 TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
   const auto message = [](std::string_view text) -> std::string {
     try {
@@ -84,6 +96,9 @@ TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(message("x,y,z,weight\n1,2,3,0\n"), HasSubstr("weight is 0"));
   EXPECT_THAT(message("x,y,z,sigma\n1,2,3,-1\n"), HasSubstr("p.csv:2: the sigma is -1"));
   EXPECT_THAT(message("x,y,z,sigma,weight\n1,2,3,1,1\n"), HasSubstr("give one of them"));
+  EXPECT_THAT(message("x,y,z,exact\n1,2,3,0.5\n"), HasSubstr("p.csv:2: exact is 0.5"));
+  EXPECT_THAT(message("x,y,z,nx,ny,nz\n1,2,3,0,0,1\n"), HasSubstr("give all three and 'exact'"));
+  EXPECT_THAT(message("x,y,z,exact,nx\n1,2,3,0,0\n"), HasSubstr("give all three and 'exact'"));
   EXPECT_THAT(message("x,y,z,heat\n1,2,3,1\n"), HasSubstr("what the option `attributes` names"));
   const std::vector<std::string> heat = {"heat"};
   EXPECT_THAT(testing::WordsOf<IoError>([&] { ParsePointTable("x,y,z\n1,2,3\n", "p.csv", heat); }),
