@@ -14,7 +14,7 @@ namespace {
 constexpr unsigned kGrace_s = 1;
 
 std::stop_source& StopSource() {
-  // A signal handler has no other way in. Never destroyed: a signal may come while the program ends.
+  // A signal handler has no other way in. Never destroyed: a signal may come as the program ends.
   static std::stop_source& source = *new std::stop_source;
   return source;
 }
