@@ -36,7 +36,8 @@ Range RangeOf(std::vector<double> values) {
 std::vector<std::size_t> Counts(const std::vector<double>& values, double high) {
   std::vector<std::size_t> counts(kBars, 0);
   for (const double value : values) {
-    ++counts[std::min(kBars - 1, static_cast<int>(value / high * kBars))];
+    // In floating point: what lies far beyond has a bar that no whole number holds.
+    ++counts[static_cast<std::size_t>(std::min(kBars - 1.0, value / high * kBars))];
   }
   return counts;
 }
@@ -64,7 +65,8 @@ std::string MarkSvg(const HistogramMark& mark, double high, int row) {
 std::string HistogramSvg(std::span<const double> values, const std::vector<HistogramMark>& marks,
                          const std::string& axis_label) {
   std::vector<double> counted;
-  std::ranges::copy_if(values, std::back_inserter(counted), [](double v) { return v >= 0; });
+  std::ranges::copy_if(values, std::back_inserter(counted),
+                       [](double v) { return v >= 0 && std::isfinite(v); });
   const Range range = RangeOf(counted);
   const std::vector<std::size_t> counts = Counts(counted, range.high);
   const auto most =

@@ -14,9 +14,10 @@ struct HistogramMark {
   std::string label;
 };
 
-// Bars of equal width from 0 to the largest value; values below 0 and NaN are not counted. Where
-// the largest is more than 2.5 times the 95th percentile, the axis ends there: what lies beyond is
-// in the last bar, and the axis says so. A mark beyond the end stands at it, with an arrow.
+// Bars of equal width from 0 to the largest value; values below 0, NaN and infinity are not
+// counted. Where the largest is more than 2.5 times the 95th percentile, the axis ends there: what
+// lies beyond is in the last bar, and the axis says so. A mark beyond the end stands at it, with an
+// arrow.
 std::string HistogramSvg(std::span<const double> values, const std::vector<HistogramMark>& marks,
                          const std::string& axis_label);
 

@@ -33,6 +33,12 @@ TEST(Histogram, EveryValueIsInABarAndNaNInNone) {
   EXPECT_EQ(Counted(HistogramSvg({}, {}, "x")), 0);
 }
 
+TEST(Histogram, ValuesBeyondEveryWholeNumberAreInTheLastBar) {
+  std::vector<double> values(100, 0.01);
+  values.insert(values.end(), {1e15, 1e300, INFINITY});
+  EXPECT_EQ(Counted(HistogramSvg(values, {}, "x")), 102);
+}
+
 TEST(Histogram, AFarOutlierDoesNotFlattenTheRestAndIsSaid) {
   std::vector<double> values;
   for (int k = 0; k < 5000; ++k) {
