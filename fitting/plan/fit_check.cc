@@ -217,10 +217,6 @@ void CheckOptions(const FitOptions& options, int max_level) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 void CheckExact(std::span<const ExactPoint> exact, const FitOptions& options) {
   constexpr std::size_t kMost = 500;
   if (exact.empty()) {

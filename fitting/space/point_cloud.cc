@@ -121,10 +121,6 @@ CloudPoint MakePoint(const HSplineShape& shape, const auto& p) {
           .weight = p.weight};
 }
 
-}  // namespace
-
-namespace {
-
 // Indices in the order of their keys, first by the leading bits alone; starts: of each such bucket.
 std::vector<std::uint32_t> IntoBuckets(std::span<const std::uint64_t> keys, int shift,
                                        std::vector<std::size_t>& starts) {

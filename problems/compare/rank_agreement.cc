@@ -71,9 +71,10 @@ RankAgreement CompareRanks(const NamedStudy& reference, const NamedStudy& other,
     }
   }
   if (labels.size() < 3) {
-    throw InputError(fmt::format(
-        "{} and {} have {} treatments in common that have the number '{}'; an order takes three",
-        reference.name, other.name, labels.size(), agreement.metric));
+    throw InputError(
+        fmt::format("{} and {} have too few treatments in common: {} with the number '{}'; an "
+                    "order takes three",
+                    reference.name, other.name, labels.size(), agreement.metric));
   }
   const Better better = options.better ? *options.better : BetterOf(agreement.metric);
   std::array<std::vector<double>, 2> means = {Means(first, labels, reference),
