@@ -40,7 +40,7 @@ std::vector<double> Means(const std::map<std::string, BySubject>& treatments,
     throw InputError(
         fmt::format("{}: no subject has all of the treatments that are compared; "
                     "run the trials that are missing",
-                    study.name));
+                    study.folder.string()));
   }
   std::vector<double> means;
   for (const std::string& label : labels) {
@@ -71,10 +71,10 @@ RankAgreement CompareRanks(const NamedStudy& reference, const NamedStudy& other,
     }
   }
   if (labels.size() < 3) {
-    throw InputError(
-        fmt::format("{} and {} have too few treatments in common: {} with the number '{}'; an "
-                    "order takes three",
-                    reference.name, other.name, labels.size(), agreement.metric));
+    throw InputError(fmt::format(
+        "{} and {} have too few treatments in common: {} with the number '{}'; an "
+        "order takes three",
+        reference.folder.string(), other.folder.string(), labels.size(), agreement.metric));
   }
   const Better better = options.better ? *options.better : BetterOf(agreement.metric);
   std::array<std::vector<double>, 2> means = {Means(first, labels, reference),

@@ -203,7 +203,7 @@ std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
   const std::vector<std::string> names = NamesOf(real);
   std::vector<NamedStudy> studies;
   for (std::size_t k = 0; k < real.size(); ++k) {
-    studies.push_back({names[k], ReadStudyResults(folders[k])});
+    studies.push_back({names[k], ReadStudyResults(folders[k]), folders[k]});
   }
   return studies;
 }

@@ -18,6 +18,7 @@ namespace semblance {
 struct NamedStudy {
   std::string name;  // no two alike
   StudyResults results;
+  std::filesystem::path folder = {};
 };
 
 // The results in each folder, called by the folder's name; by as much of the path as tells them

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -177,6 +178,29 @@ VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::filesystem::path& f
   return array;
 }
 
+std::string HeadOf(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kHead = 4096;
+  std::ifstream in(file, std::ios::binary);
+  std::string head(std::min(std::filesystem::file_size(file), kHead), ' ');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head;
+}
+
+// MetaImage's library goes through as many axes as its header claims, however many these are.
+void CheckMetaImageAxes(const std::filesystem::path& file) {
+  const std::string head = HeadOf(file);
+  const std::size_t line = head.find("NDims"), sign = head.find('=', line);
+  if (line == head.npos || sign == head.npos) {
+    return;  // the library says what is missing
+  }
+  const int axes = std::atoi(head.substr(sign + 1, 16).c_str());
+  constexpr int kMostAxes = 10;  // of the library
+  if (axes < 1 || axes > kMostAxes) {
+    throw InputError(
+        fmt::format("{}: NDims is not a number of axes; a volume has 3", file.string()));
+  }
+}
+
 // The bytes before the voxels: NIfTI's header, or MetaImage's up to the line that says LOCAL.
 std::uintmax_t HeaderBytes(const std::string& head, VolumeFormat format) {
   constexpr std::uintmax_t kNiftiHeader = 348;
@@ -188,13 +212,11 @@ std::uintmax_t HeaderBytes(const std::string& head, VolumeFormat format) {
 void CheckWhole(const std::filesystem::path& file, VolumeFormat format, std::uintmax_t needed) {
   constexpr std::uintmax_t kMostHeader = 1 << 20;
   std::uintmax_t has = std::filesystem::file_size(file);
-  std::ifstream in(file, std::ios::binary);
-  std::string head(std::min<std::uintmax_t>(has, 4096), ' ');
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  const std::string head = HeadOf(file);
   std::uintmax_t most = std::numeric_limits<std::uintmax_t>::max();
   if (format == VolumeFormat::kNifti && head.starts_with("\x1f\x8b")) {
     std::uint32_t unpacked = 0;  // the last four bytes of gzip: the size before, modulo 2^32
-    in.clear();
+    std::ifstream in(file, std::ios::binary);
     in.seekg(-4, std::ios::end);
     in.read(reinterpret_cast<char*>(&unpacked), sizeof unpacked);
     has = unpacked;
@@ -364,6 +386,9 @@ VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat forma
   SilenceLibraries();
   const std::string where = file.string();
   const Reader reader = ReaderOf(format);
+  if (format == VolumeFormat::kMetaImage) {
+    CheckMetaImageAxes(file);
+  }
   try {
     if (!reader.io->CanReadFile(where.c_str())) {
       throw IoError(

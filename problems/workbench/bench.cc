@@ -50,14 +50,10 @@ std::string SubjectKey(const FileSubject& subject) {
   return StageKey("bench subject", meshes);
 }
 
-std::vector<ReferenceHead> ReferencesOf(const BenchOptions& options) {
+std::vector<ReferenceHead> ReadReferences(const BenchOptions& options) {
   std::vector<ReferenceHead> heads;
   for (const auto& [skull, landmarks] : options.references) {
     heads.push_back(ReadReference(skull, landmarks, options.threads));
-  }
-  if (heads.empty()) {
-    heads.push_back(PhantomReference(1));
-    heads.push_back(PhantomReference(2));
   }
   return heads;
 }
@@ -85,7 +81,8 @@ bool SameLandmarks(const BenchState& a, const BenchState& b) {
 
 }  // namespace
 
-Bench::Bench(const BenchOptions& options) : options_(options), folder_(options.folder) {
+Bench::Bench(const BenchOptions& options)
+    : options_(options), references_(ReadReferences(options)), folder_(options.folder) {
   const RunContext context = Context();
   if (folder_.HasWork()) {
     if (!options.source.empty()) {
@@ -513,8 +510,13 @@ std::string Bench::Propose(const RunContext& context) {
     subject = subject_;
     revision = revision_;
   }
-  const std::vector<ReferenceHead> references = ReferencesOf(options_);
-  const Proposal proposal = ProposeLandmarks(subject->skull.mesh, "the skull", references, context);
+  std::vector<ReferenceHead> made_up;
+  if (references_.empty()) {
+    made_up.push_back(PhantomReference(1));
+    made_up.push_back(PhantomReference(2));
+  }
+  const Proposal proposal = ProposeLandmarks(subject->skull.mesh, "the skull",
+                                             references_.empty() ? made_up : references_, context);
   const LandmarkFile file = InMeshFrame(ProposalFile(proposal, Now(history_).subject));
   const Lock lock(mutex_);
   if (revision != revision_) {
@@ -527,7 +529,7 @@ std::string Bench::Propose(const RunContext& context) {
   if (proposal.axes == "RAS") {
     words += ". The skull lies as in RAS: if its file is, set its axes to RAS";
   }
-  if (options_.references.empty()) {
+  if (references_.empty()) {
     words += ". Made-up heads served as references, which have no orbits, arches or teeth";
   }
   return words;

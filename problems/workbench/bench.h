@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "problems/edits/pull.h"
+#include "problems/propose/reference_head.h"
 #include "problems/workbench/bench_checks.h"
 #include "problems/workbench/bench_faces.h"
 #include "problems/workbench/bench_folder.h"
@@ -42,8 +43,8 @@ struct RunFace {
 // Safe from several threads. What it throws leaves all as it was.
 class Bench {
  public:
-  // Opens the folder: goes on with the work in it, or begins with the source. Throws IoError,
-  // InputError or ConfigError.
+  // Reads the references, then opens the folder: goes on with the work in it, or begins with the
+  // source. Throws IoError, InputError or ConfigError.
   explicit Bench(const BenchOptions& options);
   ~Bench();
 
@@ -129,6 +130,7 @@ class Bench {
 
   mutable std::mutex mutex_;
   BenchOptions options_;
+  std::vector<ReferenceHead> references_;  // of the options
   BenchFolder folder_;
   BenchHistory history_;
   Experiment experiment_;

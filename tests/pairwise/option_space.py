@@ -35,7 +35,7 @@ def number(value, schema):
 class OptionSpace:
     """lists: by a factor's name, the values that a list may take. work: by the end of a factor's name, what stands for ends
     that only ask for more work. beside: by (name, value), the choices without which it means nothing. files: by (name,
-    value), the entries that name its files. defaults: by name, what the configuration below the cases chooses."""
+    value), the entries that name its files or keep its work small. defaults: by name, what the configuration below the cases chooses."""
 
     def __init__(self, schema, lists, work, beside, files, defaults):
         self.lists, self.work, self.beside, self.files = lists, work, beside, files

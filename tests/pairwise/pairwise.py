@@ -40,6 +40,7 @@ from option_space import CoveringArray, OptionSpace
 LIMIT_S = 60  # of processor time; a case that needs more is killed
 BATCH, BATCH_OF_SHARE = 48, 8  # cases that one call of check looks at
 SHARE_MEDIAN_S = 2
+FEW_PASSES = {("fit", "plan", "max_passes"): 3}  # of 20 over the published schedule: more of the same work
 EXCHANGES = 12  # turns in which a choice that is refused may be exchanged for another; then it is left out
 
 
@@ -82,6 +83,7 @@ def experiment_space(schema, folder):
                                    ("subject", "landmarks"): str(folder["first"] / "landmarks.csv")},
             ("landmarks.keep", "names"): {("landmarks", "keep", "sites"): ["g", "n", "rhi", "go_l", "go_r", "zy_l", "zy_r"]},
             ("template", "file"): {("template", "surface"): str(folder["first"] / "face.hspline.json")},
+            ("fit.plan", "until"): FEW_PASSES,
         },
         defaults={"template": "formula", "fill": "none", "tissue.depths": "measured", "implicit.emitter": "flat"})
 
@@ -91,9 +93,9 @@ def fit_space(schema, folder):
     return OptionSpace(
         schema,
         lists={"fit.plan[listed].schedule": [steps[:1], steps], "fit.plan[until].schedule": [steps]},
-        work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 3], ".sweeps": [0, 2], ".max_passes": [1, 3],
+        work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 2], ".sweeps": [0, 2], ".max_passes": [1, 3],
               "rounds": [1, 3], "chord_mm": [0.01, 1000], "fit.plan[auto].finest": [0, 3]},
-        beside={}, files={}, defaults={"parameters": "given", "fit.plan": "listed", "fit.solver": "ceres"})
+        beside={}, files={("fit.plan", "until"): FEW_PASSES}, defaults={"parameters": "given", "fit.plan": "listed", "fit.solver": "ceres"})
 
 
 BASE = {

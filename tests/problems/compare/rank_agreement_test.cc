@@ -13,7 +13,7 @@ namespace {
 // values[treatment][subject]; the treatments are called t0, t1, ...
 NamedStudy Study(const std::string& name, const std::string& subjects,
                  const std::vector<std::vector<double>>& values) {
-  NamedStudy study{.name = name, .results = {}};
+  NamedStudy study{.name = name, .results = {}, .folder = "out/" + name};
   study.results.metric = "face.rms_mm";
   study.results.axes = {"interp"};
   for (std::size_t t = 0; t < values.size(); ++t) {
@@ -51,7 +51,9 @@ TEST(RankAgreement, TakesOnlySubjectsThatHaveAllTreatments) {
 
 TEST(RankAgreement, RefusesTwoTreatments) {
   const NamedStudy a = Study("a", "s", {{1}, {2}, {3}}), b = Study("b", "s", {{1}, {2}});
-  EXPECT_THROW(CompareRanks(a, b, {}), InputError);
+  EXPECT_THAT([&] { CompareRanks(a, b, {}); },
+              ::testing::ThrowsMessage<InputError>(
+                  ::testing::StartsWith("out/a and out/b have too few treatments")));
 }
 
 }  // namespace

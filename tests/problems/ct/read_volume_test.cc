@@ -355,6 +355,17 @@ TEST_F(ReadVolumeTest, ClaimsBeyondTheFileAreRefusedAtOnce) {
   }
 }
 
+TEST_F(ReadVolumeTest, AMetaImageOfAsManyAxesAsNoneHasIsRefusedAtOnce) {
+  for (const char* axes : {"-92233720368", "2000000000", "0", "eleven"}) {
+    WriteFileAtomically(
+        folder_ / "x.mhd",
+        fmt::format("ObjectType = Image\nNDims = {}\nDimSize = 4 4 4\nElementType = "
+                    "MET_SHORT\nElementDataFile = x.raw\n",
+                    axes));
+    EXPECT_THAT(WordsOf<Error>([&] { Read("x.mhd"); }), HasSubstr("NDims")) << axes;
+  }
+}
+
 TEST_F(ReadVolumeTest, FilesCutShortAreOneClearError) {
   const auto cut = [&](const char* name) {
     const std::string bytes = ReadFileBytes(folder_ / name);

@@ -67,6 +67,13 @@ double DistanceFrom(const HSplineSurface& surface, const Vec3& point) {
   return SurfaceProjector(surface).Project(point).distance_mm;
 }
 
+TEST_F(WorkbenchBench, AReferenceThatIsNotThereIsRefusedBeforeAnythingIsMade) {
+  BenchOptions options = Options();
+  options.references = {{folder_ / "skull.ply", folder_ / "sites.csv"}};
+  EXPECT_THROW(Bench bench(options), IoError);
+  EXPECT_FALSE(fs::exists(options.folder));
+}
+
 TEST_F(WorkbenchBench, ARayPlacesASiteWhereItFirstMeetsTheBone) {
   Bench bench(Options());
   const Box3 box = Bounds(bench.Look().subject->skull.mesh);
