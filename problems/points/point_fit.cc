@@ -396,7 +396,40 @@ void AddAttributes(std::span<const double> weights, const RunContext& context, S
   }
 }
 
+Box3 BoxOf(std::span<const Vec3> points) {
+  Box3 box;
+  for (const Vec3& p : points) {
+    box.extend(p);
+  }
+  return box;
+}
+
+// At the corners of 64 x 64 cells of the domain.
+double ReachBeyond(const HSplineSurface& surface, const Box3& points) {
+  constexpr int kCells = 64;
+  double farthest = 0;
+  for (int i = 0; i <= kCells; ++i) {
+    for (int j = 0; j <= kCells; ++j) {
+      const Vec3 at = surface.Point(Vec2(i, j) / kCells);
+      farthest = std::max(farthest, points.exteriorDistance(at));
+    }
+  }
+  return farthest / points.diagonal().norm();
+}
+
 }  // namespace
+
+std::vector<std::string> PointFit::Faults() const {
+  std::vector<std::string> faults = FaultsIn(fit);
+  constexpr double kMostReach = 3;
+  if (faults.empty() && reach > kMostReach) {
+    faults.push_back(
+        fmt::format("the surface goes {:.3g} times the points' extent beyond them, where no point "
+                    "holds it; give the smoothness more weight, or take coarser levels",
+                    reach));
+  }
+  return faults;
+}
 
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
@@ -409,6 +442,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   const double root_weight = RootOfMeanWeight(table);
   const std::vector<double> weights = WeightsKept(table, options);
   std::vector<ExactPoint> exact = ExactOf(table, parameters.uv);
+  const Box3 box = BoxOf(table.positions);
   OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
                      std::move(table.weights)};
   PointFit result{.parameters = std::string(NameOf(parameters.source)),
@@ -426,6 +460,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
                   .sigma_mm = {},
                   .times = {}};
   result.sigma_factor = result.fit.automatic ? result.fit.automatic->noise_mm * root_weight : kNaN;
+  result.reach = ReachBeyond(result.fit.surface, box);
   AddAttributes(weights, context, step, result);
   if (options.sigma && result.Faults().empty()) {
     result.sigma = step("sigma", [&] { return SigmaOver(result, start, weights); });

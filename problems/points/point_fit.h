@@ -102,10 +102,12 @@ struct PointFit {
   std::vector<double> sigma_mm;               // at the points
   double sigma_factor = kNaN;  // how many times the sigma that were given the points are off;
                                // NaN where none were, or by another plan than `auto`
+  double reach = kNaN;         // how far the surface goes beyond the points' box, in its diagonals
   std::vector<StepTime> times;
 
-  // Why the result cannot be used; empty if it can.
-  std::vector<std::string> Faults() const { return FaultsIn(fit); }
+  // Why the result cannot be used; empty if it can. A surface that goes three diagonals beyond the
+  // points where nothing holds it is none of theirs.
+  std::vector<std::string> Faults() const;
 };
 
 // Of an adaptive fit: whether every point is within its tolerance (fit_maps.h).

@@ -321,6 +321,25 @@ TEST(PointFit, ExactPointsOfATableAreMet) {
   EXPECT_LT(ErrorAgainst(FrankePoint, result.fit.surface, 50).rms, 0.01);
 }
 
+// Two strips of points, and next to nothing between them.
+TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
+  std::string csv = "x,y,z,u,v\n";
+  for (int k = 0; k < 400; ++k) {
+    const double u = k % 20 / 200.0 + (k < 200 ? 0.0 : 0.9), v = k / 20 / 19.0;
+    const double noise = k * 7919 % 13 / 13.0;
+    csv += fmt::format("{},{},{},{},{}\n", u, v, 0.1 * noise, u, v);
+  }
+  const PointTable table = ParsePointTable(csv, "test");
+  PointFitOptions options;
+  EXPECT_LT(FitPoints(table, options, {}).reach, 1);
+  options.fit.plan = ListedPlan{{{.level = 0}, {.level = 1}, {.level = 2}}};
+  options.fit.terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-16}};
+  const PointFit result = FitPoints(table, options, {});
+  EXPECT_GT(result.reach, 3);
+  ASSERT_EQ(result.Faults().size(), 1u);
+  EXPECT_THAT(result.Faults()[0], HasSubstr("times the points' extent beyond them"));
+}
+
 TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   const auto read = [](const std::string& text) {
     return testing::WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
