@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
 #include <pybind11/stl.h>
 
 #include <optional>
@@ -16,6 +17,7 @@
 #include "problems/run.h"
 #include "problems/study/study_run.h"
 #include "problems/study_report/study_report.h"
+#include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
@@ -80,8 +82,28 @@ py::object TableOf(const fs::path& csv) {
   return rows;
 }
 
+// What `semblance study` has written into the folder, as it stands.
+py::object TableIn(const fs::path& folder) {
+  if (!fs::exists(folder / "plan.json")) {
+    throw IoError(fmt::format("{}: no folder of a study; it has no plan.json", folder.string()));
+  }
+  if (!fs::exists(folder / "trials.csv")) {
+    throw IoError(fmt::format(
+        "{}: it has no trials.csv yet; `semblance report {}` makes it of the trials that are done",
+        folder.string(), folder.string()));
+  }
+  return TableOf(folder / "trials.csv");
+}
+
 py::object RunStudyFile(const std::string& path, const std::optional<std::string>& given,
                         int jobs) {
+  if (fs::is_directory(path)) {
+    if (given) {
+      throw InputError(fmt::format(
+          "{}: it is the folder of a study, which is read where it lies; leave 'out' away", path));
+    }
+    return TableIn(path);
+  }
   const fs::path out = given ? fs::path(*given) : "out" / fs::path(path).stem();
   const StudyPlan plan = ReadStudy(path);
   StudyRunOptions options;
@@ -108,7 +130,8 @@ void BindExperiments(py::module_& module) {
   module.def("study", &RunStudyFile, py::arg("path"), py::arg("out") = py::none(),
              py::arg("jobs") = 1,
              "Runs a study, or what is left of it, into the folder `out` (left out: out/NAME, as "
-             "`semblance study NAME.yaml` does), and returns trials.csv in long form: a "
+             "`semblance study NAME.yaml` does), and returns trials.csv in long form; with the "
+             "folder of a study as its path, what stands there. A "
              "pandas.DataFrame where pandas is installed, else a list of dictionaries.");
 }
 

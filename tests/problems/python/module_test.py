@@ -190,6 +190,12 @@ class Experiments(unittest.TestCase):
                            "metric: depth_truth.along_direction.rms_mm\n" % os.path.join(SOURCE, "configs", "phantom.yaml"))
             table = semblance.study(study, os.path.join(folder, "out"))
             here = os.getcwd()
+            found = semblance.study(os.path.join(folder, "out"))
+            self.assertEqual(len(found), len(table))
+            with self.assertRaisesRegex(semblance.IoError, "no plan.json"):
+                semblance.study(folder)
+            with self.assertRaisesRegex(semblance.InputError, "leave 'out' away"):
+                semblance.study(os.path.join(folder, "out"), out="elsewhere")
             os.chdir(folder)  # where out/study lies
             try:
                 again = semblance.study("study.yaml")
