@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "problems/plots/axis_plot.h"
 #include "problems/report/plain_names.h"
@@ -136,12 +137,26 @@ double Spent(const SearchResults& search) {
   return search.treatments.empty() ? 0 : search.treatments.back().spent;
 }
 
+// "{type: bayes, initial: null, batch: 2}" as "bayes (batch: 2)": what was left out says nothing.
+std::string MethodWords(std::string_view flow) {
+  const std::regex type(R"(^\{type: (\w+)(?:, )?(.*)\}$)"), left_out(R"(\w+: null(, )?)");
+  std::cmatch parts;
+  if (!std::regex_match(flow.begin(), flow.end(), parts, type)) {
+    return std::string(flow);
+  }
+  std::string options = std::regex_replace(parts[2].str(), left_out, "");
+  if (options.ends_with(", ")) {
+    options.resize(options.size() - 2);
+  }
+  return options.empty() ? parts[1].str() : fmt::format("{} ({})", parts[1].str(), options);
+}
+
 std::string Summary(const StudyResults& results, const SearchResults& search) {
   return fmt::format(
-      "{}: {:.4g} of {} full runs spent on {}{}; {} values of {} are better. The base as it stands "
-      "has "
-      "{}.",
-      search.method, Spent(search), search.budget,
+      "Searched by {}: {:.4g} of {} full runs spent on {}{}; {} values of {} are better. The base "
+      "as "
+      "it stands has {}.",
+      MethodWords(search.method), Spent(search), search.budget,
       Counted(std::ssize(search.treatments), "treatment"),
       search.ended ? "" : ", and the search has not ended",
       search.higher_is_better ? "higher" : "lower", WordsOfMetric(results.metric),

@@ -149,6 +149,7 @@ TEST_F(SearchRunTest, SubjectsHeldOutAreRunOnceWithTheBestAndTheBaseAndAreInNoRa
   RunStudy(Plan(kBayes), folder_ / "run", {}, {});
   const StudyResults results = ReadStudyResults(folder_ / "run");
   const SearchResults found = Results(folder_ / "run");
+  EXPECT_THAT(SearchText(results, found), HasSubstr("Searched by bayes (initial: 3, batch: 2): "));
   ASSERT_EQ(found.held_out.size(), 1u);
   EXPECT_EQ(found.held_out[0].subject, "c");
   EXPECT_TRUE(std::isfinite(found.held_out[0].base) && std::isfinite(found.held_out[0].best));
