@@ -114,25 +114,22 @@ void CheckPriorFiles(const PriorSource& source, std::vector<OptionFault>& faults
   }
 }
 
-}  // namespace
-
-std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
-  const TemplateLevels levels = LevelsOf(experiment.face_template);
-  LevelCheck check(levels);
-  check.Steps("first_fit", experiment.first_fit);
-  check.At("seeds.direction_level", experiment.seeds.direction_level);
-  std::vector<OptionFault> faults = check.Take();
-  for (const FitFault& fault : FaultsOf(experiment.fit, levels.finest)) {
+// The auto plan fits levels as the points want them, and would smooth eyes, nose and mouth away.
+void CheckAutoPlan(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  const FaceSource face = WayToFace(experiment);
+  const bool fits =
+      std::holds_alternative<FittedTemplate>(face) || std::holds_alternative<PriorThenFit>(face);
+  if (fits && std::holds_alternative<AutoPlan>(experiment.fit.plan) &&
+      !FeatureVertices(LoadTemplate(experiment.face_template)).empty()) {
     faults.push_back(
-        {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
+        {"fit.plan",
+         "the auto plan knows no features, and the template has some; take `adaptive`, "
+         "or a plan of steps"});
   }
-  for (const OptionFault& fault : FaultsOfRules(experiment.rules)) {
-    faults.push_back({"rules." + fault.path, fault.what});
-  }
-  for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
-    faults.push_back({"sites." + fault.path, fault.what});
-  }
-  CheckExpected(experiment, faults);
+}
+
+// Terms and priors that only some ways to a face look at.
+void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faults) {
   const FaceSource face = WayToFace(experiment);
   const bool asks = AsksPrior(face);
   if (asks && std::holds_alternative<IctPrior>(experiment.prior) &&
@@ -157,6 +154,29 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
                       "the term 'prior_shape' looks at a prior's face; leave it out, or write "
                       "`face: prior_then_fit`"});
   }
+}
+
+}  // namespace
+
+std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
+  const TemplateLevels levels = LevelsOf(experiment.face_template);
+  LevelCheck check(levels);
+  check.Steps("first_fit", experiment.first_fit);
+  check.At("seeds.direction_level", experiment.seeds.direction_level);
+  std::vector<OptionFault> faults = check.Take();
+  for (const FitFault& fault : FaultsOf(experiment.fit, levels.finest)) {
+    faults.push_back(
+        {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
+  }
+  for (const OptionFault& fault : FaultsOfRules(experiment.rules)) {
+    faults.push_back({"rules." + fault.path, fault.what});
+  }
+  for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
+    faults.push_back({"sites." + fault.path, fault.what});
+  }
+  CheckExpected(experiment, faults);
+  CheckWayToFace(experiment, faults);
+  CheckAutoPlan(experiment, faults);
   CheckBust(experiment, faults);
   return faults;
 } catch (const Error& error) {  // of a template that cannot be used; its levels are not known

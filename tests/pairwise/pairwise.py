@@ -53,7 +53,7 @@ def experiment_space(schema, folder):
             "fit.plan[listed].schedule": [steps[:1], steps],
             "fit.plan[until].schedule": [steps],
             "interp[auto].schemes": [["mean", "nearest"], ["kriging", "barycentric"], ["surface_matern"], ["harmonic"]],
-            "region.exclude": [[], [{"site": "zy_r", "radius_mm": 20}]],
+            "region.exclude": [[], [{"site": "zy_r", "radius_mm": 5}]],
             "tissue.set_mm": [{}, {"g": 5}],
             "sites": [{}, {"mine": {"near": ["n", "rhi"], "depth": 4}}],
             "rules.points": [{}],
@@ -61,12 +61,15 @@ def experiment_space(schema, folder):
         },
         # More rings, vertices, levels, rounds and draws are more work in proportion, which is what they ask for.
         work={
-            "subject[phantom].rings": [16, 20], "implicit.resolution": [8, 24], "patches_u": [4, 8], "patches_v": [4, 8],
+            "subject[phantom].rings": [16, 20], "patches_u": [4, 8], "patches_v": [4, 8],
             "template[formula].max_level": [0, 2], "fit.plan[adaptive].finest": [0, 2], "fit.plan[auto].finest": [0, 2],
             "fit.plan[coarse_to_fine].finest": [0, 1], "seeds.level": [0, 2], "uncertainty.samples": [0, 3],
             ".sweeps": [0, 2], ".max_passes": [1, 3], "rounds": [1, 3], "estimate.rounds": [3, 5], ".surface_points": [0, 300],
             "field.centres": [0, 40], "prior[ict].count": [1, 60], "edge_mm": [2, 20], "alpha_mm": [10, 200],
-            "edges.tolerance": [1e-6, 0.5], "random_seed": [0, 7],
+            "edges.tolerance": [1e-6, 0.5], "random_seed": [0, 7], "probe_mm": [5, 50],
+            # At these ends it hangs on the head whether anything is left: the trial says that nothing is.
+            ".max_angle_deg": [60, 180], "landmarks.max_distance_mm": [1, 50], "landmarks.keep[random].n": [8, 30],
+            "landmarks.keep[spread].n": [8, 30], "implicit.resolution": [12, 24], ".decay": [3, 12],
         },
         beside={
             ("face", "prior"): [("template", "ict")],
@@ -84,6 +87,7 @@ def experiment_space(schema, folder):
             ("landmarks.keep", "names"): {("landmarks", "keep", "sites"): ["g", "n", "rhi", "go_l", "go_r", "zy_l", "zy_r"]},
             ("template", "file"): {("template", "surface"): str(folder["first"] / "face.hspline.json")},
             ("fit.plan", "until"): FEW_PASSES,
+            ("fit.plan", "coarse_to_fine"): {("fit", "plan", "finest"): 1},
         },
         defaults={"template": "formula", "fill": "none", "tissue.depths": "measured", "implicit.emitter": "flat"})
 

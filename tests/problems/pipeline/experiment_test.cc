@@ -94,6 +94,16 @@ TEST(Experiment, WhatAPlanCannotIsToldWhenTheFileIsRead) {
       "a.yaml"));
 }
 
+TEST(Experiment, ThePlanThatKnowsNoFeaturesIsNotForATemplateThatHasSome) {
+  const std::string fit =
+      "fit: {plan: auto, terms: [points, {type: smoothness, weight: auto}], relaxation: none}\n";
+  for (const char* face : {"fit", "prior_then_fit", "auto"}) {
+    EXPECT_THAT(Faults(fit + "template: ict\nface: " + face + "\n"),
+                HasSubstr("fit.plan: the auto plan knows no features, and the template has some"));
+  }
+  EXPECT_NO_THROW(ReadConfigText<Experiment>(fit + "template: ict\nface: placed\n", "a.yaml"));
+}
+
 // What a plan does not use is no key of it.
 TEST(Experiment, APlanOwnsItsOptions) {
   EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 2, sweeps: 1}}\n"),
