@@ -148,11 +148,11 @@ struct PatchFit {
 
 PatchFit LayPatch(const std::vector<ShellPoint>& patch, const SkullShell& skull) {
   constexpr int kRounds = 12;
-  constexpr double kKept = 0.8;
+  constexpr double kKeptOfPatch = 0.8;
   const std::size_t fewest = std::max<std::size_t>(12, patch.size() / 3);
   PatchFit fit;
   for (int round = 0; round <= kRounds; ++round) {
-    const std::vector<ShellMatch> kept = KeepClosest(MatchPatch(patch, skull, fit.motion), kKept);
+    const std::vector<ShellMatch> kept = KeepClosest(MatchPatch(patch, skull, fit.motion), kKeptOfPatch);
     if (kept.size() < fewest) {
       return {};
     }
