@@ -126,6 +126,31 @@ void TellChange(const StudySummary& summary, const fs::path& root) {
   }
 }
 
+StudyRunOptions RunOptionsOf(const StudyArguments& a) {
+  StudyRunOptions options = a.run;
+  const Shard shard = ShardOf(a.shard);
+  options.shard = shard.index;
+  options.shards = shard.count;
+  options.rerun = a.rerun == "failed"     ? Rerun::kFailed
+                  : a.rerun == "unusable" ? Rerun::kUnusable
+                  : a.rerun == "all"      ? Rerun::kAll
+                                          : Rerun::kNothing;
+  return options;
+}
+
+// A shard leaves tables and report to the merge.
+void TellShard(const StudySummary& summary, const StudyRunOptions& options) {
+  Tell(
+      "shard {} of {}: {} trials, {} already there, {} done, {} failed; gather with semblance "
+      "merge\n",
+      options.shard, options.shards, summary.trials, summary.skipped, summary.done, summary.failed);
+  if (summary.waits) {
+    fmt::print(
+        "the search waits for the other shards of this generation; when theirs are in the "
+        "folder, call every shard again for the next\n");
+  }
+}
+
 int StudyCommand(const StudyArguments& a) {
   const bool plan_only = a.list || (a.files.size() == 2 && a.files[0] == "plan");
   if (a.files.size() == 2 && !plan_only) {
@@ -135,14 +160,7 @@ int StudyCommand(const StudyArguments& a) {
                     a.files[0], a.files[1]));
   }
   const fs::path file = a.files.back();
-  StudyRunOptions options = a.run;
-  const Shard shard = ShardOf(a.shard);
-  options.shard = shard.index;
-  options.shards = shard.count;
-  options.rerun = a.rerun == "failed"     ? Rerun::kFailed
-                  : a.rerun == "unusable" ? Rerun::kUnusable
-                  : a.rerun == "all"      ? Rerun::kAll
-                                          : Rerun::kNothing;
+  const StudyRunOptions options = RunOptionsOf(a);
   const StudyPlan plan = ReadStudy(file);
   for (const std::string& note : plan.notes) {
     Tell("note: {}\n", note);
@@ -154,16 +172,7 @@ int StudyCommand(const StudyArguments& a) {
   const StudySummary summary = RunTold(plan, root, options, a);
   TellChange(summary, root);
   if (options.shards > 1) {
-    Tell(
-        "shard {} of {}: {} trials, {} already there, {} done, {} failed; gather with "
-        "semblance merge\n",
-        options.shard, options.shards, summary.trials, summary.skipped, summary.done,
-        summary.failed);
-    if (summary.waits) {
-      fmt::print(
-          "the search waits for the other shards of this generation; when theirs are in the "
-          "folder, call every shard again for the next\n");
-    }
+    TellShard(summary, options);
     return kDone;
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
