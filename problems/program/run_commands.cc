@@ -141,7 +141,20 @@ PointFitOptions FitOptionsOf(const Arguments& arguments) {
                                                arguments.overrides);
 }
 
+bool IsConfigName(const std::filesystem::path& file) {
+  return file.extension() == ".yaml" || file.extension() == ".yml";
+}
+
+// The other way round is the usual slip.
+void CheckOrder(const std::vector<std::string>& files) {
+  if (files.size() == 2 && IsConfigName(files[0]) && !IsConfigName(files[1])) {
+    throw InputError(fmt::format("fit {0} {1}: the points come first: semblance fit {1} {0}",
+                                 files[0], files[1]));
+  }
+}
+
 int FitCommand(const Arguments& arguments) {
+  CheckOrder(arguments.files);
   const std::filesystem::path path = arguments.files.at(0);
   const PointFitOptions options = FitOptionsOf(arguments);
   PointFile file = ReadPointFile(path, options.attributes);

@@ -233,6 +233,7 @@ TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   Write("cylinder.yaml", "parameters: cylinder\n");
   refused("bad.csv plain.yaml", "bad.csv:2: column 'z': 'zero'");
   refused("none.csv plain.yaml", "none.csv");
+  refused("plain.yaml good.csv", "the points come first: semblance fit good.csv plain.yaml");
   refused("line.csv plain.yaml", "lie on a line");
   refused("good.csv --set chord_mm=1e-9", "chord_mm: 1e-09 is too fine");
   Write("franke.csv", Csv(Scattered(FrankePoint, 2000, 1e-3, 1), /*with_uv=*/true));
