@@ -310,8 +310,23 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
 
 }  // namespace
 
-PointFile ReadPointFile(const std::filesystem::path& path,
-                        std::span<const std::string> attributes) {
+namespace {
+
+// Beyond, the square of a distance is no number any more.
+void CheckReach(const PointTable& points, const std::filesystem::path& path) {
+  constexpr double kFarthest = 1e100;
+  for (std::size_t k = 0; k < points.positions.size(); ++k) {
+    const double largest = points.positions[k].cwiseAbs().maxCoeff();
+    if (largest > kFarthest) {
+      throw InputError(
+          fmt::format("{}: point {} has a coordinate of {:.3g}; at most 1e100 are allowed",
+                      path.string(), k + 1, largest));
+    }
+  }
+}
+
+PointFile ReadAnyPointFile(const std::filesystem::path& path,
+                           std::span<const std::string> attributes) {
   if (auto plain = IsCsv(path) ? ReadPlainCsv(path, attributes) : std::nullopt) {
     return std::move(*plain);
   }
@@ -323,6 +338,15 @@ PointFile ReadPointFile(const std::filesystem::path& path,
     bytes = Unzipped(bytes, path.string());
   }
   file.points = Parse(bytes, zipped ? path.parent_path() / path.stem() : path, attributes);
+  return file;
+}
+
+}  // namespace
+
+PointFile ReadPointFile(const std::filesystem::path& path,
+                        std::span<const std::string> attributes) {
+  PointFile file = ReadAnyPointFile(path, attributes);
+  CheckReach(file.points, path);
   return file;
 }
 

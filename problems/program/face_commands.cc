@@ -57,11 +57,26 @@ void RefuseOneName(const std::string& out, const std::string& other) {
   }
 }
 
+// What is wrong with what a file holds is said with its name.
+InputError Named(const InputError& error, const std::string& file) {
+  const std::string words = error.what();
+  return InputError(words.find(file) == words.npos ? fmt::format("{}: {}", file, words) : words);
+}
+
+EditScript Edited(const std::string& script, HSplineSurface& face) {
+  const EditScript edits = ReadEditScript(script);
+  try {
+    return ApplyEdits(edits, face);
+  } catch (const InputError& error) {
+    throw Named(error, script);
+  }
+}
+
 int Edit(const FaceArguments& a) {
   RefuseToReplace(a.out, a);
   RefuseOneName(a.out, a.inverse);
   HSplineSurface face = ReadHSpline(a.face);
-  const EditScript inverse = ApplyEdits(ReadEditScript(a.script), face);
+  const EditScript inverse = Edited(a.script, face);
   if (!a.inverse.empty()) {
     RefuseToReplace(a.inverse, a);
     WriteFileAtomically(a.inverse, WriteConfig(inverse));
@@ -71,7 +86,7 @@ int Edit(const FaceArguments& a) {
   return kDone;
 }
 
-int Export(const FaceArguments& a) {
+int Export(const FaceArguments& a) try {
   RefuseToReplace(a.out, a);
   const std::string bytes =
       ExportedBytes(a.face, {.extension = fs::path(a.out).extension().string(),
@@ -80,6 +95,8 @@ int Export(const FaceArguments& a) {
   WriteFileAtomically(a.out, bytes);
   fmt::print("{}: {} bytes\n", a.out, bytes.size());
   return kDone;
+} catch (const InputError& error) {
+  throw Named(error, a.face);
 }
 
 int Store(const Feature& feature, const FaceArguments& a) {

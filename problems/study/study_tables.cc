@@ -131,6 +131,12 @@ int StudyResults::Count(const std::string& status) const {
 
 StudyResults ReadStudyResults(const fs::path& folder) {
   const fs::path file = folder / "plan.json";
+  const auto fail = [&file] {
+    return IoError(fmt::format(
+        "{}: not the plan of a study, or of a part of it only; run the study again, which writes "
+        "it anew",
+        file.string()));
+  };
   StudyResults results;
   try {
     const Json plan = ParseJson(ReadFileBytes(file), file.string());
@@ -145,6 +151,9 @@ StudyResults ReadStudyResults(const fs::path& folder) {
       row.subject = trial.at("subject");
       row.values = trial.at("values").get<std::vector<std::string>>();
       row.aside = trial.value("aside", false);
+      if (row.values.size() != results.axes.size()) {
+        throw fail();
+      }
       results.trials.push_back(std::move(row));
     }
     ReadTrials(folder, results.trials);
@@ -153,10 +162,7 @@ StudyResults ReadStudyResults(const fs::path& folder) {
                                    ? plan["search"].at("better").get<std::string>() == "higher"
                                    : BetterOf(results.metric) == Better::kHigher;
   } catch (const nlohmann::json::exception&) {
-    throw IoError(fmt::format(
-        "{}: not the plan of a study, or of a part of it only; run the study again, which writes "
-        "it anew",
-        file.string()));
+    throw fail();
   }
   std::ranges::copy(AreaNotes(results), std::back_inserter(results.notes));
   if (!results.tags.empty()) {

@@ -223,6 +223,9 @@ TEST_F(PointFiles, WhatIsNotOfItsKindIsRefusedByName) {
   EXPECT_THAT(Refusal("a.npy", Npy(4)), HasSubstr("neither n x 3"));
   EXPECT_THAT(Refusal("a.xyz", "1 2\n"), HasSubstr("a.xyz"));
   EXPECT_THAT(Refusal("b.xyz", "1 2 inf\n"), HasSubstr("b.xyz"));
+  EXPECT_THAT(Refusal("d.xyz", "1 2 3\n1 -2e200 3\n"),
+              HasSubstr("d.xyz: point 2 has a coordinate"));
+  EXPECT_THAT(Refusal("d.csv", "x,y,z\n1,2e200,3\n"), HasSubstr("d.csv: point 1 has a coordinate"));
   EXPECT_THAT(Refusal("c.xyz", "# nothing\n"), HasSubstr("there is no point"));
   EXPECT_THAT(Refusal("a.obj", "v 1 2 nan\n"), HasSubstr("a.obj"));
   EXPECT_THAT(Refusal("b.obj", "vn 0 0 1\n"), HasSubstr("there is no point"));

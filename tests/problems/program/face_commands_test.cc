@@ -60,6 +60,8 @@ TEST_F(FaceCommands, EditMovesVerticesAndItsInverseMovesThemBack) {
   ExpectDone("edit edited.json inverse.yaml --out back.json");
   EXPECT_EQ(Bytes("back.json"), Bytes("face.json"));
   ExpectRefused("edit face.json missing.yaml --out x.json", "missing.yaml");
+  WriteFileAtomically(folder_ / "none.yaml", "edits: [{level: 0, i: 0, j: 0}]\n");
+  ExpectRefused("edit face.json none.yaml --out x.json", "none.yaml: edit script: vertex (0, 0)");
   ExpectRefused("edit face.json script.yaml --out back.json", "--force");
   ExpectRefused("edit face.json script.yaml --out x.json --inverse inverse.yaml", "--force");
   EXPECT_FALSE(fs::exists(folder_ / "x.json"));

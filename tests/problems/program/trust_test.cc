@@ -175,7 +175,9 @@ TEST_F(Trust, AStudysFilesMayHoldAnything) {
       "\"x\"",
       std::string(100000, '['),
       R"({"hash": 7})",
-      R"({"title": 1, "hash": 2, "metric": [], "axes": {}, "notes": 3, "trials": 7})"};
+      R"({"title": 1, "hash": 2, "metric": [], "axes": {}, "notes": 3, "trials": 7})",
+      R"({"title": "t", "hash": "h", "metric": "m", "axes": [], "notes": [],
+          "trials": [{"id": "a", "subject": "p", "values": ["more than axes"]}]})"};
   Write("study.yaml", fmt::format("base: {}\ngrid: {{rounds: [1, 2]}}\n", kPhantom));
   for (const std::string& content : contents) {
     Write("s/plan.json", content);
