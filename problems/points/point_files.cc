@@ -313,14 +313,14 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
 namespace {
 
 // Beyond, the square of a distance is no number any more.
-void CheckReach(const PointTable& points, const std::filesystem::path& path) {
+void CheckReach(const PointTable& points, const std::string& name) {
   constexpr double kFarthest = 1e100;
   for (std::size_t k = 0; k < points.positions.size(); ++k) {
     const double largest = points.positions[k].cwiseAbs().maxCoeff();
     if (largest > kFarthest) {
       throw InputError(
-          fmt::format("{}: point {} has a coordinate of {:.3g}; at most 1e100 are allowed",
-                      path.string(), k + 1, largest));
+          fmt::format("{}: point {} has a coordinate of {:.3g}; at most 1e100 are allowed", name,
+                      k + 1, largest));
     }
   }
 }
@@ -346,7 +346,7 @@ PointFile ReadAnyPointFile(const std::filesystem::path& path,
 PointFile ReadPointFile(const std::filesystem::path& path,
                         std::span<const std::string> attributes) {
   PointFile file = ReadAnyPointFile(path, attributes);
-  CheckReach(file.points, path);
+  CheckReach(file.points, path == "-" ? "standard input" : path.string());
   return file;
 }
 
