@@ -58,9 +58,9 @@ fs::path SubmitStudy(const SubmitOptions& options) {
   folder.Write("submit.sh", SubmitScript(options));
   const fs::path script = folder.Root() / "submit.sh";
   if (std::system("command -v sbatch > /dev/null 2>&1") != 0) {
-    throw InputError(
-        fmt::format("{}: written, but there is no sbatch here; run it with sh where Slurm is",
-                    script.string()));
+    throw InputError(fmt::format(
+        "--slurm: there is no sbatch here; {} is written: run it with sh where Slurm is",
+        script.string()));
   }
   if (std::system(("sh " + QuotedPath(script)).c_str()) != 0) {
     throw InputError(fmt::format(

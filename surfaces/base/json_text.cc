@@ -52,6 +52,10 @@ std::string JsonFault(const std::exception& error) {
 }
 
 nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name) {
+  // The library takes one for the end, and reads nothing behind it.
+  if (const std::size_t zero = text.find('\0'); zero != text.npos) {
+    throw IoError(fmt::format("{}: this is not JSON: byte {} is zero", name, zero + 1));
+  }
   try {
     CheckJsonDepth(text);
     return nlohmann::ordered_json::parse(text);

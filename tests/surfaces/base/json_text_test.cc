@@ -65,6 +65,8 @@ TEST(JsonText, WhatIsNoJsonIsNamed) {
     EXPECT_THAT(WordsOf<IoError>([&] { ParseJson(text, "a.json"); }),
                 HasSubstr("a.json: this is not JSON"));
   }
+  EXPECT_THAT(WordsOf<IoError>([] { ParseJson(std::string_view("{}\0{}", 5), "a.json"); }),
+              HasSubstr("a.json: this is not JSON: byte 3 is zero"));
 }
 
 }  // namespace
