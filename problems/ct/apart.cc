@@ -107,10 +107,32 @@ void Settle(double memory_bytes) {
   }
 }
 
-[[noreturn]] void WorkAndEnd(const std::function<std::string(const TellFile&)>& work, int pipe) {
+// From now on; a library that goes round for ever is ended by the system.
+void AllowProcessor(double seconds) {
+  rusage used{};
+  ::getrusage(RUSAGE_SELF, &used);
+  rlimit limit{};
+  ::getrlimit(RLIMIT_CPU, &limit);
+  const auto most = static_cast<rlim_t>(static_cast<double>(used.ru_utime.tv_sec) +
+                                        static_cast<double>(used.ru_stime.tv_sec) + 1 + seconds);
+  limit.rlim_cur = std::min(limit.rlim_max, most);
+  ::setrlimit(RLIMIT_CPU, &limit);
+}
+
+// For each file: what reading so much takes ten times over.
+double ProcessorFor_s(double memory_bytes) {
+  constexpr double kLeast_s = 1, kBytesPerSecond = 100e6;
+  return kLeast_s + memory_bytes / kBytesPerSecond;
+}
+
+[[noreturn]] void WorkAndEnd(const std::function<std::string(const TellFile&)>& work,
+                             double memory_bytes, int pipe) {
+  const auto tell = [&](const std::string& file) {
+    AllowProcessor(ProcessorFor_s(memory_bytes));
+    Send(pipe, Kind::kFile, file);
+  };
   try {
-    Send(pipe, Kind::kResult,
-         work([pipe](const std::string& file) { Send(pipe, Kind::kFile, file); }));
+    Send(pipe, Kind::kResult, work(tell));
   } catch (const InputError& error) {
     Send(pipe, Kind::kInputError, error.what());
   } catch (const Error& error) {
@@ -207,7 +229,7 @@ std::string DoApart(const std::function<std::string(const TellFile&)>& work, dou
   const pid_t child = ::fork();
   if (child == 0) {
     Settle(memory_bytes);
-    WorkAndEnd(work, pipe.in);
+    WorkAndEnd(work, memory_bytes, pipe.in);
   }
   ::close(pipe.in);
   const int out = pipe.out;

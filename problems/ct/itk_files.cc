@@ -15,8 +15,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -199,6 +201,44 @@ void CheckMetaImageAxes(const std::filesystem::path& file) {
     throw InputError(
         fmt::format("{}: NDims is not a number of axes; a volume has 3", file.string()));
   }
+}
+
+// A value of a NIfTI header, whose bytes may stand the other way round.
+template <class Value>
+Value NiftiValue(const std::string& head, std::size_t at, bool swapped) {
+  std::array<char, sizeof(Value)> bytes{};
+  std::memcpy(bytes.data(), head.data() + at, bytes.size());
+  if (swapped) {
+    std::ranges::reverse(bytes);
+  }
+  return std::bit_cast<Value>(bytes);
+}
+
+// How the voxels lie, in a NIfTI-1 file that is not packed: steps, quaternion with its place, rows
+// of a matrix. ITK takes the matrix apart without end if it holds what is no number, or a huge one.
+void CheckNiftiPlaces(const std::filesystem::path& file) {
+  constexpr std::size_t kHeader = 348;
+  constexpr double kFarthest_mm = 1e9;
+  const std::string head = HeadOf(file);
+  if (head.size() < kHeader) {
+    return;  // the library says that it is cut short
+  }
+  const bool swapped = NiftiValue<std::int32_t>(head, 0, /*swapped=*/true) == kHeader;
+  const auto check = [&](std::size_t from, int count) {
+    for (int k = 0; k < count; ++k) {
+      const double value = NiftiValue<float>(head, from + 4 * static_cast<std::size_t>(k), swapped);
+      if (!(std::abs(value) <= kFarthest_mm)) {
+        throw InputError(
+            fmt::format("{}: one of the numbers that say how its voxels lie is {}; export it again",
+                        file.string(), value));
+      }
+    }
+  };
+  const bool has_quaternion = NiftiValue<std::int16_t>(head, 252, swapped) > 0;
+  const bool has_matrix = NiftiValue<std::int16_t>(head, 254, swapped) > 0;
+  check(80, 3);
+  check(256, has_quaternion ? 6 : 0);
+  check(280, has_matrix ? 12 : 0);
 }
 
 // The bytes before the voxels: NIfTI's header, or MetaImage's up to the line that says LOCAL.
@@ -388,6 +428,8 @@ VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat forma
   const Reader reader = ReaderOf(format);
   if (format == VolumeFormat::kMetaImage) {
     CheckMetaImageAxes(file);
+  } else if (format == VolumeFormat::kNifti && !HeadOf(file).starts_with("\x1f\x8b")) {
+    CheckNiftiPlaces(file);
   }
   try {
     if (!reader.io->CanReadFile(where.c_str())) {

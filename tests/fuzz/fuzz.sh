@@ -36,12 +36,13 @@ seeds() {
 
 # One target; its line of the table into TARGET.row, and below it what was found.
 fuzz() {
-  local target=$1 options=detect_leaks=1 found done
+  local target=$1 options=detect_leaks=1 longest_s=10 found done
   mkdir -p "corpus/$target"
   seeds "$target"
   # What ITK and GDCM forget when they give up is theirs. The program gives them little memory by a limit that ASan does not know.
-  [ "$target" = volume_fuzz ] && options=detect_leaks=0:max_allocation_size_mb=256
-  ASAN_OPTIONS=$options "./$target" "corpus/$target" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
+  # A library that goes round for ever is ended after some seconds of processor.
+  [ "$target" = volume_fuzz ] && options=detect_leaks=0:max_allocation_size_mb=256 longest_s=60
+  ASAN_OPTIONS=$options "./$target" "corpus/$target" -max_total_time="$seconds" -timeout="$longest_s" -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
     -artifact_prefix="found/$target-" > "$target.log" 2>&1
   found=$(($? != 0))
   [ "$target$found" = volume_fuzz0 ] && rm -f found/volume_fuzz-crash-*  # of ITK's and GDCM's own process

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
 
 namespace semblance {
 namespace {
@@ -92,6 +93,18 @@ TEST(Apart, MemoryIsLimited) {
                 EXPECT_EQ(much.back(), 'x');
               }),
               HasSubstr("asks for more memory"));
+}
+
+TEST(Apart, WorkThatGoesRoundForEverIsEnded) {
+  const auto endless = [](const TellFile& tell) -> std::string {
+    tell("a.dcm");
+    volatile bool goes_on = true;
+    while (goes_on) {
+    }
+    return "";
+  };
+  EXPECT_THAT(testing::WordsOf<IoError>([&] { DoApart(endless, /*memory_bytes=*/1e6, {}); }),
+              StartsWith("a.dcm: the library that reads it gave up on it"));
 }
 
 TEST(Apart, AStopEndsIt) {

@@ -366,6 +366,21 @@ TEST_F(ReadVolumeTest, AMetaImageOfAsManyAxesAsNoneHasIsRefusedAtOnce) {
   }
 }
 
+TEST_F(ReadVolumeTest, ANiftiWhoseVoxelsLieNowhereIsRefusedAtOnce) {
+  WriteItk(folder_ / "a.nii", array_, *itk::NiftiImageIO::New());
+  const std::string sound = ReadFileBytes(folder_ / "a.nii");
+  for (const float value : {-1.7e38F, std::numeric_limits<float>::quiet_NaN()}) {
+    for (const std::size_t at : {80, 256, 284}) {  // a step, the quaternion, the matrix
+      std::string bytes = sound;
+      bytes[252] = bytes[254] = 1;
+      std::memcpy(bytes.data() + at, &value, sizeof value);
+      WriteFileAtomically(folder_ / "x.nii", bytes);
+      EXPECT_THAT(WordsOf<Error>([&] { Read("x.nii"); }),
+                  HasSubstr("numbers that say how its voxels lie"));
+    }
+  }
+}
+
 TEST_F(ReadVolumeTest, FilesCutShortAreOneClearError) {
   const auto cut = [&](const char* name) {
     const std::string bytes = ReadFileBytes(folder_ / name);
