@@ -40,7 +40,8 @@ from option_space import CoveringArray, OptionSpace
 LIMIT_S = 60  # of processor time; a case that needs more is killed
 BATCH, BATCH_OF_SHARE = 48, 8  # cases that one call of check looks at
 SHARE_MEDIAN_S = 2
-FEW_PASSES = {("fit", "plan", "max_passes"): 3}  # of 20 over the published schedule: more of the same work
+# Of 20 passes over the published schedule, which are more of the same work.
+FEW_PASSES = {("fit", "plan", "max_passes"): 2, ("fit", "plan", "schedule"): [{"level": 0}, {"level": 1, "fraction": 0.5}]}
 EXCHANGES = 12  # turns in which a choice that is refused may be exchanged for another; then it is left out
 
 
@@ -68,7 +69,7 @@ def experiment_space(schema, folder):
             "field.centres": [0, 40], "prior[ict].count": [1, 60], "edge_mm": [2, 20], "alpha_mm": [10, 200],
             "edges.tolerance": [1e-6, 0.5], "random_seed": [0, 7], "probe_mm": [5, 50],
             # At these ends it hangs on the head whether anything is left: the trial says that nothing is.
-            ".max_angle_deg": [60, 180], "landmarks.max_distance_mm": [1, 50], "landmarks.keep[random].n": [8, 30],
+            ".max_angle_deg": [60, 180], "landmarks.max_distance_mm": [5, 50], "landmarks.keep[random].n": [8, 30],
             "landmarks.keep[spread].n": [8, 30], "implicit.resolution": [12, 24], ".decay": [3, 12],
         },
         beside={
