@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <set>
 
 #include "problems/config/config.h"
@@ -154,6 +155,21 @@ void TurnToLps(const fs::path& path, LandmarkFile& file, Notes& notes) {
       fmt::format("{}: turned from RAS to LPS (x and y negated)", path.filename().string()));
 }
 
+// Beyond, no weight of the placement is a number.
+void CheckReach(const fs::path& path, const LandmarkFile& file) {
+  constexpr double kFarthest_mm = 1e9;
+  std::vector<std::string> faults;
+  for (const Landmark& landmark : file.landmarks) {
+    const auto& [x, y, z] = landmark.point;
+    const double farthest_mm = std::max({std::abs(x), std::abs(y), std::abs(z)});
+    if (farthest_mm > kFarthest_mm) {
+      faults.push_back(fmt::format("site {}: a coordinate of {:.3g} mm; at most 1e9 are allowed",
+                                   landmark.site, farthest_mm));
+    }
+  }
+  Complain(path, faults);
+}
+
 LandmarkReading ReadForeign(const fs::path& path, const Format& format,
                             const ReadLandmarksOptions& options) {
   LandmarkReading reading;
@@ -169,6 +185,7 @@ LandmarkReading ReadForeign(const fs::path& path, const Format& format,
     faults.emplace_back("there is no landmark; place at least one");
   }
   Complain(path, faults);
+  CheckReach(path, file);
   ChooseAxes(path, options, file, reading.notes);
   TurnToLps(path, file, reading.notes);
   return reading;
@@ -182,6 +199,7 @@ LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& 
     return ReadForeign(path, format, options);
   }
   LandmarkReading reading{.file = ReadLandmarkFile(path), .notes = {}};
+  CheckReach(path, reading.file);
   ChooseAxes(path, options, reading.file, reading.notes);
   if (reading.file.proposed) {
     reading.notes.push_back(fmt::format(

@@ -185,6 +185,8 @@ TEST_F(LandmarkReadingTest, TablesWithCommasOrSemicolons) {
   EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("columns that mean nothing here: Author"),
                                          HasSubstr("taken as LPS")));
   EXPECT_THAT(Fault("a.csv", "name,x,y\ng,1,2\n"), HasSubstr("there is no column z or z_mm"));
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z\ng,1,-2e90,3\n"),
+              HasSubstr("a.csv: site g: a coordinate"));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z\ng,1,2,inf\n"), HasSubstr("a.csv:2: column 'z'"));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z\ng,\"1,5\",2,0\n"), HasSubstr("'1,5' is not a finite"));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z,normal_x\ng,1,2,0,1\n"), HasSubstr("normal_z, or none"));
