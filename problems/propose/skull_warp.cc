@@ -152,7 +152,8 @@ PatchFit LayPatch(const std::vector<ShellPoint>& patch, const SkullShell& skull)
   const std::size_t fewest = std::max<std::size_t>(12, patch.size() / 3);
   PatchFit fit;
   for (int round = 0; round <= kRounds; ++round) {
-    const std::vector<ShellMatch> kept = KeepClosest(MatchPatch(patch, skull, fit.motion), kKeptOfPatch);
+    const std::vector<ShellMatch> kept =
+        KeepClosest(MatchPatch(patch, skull, fit.motion), kKeptOfPatch);
     if (kept.size() < fewest) {
       return {};
     }
