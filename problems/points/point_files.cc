@@ -308,10 +308,6 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
   return PointFile{.points = points->Take(), .sha256 = sha.Hex()};
 }
 
-}  // namespace
-
-namespace {
-
 // Beyond, the square of a distance is no number any more.
 void CheckReach(const PointTable& points, const std::string& name) {
   constexpr double kFarthest = 1e100;

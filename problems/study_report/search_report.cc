@@ -153,9 +153,8 @@ std::string MethodWords(std::string_view flow) {
 
 std::string Summary(const StudyResults& results, const SearchResults& search) {
   return fmt::format(
-      "Searched by {}: {:.4g} of {} full runs spent on {}{}; {} values of {} are better. The base "
-      "as "
-      "it stands has {}.",
+      "Searched by {}: {:.4g} of {} full runs spent on {}{}; {} values of {} are better. The "
+      "base as it stands has {}.",
       MethodWords(search.method), Spent(search), search.budget,
       Counted(std::ssize(search.treatments), "treatment"),
       search.ended ? "" : ", and the search has not ended",
