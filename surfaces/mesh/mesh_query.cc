@@ -18,7 +18,23 @@ namespace {
 using QueryKernel = CGAL::Simple_cartesian<double>;
 using Triangles = std::vector<QueryKernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<QueryKernel, Triangles::const_iterator>;
-using AabbTree = CGAL::AABB_tree<CGAL::AABB_traits<QueryKernel, Primitive>>;
+using Traits = CGAL::AABB_traits<QueryKernel, Primitive>;
+
+// No ray meets a triangle without area: CGAL asks for triangles that have one, and the triangles
+// beside it are met. Closest points lie on it as on any other.
+struct RayTraits : Traits {
+  struct Intersection {
+    using Hit = Traits::Intersection_and_primitive_id<QueryKernel::Segment_3>::Type;
+    boost::optional<Hit> operator()(const QueryKernel::Segment_3& ray,
+                                    const Primitive& triangle) const {
+      if (triangle.datum().is_degenerate()) return boost::none;
+      return traits.Traits::intersection_object()(ray, triangle);
+    }
+    const RayTraits& traits;
+  };
+  Intersection intersection_object() const { return {*this}; }
+};
+using AabbTree = CGAL::AABB_tree<RayTraits>;
 
 QueryKernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 Vec3 ToVec(const QueryKernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
@@ -78,7 +94,8 @@ std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direct
                                           double max_distance_mm) const {
   const Vec3 end = origin + max_distance_mm * direction.normalized();
   const QueryKernel::Segment_3 segment(ToCgal(origin), ToCgal(end));
-  std::vector<AabbTree::Intersection_and_primitive_id<QueryKernel::Segment_3>::Type> found;
+  if (segment.is_degenerate()) return {};
+  std::vector<RayTraits::Intersection::Hit> found;
   tree_->tree.all_intersections(segment, std::back_inserter(found));
   std::vector<MeshPoint> hits;
   for (const auto& hit : found) {

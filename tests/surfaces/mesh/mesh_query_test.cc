@@ -65,6 +65,24 @@ TEST(MeshQuery, APointIsTheWeightedSumOfItsTrianglesCorners) {
   check(query.Closest(2 * sphere.points[7] - Vec3(3, -2, 5)));  // a corner, straight above it
 }
 
+// CGAL's own answer for a triangle whose corners lie on a line is undefined.
+TEST(MeshQuery, ARayPassesATriangleWithoutArea) {
+  TriMesh mesh = Plate(10, 3);
+  const int corner = int(mesh.points.size());
+  mesh.points.insert(mesh.points.end(), {{1, 1, 2}, {3, 1, 2}, {2, 1, 2}});
+  mesh.triangles.push_back({corner, corner + 1, corner + 2});
+  mesh.triangles.push_back({corner, corner, corner});
+  const MeshQuery query(mesh);
+  for (const Vec3& from : {Vec3(2, 1, 5), Vec3(1, 1, 5), Vec3(2.5, 1, 5)}) {
+    const auto hits = query.AllHits(from, {0, 0, -1}, 100);
+    ASSERT_FALSE(hits.empty());
+    EXPECT_NEAR(hits.front().distance_mm, 5, 1e-12);
+  }
+  EXPECT_TRUE(query.AllHits({0, 1, 2}, {1, 0, 0}, 9).empty());  // along it
+  EXPECT_TRUE(query.AllHits({2, 1, 2}, {0, 0, -1}, 0).empty());
+  EXPECT_NEAR(query.Closest({2, 1, 2.5}).distance_mm, 0.5, 1e-12);
+}
+
 TEST(MeshQuery, RayThroughAPlateHitsItOnce) {
   const MeshQuery query(Plate(10, 3));
   const auto hit = query.FirstHit({4.1, 2.3, 5}, {0, 0, -2}, 100);
