@@ -26,9 +26,6 @@ class NestedSpace {
 
   int finest() const { return static_cast<int>(levels_.size()) - 1; }
   const NestedLevel& operator[](int level) const { return levels_[level]; }
-  bool IsLeaf(int level, std::size_t patch) const {
-    return levels_[level].there[patch] != 0 && levels_[level].split[patch] == 0;
-  }
   // The level whose patch holds the point, in patches of level 0, and is no more split.
   int LeafLevel(double x, double y) const;
   // Vertices that are active and not sums of active ones of the next level.

@@ -52,12 +52,7 @@ bool IsSeparable(const T&) {
   return RowTerm<T>;
 }
 
-// Of each term with a weight.
-inline bool AllSeparable(std::span<const Term> terms) {
-  return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
-    return WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsSeparable(t); }, term);
-  });
-}
+// Whether all terms with a weight add rows that treat x, y and z alike.
 inline bool SeparableButForLoss(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
     return std::visit([]<class T>(const T& t) { return t.weight <= 0 || RowTerm<T>; }, term);

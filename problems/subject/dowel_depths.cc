@@ -229,13 +229,4 @@ std::vector<std::filesystem::path> TablesOf(const TissueOptions& options) {
   return tables;
 }
 
-std::vector<std::string> DepthWarnings(const TissueOptions& options) {
-  Notes warnings;
-  for (const std::filesystem::path& path : TablesOf(options)) {
-    const Notes more = TableWarnings(ReadTissueTable(path));
-    warnings.insert(warnings.end(), more.begin(), more.end());
-  }
-  return warnings;
-}
-
 }  // namespace semblance

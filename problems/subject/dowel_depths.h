@@ -198,8 +198,4 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
 // The tables that the options name and use, in the order in which they are asked.
 std::vector<std::filesystem::path> TablesOf(const TissueOptions& options);
 
-// TableWarnings of TablesOf.
-// Throws as ReadTissueTable.
-std::vector<std::string> DepthWarnings(const TissueOptions& options);
-
 }  // namespace semblance

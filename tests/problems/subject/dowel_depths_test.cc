@@ -123,14 +123,6 @@ TEST(FillDepths, SaysWhichRowsUsedDoNotGrowWithTheBuild) {
   EXPECT_THAT(FillDepths(options, s.file, s.dowels), ElementsAre(HasSubstr("set to 5 mm by hand")));
 }
 
-TEST(DepthWarnings, AreThoseOfTheTableThatIsUsed) {
-  TissueOptions options = FromTable("rhine_black", Sex::kMale, Build::kNormal);
-  EXPECT_EQ(DepthWarnings(options).size(), 9u);
-  options.depths = DepthSource::kMeasured;
-  EXPECT_THAT(DepthWarnings(options), IsEmpty());
-  EXPECT_THAT(DepthWarnings({}), IsEmpty());
-}
-
 TEST(FillDepths, ASiteThatTheTableLacksIsLeftOutUnlessSet) {
   Subject s({"g", "iM2_l", "iM2_r"});
   TissueOptions options = FromTable("rhine_caucasoid", Sex::kMale, Build::kEmaciated);
