@@ -34,7 +34,7 @@ using LayoutKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using LayoutMesh = CGAL::Surface_mesh<LayoutKernel::Point_3>;
 using Vertex = LayoutMesh::Vertex_index;
 using Border = LayoutMesh::Halfedge_index;
-using PlacesMap = LayoutMesh::Property_map<Vertex, LayoutKernel::Point_2>;
+using PositionMap = LayoutMesh::Property_map<Vertex, LayoutKernel::Point_2>;
 
 [[noreturn]] void FailLayout(const std::string& what) {
   throw InputError("parameters: the mesh cannot be laid out on the plane: " + what);
@@ -165,7 +165,7 @@ SquareBorder SquareOf(const LayoutMesh& mesh, Border border) {
                  : SquareBorder();
 }
 
-layout::Error_code Parameterize(LayoutMesh& mesh, Border border, MeshMap map, PlacesMap places) {
+layout::Error_code Parameterize(LayoutMesh& mesh, Border border, MeshMap map, PositionMap places) {
   switch (map) {
     case MeshMap::kLscm:
       return layout::parameterize(mesh, layout::LSCM_parameterizer_3<LayoutMesh>(), border, places);
@@ -213,7 +213,7 @@ void TurnLengthwise(std::vector<Vec2>& at) {
 }
 
 std::vector<Vec2> Places(const TriMesh& mesh, LayoutMesh& halfedges, Border border, MeshMap map) {
-  const PlacesMap places =
+  const PositionMap places =
       halfedges.add_property_map<Vertex, LayoutKernel::Point_2>("v:place").first;
   const layout::Error_code error = Parameterize(halfedges, border, map, places);
   std::vector<Vec2> at;

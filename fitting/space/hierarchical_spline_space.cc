@@ -35,7 +35,7 @@ PatchSlot SlotOf(const HSplineShape& shape, const VertexId& v) {
 }
 
 // A vertex where the coarser level alone would have it.
-Vec3 RefinedPlace(const HSplineSurface& surface, const VertexId& v) {
+Vec3 RefinedPosition(const HSplineSurface& surface, const VertexId& v) {
   const PatchSlot slot = SlotOf(surface.shape(), v);
   const PatchId parent{v.level - 1, slot.patch.i / 2, slot.patch.j / 2};
   return RefinePatch(surface.PatchVertices(parent), slot.patch.i % 2, slot.patch.j % 2)[slot.index];
@@ -45,7 +45,7 @@ Vec3 RefinedPlace(const HSplineSurface& surface, const VertexId& v) {
 Vec3 ValueIn(const HSplineSurface& surface, const VertexId& v) {
   const PatchSlot slot = SlotOf(surface.shape(), v);
   const Vec3 place = surface.PatchVertices(slot.patch)[slot.index];
-  return v.level == 0 ? place : Vec3(place - RefinedPlace(surface, v));
+  return v.level == 0 ? place : Vec3(place - RefinedPosition(surface, v));
 }
 
 }  // namespace
@@ -337,7 +337,7 @@ HSplineSurface HierarchicalSplineSpace::Surface() const {
     for (const ControlDof* dof : level) {
       const VertexId& v = dof->vertex;
       const SurfaceFrame frame = surface.LevelFrame(v.level - 1, surface.ParameterOf(v));
-      const Vec3 way = RefinedPlace(surface, v) + dof->value - frame.point;
+      const Vec3 way = RefinedPosition(surface, v) + dof->value - frame.point;
       const bool world = shape_.reference == OffsetReference::kWorld;
       offsets[v] = world ? way : Vec3(frame.axes.transpose() * way);
     }

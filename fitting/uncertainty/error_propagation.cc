@@ -109,7 +109,7 @@ HSplineSurface UpTo(int level, const HSplineSurface& surface) {
 }
 
 // Whether the level was fitted with finer vertices only in places.
-bool IsFinerInPlaces(const HSplineSurface& surface, int level) {
+bool IsFinerSomewhere(const HSplineSurface& surface, int level) {
   const std::size_t edited = surface.Offsets(level).size(),
                     all = static_cast<std::size_t>(surface.Columns(level)) * surface.Rows(level);
   return level > 0 && edited > 0 && edited < all;
@@ -176,7 +176,7 @@ struct ErrorPropagation::Model {
       : surface(fitted),
         level(fitted_level),
         target(LessFiner(fitted, rest, points_given, fitted_level)),
-        in_places(IsFinerInPlaces(fitted, fitted_level)),
+        in_places(IsFinerSomewhere(fitted, fitted_level)),
         given(terms.begin(), terms.end()) {
     const std::vector<Term> solved = Solved(terms);
     if (in_places) {

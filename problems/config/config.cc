@@ -23,18 +23,18 @@ namespace {
 
 using SourcePtr = std::shared_ptr<const ConfigSource>;
 
-ConfigPlace PlaceAt(const SourcePtr& source, const YAML::Mark& mark) {
+ConfigLocation LocationAt(const SourcePtr& source, const YAML::Mark& mark) {
   return {source, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1};
 }
 
 // What is left of a text that cannot be read: what is missed in it is missed there.
 ConfigNode EmptyMap(const SourcePtr& source) {
   ConfigNode map = ConfigNode::Map();
-  map.place = {source, 1, 1};
+  map.location = {source, 1, 1};
   return map;
 }
 
-ConfigPlace EndOf(std::string_view text, const SourcePtr& source) {
+ConfigLocation EndOf(std::string_view text, const SourcePtr& source) {
   const auto lines = std::count(text.begin(), text.end(), '\n');
   const std::size_t last_break = text.rfind('\n');
   const std::size_t line_begin = last_break == text.npos ? 0 : last_break + 1;
@@ -56,7 +56,7 @@ std::vector<std::string_view> LinesOf(std::string_view text) {
   return lines;
 }
 
-// What follows a place in its line.
+// What follows a location in its line.
 std::string_view LineFrom(std::span<const std::string_view> lines, const YAML::Mark& mark) {
   const auto line = static_cast<std::size_t>(std::max(mark.line, 0));
   const std::string_view text = line < lines.size() ? lines[line] : std::string_view();
@@ -83,7 +83,7 @@ class TreeBuilder : public YAML::EventHandler {
  public:
   TreeBuilder(std::string_view text, SourcePtr source, ConfigErrors& errors)
       : lines_(LinesOf(text)), source_(std::move(source)), errors_(errors) {
-    root_.place = {source_, 1, 1};
+    root_.location = {source_, 1, 1};
   }
 
   ConfigNode TakeRoot() { return std::move(root_); }
@@ -91,7 +91,7 @@ class TreeBuilder : public YAML::EventHandler {
   void OnDocumentStart(const YAML::Mark& mark) override {
     ++documents_;
     if (documents_ == 2) {
-      errors_.Add(PlaceAt(source_, mark), "", "a second document begins here; a file holds one");
+      errors_.Add(LocationAt(source_, mark), "", "a second document begins here; a file holds one");
     }
   }
   void OnDocumentEnd() override {}
@@ -138,12 +138,12 @@ class TreeBuilder : public YAML::EventHandler {
     bool has_key = false;
     bool is_key_good = false;
     std::string key = {};
-    ConfigPlace key_place = {};
+    ConfigLocation key_location = {};
   };
 
   ConfigNode At(const YAML::Mark& mark) const {
     ConfigNode node;
-    node.place = PlaceAt(source_, mark);
+    node.location = LocationAt(source_, mark);
     return node;
   }
 
@@ -161,7 +161,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   void AddError(const YAML::Mark& mark, std::string_view what) {
     if (documents_ <= 1) {
-      errors_.Add(PlaceAt(source_, mark), Path(), what);
+      errors_.Add(LocationAt(source_, mark), Path(), what);
     }
   }
 
@@ -235,35 +235,35 @@ class TreeBuilder : public YAML::EventHandler {
   void TakeKey(Level& level, const ConfigNode& node) {
     if (++level.keys > kMostKeys) {
       YAML::Mark mark;
-      mark.line = node.place.line - 1;
-      mark.column = node.place.column - 1;
+      mark.line = node.location.line - 1;
+      mark.column = node.location.column - 1;
       throw YAML::Exception(mark, fmt::format("more than {} entries in one map", kMostKeys));
     }
     level.is_key_good = node.IsScalar();
     level.key = node.text;
-    level.key_place = node.place;
+    level.key_location = node.location;
     std::string what;
     if (!node.IsScalar()) {
       what = "a key must be a word";
     } else if (node.text == "<<" && !node.quoted) {
       what = "merge keys (<<) are not read; repeat the entries or use base:";
-    } else if (const ConfigPlace* first = FindKey(level.node, node.text)) {
+    } else if (const ConfigLocation* first = FindKey(level.node, node.text)) {
       what = fmt::format("the key stands twice; first at line {}, column {}", first->line,
                          first->column);
     }
     if (!what.empty()) {
       level.is_key_good = false;
       if (documents_ <= 1) {
-        errors_.Add(node.place, node.IsScalar() ? JoinPath(Path(), node.text) : Path(), what);
+        errors_.Add(node.location, node.IsScalar() ? JoinPath(Path(), node.text) : Path(), what);
       }
     }
     level.has_key = true;
   }
 
-  static const ConfigPlace* FindKey(const ConfigNode& map, const std::string& key) {
+  static const ConfigLocation* FindKey(const ConfigNode& map, const std::string& key) {
     for (const ConfigNode::Entry& entry : map.entries) {
       if (entry.key == key) {
-        return &entry.key_place;
+        return &entry.key_location;
       }
     }
     return nullptr;
@@ -275,9 +275,10 @@ class TreeBuilder : public YAML::EventHandler {
       return;
     }
     if (value.IsNull()) {
-      value.place = level.key_place;  // the parser's place of nothing is that of what follows
+      value.location =
+          level.key_location;  // the parser's location of nothing is that of what follows
     }
-    level.node.entries.push_back({level.key, level.key_place, std::move(value)});
+    level.node.entries.push_back({level.key, level.key_location, std::move(value)});
   }
 
   std::vector<std::string_view> lines_;
@@ -299,7 +300,7 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
 
 ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, Loading& loading) {
   const auto fail = [&](const std::string& what) {
-    loading.errors.Add(base.place, "base", what);
+    loading.errors.Add(base.location, "base", what);
     return ConfigNode::Map();
   };
   if (!base.IsScalar() || base.text.empty()) {
@@ -332,10 +333,10 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
   if (tree.IsNull()) {
     tree.kind = ConfigNode::Kind::kMap;
   } else if (!tree.IsMap()) {
-    loading.errors.Add(tree.place, "",
+    loading.errors.Add(tree.location, "",
                        fmt::format("expected a map of options at the top, found {}",
                                    tree.IsList() ? "a list" : "a scalar"));
-    return EmptyMap(tree.place.source);
+    return EmptyMap(tree.location.source);
   }
   const auto entry = std::find_if(tree.entries.begin(), tree.entries.end(),
                                   [](const auto& candidate) { return candidate.key == "base"; });
@@ -348,7 +349,7 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
   return MergeTrees(LoadBase(base, file, loading), tree);
 }
 
-// One override laid over `tree`. `order` places its errors among those of other sources.
+// One override laid over `tree`. `order` puts its errors among those of other sources.
 void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
                    ConfigNode& tree, ConfigErrors& errors) {
   const ConfigSource source{.name = fmt::format("--set {}", override_text),
@@ -357,9 +358,9 @@ void ApplyOverride(std::string_view override_text, int order, const ConfigNode& 
                             .has_lines = false};
   const std::size_t equals = override_text.find('=');
   const std::size_t errors_before = errors.size();
-  const ConfigPlace place{std::make_shared<const ConfigSource>(source)};
+  const ConfigLocation location{std::make_shared<const ConfigSource>(source)};
   if (equals == override_text.npos) {
-    errors.Add(place, "", "an override is written path=value");
+    errors.Add(location, "", "an override is written path=value");
     return;
   }
   const ConfigNode value = ParseConfigText(override_text.substr(equals + 1), source, errors);
@@ -369,7 +370,7 @@ void ApplyOverride(std::string_view override_text, int order, const ConfigNode& 
   try {
     SetPath(tree, override_text.substr(0, equals), value, &defaults);
   } catch (const ConfigError& error) {
-    errors.Add(place, "", error.what());
+    errors.Add(location, "", error.what());
   }
 }
 
@@ -395,9 +396,9 @@ ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
       parser.HandleNextDocument(builder);
     }
   } catch (const YAML::Exception& error) {
-    // The parser has no place for what ends too soon.
+    // The parser has no location for what ends too soon.
     const bool is_at_end = error.msg.starts_with("end of ");
-    errors.Add(is_at_end ? EndOf(text, shared_source) : PlaceAt(shared_source, error.mark), "",
+    errors.Add(is_at_end ? EndOf(text, shared_source) : LocationAt(shared_source, error.mark), "",
                fmt::format("this is not YAML: {}", error.msg));
     return EmptyMap(shared_source);
   }

@@ -71,7 +71,7 @@ T ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors) {
   if constexpr (requires { FaultsBetween(value); }) {
     if (errors.size() == errors_before) {
       for (const OptionFault& fault : FaultsBetween(value)) {
-        errors.Add(PlaceOf(tree, fault.path), fault.path, fault.what);
+        errors.Add(LocationOf(tree, fault.path), fault.path, fault.what);
       }
     }
   }

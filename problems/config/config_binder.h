@@ -74,7 +74,7 @@ void CheckWhole(ConfigErrors& errors, const ConfigItem& item, const T& value) {
   if constexpr (HasCheck<T>) {
     const auto report = [&](std::string_view field, std::string_view what) {
       const ConfigNode* node = item.node.Find(field);
-      errors.Add(node ? node->place : item.node.place, JoinPath(item.path, field), what);
+      errors.Add(node ? node->location : item.node.location, JoinPath(item.path, field), what);
     };
     CheckValue(report, value);
   }
@@ -171,7 +171,7 @@ void ReadMap(ConfigErrors& errors, const ConfigItem& item, ConfigMap<T>& out) {
   }
   out.entries.clear();
   for (const ConfigNode::Entry& entry : item.node.entries) {
-    out.entries.push_back({entry.key, entry.key_place, T{}});
+    out.entries.push_back({entry.key, entry.key_location, T{}});
     ReadElement(errors, {entry.value, JoinPath(item.path, entry.key), item.info},
                 out.entries.back().value);
   }

@@ -10,12 +10,13 @@
 
 namespace semblance {
 
-void ConfigErrors::Add(const ConfigPlace& place, std::string_view path, std::string_view what) {
+void ConfigErrors::Add(const ConfigLocation& location, std::string_view path,
+                       std::string_view what) {
   const std::string_view separator = path.empty() ? "" : ": ";
-  errors_.push_back({.order = place.source ? place.source->order : -1,
-                     .line = place.line,
-                     .column = place.column,
-                     .text = fmt::format("{}: {}{}{}", ToText(place), path, separator, what)});
+  errors_.push_back({.order = location.source ? location.source->order : -1,
+                     .line = location.line,
+                     .column = location.column,
+                     .text = fmt::format("{}: {}{}{}", ToText(location), path, separator, what)});
 }
 
 void ConfigErrors::ThrowIfAny() const {

@@ -19,7 +19,7 @@ class ConfigErrors {
  public:
   // `path` is that of the entry ("a.b[0].c"), empty for the document as a whole; `what` is one
   // clause or more, with the remedy.
-  void Add(const ConfigPlace& place, std::string_view path, std::string_view what);
+  void Add(const ConfigLocation& location, std::string_view path, std::string_view what);
   std::size_t size() const { return errors_.size(); }
   // Throws ConfigError with one line an error, in the order of sources, lines and columns; does
   // nothing if there are none.

@@ -16,7 +16,7 @@ namespace semblance {
 namespace {
 
 void AddError(ConfigErrors& errors, const ConfigItem& item, std::string_view what) {
-  errors.Add(item.node.place, item.path, what);
+  errors.Add(item.node.location, item.path, what);
 }
 
 // What stands there, for "expected a number, found ...".
@@ -224,7 +224,7 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::p
   } else if (text.empty()) {
     out.clear();
   } else {
-    const auto& source = item.node.place.source;
+    const auto& source = item.node.location.source;
     const std::filesystem::path folder = source ? source->folder : std::filesystem::path();
     out = FoundPath(folder, text);
   }
@@ -301,7 +301,7 @@ void RefuseUnknownKeys(ConfigErrors& errors, const ConfigItem& item,
       is_known = is_known || name == entry.key;
     }
     if (!is_known) {
-      errors.Add(entry.key_place, JoinPath(item.path, entry.key),
+      errors.Add(entry.key_location, JoinPath(item.path, entry.key),
                  fmt::format("unknown key{}", Suggestion(entry.key, known)));
     }
   }

@@ -73,8 +73,8 @@ std::vector<Step> ParsePath(std::string_view path) {
 void ExpandBareName(ConfigNode& node) {
   if (node.IsScalar()) {
     ConfigNode map = ConfigNode::Map();
-    map.place = node.place;
-    map.entries.push_back({"type", node.place, std::move(node)});
+    map.location = node.location;
+    map.entries.push_back({"type", node.location, std::move(node)});
     node = std::move(map);
   }
 }
@@ -92,19 +92,19 @@ const ConfigNode* MatchingDefaults(const ConfigNode& node, const ConfigNode* def
 }
 
 // Whether two entries were said together: in one file, or both by overrides.
-bool IsSameLayer(const ConfigPlace& a, const ConfigPlace& b) {
+bool IsSameLayer(const ConfigLocation& a, const ConfigLocation& b) {
   const bool are_overrides = a.source && b.source && !a.source->has_lines && !b.source->has_lines;
   return a.source && (a.source == b.source || are_overrides);
 }
 
-// Leaves of `node` what stands in the layer of `place`. Returns whether anything does.
-bool KeepLayer(ConfigNode& node, const ConfigPlace& place) {
-  bool keeps_part = IsSameLayer(node.place, place);
+// Leaves of `node` what stands in the layer of `location`. Returns whether anything does.
+bool KeepLayer(ConfigNode& node, const ConfigLocation& location) {
+  bool keeps_part = IsSameLayer(node.location, location);
   for (ConfigNode& item : node.items) {
-    keeps_part |= KeepLayer(item, place);
+    keeps_part |= KeepLayer(item, location);
   }
   std::erase_if(node.entries,
-                [&](ConfigNode::Entry& entry) { return !KeepLayer(entry.value, place); });
+                [&](ConfigNode::Entry& entry) { return !KeepLayer(entry.value, location); });
   return keeps_part || !node.entries.empty();
 }
 
@@ -115,13 +115,13 @@ void ForgetFormerType(ConfigNode& variant, const ConfigNode& type, const ConfigN
   const ConfigNode* named = variant.Find("type");
   const ConfigNode* former = named || !defaults ? named : defaults->Find("type");
   if (former && former->text != type.text) {
-    KeepLayer(variant, type.place);
+    KeepLayer(variant, type.location);
   }
 }
 
-// The entry that `step` names; made, as written at `place`, where it is missing.
+// The entry that `step` names; made, as written at `location`, where it is missing.
 ConfigNode& StepIntoMap(ConfigNode& node, const Step& step, const ConfigNode*& defaults,
-                        bool is_last, const ConfigPlace& place) {
+                        bool is_last, const ConfigLocation& location) {
   ExpandBareName(node);
   if (node.IsList()) {
     throw ConfigError(
@@ -133,15 +133,15 @@ ConfigNode& StepIntoMap(ConfigNode& node, const Step& step, const ConfigNode*& d
   const auto entry = std::find_if(node.entries.begin(), node.entries.end(),
                                   [&](const auto& candidate) { return candidate.key == step.key; });
   if (entry != node.entries.end()) {
-    entry->key_place = is_last ? place : entry->key_place;
+    entry->key_location = is_last ? location : entry->key_location;
     return entry->value;
   }
-  node.entries.push_back({std::string(step.key), place, {}});
+  node.entries.push_back({std::string(step.key), location, {}});
   ConfigNode& child = node.entries.back().value;
   if (defaults && !is_last) {
     child = *defaults;
   }
-  child.place = place;
+  child.location = location;
   return child;
 }
 
@@ -161,13 +161,13 @@ ConfigNode& StepIntoList(ConfigNode& node, const Step& step, const ConfigNode*& 
 
 }  // namespace
 
-std::string ToText(const ConfigPlace& place) {
-  if (!place.source) {
+std::string ToText(const ConfigLocation& location) {
+  if (!location.source) {
     return "default";
   }
-  return place.source->has_lines
-             ? fmt::format("{}:{}:{}", place.source->name, place.line, place.column)
-             : place.source->name;
+  return location.source->has_lines
+             ? fmt::format("{}:{}:{}", location.source->name, location.line, location.column)
+             : location.source->name;
 }
 
 ConfigNode ConfigNode::Scalar(std::string text) {
@@ -202,8 +202,8 @@ ConfigNode& ConfigNode::Set(std::string_view key, ConfigNode value) {
   if (ConfigNode* old = Find(key)) {
     return *old = std::move(value);
   }
-  ConfigPlace key_place = value.place;
-  entries.push_back({std::string(key), std::move(key_place), std::move(value)});
+  ConfigLocation key_location = value.location;
+  entries.push_back({std::string(key), std::move(key_location), std::move(value)});
   return entries.back().value;
 }
 
@@ -219,11 +219,11 @@ ConfigNode MergeTrees(ConfigNode base, const ConfigNode& over) {
     ConfigNode* old = base.Find(entry.key);
     base.Set(entry.key, old ? MergeTrees(std::move(*old), entry.value) : entry.value);
   }
-  base.place = over.place;
+  base.location = over.location;
   return base;
 }
 
-ConfigPlace PlaceOf(const ConfigNode& tree, std::string_view path) {
+ConfigLocation LocationOf(const ConfigNode& tree, std::string_view path) {
   const ConfigNode* node = &tree;
   for (const Step& step : ParsePath(path)) {
     const bool has_item = step.index && *step.index < node->items.size();
@@ -234,7 +234,7 @@ ConfigPlace PlaceOf(const ConfigNode& tree, std::string_view path) {
     }
     node = child;
   }
-  return node->place;
+  return node->location;
 }
 
 void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
@@ -248,7 +248,7 @@ void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
       ForgetFormerType(*node, value, defaults);
     }
     node = step.index ? &StepIntoList(*node, step, defaults)
-                      : &StepIntoMap(*node, step, defaults, is_last, value.place);
+                      : &StepIntoMap(*node, step, defaults, is_last, value.location);
   }
   *node = MergeTrees(std::move(*node), value);
   tree = std::move(edited);

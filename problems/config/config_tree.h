@@ -21,15 +21,15 @@ struct ConfigSource {
   bool has_lines = true;         // false for an override, which has no line and column
 };
 
-// A place in a source, for messages. line and column count from 1; 0 where there is none.
-struct ConfigPlace {
+// A location in a source, for messages. line and column count from 1; 0 where there is none.
+struct ConfigLocation {
   std::shared_ptr<const ConfigSource> source;  // null for defaults, which stand in no file
   int line = 0;
   int column = 0;
 };
 
 // "file:3:7", "--set a.b=c" or "default".
-std::string ToText(const ConfigPlace& place);
+std::string ToText(const ConfigLocation& location);
 
 // An ordered tree of null, text, maps and lists. Keys are unique within a map.
 struct ConfigNode {
@@ -39,7 +39,7 @@ struct ConfigNode {
   Kind kind = Kind::kNull;
   std::string text;               // of a scalar, without its quotes
   bool quoted = false;            // a quoted scalar is a text, never a number or true
-  ConfigPlace place;              // of a null in a map: that of its key
+  ConfigLocation location;        // of a null in a map: that of its key
   std::vector<Entry> entries;     // of a map, in the order of the file
   std::vector<ConfigNode> items;  // of a list
 
@@ -65,7 +65,7 @@ struct ConfigNode {
 
 struct ConfigNode::Entry {
   std::string key;
-  ConfigPlace key_place;
+  ConfigLocation key_location;
   ConfigNode value;
 };
 
@@ -74,12 +74,12 @@ inline ConfigNode ConfigNode::Map() { return OfKind(Kind::kMap); }
 inline ConfigNode ConfigNode::List() { return OfKind(Kind::kList); }
 
 // A map in the order of the file that remembers where its keys stand: a field for option paths and
-// other keys whose order or place matters.
+// other keys whose order or location matters.
 template <class T>
 struct ConfigMap {
   struct Entry {
     std::string key;
-    ConfigPlace key_place;
+    ConfigLocation key_location;
     T value;
   };
   std::vector<Entry> entries;
@@ -92,7 +92,7 @@ ConfigNode MergeTrees(ConfigNode base, const ConfigNode& over);
 
 // Where the entry at `path` ("a.b[0].c") stands; where the tree does not hold it, the last entry on
 // the way to it.
-ConfigPlace PlaceOf(const ConfigNode& tree, std::string_view path);
+ConfigLocation LocationOf(const ConfigNode& tree, std::string_view path);
 
 // Sets the entry at `path` ("a.b[0].c"; an index counts from 0) to `value`, merging as MergeTrees
 // does. Maps on the way are made where they are missing; a list must have the item already.

@@ -23,7 +23,7 @@ bool SameSlices(const DicomHeader& a, const DicomHeader& b) {
 
 bool IsImage(const DicomHeader& header) { return header.rows > 0 && header.columns > 0; }
 
-bool HasPlace(const DicomHeader& header) {
+bool HasPosition(const DicomHeader& header) {
   return header.position && header.along_columns && header.along_rows && header.spacing_mm;
 }
 
@@ -45,7 +45,7 @@ void NameSeries(std::vector<DicomSeries>& all) {
 
 void NoteLeftOut(const std::vector<DicomHeader>& headers, std::vector<std::string>& notes) {
   const auto unplaced = std::ranges::count_if(
-      headers, [](const auto& h) { return IsImage(h) && h.frames == 1 && !HasPlace(h); });
+      headers, [](const auto& h) { return IsImage(h) && h.frames == 1 && !HasPosition(h); });
   const auto many = std::ranges::count_if(headers, [](const auto& h) { return h.frames > 1; });
   if (unplaced > 0) {
     notes.push_back(fmt::format("{} images without a position or orientation left out", unplaced));
@@ -91,7 +91,7 @@ std::vector<DicomSeries> GroupSeries(const std::vector<DicomHeader>& headers,
                                      std::vector<std::string>& notes) {
   std::vector<DicomSeries> all;
   for (const DicomHeader& header : headers) {
-    if (!IsImage(header) || !HasPlace(header) || header.frames > 1) {
+    if (!IsImage(header) || !HasPosition(header) || header.frames > 1) {
       continue;
     }
     const auto found = std::ranges::find_if(

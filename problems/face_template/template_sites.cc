@@ -17,14 +17,14 @@ namespace semblance {
 namespace {
 
 // Where the soft-tissue point of a landmark lies on an average adult; of a pair, on the left.
-struct SkinPlace {
+struct SkinSite {
   std::string_view code;  // without side, as Site::landmark
   Vec3 near_skin;         // of HeadPoint, mm
 };
 
 // Heights and widths after the definitions of the sites on the skull, moved out to the skin along
 // the direction in which the dowel of the site stands.
-const SkinPlace kAverageSkin[] = {
+const SkinSite kAverageSkin[] = {
     {"sg", {0, 0, 25}},       // the shallow above glabella
     {"g", {0, -2, 13}},       // most forward point of the brow
     {"n", {0, 1, 1}},         // the root of the nose
@@ -49,7 +49,7 @@ const SkinPlace kAverageSkin[] = {
 };
 
 // On the formula's own features; of a pair, on the left.
-const SkinPlace kFacialLandmarks[] = {
+const SkinSite kFacialLandmarks[] = {
     {"prn", {0, -45, -44}},   // from far in front: the tip itself
     {"sn", {0, -7, -54.5}},   // where the septum meets the philtrum
     {"sbal", {12, -8, -52}},  // under the wing
@@ -62,7 +62,7 @@ const SkinPlace kFacialLandmarks[] = {
 };
 
 const Vec3& NearSkin(const Site& site) {
-  const auto* const found = std::ranges::find(kAverageSkin, site.landmark, &SkinPlace::code);
+  const auto* const found = std::ranges::find(kAverageSkin, site.landmark, &SkinSite::code);
   assert(found != std::end(kAverageSkin));
   return found->near_skin;
 }
@@ -124,7 +124,7 @@ std::map<std::string, Vec2> TemplateSites() {
 
 std::map<std::string, Vec2> FacialLandmarks() {
   std::map<std::string, Vec2> landmarks;
-  for (const SkinPlace& place : kFacialLandmarks) {
+  for (const SkinSite& place : kFacialLandmarks) {
     const std::string code(place.code);
     if (place.near_skin.x() == 0) {
       landmarks[code] = Closest(place.near_skin, 0.5);
@@ -139,7 +139,7 @@ std::map<std::string, Vec2> FacialLandmarks() {
 
 std::vector<std::string> FacialLandmarkCodes() {
   std::vector<std::string> codes;
-  for (const SkinPlace& place : kFacialLandmarks) {
+  for (const SkinSite& place : kFacialLandmarks) {
     const std::string code(place.code);
     const bool midline = place.near_skin.x() == 0;
     codes.push_back(midline ? code : code + "_l");

@@ -63,13 +63,13 @@ Json FeaturesJson(const std::vector<FeatureError>& features) {
   return json;
 }
 
-double AreaAt(const ScoredSkin& skin, SkinPlace place) {
-  return skin.area_cm2[static_cast<int>(place)];
+double AreaAt(const ScoredSkin& skin, SkinStatus status) {
+  return skin.area_cm2[static_cast<int>(status)];
 }
 
 Json SkinJson(const ScoredSkin& skin) {
   Json json;
-  const auto names = EnumNames(SkinPlace{});
+  const auto names = EnumNames(SkinStatus{});
   for (std::size_t k = 0; k < names.size(); ++k) {
     json[fmt::format("{}_cm2", names[k])] = skin.area_cm2[k];
   }
@@ -121,13 +121,13 @@ Json ScoreToJson(const FaceMetrics& metrics, const FaceDetails& details, const S
 
 std::string InWords(const ScoredSkin& skin) {
   std::string left_out;
-  const auto names = EnumNames(SkinPlace{});
-  for (const SkinPlace place : {SkinPlace::kMasked, SkinPlace::kInner, SkinPlace::kEnd}) {
-    left_out += fmt::format("{}{:.1f} cm² {}", left_out.empty() ? "" : ", ", AreaAt(skin, place),
-                            names[static_cast<int>(place)]);
+  const auto names = EnumNames(SkinStatus{});
+  for (const SkinStatus status : {SkinStatus::kMasked, SkinStatus::kInner, SkinStatus::kEnd}) {
+    left_out += fmt::format("{}{:.1f} cm² {}", left_out.empty() ? "" : ", ", AreaAt(skin, status),
+                            names[static_cast<int>(status)]);
   }
   return fmt::format("{:.1f} cm² of outer skin scored; left out of the face: {}",
-                     AreaAt(skin, SkinPlace::kScored), left_out);
+                     AreaAt(skin, SkinStatus::kScored), left_out);
 }
 
 }  // namespace semblance

@@ -59,7 +59,7 @@ bool OnLid(const Vec3& p, const Vec3& normal, const std::vector<CutPlane>& ends)
 void MeasureAreas(const TriMesh& skin, ScoredSkin& scored) {
   const std::vector<double> areas = VertexAreas(skin);
   for (std::size_t v = 0; v < areas.size(); ++v) {
-    scored.area_cm2[static_cast<int>(scored.place[v])] += areas[v] / 100;
+    scored.area_cm2[static_cast<int>(scored.status[v])] += areas[v] / 100;
   }
 }
 
@@ -78,17 +78,17 @@ ScoredSkin FindScoredSkin(const TriMesh& skin, const OuterSkin& felt, const Skul
   const std::vector<Sphere> excluded = ExcludedSpheres(sites.points, options.exclude);
   const std::vector<Vec3> normals = VertexNormals(skin);
   ScoredSkin scored{.region = Extent(skin, sites, dowels, network, options),
-                    .place = std::vector<SkinPlace>(skin.points.size(), SkinPlace::kScored),
+                    .status = std::vector<SkinStatus>(skin.points.size(), SkinStatus::kScored),
                     .ends = felt.ends};
   for (std::size_t v = 0; v < skin.points.size(); ++v) {
     const Vec3& p = skin.points[v];
     const auto holds_p = [&](const Sphere& zone) { return zone.Contains(p); };
-    scored.place[v] = !scored.region.scored[v]                 ? SkinPlace::kBeyond
-                      : OnLid(p, normals[v], felt.ends)        ? SkinPlace::kEnd
-                      : !felt.outer[v]                         ? SkinPlace::kInner
-                      : std::ranges::any_of(excluded, holds_p) ? SkinPlace::kMasked
-                                                               : SkinPlace::kScored;
-    scored.region.scored[v] = scored.place[v] == SkinPlace::kScored;
+    scored.status[v] = !scored.region.scored[v]                 ? SkinStatus::kBeyond
+                       : OnLid(p, normals[v], felt.ends)        ? SkinStatus::kEnd
+                       : !felt.outer[v]                         ? SkinStatus::kInner
+                       : std::ranges::any_of(excluded, holds_p) ? SkinStatus::kMasked
+                                                                : SkinStatus::kScored;
+    scored.region.scored[v] = scored.status[v] == SkinStatus::kScored;
     scored.region.part[v] = scored.region.scored[v] ? scored.region.part[v] : -1;
   }
   scored.region.outer = felt.outer;
@@ -98,7 +98,7 @@ ScoredSkin FindScoredSkin(const TriMesh& skin, const OuterSkin& felt, const Skul
 
 ScoredSkin AllScored(const TriMesh& skin) {
   ScoredSkin scored{.region = WholeSurface(skin),
-                    .place = std::vector<SkinPlace>(skin.points.size(), SkinPlace::kScored)};
+                    .status = std::vector<SkinStatus>(skin.points.size(), SkinStatus::kScored)};
   MeasureAreas(skin, scored);
   return scored;
 }

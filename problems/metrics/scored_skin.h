@@ -15,21 +15,21 @@
 namespace semblance {
 
 // Why a vertex of the skin is scored or not; the first that holds, from the last to the first.
-enum class SkinPlace {
+enum class SkinStatus {
   kScored,
   kMasked,  // in an excluded zone
   kInner,   // a wall of an airway or a sinus, a fold too narrow for the probe
   kEnd,     // a lid where the scan ended
   kBeyond   // not the face: hair, ears, neck, back of the head
 };
-constexpr auto EnumNames(SkinPlace) {
+constexpr auto EnumNames(SkinStatus) {
   return std::to_array<std::string_view>({"scored", "masked", "inner", "end", "beyond"});
 }
 
 struct ScoredSkin {
   FaceRegion region;
-  std::vector<SkinPlace> place;      // one per vertex
-  std::array<double, 5> area_cm2{};  // by SkinPlace
+  std::vector<SkinStatus> status;    // one per vertex
+  std::array<double, 5> area_cm2{};  // by SkinStatus
   std::vector<CutPlane> ends = {};   // of the scan
 };
 

@@ -42,9 +42,7 @@ std::vector<std::size_t> Counts(const std::vector<double>& values, double high) 
   return counts;
 }
 
-double PlaceOf(double value, double high) {
-  return kLeft + value / high * (kWidth - kLeft - kRight);
-}
+double XOf(double value, double high) { return kLeft + value / high * (kWidth - kLeft - kRight); }
 
 // row: of the word beside the line, so that words do not lie on each other.
 std::string MarkSvg(const HistogramMark& mark, double high, int row) {
@@ -52,7 +50,7 @@ std::string MarkSvg(const HistogramMark& mark, double high, int row) {
     return {};
   }
   const bool beyond = mark.value > high;
-  const double x = PlaceOf(std::min(mark.value, high), high);
+  const double x = XOf(std::min(mark.value, high), high);
   const bool right = x > kWidth / 2;
   return svg::Line(x, kTop - 14, x, kBottom, "#d55e00", 2) +
          svg::Text(x + (right ? -6 : 6), kTop + 16 * row,
@@ -71,7 +69,7 @@ std::string HistogramSvg(std::span<const double> values, const std::vector<Histo
   const std::vector<std::size_t> counts = Counts(counted, range.high);
   const auto most =
       static_cast<double>(std::max<std::size_t>(1, *std::ranges::max_element(counts)));
-  const auto x = [&](double v) { return PlaceOf(v, range.high); };
+  const auto x = [&](double v) { return XOf(v, range.high); };
   std::string text = svg::Open(kBottom + 60, kWidth);
   for (int k = 0; k < kBars; ++k) {
     const double low = range.high * k / kBars, high = range.high * (k + 1) / kBars;

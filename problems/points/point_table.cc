@@ -21,26 +21,26 @@ constexpr std::array<std::string_view, kPointColumns> kNames = {
     "x", "y", "z", "u", "v", "weight", "sigma", "exact", "nx", "ny", "nz"};
 
 // Of the file, by PointColumn and then by attribute.
-using ColumnPlaces = std::vector<std::optional<std::size_t>>;
+using ColumnIndices = std::vector<std::optional<std::size_t>>;
 
-// In `places` or not.
-const std::optional<std::size_t>& PlaceOf(const ColumnPlaces& places, PointColumn column) {
-  return places[static_cast<std::size_t>(column)];
+// In `indices` or not.
+const std::optional<std::size_t>& IndexOf(const ColumnIndices& indices, PointColumn column) {
+  return indices[static_cast<std::size_t>(column)];
 }
 
-void CheckPairs(const CsvReader& csv, const ColumnPlaces& places) {
-  const bool u = PlaceOf(places, PointColumn::kU).has_value();
-  if (u != PlaceOf(places, PointColumn::kV).has_value()) {
+void CheckPairs(const CsvReader& csv, const ColumnIndices& indices) {
+  const bool u = IndexOf(indices, PointColumn::kU).has_value();
+  if (u != IndexOf(indices, PointColumn::kV).has_value()) {
     csv.Fail(fmt::format("the column '{}' stands alone; give u and v, or neither", u ? "u" : "v"));
   }
-  if (PlaceOf(places, PointColumn::kWeight) && PlaceOf(places, PointColumn::kSigma)) {
+  if (IndexOf(indices, PointColumn::kWeight) && IndexOf(indices, PointColumn::kSigma)) {
     csv.Fail("there are the columns 'weight' and 'sigma'; give one of them");
   }
-  const auto normal = {PlaceOf(places, PointColumn::kNx).has_value(),
-                       PlaceOf(places, PointColumn::kNy).has_value(),
-                       PlaceOf(places, PointColumn::kNz).has_value()};
+  const auto normal = {IndexOf(indices, PointColumn::kNx).has_value(),
+                       IndexOf(indices, PointColumn::kNy).has_value(),
+                       IndexOf(indices, PointColumn::kNz).has_value()};
   const auto some = std::count(normal.begin(), normal.end(), true);
-  if (some != 0 && (some != 3 || !PlaceOf(places, PointColumn::kExact))) {
+  if (some != 0 && (some != 3 || !IndexOf(indices, PointColumn::kExact))) {
     csv.Fail("the columns nx, ny and nz are of exact points; give all three and 'exact', or none");
   }
 }
@@ -59,37 +59,37 @@ void CheckNames(const CsvReader& csv, std::span<const std::string> attributes) {
   }
 }
 
-ColumnPlaces PlacesIn(const CsvReader& csv, std::span<const std::string> attributes) {
+ColumnIndices IndicesIn(const CsvReader& csv, std::span<const std::string> attributes) {
   CheckNames(csv, attributes);
-  ColumnPlaces places;
+  ColumnIndices indices;
   for (const std::string_view name : kNames) {
-    places.push_back(csv.Find(name));
+    indices.push_back(csv.Find(name));
   }
   for (const std::size_t k : {0, 1, 2}) {
-    if (!places[k]) {
+    if (!indices[k]) {
       csv.Fail(fmt::format("there is no column '{}'; x, y and z are needed", kNames[k]));
     }
   }
   for (const std::string& attribute : attributes) {
-    places.push_back(csv.Find(attribute));
-    if (!places.back()) {
+    indices.push_back(csv.Find(attribute));
+    if (!indices.back()) {
       csv.Fail(
           fmt::format("there is no column '{}', which the option `attributes` names", attribute));
     }
   }
-  CheckPairs(csv, places);
-  return places;
+  CheckPairs(csv, indices);
+  return indices;
 }
 
 // Any table that may be, line by line.
 class PointReader {
  public:
   PointReader(std::string_view text, std::string_view name, std::span<const std::string> attributes)
-      : csv_(text, name), places_(PlacesIn(csv_, attributes)) {
+      : csv_(text, name), indices_(IndicesIn(csv_, attributes)) {
     for (const std::string& attribute : attributes) {
       table_.attributes.push_back({attribute, {}});
     }
-    table_.weights_of_sigma = PlaceOf(places_, PointColumn::kSigma).has_value();
+    table_.weights_of_sigma = IndexOf(indices_, PointColumn::kSigma).has_value();
   }
 
   PointTable Read() {
@@ -104,34 +104,34 @@ class PointReader {
 
  private:
   void ReadPoint() {
-    const auto number = [&](PointColumn column) { return csv_.Number(*PlaceOf(places_, column)); };
+    const auto number = [&](PointColumn column) { return csv_.Number(*IndexOf(indices_, column)); };
     table_.positions.emplace_back(number(PointColumn::kX), number(PointColumn::kY),
                                   number(PointColumn::kZ));
-    if (PlaceOf(places_, PointColumn::kU)) {
+    if (IndexOf(indices_, PointColumn::kU)) {
       table_.uv.emplace_back(number(PointColumn::kU), number(PointColumn::kV));
     }
     for (const PointColumn column : {PointColumn::kWeight, PointColumn::kSigma}) {
-      if (PlaceOf(places_, column)) {
+      if (IndexOf(indices_, column)) {
         table_.weights.push_back(WeightOf(column));
       }
     }
-    if (PlaceOf(places_, PointColumn::kExact)) {
+    if (IndexOf(indices_, PointColumn::kExact)) {
       ReadExact();
     }
     for (std::size_t k = 0; k < table_.attributes.size(); ++k) {
-      table_.attributes[k].values.push_back(csv_.Number(*places_[kPointColumns + k]));
+      table_.attributes[k].values.push_back(csv_.Number(*indices_[kPointColumns + k]));
     }
   }
 
   void ReadExact() {
-    const auto number = [&](PointColumn column) { return csv_.Number(*PlaceOf(places_, column)); };
+    const auto number = [&](PointColumn column) { return csv_.Number(*IndexOf(indices_, column)); };
     const double exact = number(PointColumn::kExact);
     if (exact != 0 && exact != 1) {
       csv_.Fail(
           fmt::format("exact is {}; write 1 for a point that is to be met exactly, else 0", exact));
     }
     if (exact == 1) {
-      const bool normal = PlaceOf(places_, PointColumn::kNx).has_value();
+      const bool normal = IndexOf(indices_, PointColumn::kNx).has_value();
       AddExact(table_, normal ? Vec3(number(PointColumn::kNx), number(PointColumn::kNy),
                                      number(PointColumn::kNz))
                               : Vec3::Zero());
@@ -139,7 +139,7 @@ class PointReader {
   }
 
   double WeightOf(PointColumn column) const {
-    const double number = csv_.Number(*PlaceOf(places_, column));
+    const double number = csv_.Number(*IndexOf(indices_, column));
     const double weight = column == PointColumn::kWeight ? number : 1 / (number * number);
     if (!(number > 0) || !std::isfinite(weight)) {
       csv_.Fail(fmt::format("the {} is {}; it must be positive{}",
@@ -150,7 +150,7 @@ class PointReader {
   }
 
   CsvReader csv_;
-  ColumnPlaces places_;
+  ColumnIndices indices_;
   PointTable table_;
 };
 
@@ -168,12 +168,12 @@ bool PointColumns::Has(PointColumn wanted) const {
 PointColumns PointColumnsOf(std::string_view first_line, std::string_view name,
                             std::span<const std::string> attributes) {
   const CsvReader csv(first_line, name);
-  const ColumnPlaces places = PlacesIn(csv, attributes);
+  const ColumnIndices indices = IndicesIn(csv, attributes);
   PointColumns columns{.kinds = std::vector<std::size_t>(csv.Columns().size()),
                        .attributes = {attributes.begin(), attributes.end()}};
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    if (places[k]) {
-      columns.kinds[*places[k]] = k;
+  for (std::size_t k = 0; k < indices.size(); ++k) {
+    if (indices[k]) {
+      columns.kinds[*indices[k]] = k;
     }
   }
   return columns;

@@ -191,7 +191,7 @@ void AddMissing(std::span<const NamedFile> named, const ConfigNode& tree, Config
   for (const NamedFile& input : named) {
     const bool is_told = input.option.starts_with("template.") || input.option.starts_with("bust.");
     if (!is_told && !std::filesystem::exists(input.file, ignored)) {
-      errors.Add(PlaceOf(tree, input.option), input.option,
+      errors.Add(LocationOf(tree, input.option), input.option,
                  fmt::format("no such file: {}; paths are relative to the file that they stand in",
                              input.file.string()));
     }

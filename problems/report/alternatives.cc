@@ -33,10 +33,10 @@ bool IsName(const std::string& name) {
 
 // Settings are read as if they stood in a file of that folder.
 void StartPathsAt(const fs::path& folder, ConfigNode& node) {
-  if (node.place.source && !node.place.source->has_lines) {
-    auto source = std::make_shared<ConfigSource>(*node.place.source);
+  if (node.location.source && !node.location.source->has_lines) {
+    auto source = std::make_shared<ConfigSource>(*node.location.source);
     source->folder = folder;
-    node.place.source = std::move(source);
+    node.location.source = std::move(source);
   }
   for (ConfigNode::Entry& entry : node.entries) {
     StartPathsAt(folder, entry.value);

@@ -70,17 +70,17 @@ Image WriteBust(Album& album) {
   return Render(head, album.cameras.front(), options, album.threads);
 }
 
-Colour PlaceColour(SkinPlace place) {
-  switch (place) {
-    case SkinPlace::kScored:
+Colour StatusColour(SkinStatus status) {
+  switch (status) {
+    case SkinStatus::kScored:
       return HexColour(0x4f9d69);
-    case SkinPlace::kMasked:
+    case SkinStatus::kMasked:
       return HexColour(0xe0a030);
-    case SkinPlace::kInner:
+    case SkinStatus::kInner:
       return HexColour(0xb03060);
-    case SkinPlace::kEnd:
+    case SkinStatus::kEnd:
       return HexColour(0x6070c0);
-    case SkinPlace::kBeyond:
+    case SkinStatus::kBeyond:
       break;
   }
   return HexColour(0xc8c0b8);
@@ -90,8 +90,8 @@ Colour PlaceColour(SkinPlace place) {
 void WriteScoredSkin(Album& album) {
   const ScoredSkin& skin = album.result.truth->skin;
   SceneObject object = SkinObject(*album.result.subject.skin);
-  for (const SkinPlace place : skin.place) {
-    object.vertex_colours.push_back(PlaceColour(place));
+  for (const SkinStatus status : skin.status) {
+    object.vertex_colours.push_back(StatusColour(status));
   }
   WriteSheet("pictures/scored.png", {{object}}, {InWords(skin), {}, std::nullopt},
              Lighting::kStudio, album.of_skin, album);

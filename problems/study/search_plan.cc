@@ -19,17 +19,18 @@ SearchAxis AxisOf(const ConfigMap<SearchedNumber>::Entry& entry, ConfigErrors& e
   const std::string path = JoinPath("search.ranges", entry.key);
   SearchAxis axis{.whole = IsWhole(low) && IsWhole(high), .log = log};
   if (low.IsNull() || high.IsNull()) {
-    errors.Add(entry.key_place, path, "give both ends, as in {low: 0.1, high: 1.0}");
+    errors.Add(entry.key_location, path, "give both ends, as in {low: 0.1, high: 1.0}");
     return axis;
   }
   const std::size_t before = errors.size();
   ReadScalar(errors, {low, JoinPath(path, "low"), FieldInfo{}}, axis.low);
   ReadScalar(errors, {high, JoinPath(path, "high"), FieldInfo{}}, axis.high);
   if (errors.size() == before && !(axis.low < axis.high)) {
-    errors.Add(entry.key_place, path, "low must be lower than high");
+    errors.Add(entry.key_location, path, "low must be lower than high");
   }
   if (errors.size() == before && axis.log && !(axis.low > 0)) {
-    errors.Add(entry.key_place, path, "log: both ends must be above 0; raise low, or take log out");
+    errors.Add(entry.key_location, path,
+               "log: both ends must be above 0; raise low, or take log out");
   }
   return axis;
 }
@@ -48,14 +49,15 @@ StudyRow RowAt(const SearchPlan& plan, const SearchPoint& point) {
   StudyRow row;
   std::size_t k = plan.options.ranges.entries.size();
   for (const auto& choice : plan.options.choices.entries) {
-    row.push_back({choice.key, choice.key_place, choice.value[static_cast<std::size_t>(point[k])]});
+    row.push_back(
+        {choice.key, choice.key_location, choice.value[static_cast<std::size_t>(point[k])]});
     ++k;
   }
   k = 0;  // after the choices, so that a number that a chosen type does not have is a fault
   for (const auto& range : plan.options.ranges.entries) {
     ConfigNode value = ConfigNode::Scalar(NumberText(plan.space[k], point[k]));
-    value.place = range.value.low.place;
-    row.push_back({range.key, range.key_place, std::move(value)});
+    value.location = range.value.low.location;
+    row.push_back({range.key, range.key_location, std::move(value)});
     ++k;
   }
   return row;
@@ -123,7 +125,7 @@ SearchPlan MakeSearchPlan(const StudySearch& options, const ConfigNode& tree,
   }
   for (const auto& choice : options.choices.entries) {
     if (std::ranges::find(plan.axes, choice.key) != plan.axes.end()) {
-      errors.Add(PlaceOf(tree, "search.choices"), JoinPath("search.choices", choice.key),
+      errors.Add(LocationOf(tree, "search.choices"), JoinPath("search.choices", choice.key),
                  "stands among the ranges too; take one out");
     }
     plan.axes.push_back(choice.key);

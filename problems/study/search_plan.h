@@ -21,7 +21,7 @@ struct SearchPlan {
 // Says of a short run which rung it is on ("1 of 3"); of a run in full it says nothing.
 inline constexpr const char* kRungAxis = "rung";
 
-// Without subjects. What is wrong with the axes goes to `errors`, at its place in the file.
+// Without subjects. What is wrong with the axes goes to `errors`, at its location in the file.
 SearchPlan MakeSearchPlan(const StudySearch& options, const ConfigNode& tree, ConfigErrors& errors);
 
 // Rows that have every end and every choice of each axis with those of each other one: what is

@@ -81,7 +81,7 @@ class SubjectReader {
   }
 
   void Fail(std::string_view path, std::string_view what) const {
-    errors_.Add(PlaceOf(tree_, path), path, what);
+    errors_.Add(LocationOf(tree_, path), path, what);
   }
 
   ConfigNode ReadBase() const {
@@ -238,11 +238,11 @@ void CheckMetric(const StudyFile& study, const ConfigNode& tree, ConfigErrors& e
   const char* const path = SearchHasMetric(study) ? "search.metric" : "metric";
   if (const std::string complaint = ComplaintAboutMetric(MetricOf(study), study.job);
       !complaint.empty()) {
-    errors.Add(PlaceOf(tree, path), path, complaint);
+    errors.Add(LocationOf(tree, path), path, complaint);
   }
   if (SearchHasMetric(study) && tree.Find("metric") && study.metric != study.search->metric) {
     errors.Add(
-        PlaceOf(tree, path), path,
+        LocationOf(tree, path), path,
         fmt::format("the study's metric is '{}'; a study has one: take one out", study.metric));
   }
 }
@@ -324,7 +324,7 @@ void CheckSubjects(const fs::path& file, const ConfigNode& tree, const StudyPlan
     faults.Add(fmt::format(
         "{}: metric: '{}' is measured against the true skin, which no subject has; name the skins "
         "(subject.skin), or another metric",
-        ToText(PlaceOf(tree, "metric")), plan.metric));
+        ToText(LocationOf(tree, "metric")), plan.metric));
   }
 }
 
@@ -332,7 +332,7 @@ void CheckSubjects(const fs::path& file, const ConfigNode& tree, const StudyPlan
 StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& errors) {
   StudyFile study = ReadStudyFile(file, tree, errors);
   if (const std::string complaint = ComplaintAboutSize(study); !complaint.empty()) {
-    errors.Add(tree.place, "", complaint);
+    errors.Add(tree.location, "", complaint);
     errors.ThrowIfAny();
   }
   return study;

@@ -34,7 +34,7 @@ std::vector<StudyRow> GridRows(const OptionAxes& grid) {
   for (const OptionAxes::Entry& axis : grid.entries) {
     std::vector<StudyRow> values;
     for (const ConfigNode& value : axis.value) {
-      values.push_back({{axis.key, axis.key_place, value}});
+      values.push_back({{axis.key, axis.key_location, value}});
     }
     rows = Product(rows, values);
   }
@@ -49,13 +49,13 @@ std::vector<StudyRow> ZipRows(const OptionAxes& zip, ConfigErrors& errors) {
   std::vector<StudyRow> rows(first.value.size());
   for (const OptionAxes::Entry& axis : zip.entries) {
     if (axis.value.size() != rows.size()) {
-      errors.Add(axis.key_place, JoinPath("zip", axis.key),
+      errors.Add(axis.key_location, JoinPath("zip", axis.key),
                  fmt::format("{} values, but '{}' has {}; the lists of zip go side by side",
                              axis.value.size(), first.key, rows.size()));
       continue;
     }
     for (std::size_t n = 0; n < rows.size(); ++n) {
-      rows[n].push_back({axis.key, axis.key_place, axis.value[n]});
+      rows[n].push_back({axis.key, axis.key_location, axis.value[n]});
     }
   }
   return rows;
@@ -75,14 +75,14 @@ struct SampleRange {
 };
 
 // Nothing, and an error, if the two are not a lower and a higher number.
-std::optional<SampleRange> ReadRange(const std::string& path, const ConfigPlace& place,
+std::optional<SampleRange> ReadRange(const std::string& path, const ConfigLocation& location,
                                      const std::array<ConfigNode, 2>& ends, ConfigErrors& errors) {
   SampleRange range;
   const std::size_t before = errors.size();
   ReadScalar(errors, {ends[0], JoinPath(path, std::size_t{0}), FieldInfo{}}, range.low);
   ReadScalar(errors, {ends[1], JoinPath(path, std::size_t{1}), FieldInfo{}}, range.high);
   if (errors.size() == before && !(range.low < range.high)) {
-    errors.Add(place, path, "the first number must be the lower");
+    errors.Add(location, path, "the first number must be the lower");
   }
   range.whole = std::all_of(ends.begin(), ends.end(), [](const ConfigNode& end) {
     return end.text.find_first_of(".eE") == std::string::npos;
@@ -107,12 +107,12 @@ std::vector<StudyRow> SampleRows(const std::optional<StudySamples>& samples, Con
   const auto points =
       UnitSamples(samples->method, samples->n, static_cast<int>(axes.size()), samples->random_seed);
   for (std::size_t k = 0; k < axes.size(); ++k) {
-    const auto range =
-        ReadRange(JoinPath("sample.ranges", axes[k].key), axes[k].key_place, axes[k].value, errors);
+    const auto range = ReadRange(JoinPath("sample.ranges", axes[k].key), axes[k].key_location,
+                                 axes[k].value, errors);
     for (std::size_t n = 0; range && n < rows.size(); ++n) {
       ConfigNode value = ConfigNode::Scalar(SampleText(*range, points[n][k]));
-      value.place = axes[k].value[0].place;
-      rows[n].push_back({axes[k].key, axes[k].key_place, std::move(value)});
+      value.location = axes[k].value[0].location;
+      rows[n].push_back({axes[k].key, axes[k].key_location, std::move(value)});
     }
   }
   return rows;
@@ -153,7 +153,7 @@ void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, Conf
   try {
     SetPath(tree, setting.key, setting.value, &defaults);
   } catch (const ConfigError& error) {
-    errors.Add(setting.key_place, "", error.what());
+    errors.Add(setting.key_location, "", error.what());
   }
 }
 

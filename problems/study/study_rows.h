@@ -26,7 +26,7 @@ std::string ComplaintAboutSize(const StudyFile& study);
 std::vector<StudyRow> StudyRows(const StudyFile& study, ConfigErrors& errors);
 
 // Sets the option in an experiment's tree; `defaults` as for SetPath. A path that leads nowhere is
-// an error at its place.
+// an error at its location.
 void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, ConfigNode& tree,
                   ConfigErrors& errors);
 

@@ -317,8 +317,8 @@ TriMesh InFrameOf(const FileSubject& files, TriMesh mesh) {
   return mesh;
 }
 
-const FileSubject& FilesOf(const OpenPlace& place) {
-  return std::get<FileSubject>(place.experiment.subject);
+const FileSubject& FilesOf(const OpenBase& base) {
+  return std::get<FileSubject>(base.experiment.subject);
 }
 
 std::string StemOf(const fs::path& path) {
@@ -331,42 +331,42 @@ std::string NameOfVolume(const fs::path& path, const fs::path& root) {
   return BatchOf(root, path) == path ? "volume" : StemOf(path);
 }
 
-Opened OpenSkinOf(const OpenRequest& request, const fs::path& path, const OpenPlace& place,
+Opened OpenSkinOf(const OpenRequest& request, const fs::path& path, const OpenBase& base,
                   Additions& added, const RunContext& context) {
   const VolumeReading reading = ReadVolume(path, request.volume.read, context);
-  Opened opened{.what = {}, .state = place.state, .notes = reading.notes};
+  Opened opened{.what = {}, .state = base.state, .notes = reading.notes};
   TriMesh skin = reading.modality == Modality::kMr
                      ? ImportMrSkin(reading.volume, {}, context).skin
                      : ImportCt(reading.volume, request.volume.import, context).skin;
-  const fs::path file = added.NewPath(NameOfVolume(path, place.folder.Root()) + "_skin.ply");
-  WriteFileAtomically(file, EncodeMesh(InFrameOf(FilesOf(place), std::move(skin)), ".ply"));
+  const fs::path file = added.NewPath(NameOfVolume(path, base.folder.Root()) + "_skin.ply");
+  WriteFileAtomically(file, EncodeMesh(InFrameOf(FilesOf(base), std::move(skin)), ".ply"));
   opened.state = ChangeSetting(std::move(opened.state), "subject.skin",
-                               PathForState(file, place.folder.Root()));
+                               PathForState(file, base.folder.Root()));
   return opened;
 }
 
-Opened OpenMesh(const OpenRequest& request, const fs::path& path, const OpenPlace& place,
+Opened OpenMesh(const OpenRequest& request, const fs::path& path, const OpenBase& base,
                 Additions& added) {
   const fs::path file = added.Settled(path);
   if (request.as == OpenAs::kHead) {
     FileSubject files;
     files.skull = file;
     return {.what = {},
-            .state = WithHead(place.state, files, StemOf(path), place.folder.Root()),
+            .state = WithHead(base.state, files, StemOf(path), base.folder.Root()),
             .notes = {}};
   }
   return {.what = {},
-          .state = ChangeSetting(place.state, fmt::format("subject.{}", WordOf(request.as)),
-                                 PathForState(file, place.folder.Root())),
+          .state = ChangeSetting(base.state, fmt::format("subject.{}", WordOf(request.as)),
+                                 PathForState(file, base.folder.Root())),
           .notes = {}};
 }
 
-Opened OpenVolume(const OpenRequest& request, const fs::path& path, const OpenPlace& place,
+Opened OpenVolume(const OpenRequest& request, const fs::path& path, const OpenBase& base,
                   Additions& added, const RunContext& context) {
   if (request.as == OpenAs::kSkin) {
-    return OpenSkinOf(request, path, place, added, context);
+    return OpenSkinOf(request, path, base, added, context);
   }
-  const std::string name = NameOfVolume(path, place.folder.Root());
+  const std::string name = NameOfVolume(path, base.folder.Root());
   CtSubject subject = request.volume;
   subject.volume = path;
   subject.landmarks.clear();
@@ -374,18 +374,18 @@ Opened OpenVolume(const OpenRequest& request, const fs::path& path, const OpenPl
   Opened opened;
   const FileSubject files =
       SubjectAsFiles(subject, added.NewPath(name), read, context, opened.notes);
-  opened.state = WithHead(place.state, files, name, place.folder.Root());
+  opened.state = WithHead(base.state, files, name, base.folder.Root());
   return opened;
 }
 
-Opened OpenConfig(const OpenRequest& request, const fs::path& path, const OpenPlace& place,
+Opened OpenConfig(const OpenRequest& request, const fs::path& path, const OpenBase& base,
                   Additions& added, const RunContext& context) {
   const fs::path file = added.SettledWithAll(path);
-  Opened opened{.what = {}, .state = place.state, .notes = {}};
+  Opened opened{.what = {}, .state = base.state, .notes = {}};
   Experiment experiment;
   if (request.as == OpenAs::kOptions) {
     experiment = ReadConfig<Experiment>(file);
-    experiment.subject = place.experiment.subject;
+    experiment.subject = base.experiment.subject;
     experiment.edits.clear();
     opened.state.settings.clear();
   } else {
@@ -394,29 +394,29 @@ Opened OpenConfig(const OpenRequest& request, const fs::path& path, const OpenPl
     opened.state = std::move(beginning.state);
     opened.notes = std::move(beginning.notes);
   }
-  opened.state.start = place.folder.AddStart(StartConfig(experiment, place.folder.Root()));
-  added.Add(place.folder.Root() / opened.state.start);
+  opened.state.start = base.folder.AddStart(StartConfig(experiment, base.folder.Root()));
+  added.Add(base.folder.Root() / opened.state.start);
   return opened;
 }
 
-Opened OpenLandmarks(const OpenRequest& request, const fs::path& path, const OpenPlace& place) {
+Opened OpenLandmarks(const OpenRequest& request, const fs::path& path, const OpenBase& base) {
   LandmarkReading reading = ReadLandmarks(path, {.axes = request.axes});
   return {.what = {},
-          .state = TakeLandmarks(place.state, reading.file),
+          .state = TakeLandmarks(base.state, reading.file),
           .notes = std::move(reading.notes)};
 }
 
-Opened OpenAsAsked(const OpenRequest& request, const Brought& brought, const OpenPlace& place,
+Opened OpenAsAsked(const OpenRequest& request, const Brought& brought, const OpenBase& base,
                    Additions& added, const RunContext& context) {
   switch (brought.kind) {
     case BroughtKind::kMesh:
-      return OpenMesh(request, brought.path, place, added);
+      return OpenMesh(request, brought.path, base, added);
     case BroughtKind::kVolume:
-      return OpenVolume(request, brought.path, place, added, context);
+      return OpenVolume(request, brought.path, base, added, context);
     case BroughtKind::kConfig:
-      return OpenConfig(request, brought.path, place, added, context);
+      return OpenConfig(request, brought.path, base, added, context);
     case BroughtKind::kLandmarks:
-      return OpenLandmarks(request, brought.path, place);
+      return OpenLandmarks(request, brought.path, base);
   }
   return {};
 }
@@ -457,15 +457,15 @@ Brought LookAtBrought(const fs::path& path) {
   return fs::is_directory(status) ? LookAtFolder(path) : LookAtFile(path);
 }
 
-void OpenBrought(const OpenRequest& request, const OpenPlace& place, const RunContext& context,
+void OpenBrought(const OpenRequest& request, const OpenBase& base, const RunContext& context,
                  const std::function<void(Opened)>& take) {
   context.Report("look");
   const Brought brought = LookAtBrought(request.path);
   CheckWay(request, brought);
-  const fs::path batch = BatchOf(place.folder.Root(), brought.path);
+  const fs::path batch = BatchOf(base.folder.Root(), brought.path);
   try {
-    Additions added(place.folder);
-    Opened opened = OpenAsAsked(request, brought, place, added, context);
+    Additions added(base.folder);
+    Opened opened = OpenAsAsked(request, brought, base, added, context);
     const std::string name = batch == brought.path ? "slices" : brought.path.filename().string();
     opened.what = fmt::format("opened {} as {}", name, WordOf(request.as));
     take(std::move(opened));
@@ -479,7 +479,7 @@ void OpenBrought(const OpenRequest& request, const OpenPlace& place, const RunCo
         error.what()));
   }
   if (!batch.empty()) {
-    DropIncoming(place.folder.Root(), batch.filename().string());
+    DropIncoming(base.folder.Root(), batch.filename().string());
   }
 }
 

@@ -54,7 +54,7 @@ struct OpenRequest {
 };
 
 // What an opening starts from.
-struct OpenPlace {
+struct OpenBase {
   const BenchFolder& folder;
   const BenchState& state;
   const Experiment& experiment;  // of that state
@@ -70,7 +70,7 @@ struct Opened {
 // the folder under names that are free; they are gone again if anything throws, `take` too. What
 // the browser had sent is forgotten once it is opened. Throws as ReadVolume, ImportCt, ReadConfig,
 // ReadLandmarks and `take`; InputError for a kind that cannot be taken so.
-void OpenBrought(const OpenRequest& request, const OpenPlace& place, const RunContext& context,
+void OpenBrought(const OpenRequest& request, const OpenBase& base, const RunContext& context,
                  const std::function<void(Opened)>& take);
 
 }  // namespace semblance

@@ -206,7 +206,7 @@ std::string Names(const PlyElement& element) {
 }
 
 // Where each property of a vertex goes.
-struct PlyPlaces {
+struct PlyColumns {
   std::optional<std::array<std::size_t, 3>> normal, colour;
   std::vector<std::size_t> scalars;
 };
@@ -225,14 +225,14 @@ std::optional<std::array<std::size_t, 3>> FindThree(const PlyElement& vertex,
   return three;
 }
 
-PlyPlaces PlacesOf(const PlyElement& vertex) {
-  PlyPlaces places{.normal = FindThree(vertex, {"nx", "ny", "nz"}),
-                   .colour = FindThree(vertex, {"red", "green", "blue"}),
-                   .scalars = {}};
-  if (places.colour && std::ranges::any_of(*places.colour, [&](std::size_t k) {
+PlyColumns ColumnsOf(const PlyElement& vertex) {
+  PlyColumns columns{.normal = FindThree(vertex, {"nx", "ny", "nz"}),
+                     .colour = FindThree(vertex, {"red", "green", "blue"}),
+                     .scalars = {}};
+  if (columns.colour && std::ranges::any_of(*columns.colour, [&](std::size_t k) {
         return vertex.properties[k].type != PlyType::kUint8;
       })) {
-    places.colour.reset();
+    columns.colour.reset();
   }
   const auto is_of = [](const std::optional<std::array<std::size_t, 3>>& three, std::size_t k) {
     return three && std::ranges::find(*three, k) != three->end();
@@ -240,20 +240,21 @@ PlyPlaces PlacesOf(const PlyElement& vertex) {
   for (std::size_t k = 0; k < vertex.properties.size(); ++k) {
     const PlyProperty& property = vertex.properties[k];
     const bool is_axis = property.name == "x" || property.name == "y" || property.name == "z";
-    if (!is_axis && !property.length_type && !is_of(places.normal, k) && !is_of(places.colour, k)) {
-      places.scalars.push_back(k);
+    if (!is_axis && !property.length_type && !is_of(columns.normal, k) &&
+        !is_of(columns.colour, k)) {
+      columns.scalars.push_back(k);
     }
   }
-  return places;
+  return columns;
 }
 
 // In text any number may stand there.
 template <class Data>
-void CheckColour(const Data& data, const std::vector<double>& row, const PlyPlaces& places,
+void CheckColour(const Data& data, const std::vector<double>& row, const PlyColumns& columns,
                  std::int64_t vertex) {
   constexpr double kColours = 256;
-  for (std::size_t k = 0; places.colour && k < 3; ++k) {
-    if (const double value = row[(*places.colour)[k]]; !IsIndex(value, kColours)) {
+  for (std::size_t k = 0; columns.colour && k < 3; ++k) {
+    if (const double value = row[(*columns.colour)[k]]; !IsIndex(value, kColours)) {
       data.Fail(fmt::format("vertex {} has a colour of {}; allowed are whole numbers from 0 to 255",
                             vertex, value));
     }
@@ -261,27 +262,27 @@ void CheckColour(const Data& data, const std::vector<double>& row, const PlyPlac
 }
 
 // One row of values as the attributes of a vertex.
-void AppendVertex(const std::vector<double>& row, const PlyPlaces& places,
+void AppendVertex(const std::vector<double>& row, const PlyColumns& columns,
                   MeshAttributes& attributes) {
-  if (places.normal) {
-    const auto& n = *places.normal;
+  if (columns.normal) {
+    const auto& n = *columns.normal;
     attributes.normals.emplace_back(row[n[0]], row[n[1]], row[n[2]]);
   }
-  if (places.colour) {
+  if (columns.colour) {
     const auto byte = [&](std::size_t k) { return static_cast<std::uint8_t>(row[k]); };
-    const auto& c = *places.colour;
+    const auto& c = *columns.colour;
     attributes.colors.push_back({byte(c[0]), byte(c[1]), byte(c[2])});
   }
-  for (std::size_t k = 0; k < places.scalars.size(); ++k) {
-    attributes.scalars[k].values.push_back(row[places.scalars[k]]);
+  for (std::size_t k = 0; k < columns.scalars.size(); ++k) {
+    attributes.scalars[k].values.push_back(row[columns.scalars[k]]);
   }
 }
 
 template <class Data>
 MeshAttributes ReadAttributesData(Data data, const PlyHeader& header, const PlyElement& vertex) {
-  const PlyPlaces places = PlacesOf(vertex);
+  const PlyColumns columns = ColumnsOf(vertex);
   MeshAttributes attributes;
-  for (const std::size_t k : places.scalars) {
+  for (const std::size_t k : columns.scalars) {
     attributes.scalars.push_back({vertex.properties[k].name, {}});
   }
   std::vector<double> row(vertex.properties.size());
@@ -296,8 +297,8 @@ MeshAttributes ReadAttributesData(Data data, const PlyHeader& header, const PlyE
         },
         [&](std::int64_t vertex_number) {
           if (is_vertex) {
-            CheckColour(data, row, places, vertex_number);
-            AppendVertex(row, places, attributes);
+            CheckColour(data, row, columns, vertex_number);
+            AppendVertex(row, columns, attributes);
           }
         });
   }

@@ -31,8 +31,8 @@ ScoredSkin Scored(const std::vector<std::string>& left_out, FaceRegionOptions op
   return FindScoredSkin(Head().face, CompleteSites(SitesBut(left_out)), {}, {}, options);
 }
 
-double AreaAt(const ScoredSkin& skin, SkinPlace place) {
-  return skin.area_cm2[static_cast<int>(place)];
+double AreaAt(const ScoredSkin& skin, SkinStatus status) {
+  return skin.area_cm2[static_cast<int>(status)];
 }
 
 // Scored in one and not in the other, cm^2.
@@ -47,24 +47,24 @@ double Difference(const ScoredSkin& a, const ScoredSkin& b) {
 
 TEST(ScoredSkin, IsTheFaceBetweenHairEarsAndChin) {
   const ScoredSkin skin = Scored({});
-  EXPECT_GT(AreaAt(skin, SkinPlace::kScored), 300);
-  EXPECT_LT(AreaAt(skin, SkinPlace::kScored), 500);
-  EXPECT_EQ(AreaAt(skin, SkinPlace::kMasked), 0);
+  EXPECT_GT(AreaAt(skin, SkinStatus::kScored), 300);
+  EXPECT_LT(AreaAt(skin, SkinStatus::kScored), 500);
+  EXPECT_EQ(AreaAt(skin, SkinStatus::kMasked), 0);
   EXPECT_NEAR(std::accumulate(skin.area_cm2.begin(), skin.area_cm2.end(), 0.0),
               Area(Head().face) / 100, 1e-6);
-  for (std::size_t v = 0; v < skin.place.size(); ++v) {
+  for (std::size_t v = 0; v < skin.status.size(); ++v) {
     const Vec3& p = Head().face.points[v];
-    EXPECT_EQ(skin.region.scored[v], skin.place[v] == SkinPlace::kScored);
+    EXPECT_EQ(skin.region.scored[v], skin.status[v] == SkinStatus::kScored);
     EXPECT_EQ(skin.region.part[v] >= 0, bool(skin.region.scored[v]));
     if (p.y() > 95 || p.z() > 80) {
-      EXPECT_EQ(skin.place[v], SkinPlace::kBeyond);
+      EXPECT_EQ(skin.status[v], SkinStatus::kBeyond);
     }
   }
 }
 
 TEST(ScoredSkin, IsTheSameWhateverLandmarksThereAre) {
   const ScoredSkin all = Scored({});
-  const double area = AreaAt(all, SkinPlace::kScored);
+  const double area = AreaAt(all, SkinStatus::kScored);
   for (const PhantomSite& site : Head().sites) {
     EXPECT_LE(Difference(all, Scored({site.site})), 0.03 * area) << site.site;
   }
@@ -77,9 +77,9 @@ TEST(ScoredSkin, AZoneIsMaskedAlsoWhereTheSiteIsOnlyForeseen) {
   const FaceRegionOptions masked{.exclude = {{"zy_r", 30}}};
   for (const auto& left_out : {std::vector<std::string>{}, std::vector<std::string>{"zy_r"}}) {
     const ScoredSkin all = Scored(left_out), skin = Scored(left_out, masked);
-    EXPECT_GT(AreaAt(skin, SkinPlace::kMasked), 10);
-    EXPECT_NEAR(AreaAt(skin, SkinPlace::kScored) + AreaAt(skin, SkinPlace::kMasked),
-                AreaAt(all, SkinPlace::kScored), 1e-9);
+    EXPECT_GT(AreaAt(skin, SkinStatus::kMasked), 10);
+    EXPECT_NEAR(AreaAt(skin, SkinStatus::kScored) + AreaAt(skin, SkinStatus::kMasked),
+                AreaAt(all, SkinStatus::kScored), 1e-9);
   }
   EXPECT_THROW(Scored({}, {.exclude = {{"elbow", 30}}}), InputError);
 }
@@ -96,8 +96,8 @@ TEST(ScoredSkin, InnerWallsAreLeftOutAndNoDistanceIsTakenToThem) {
   }
   const SkullSites sites = CompleteSites(SitesBut({}));
   const ScoredSkin scored = FindScoredSkin(skin, sites, {}, {}, {.probe_mm = 15, .exclude = {}});
-  EXPECT_NEAR(AreaAt(scored, SkinPlace::kScored), AreaAt(Scored({}), SkinPlace::kScored), 1e-9);
-  EXPECT_GT(AreaAt(scored, SkinPlace::kInner), 100);
+  EXPECT_NEAR(AreaAt(scored, SkinStatus::kScored), AreaAt(Scored({}), SkinStatus::kScored), 1e-9);
+  EXPECT_GT(AreaAt(scored, SkinStatus::kInner), 100);
   for (std::size_t v = first; v < skin.points.size(); ++v) {
     EXPECT_FALSE(scored.region.outer[v]);
   }
