@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "problems/command_line/exit_code.h"
 #include "problems/config/config.h"
 #include "problems/edits/edit_script.h"
 #include "problems/exports/export_file.h"
 #include "problems/face_template/template_io.h"
 #include "problems/prior/hspline_prior.h"
-#include "problems/program/exit_code.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/feature.h"

@@ -13,8 +13,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "problems/command_line/exit_code.h"
 #include "problems/config/terminal_text.h"
-#include "problems/program/exit_code.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/out_of_memory.h"

@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
+#include "problems/command_line/exit_code.h"
+#include "problems/command_line/progress.h"
 #include "problems/config/terminal_text.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/landmark_files/site_page.h"
 #include "problems/landmark_files/site_picture.h"
-#include "problems/program/exit_code.h"
-#include "problems/program/progress.h"
 #include "problems/propose/proposal_table.h"
 #include "problems/propose/propose_landmarks.h"
 #include "surfaces/base/atomic_file.h"

@@ -10,10 +10,11 @@
 #include <vector>
 
 #include "problems/command_line/command_tree.h"
+#include "problems/command_line/exit_code.h"
 #include "problems/command_line/unknown_word.h"
-#include "problems/program/exit_code.h"
 #include "problems/program/face_commands.h"
 #include "problems/program/failure.h"
+#include "problems/program/fit_command.h"
 #include "problems/program/landmark_commands.h"
 #include "problems/program/phantom_commands.h"
 #include "problems/program/population_command.h"
@@ -46,9 +47,9 @@ int ParseAndRun(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   app.require_subcommand(1);
   CommandLine line{.stop = StopOnSignals(), .chosen = {}};
-  for (const auto& commands :
-       {RunCommands(), StudyCommands(), FaceCommands(), LandmarkCommands(), TemplateCommands(),
-        PopulationCommands(), PhantomCommands(), WorkbenchCommands(), ShellCommands()}) {
+  for (const auto& commands : {RunCommands(), FitCommands(), StudyCommands(), FaceCommands(),
+                               LandmarkCommands(), TemplateCommands(), PopulationCommands(),
+                               PhantomCommands(), WorkbenchCommands(), ShellCommands()}) {
     Declare(commands, app, line);
   }
   try {

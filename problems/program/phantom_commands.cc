@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "problems/command_line/exit_code.h"
 #include "problems/ct/itk_files.h"
 #include "problems/ct/read_volume.h"
 #include "problems/landmark_files/read_landmarks.h"
@@ -18,7 +19,6 @@
 #include "problems/output/staged_folder.h"
 #include "problems/phantom/phantom_ct.h"
 #include "problems/phantom/phantom_landmarks.h"
-#include "problems/program/exit_code.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

@@ -11,13 +11,13 @@
 #include <thread>
 #include <vector>
 
+#include "problems/command_line/exit_code.h"
 #include "problems/command_line/shard.h"
 #include "problems/config/terminal_text.h"
 #include "problems/output/files.h"
 #include "problems/population/population_files.h"
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
-#include "problems/program/exit_code.h"
 
 namespace semblance {
 namespace {

@@ -14,9 +14,9 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "problems/command_line/exit_code.h"
 #include "problems/ct/mr_skin.h"
 #include "problems/ct/read_volume.h"
 #include "problems/inputs/input_check.h"
@@ -25,14 +25,11 @@
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/stage_cache.h"
-#include "problems/points/fit_report.h"
-#include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
 #include "problems/population/population_file.h"
 #include "problems/program/evaluate.h"
-#include "problems/program/exit_code.h"
 #include "problems/program/failure.h"
-#include "problems/program/progress.h"
+#include "problems/program/work_options.h"
 #include "problems/report/alternatives.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
@@ -47,12 +44,9 @@ namespace semblance {
 namespace {
 
 // What the user typed; each command reads its part.
-struct Arguments {
+struct Arguments : WorkOptions {
   std::vector<std::string> files;
-  std::vector<std::string> overrides;
-  std::string out;
-  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool force = false, quiet = false, schema = false, without_inputs = false;
+  bool schema = false, without_inputs = false;
   std::string options_of = "experiment";
   std::string config, landmarks;
   std::vector<std::string> exclude;
@@ -61,31 +55,7 @@ struct Arguments {
   ReadVolumeOptions reading;
   MrSkinOptions mr;
   std::string modality = "auto";
-  std::stop_token stop;
 };
-
-RunContext MakeContext(const Arguments& arguments) {
-  RunContext context;
-  context.threads = arguments.threads;
-  context.stop_token = arguments.stop;
-  if (!arguments.quiet) {
-    context.on_event = ProgressPrinter(stderr);
-  }
-  return context;
-}
-
-StagedFolder MakeFolder(const Arguments& arguments, const std::string& default_out) {
-  return {arguments.out.empty() ? default_out : arguments.out,
-          arguments.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
-}
-
-// The exit code of a result with these faults.
-int TellFaults(const std::vector<std::string>& faults) {
-  for (const std::string& fault : faults) {
-    fmt::print(stderr, "semblance: the result is not usable: {}\n", fault);
-  }
-  return faults.empty() ? kDone : kNotUsable;
-}
 
 void PrintFaceError(const char* what, const FaceMetrics& m) {
   const DistanceSummary& s = m.truth_to_face;
@@ -99,8 +69,8 @@ int RunCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);
-  StagedFolder folder = MakeFolder(arguments, "out/" + config.stem().string());
-  const RunContext context = MakeContext(arguments);
+  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string());
+  const RunContext context = ContextOf(arguments);
   const std::vector<NamedExperiment> named = AlternativesOf(experiment, config.parent_path());
   StageCache cache(16);
   const RunResult result = Run(experiment, context, &cache);
@@ -125,62 +95,12 @@ int DepthCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);
-  StagedFolder folder = MakeFolder(arguments, "out/" + config.stem().string() + "_depth");
-  const RunContext context = MakeContext(arguments);
+  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string() + "_depth");
+  const RunContext context = ContextOf(arguments);
   const DepthResult result = MeasureDepth(experiment, context);
   WriteDepth(experiment, result, folder.Files(), context);
   folder.Publish();
   fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
-  return TellFaults(result.Faults());
-}
-
-PointFitOptions FitOptionsOf(const Arguments& arguments) {
-  return arguments.files.size() > 1
-             ? ReadConfig<PointFitOptions>(arguments.files[1], arguments.overrides)
-             : ReadConfigText<PointFitOptions>("{}", "the options of the command",
-                                               arguments.overrides);
-}
-
-bool IsConfigName(const std::filesystem::path& file) {
-  return file.extension() == ".yaml" || file.extension() == ".yml";
-}
-
-// The other way round is the usual slip.
-void CheckOrder(const std::vector<std::string>& files) {
-  if (files.size() == 2 && IsConfigName(files[0]) && !IsConfigName(files[1])) {
-    throw InputError(fmt::format("fit {0} {1}: the points come first: semblance fit {1} {0}",
-                                 files[0], files[1]));
-  }
-}
-
-int FitCommand(const Arguments& arguments) {
-  CheckOrder(arguments.files);
-  const std::filesystem::path path = arguments.files.at(0);
-  const PointFitOptions options = FitOptionsOf(arguments);
-  PointFile file = ReadPointFile(path, options.attributes);
-  const std::string name = path == "-" ? "standard input" : path.filename().string();
-  StagedFolder folder = MakeFolder(
-      arguments, fmt::format("out/{}", path == "-" ? "points" : name.substr(0, name.find('.', 1))));
-  const RunContext context = MakeContext(arguments);
-  const PointFit result = FitPoints(std::move(file.points), options, context);
-  const std::vector<std::string> notes = WritePointFit(
-      options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
-  folder.Publish();
-  fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
-             result.fit.residual_mm.size(), result.parameters,
-             result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
-             result.fit.point_rms_mm,
-             *std::max_element(result.fit.residual_mm.begin(), result.fit.residual_mm.end()));
-  if (result.fit.automatic) {
-    fmt::print("{}", AutoText(*result.fit.automatic));
-  }
-  for (const std::string& note : notes) {
-    fmt::print("{}\n", note);
-  }
-  if (const auto tolerance = ToleranceOf(options, result)) {
-    fmt::print("{}\n", ToleranceText(*tolerance));
-  }
-  fmt::print("folder: {}\n", folder.Root().string());
   return TellFaults(result.Faults());
 }
 
@@ -380,14 +300,14 @@ void Import(const Arguments& arguments, const VolumeReading& reading, bool mr, O
 
 int ImportCtCommand(const Arguments& arguments) {
   const std::filesystem::path path = arguments.files.at(0);
-  const RunContext context = MakeContext(arguments);
+  const RunContext context = ContextOf(arguments);
   const VolumeReading reading = ReadVolume(path, arguments.reading, context);
   const bool mr = IsMr(arguments, reading);
   if (!mr && arguments.mr.skin_value > 0) {
     throw InputError("--skin-value is for an MR; the skin of a CT is at --skin-hu");
   }
   PrintNotes(reading.notes);
-  StagedFolder folder = MakeFolder(arguments, "out/" + VolumeName(path));
+  StagedFolder folder = FolderOf(arguments, "out/" + VolumeName(path));
   Import(arguments, reading, mr, folder.Files(), context);
   folder.Publish();
   const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();
@@ -409,7 +329,7 @@ int EvaluateCommand(const Arguments& arguments) {
                           .landmarks = arguments.landmarks,
                           .exclude = {}};
   std::ranges::transform(arguments.exclude, std::back_inserter(options.exclude), ParseZone);
-  const nlohmann::ordered_json score = Evaluate(options, MakeContext(arguments));
+  const nlohmann::ordered_json score = Evaluate(options, ContextOf(arguments));
   fmt::print("{}\n", score.dump(2));
   return TellFaults(std::isfinite(score.at("rms_mm").get<double>())
                         ? std::vector<std::string>()
@@ -442,25 +362,6 @@ int ReportCommand(const Arguments& arguments) {
 
 using CommandFunction = int (*)(const Arguments&);
 
-void AddSet(CLI::App& command, Arguments& a) {
-  command
-      .add_option("--set", a.overrides, "path=value, laid over the configuration; may be repeated")
-      ->allow_extra_args(false);
-}
-
-void AddOutput(CLI::App& command, Arguments& a) {
-  command.add_option("--out", a.out, "folder for the results");
-  command.add_flag("--force", a.force,
-                   "replace files of the same name in a folder that is not empty");
-}
-
-void AddWork(CLI::App& command, CommandLine& line, Arguments& a) {
-  a.stop = line.stop;
-  command.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
-  command.add_flag("--quiet", a.quiet, "no progress");
-}
-
 // A command that reads a configuration and writes a folder.
 Arguments& DeclareJob(CLI::App& command, CommandLine& line, CommandFunction run) {
   Arguments& a = *Bind(command, line, run);
@@ -478,19 +379,6 @@ void DeclareRun(CLI::App& command, CommandLine& line) {
 void DeclareDepth(CLI::App& command, CommandLine& line) {
   Arguments& a = DeclareJob(command, line, &DepthCommand);
   command.add_option("CONFIG", a.files, "YAML file of the experiment")->required()->expected(1);
-}
-
-void DeclareFit(CLI::App& command, CommandLine& line) {
-  Arguments& a = DeclareJob(command, line, &FitCommand);
-  command
-      .add_option(
-          "POINTS [CONFIG]", a.files,
-          "points: .csv with the columns x,y,z and, if known, u,v, weight or sigma; .xyz .npy .ply "
-          ".obj .stl .off; each also .gz; - for a CSV on standard input. YAML file of the fit; "
-          "without it all "
-          "follows from the points")
-      ->required()
-      ->expected(1, 2);
 }
 
 void DeclareImportCt(CLI::App& command, CommandLine& line) {
@@ -583,7 +471,6 @@ std::span<const ProgramCommand> RunCommands() {
       ProgramCommand{"depth",
                      "interpolate depth alone: against the true skin, and with dowels left out",
                      &DeclareDepth},
-      ProgramCommand{"fit", "fit an H-spline surface to any scattered points", &DeclareFit},
       ProgramCommand{
           "import-ct",
           "make meshes of skull and skin from a CT volume, or of the skin from an MR, in "

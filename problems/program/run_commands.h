@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands that work on one subject, set of points or folder: run, depth, fit, import-ct,
-// check, options, evaluate, report.
+// The commands that work on one subject or folder: run, depth, import-ct, check, options, evaluate,
+// report.
 #pragma once
 
 #include <span>

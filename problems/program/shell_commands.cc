@@ -7,9 +7,9 @@
 #include <cstdio>
 
 #include "problems/command_line/command_tree.h"
+#include "problems/command_line/exit_code.h"
 #include "problems/command_line/manual_page.h"
 #include "problems/command_line/shell_completion.h"
-#include "problems/program/exit_code.h"
 
 namespace semblance {
 namespace {

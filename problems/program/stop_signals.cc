@@ -6,7 +6,7 @@
 #include <csignal>
 #include <string_view>
 
-#include "problems/program/exit_code.h"
+#include "problems/command_line/exit_code.h"
 
 namespace semblance {
 namespace {

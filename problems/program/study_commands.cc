@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "problems/command_line/exit_code.h"
 #include "problems/command_line/shard.h"
 #include "problems/compare/comparison_files.h"
 #include "problems/compare/rank_agreement.h"
 #include "problems/config/terminal_text.h"
 #include "problems/output/staged_folder.h"
-#include "problems/program/exit_code.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_submit.h"
 #include "problems/study_report/search_report.h"

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "problems/bust/whole_head.h"
+#include "problems/command_line/exit_code.h"
 #include "problems/face_template/template_io.h"
 #include "problems/face_template/template_summary.h"
 #include "problems/output/staged_folder.h"
@@ -20,8 +21,7 @@
 #include "problems/pipeline/experiment_config.h"
 #include "problems/prior/hspline_prior.h"
 #include "problems/prior/recentre.h"
-#include "problems/program/exit_code.h"
-#include "problems/program/progress.h"
+#include "problems/program/work_options.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -31,20 +31,15 @@ namespace {
 namespace fs = std::filesystem;
 
 // What the user typed.
-struct TemplateArguments {
+struct TemplateArguments : WorkOptions {
   fs::path input;
   std::vector<fs::path> landmarks;
-  std::vector<std::string> overrides;
-  std::string out;
   TemplateFitOptions fit;
-  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool bust = false, force = false, quiet = false;
-  std::stop_token stop;
+  bool bust = false;
 };
 
 StagedFolder MakeFolder(const TemplateArguments& a) {
-  return {a.out.empty() ? fmt::format("out/{}_template", a.input.stem().string()) : a.out,
-          a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
+  return FolderOf(a, fmt::format("out/{}_template", a.input.stem().string()));
 }
 
 void Write(const TemplateFace& face, StagedFolder& folder) {
@@ -73,10 +68,7 @@ int FromHead(const TemplateArguments& a) {
   if (!a.overrides.empty()) {
     throw InputError("--set is for a configuration; a head takes --finest and --tolerance_mm");
   }
-  RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
-  if (!a.quiet) {
-    context.on_event = ProgressPrinter(stderr);
-  }
+  const RunContext context = ContextOf(a);
   const TriMesh mesh = ReadMesh(a.input);
   const OuterHead head =
       PrepareHead(mesh, ReadSkinLandmarks(a.landmarks), a.input.string(), context);
@@ -108,7 +100,6 @@ int Template(const TemplateArguments& a) {
 
 void DeclareTemplate(CLI::App& command, CommandLine& line) {
   TemplateArguments& a = *Bind(command, line, &Template);
-  a.stop = line.stop;
   command
       .add_option("MESH", a.input,
                   "head (.ply .obj .stl .off), LPS in mm; or, without LANDMARKS, YAML file of an "
@@ -126,19 +117,13 @@ void DeclareTemplate(CLI::App& command, CommandLine& line) {
   command.add_option("--finest", a.fit.finest, "finest level of the H-spline")
       ->check(CLI::Range(3, 6))
       ->capture_default_str();
-  command
-      .add_option("--set", a.overrides, "path=value, laid over the configuration; may be repeated")
-      ->allow_extra_args(false);
+  AddSet(command, a);
   command.add_flag("--bust", a.bust,
                    "write bust.json too: the whole head, ears and neck, which `bust: {type: "
                    "hspline, file: bust.json}` takes; the mesh must be one piece, open at the "
                    "neck alone but for eyes and mouth");
-  command.add_option("--out", a.out, "folder for the results");
-  command.add_flag("--force", a.force,
-                   "replace files of the same name in a folder that is not empty");
-  command.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
-  command.add_flag("--quiet", a.quiet, "no progress");
+  AddOutput(command, a);
+  AddWork(command, line, a);
 }
 
 // ---------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "problems/program/exit_code.h"
+#include "problems/command_line/exit_code.h"
 #include "problems/program/stop_signals.h"
 #include "problems/serving/http_server.h"
 #include "surfaces/base/error.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/progress.h"
+#include "problems/command_line/progress.h"
 
 #include <fmt/format.h>
 

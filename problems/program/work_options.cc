@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/program/work_options.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "problems/command_line/exit_code.h"
+#include "problems/command_line/progress.h"
+
+namespace semblance {
+
+void AddSet(CLI::App& command, WorkOptions& options) {
+  command
+      .add_option("--set", options.overrides,
+                  "path=value, laid over the configuration; may be repeated")
+      ->allow_extra_args(false);
+}
+
+void AddOutput(CLI::App& command, WorkOptions& options) {
+  command.add_option("--out", options.out, "folder for the results");
+  command.add_flag("--force", options.force,
+                   "replace files of the same name in a folder that is not empty");
+}
+
+void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options) {
+  options.stop = line.stop;
+  command
+      .add_option("--threads", options.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  command.add_flag("--quiet", options.quiet, "no progress");
+}
+
+RunContext ContextOf(const WorkOptions& options) {
+  RunContext context;
+  context.threads = options.threads;
+  context.stop_token = options.stop;
+  if (!options.quiet) {
+    context.on_event = ProgressPrinter(stderr);
+  }
+  return context;
+}
+
+StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out) {
+  return {options.out.empty() ? default_out : options.out,
+          options.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
+}
+
+int TellFaults(const std::vector<std::string>& faults) {
+  for (const std::string& fault : faults) {
+    fmt::print(stderr, "semblance: the result is not usable: {}\n", fault);
+  }
+  return faults.empty() ? kDone : kNotUsable;
+}
+
+}  // namespace semblance
