@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
 
 namespace semblance {
@@ -40,15 +41,6 @@ PointsOfLeaf Of(const NestedPoints& points, const LeafPatch& leaf,
           .scale = static_cast<double>(1 << leaf.level),
           .first_u = static_cast<double>(leaf.i),
           .first_v = static_cast<double>(leaf.j)};
-}
-
-// CubicWeights, in the clones' own instructions.
-SEMBLANCE_INLINE void WeightsAt(double t, double* weights) {
-  const double s = 1 - t;
-  weights[0] = s * s * s / 6;
-  weights[1] = (4 - 6 * t * t + 3 * t * t * t) / 6;
-  weights[2] = (4 - 6 * s * s + 3 * s * s * s) / 6;
-  weights[3] = t * t * t / 6;
 }
 
 SEMBLANCE_INLINE void PairsOf(const double* weights, double factor, double* pairs) {

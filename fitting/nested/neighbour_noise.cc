@@ -86,15 +86,12 @@ double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t>
   return std::sqrt(*middle / std::pow(1 - 2 / (9 * freedom), 3));
 }
 
-void NeighbourPairs::Add(const NestedResidual& residual) {
-  if (begun_) {
-    for (int c = 0; c < 3; ++c) {
-      together_ += last_.along[c] * residual.along[c];
-    }
-    squares_ += (last_.Square() + residual.Square()) / 2;
+void PairCorrelation::Add(const NestedResidual& a, const NestedResidual& b) {
+  for (int c = 0; c < 3; ++c) {
+    together_ += a.along[c] * b.along[c];
   }
-  begun_ = true;
-  last_ = residual;
+  squares_ += (a.Square() + b.Square()) / 2;
+  ++count_;
 }
 
 PairCorrelation ClosestCorrelation(const NestedPoints& points,
@@ -114,17 +111,11 @@ PairCorrelation ClosestCorrelation(const NestedPoints& points,
   const auto tenth = sorted.begin() + std::ssize(sorted) / kOneIn;
   std::nth_element(sorted.begin(), tenth, sorted.end());
   PairCorrelation pairs;
-  double together = 0, squares = 0;
   for (std::size_t n = 0; n + 1 < indices.size(); ++n) {
     if (apart[n] <= *tenth) {
-      for (int c = 0; c < 3; ++c) {
-        together += residuals[n].along[c] * residuals[n + 1].along[c];
-      }
-      squares += (residuals[n].Square() + residuals[n + 1].Square()) / 2;
-      ++pairs.count;
+      pairs.Add(residuals[n], residuals[n + 1]);
     }
   }
-  pairs.value = squares > 0 ? together / squares : 0;
   return pairs;
 }
 

@@ -18,24 +18,22 @@ enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
 double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
                       NeighbourModel model);
 
-// Of residuals along the curve, one after the other: the sum of e_a . e_b over that of |e|^2, b
-// being next to a. 0 for errors that do not know of each other.
-class NeighbourPairs {
+// Of pairs of residuals: the sum of e_a . e_b over that of |e|^2. 0 for errors that do not know of
+// each other.
+class PairCorrelation {
  public:
-  void Add(const NestedResidual& residual);
-  double Correlation() const { return squares_ > 0 ? together_ / squares_ : 0; }
+  void Add(const NestedResidual& a, const NestedResidual& b);
+  double Value() const { return squares_ > 0 ? together_ / squares_ : 0; }
+  // The standard error is 1 / sqrt(Count()), or less.
+  std::size_t Count() const { return count_; }
 
  private:
-  NestedResidual last_;
-  bool begun_ = false;
   double together_ = 0, squares_ = 0;
+  std::size_t count_ = 0;
 };
 
-// The same of that tenth of the pairs whose points are closest to each other in (u,v).
-struct PairCorrelation {
-  double value = 0;
-  std::size_t count = 0;  // pairs: the standard error is 1 / sqrt(count), or less
-};
+// Of that tenth of the pairs of neighbours along the curve whose points are closest to each other
+// in (u,v).
 PairCorrelation ClosestCorrelation(const NestedPoints& points,
                                    std::span<const std::uint32_t> indices,
                                    std::span<const NestedResidual> residuals);

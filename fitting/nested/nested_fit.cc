@@ -264,7 +264,7 @@ class NestedFitter {
   // noise does not.
   bool ClosestAgree() const {
     const PairCorrelation pairs = ClosestCorrelation(points_, Kept(), KeptResiduals());
-    return pairs.value * std::sqrt(static_cast<double>(pairs.count)) > kSure;
+    return pairs.Value() * std::sqrt(static_cast<double>(pairs.Count())) > kSure;
   }
 
   // Of the points looked at that are no outliers.
@@ -323,7 +323,8 @@ class NestedFitter {
     double sum = 0, weights = 0;
     result.residual_mm.resize(points_.size());
     NestedResiduals residuals(solve_);
-    NeighbourPairs pairs;
+    PairCorrelation neighbours;
+    std::optional<Residual> last;
     for (std::size_t begin = 0; begin < points_.size(); begin += kAtOnce) {
       const std::size_t end = std::min(begin + kAtOnce, points_.size());
       const std::span<const Residual> some = residuals.Of(begin, end);
@@ -333,12 +334,15 @@ class NestedFitter {
         sum += points_.Weight(k) * square;
         weights += points_.Weight(k);
         if (outlier_[k] == 0) {
-          pairs.Add(some[k - begin]);
+          if (last) {
+            neighbours.Add(*last, some[k - begin]);
+          }
+          last = some[k - begin];
         }
       }
     }
     result.rms_mm = std::sqrt(sum / weights);
-    report_.neighbour_correlation = pairs.Correlation();
+    report_.neighbour_correlation = neighbours.Value();
   }
 
   // Whether others than before are outliers.

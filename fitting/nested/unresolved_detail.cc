@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
 
 namespace semblance {
@@ -37,14 +38,6 @@ struct PatchOfPoints {
 
 // Of a patch's sixteen functions: the sums of w N e along each channel, and last of (w N)^2 |e|^2.
 using PatchSums = double[4][16];
-
-SEMBLANCE_INLINE void WeightsAt(double t, double* weights) {
-  const double s = 1 - t;
-  weights[0] = s * s * s / 6;
-  weights[1] = (4 - 6 * t * t + 3 * t * t * t) / 6;
-  weights[2] = (4 - 6 * s * s + 3 * s * s * s) / 6;
-  weights[3] = t * t * t / 6;
-}
 
 template <int channels>
 SEMBLANCE_INLINE void SumPatch(const EvidencePoints& of, const PatchOfPoints& patch,

@@ -80,7 +80,7 @@ class Dissection {
   int mark_ = 0;
 };
 
-// What a front leaves to those above it: the lower triangle of a matrix on its border.
+// What a frontal matrix leaves to those above it: the lower triangle of a matrix on its border.
 struct Update {
   std::vector<int> border;
   Eigen::MatrixXd matrix;
@@ -97,7 +97,7 @@ class Elimination {
       Eliminate(node);
     }
   }
-  std::vector<MeshSolver::Front> Take() { return std::move(fronts_); }
+  std::vector<MeshSolver::FrontalMatrix> Take() { return std::move(frontals_); }
 
  private:
   void Eliminate(const Dissection::Node& node) {
@@ -106,26 +106,26 @@ class Elimination {
       children.push_back(std::move(updates_.back()));
       updates_.pop_back();
     }
-    MeshSolver::Front front{node.begin, node.end, BorderOf(node, children), {}, {}};
-    Eigen::MatrixXd full = Assembled(front, children);
+    MeshSolver::FrontalMatrix frontal{node.begin, node.end, BorderOf(node, children), {}, {}};
+    Eigen::MatrixXd full = Assembled(frontal, children);
     const Eigen::Index own = node.end - node.begin;
-    const auto border = static_cast<Eigen::Index>(front.border.size());
-    front.own = full.topLeftCorner(own, own);
-    front.below = full.bottomLeftCorner(border, own);
-    Update update{front.border, full.bottomRightCorner(border, border)};
+    const auto border = static_cast<Eigen::Index>(frontal.border.size());
+    frontal.own = full.topLeftCorner(own, own);
+    frontal.below = full.bottomLeftCorner(border, own);
+    Update update{frontal.border, full.bottomRightCorner(border, border)};
     if (own > 0) {
-      Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(front.own);
+      Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(frontal.own);
     }
     if (own > 0 && border > 0) {  // Eigen's products do not take empty matrices
-      front.own.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(
-          front.below);
-      update.matrix.selfadjointView<Eigen::Lower>().rankUpdate(front.below, -1);
+      frontal.own.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(
+          frontal.below);
+      update.matrix.selfadjointView<Eigen::Lower>().rankUpdate(frontal.below, -1);
     }
     updates_.push_back(std::move(update));
-    fronts_.push_back(std::move(front));
+    frontals_.push_back(std::move(frontal));
   }
 
-  // The later unknowns that the front's own ones are coupled with, by the matrix or by fill.
+  // The later unknowns that a frontal matrix's own ones are coupled with, by the matrix or by fill.
   std::vector<int> BorderOf(const Dissection::Node& node, const std::vector<Update>& children) {
     std::vector<int> border;
     for (int k = node.begin; k < node.end; ++k) {
@@ -145,20 +145,21 @@ class Elimination {
   }
 
   // The lower triangle over own and border unknowns, in their order.
-  Eigen::MatrixXd Assembled(const MeshSolver::Front& front, const std::vector<Update>& children) {
-    const int own = front.end - front.begin;
+  Eigen::MatrixXd Assembled(const MeshSolver::FrontalMatrix& frontal,
+                            const std::vector<Update>& children) {
+    const int own = frontal.end - frontal.begin;
     for (int k = 0; k < own; ++k) {
-      local_[front.begin + k] = k;
+      local_[frontal.begin + k] = k;
     }
-    for (std::size_t k = 0; k < front.border.size(); ++k) {
-      local_[front.border[k]] = own + static_cast<int>(k);
+    for (std::size_t k = 0; k < frontal.border.size(); ++k) {
+      local_[frontal.border[k]] = own + static_cast<int>(k);
     }
-    const auto size = own + static_cast<Eigen::Index>(front.border.size());
+    const auto size = own + static_cast<Eigen::Index>(frontal.border.size());
     Eigen::MatrixXd full = Eigen::MatrixXd::Zero(size, size);
-    for (int k = front.begin; k < front.end; ++k) {
+    for (int k = frontal.begin; k < frontal.end; ++k) {
       for (Eigen::SparseMatrix<double>::InnerIterator it(matrix_, order_[k]); it; ++it) {
         if (rank_[it.row()] >= k) {
-          full(local_[rank_[it.row()]], k - front.begin) = it.value();
+          full(local_[rank_[it.row()]], k - frontal.begin) = it.value();
         }
       }
     }
@@ -180,39 +181,39 @@ class Elimination {
   const std::vector<int>& order_;
   const Eigen::SparseMatrix<double>& matrix_;
   std::vector<int> rank_;   // of each unknown in the order
-  std::vector<int> local_;  // of each rank in the current front
+  std::vector<int> local_;  // of each rank in the current frontal matrix
   std::vector<Update> updates_;
-  std::vector<MeshSolver::Front> fronts_;
+  std::vector<MeshSolver::FrontalMatrix> frontals_;
 };
 
-// Blocks of the inverse over each front's own unknowns and its border, from the last front to the
-// first. Let L be the factor's own part, B that below it, Z the inverse; on the border Z is known
-// from the front that owns the first of the border. With Y = B L^-1, Z between border and own is
-// -Z Y, and that of the own is (L L')^-1 + Y' Z Y.
+// Blocks of the inverse over each frontal matrix's own unknowns and its border, from the last
+// matrix to the first. Let L be the factor's own part, B that below it, Z the inverse; on the
+// border Z is known from the matrix that owns the first of the border. With Y = B L^-1, Z between
+// border and own is -Z Y, and that of the own is (L L')^-1 + Y' Z Y.
 class BlockInverse {
  public:
-  BlockInverse(const std::vector<MeshSolver::Front>& fronts, const std::vector<int>& order,
-               Eigen::SparseMatrix<double>& entries)
-      : fronts_(fronts),
+  BlockInverse(const std::vector<MeshSolver::FrontalMatrix>& frontals,
+               const std::vector<int>& order, Eigen::SparseMatrix<double>& entries)
+      : frontals_(frontals),
         order_(order),
         entries_(entries),
         rank_(order.size()),
         owner_(order.size(), -1),
-        open_children_(fronts.size(), 0),
-        blocks_(fronts.size()) {
-    for (std::size_t f = 0; f < fronts.size(); ++f) {
-      for (int k = fronts[f].begin; k < fronts[f].end; ++k) {
+        open_children_(frontals.size(), 0),
+        blocks_(frontals.size()) {
+    for (std::size_t f = 0; f < frontals.size(); ++f) {
+      for (int k = frontals[f].begin; k < frontals[f].end; ++k) {
         rank_[order[k]] = k;
         owner_[k] = static_cast<int>(f);
       }
     }
-    for (const MeshSolver::Front& front : fronts) {
-      if (front.end > front.begin && !front.border.empty()) {
-        ++open_children_[owner_[front.border.front()]];
+    for (const MeshSolver::FrontalMatrix& frontal : frontals) {
+      if (frontal.end > frontal.begin && !frontal.border.empty()) {
+        ++open_children_[owner_[frontal.border.front()]];
       }
     }
-    for (std::size_t f = fronts.size(); f-- > 0;) {
-      if (fronts[f].end > fronts[f].begin) {
+    for (std::size_t f = frontals.size(); f-- > 0;) {
+      if (frontals[f].end > frontals[f].begin) {
         Invert(f);
       }
     }
@@ -220,34 +221,34 @@ class BlockInverse {
 
  private:
   void Invert(std::size_t f) {
-    const MeshSolver::Front& front = fronts_[f];
-    const Eigen::Index own = front.end - front.begin;
-    const auto border = static_cast<Eigen::Index>(front.border.size());
+    const MeshSolver::FrontalMatrix& frontal = frontals_[f];
+    const Eigen::Index own = frontal.end - frontal.begin;
+    const auto border = static_cast<Eigen::Index>(frontal.border.size());
     Eigen::MatrixXd& block = blocks_[f];
     block.resize(own + border, own + border);
     const Eigen::MatrixXd root =
-        front.own.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(own, own));
+        frontal.own.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(own, own));
     block.topLeftCorner(own, own).noalias() = root.transpose() * root;
     if (border > 0) {
-      const Eigen::MatrixXd known = OnBorder(front), y = front.below * root;
+      const Eigen::MatrixXd known = OnBorder(frontal), y = frontal.below * root;
       const Eigen::MatrixXd across = known * y;
       block.bottomLeftCorner(border, own) = -across;
       block.topRightCorner(own, border) = -across.transpose();
       block.topLeftCorner(own, own).noalias() += y.transpose() * across;
       block.bottomRightCorner(border, border) = known;
     }
-    Write(front, block);
+    Write(frontal, block);
     if (open_children_[f] == 0) {
       block.resize(0, 0);
     }
   }
 
   // Of the owner's block, which is given up with its last child.
-  Eigen::MatrixXd OnBorder(const MeshSolver::Front& front) {
-    const int owner = owner_[front.border.front()];
+  Eigen::MatrixXd OnBorder(const MeshSolver::FrontalMatrix& frontal) {
+    const int owner = owner_[frontal.border.front()];
     std::vector<int> local;
-    for (const int rank : front.border) {
-      local.push_back(LocalIndex(fronts_[owner], rank));
+    for (const int rank : frontal.border) {
+      local.push_back(LocalIndex(frontals_[owner], rank));
     }
     Eigen::MatrixXd known = blocks_[owner](local, local);
     if (--open_children_[owner] == 0) {
@@ -256,33 +257,34 @@ class BlockInverse {
     return known;
   }
 
-  static int LocalIndex(const MeshSolver::Front& front, int rank) {
-    return rank < front.end ? rank - front.begin
-                            : front.end - front.begin +
-                                  static_cast<int>(std::ranges::lower_bound(front.border, rank) -
-                                                   front.border.begin());
+  static int LocalIndex(const MeshSolver::FrontalMatrix& frontal, int rank) {
+    return rank < frontal.end
+               ? rank - frontal.begin
+               : frontal.end - frontal.begin +
+                     static_cast<int>(std::ranges::lower_bound(frontal.border, rank) -
+                                      frontal.border.begin());
   }
 
-  void Write(const MeshSolver::Front& front, const Eigen::MatrixXd& block) {
-    for (int k = front.begin; k < front.end; ++k) {
+  void Write(const MeshSolver::FrontalMatrix& frontal, const Eigen::MatrixXd& block) {
+    for (int k = frontal.begin; k < frontal.end; ++k) {
       for (Eigen::SparseMatrix<double>::InnerIterator it(entries_, order_[k]); it; ++it) {
         const int rank = rank_[it.row()];
-        if (rank >= front.begin) {
-          it.valueRef() = block(LocalIndex(front, rank), k - front.begin);
+        if (rank >= frontal.begin) {
+          it.valueRef() = block(LocalIndex(frontal, rank), k - frontal.begin);
         }
-        if (rank >= front.end) {
+        if (rank >= frontal.end) {
           entries_.coeffRef(order_[k], it.row()) = it.value();
         }
       }
     }
   }
 
-  const std::vector<MeshSolver::Front>& fronts_;
+  const std::vector<MeshSolver::FrontalMatrix>& frontals_;
   const std::vector<int>& order_;
   Eigen::SparseMatrix<double>& entries_;
   std::vector<int> rank_;           // of each unknown in the order
-  std::vector<int> owner_;          // the front of each rank
-  std::vector<int> open_children_;  // of each front: those that still need its block
+  std::vector<int> owner_;          // the frontal matrix of each rank
+  std::vector<int> open_children_;  // of each of them: those that still need its block
   std::vector<Eigen::MatrixXd> blocks_;
 };
 
@@ -290,24 +292,24 @@ class BlockInverse {
 
 MeshSolver::MeshSolver(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& matrix) {
   Dissection dissection(points, matrix);
-  fronts_ = Elimination(dissection, matrix).Take();
+  frontals_ = Elimination(dissection, matrix).Take();
   order_ = std::move(dissection.order);
 }
 
 Eigen::MatrixXd MeshSolver::Solve(const Eigen::MatrixXd& right) const {
   Eigen::MatrixXd x = right(order_, Eigen::all);
-  for (const Front& front : fronts_) {
-    auto own = x.middleRows(front.begin, front.end - front.begin);
+  for (const FrontalMatrix& frontal : frontals_) {
+    auto own = x.middleRows(frontal.begin, frontal.end - frontal.begin);
     if ((own.array() == 0).all()) {
-      continue;  // right sides of few entries touch few fronts
+      continue;  // right sides of few entries touch few of them
     }
-    front.own.triangularView<Eigen::Lower>().solveInPlace(own);
-    if (!front.border.empty()) {
-      const Eigen::MatrixXd down = front.below * own;
-      x(front.border, Eigen::all) -= down;
+    frontal.own.triangularView<Eigen::Lower>().solveInPlace(own);
+    if (!frontal.border.empty()) {
+      const Eigen::MatrixXd down = frontal.below * own;
+      x(frontal.border, Eigen::all) -= down;
     }
   }
-  for (auto it = fronts_.rbegin(); it != fronts_.rend(); ++it) {
+  for (auto it = frontals_.rbegin(); it != frontals_.rend(); ++it) {
     auto own = x.middleRows(it->begin, it->end - it->begin);
     if (own.rows() == 0) {
       continue;
@@ -325,7 +327,7 @@ Eigen::MatrixXd MeshSolver::Solve(const Eigen::MatrixXd& right) const {
 
 Eigen::SparseMatrix<double> MeshSolver::SelectedInverse(Eigen::SparseMatrix<double> entries) const {
   entries.makeCompressed();
-  const BlockInverse fill(fronts_, order_, entries);
+  const BlockInverse fill(frontals_, order_, entries);
   return entries;
 }
 

@@ -23,12 +23,12 @@ class MeshSolver {
 
   // The inverse's entries where `entries` has some, whatever their values: both triangles, and only
   // where the matrix has an entry (or its factor; so vertices and edges of the mesh). By Takahashi,
-  // Fagan & Chin (1973), front by front; costs about twice the factorisation.
+  // Fagan & Chin (1973), matrix by matrix; costs about twice the factorisation.
   Eigen::SparseMatrix<double> SelectedInverse(Eigen::SparseMatrix<double> entries) const;
 
   // Unknowns that are eliminated together: those at begin..end-1 in the order, coupled with later
   // ones, the border.
-  struct Front {
+  struct FrontalMatrix {
     int begin = 0, end = 0;
     std::vector<int> border;
     Eigen::MatrixXd own;    // lower triangle of the Cholesky factor
@@ -37,7 +37,7 @@ class MeshSolver {
 
  private:
   std::vector<int> order_;
-  std::vector<Front> fronts_;
+  std::vector<FrontalMatrix> frontals_;
 };
 
 }  // namespace semblance

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kHeldTogether = 8;  // distances held at a time: 8 bytes per vertex each
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-// The distance at c of a front that reached a and b from one source: a, b and c in a plane, the
+// The distance at c of a wave that reached a and b from one source: a, b and c in a plane, the
 // source on the other side of ab. Infinite where the straight way does not pass between a and b.
 double ThroughEdge(const Vec3& a, double at_a, const Vec3& b, double at_b, const Vec3& c) {
   const double edge2 = (b - a).squaredNorm();

@@ -29,7 +29,7 @@ void DistanceField(Visitor& visit, DowelDistance& distance) {
         distance);
 }
 
-// Fast marching with wave fronts that are spherical in each triangle: exact on a plane where the
+// Fast marching with waves that are spherical in each triangle: exact on a plane where the
 // way passes between the two corners it comes from; else off by some tenths of an edge near the
 // source and by up to 2 % far away. Takes any triangles: open, of several pieces, non-manifold,
 // slivers.

@@ -45,17 +45,17 @@ class ProbeGrid {
 
   // The ball comes from all faces of the box that are free.
   void Flood() {
-    std::vector<Cell> front;
-    ForFaces([&](const Cell& c) { Enter(c, front); });
-    while (!front.empty()) {
-      const Cell c = front.back();
-      front.pop_back();
+    std::vector<Cell> open;
+    ForFaces([&](const Cell& c) { Enter(c, open); });
+    while (!open.empty()) {
+      const Cell c = open.back();
+      open.pop_back();
       for (int axis = 0; axis < 3; ++axis) {
         for (const int step : {-1, 1}) {
           Cell next = c;
           next[axis] += step;
           if (next[axis] >= 0 && next[axis] < size_[axis]) {
-            Enter(next, front);
+            Enter(next, open);
           }
         }
       }
@@ -87,11 +87,11 @@ class ProbeGrid {
   Vec3 Middle(const Cell& c) const {
     return origin_ + cell_mm_ * Vec3(c[0] + 0.5, c[1] + 0.5, c[2] + 0.5);
   }
-  void Enter(const Cell& c, std::vector<Cell>& front) {
+  void Enter(const Cell& c, std::vector<Cell>& open) {
     std::uint8_t& state = state_[IndexOf(c)];
     if (state == kFree) {
       state = kReached;
-      front.push_back(c);
+      open.push_back(c);
     }
   }
   void CloseBeyond(const CutPlane& end) {
