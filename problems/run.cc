@@ -89,6 +89,24 @@ std::shared_ptr<const TemplateFace> GenericFace(const TemplateSource& source, St
                                  [&source] { return LoadTemplate(source); });
 }
 
+// The generic face and the prior; their files are noted with the subject.
+struct FacesAtHand {
+  std::shared_ptr<const TemplateFace> generic;
+  std::shared_ptr<const LoadedPrior> prior;  // null where no face asks for it
+};
+
+FacesAtHand GivenFaces(const Experiment& experiment, StageCache& cache, StepClock& step,
+                       Case& subject, const RunContext& context) {
+  FacesAtHand faces;
+  faces.generic =
+      step("make template", [&] { return GenericFace(experiment.face_template, cache); });
+  faces.prior =
+      step("load prior", [&] { return GivenPrior(experiment, *faces.generic, cache, context); });
+  Append(TemplateFiles(experiment.face_template), subject.inputs);
+  Append(faces.prior ? PriorFiles(experiment.prior) : Files(), subject.inputs);
+  return faces;
+}
+
 // As the face was made: none of one that was only placed or bent.
 std::optional<FaceUncertainty> UncertaintyOf(const Experiment& experiment, const DepthStage& bone,
                                              const LoadedPrior* prior, const MadeFace& made,
@@ -119,9 +137,17 @@ std::shared_ptr<const BustModel> GivenBust(const Experiment& experiment, StageCa
   return *model ? std::shared_ptr<const BustModel>(model, &**model) : nullptr;
 }
 
-Bust BustOf(const BustModel& model, const MadeFace& made, const TriMesh& seedable,
-            const RunContext& context) {
-  return PoseBust({model, made.fitted.fit.surface, made.placed.face.site_uv, seedable}, context);
+// The head that is put on, where one is asked for; its files are noted with the subject.
+std::optional<Bust> BustOf(const BustModel* model, const BustSource& source, const MadeFace& made,
+                           const TriMesh& seedable, StepClock& step, Case& subject,
+                           const RunContext& context) {
+  if (model == nullptr) {
+    return std::nullopt;
+  }
+  Append(BustFiles(source), subject.inputs);
+  return step("bust", [&] {
+    return PoseBust({*model, made.fitted.fit.surface, made.placed.face.site_uv, seedable}, context);
+  });
 }
 
 void NoteDraw(const Experiment& experiment, Case& subject) {
@@ -139,6 +165,30 @@ void NoteDraw(const Experiment& experiment, Case& subject) {
 // mouth and eyes, and so does its sigma.
 std::vector<Sphere> SigmaMasks(const MadeFace& made) {
   return made.prior ? std::vector<Sphere>() : TemplateMasks(made.placed.face);
+}
+
+// What was made; what is measured of it comes later.
+RunResult ResultOf(const SkullStage& skull, Case subject, MadeFace made) {
+  return {.subject = std::move(subject),
+          .shell = skull.depth_stage->shell,
+          .origin = skull.origin,
+          .depth = skull.depth_stage->depth,
+          .implicit = skull.implicit,
+          .face_from_template = made.placed.face_from_template,
+          .placed = std::move(made.placed.face),
+          .prior = std::move(made.prior),
+          .rules = std::move(made.rules),
+          .seeding = std::move(made.fitted.seeding),
+          .target = std::move(made.fitted.target),
+          .fit = std::move(made.fitted.fit),
+          .before_edits = {},
+          .face = {},
+          .uncertainty = {},
+          .truth = {},
+          .features = {},
+          .bust_model = {},
+          .bust = {},
+          .times = {}};
 }
 
 }  // namespace
@@ -169,54 +219,35 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const auto skull = MakeSkullStage(experiment, shared, step, context);
   const DepthStage& bone = *skull->depth_stage;
   Case subject = bone.subject;
-  const auto generic =
-      step("make template", [&] { return GenericFace(experiment.face_template, shared); });
-  const auto prior =
-      step("load prior", [&] { return GivenPrior(experiment, *generic, shared, context); });
-  Append(TemplateFiles(experiment.face_template), subject.inputs);
-  Append(prior ? PriorFiles(experiment.prior) : Files(), subject.inputs);
+  const FacesAtHand faces = GivenFaces(experiment, shared, step, subject, context);
+  const LoadedPrior* const prior = faces.prior.get();
   const TriMesh seedable = SeedableFace(experiment, skull->cuts, skull->implicit.dense, subject);
   MadeFace made = step("fit", [&] {
-    return MakeFace({experiment, *generic, prior.get(), subject, seedable, bone.shell}, context);
+    return MakeFace({experiment, *faces.generic, prior, subject, seedable, bone.shell}, context);
   });
   NoteDraw(experiment, subject);
-  std::optional<HSplineSurface> before_edits = EditByHand(experiment, made.fitted, subject);
+  auto before_edits = EditByHand(experiment, made.fitted, subject);
   CheckFinite(made.fitted.fit.surface);
   Tessellation face =
       step("tessellate", [&] { return Tessellate(made.fitted.fit.surface, kFaceQuadsPerPatch); });
-  std::optional<FaceUncertainty> uncertainty = step("uncertainty", [&] {
-    return UncertaintyOf(experiment, bone, prior.get(), made, face, subject, context);
+  auto uncertainty = step("uncertainty", [&] {
+    return UncertaintyOf(experiment, bone, prior, made, face, subject, context);
   });
-  std::optional<TruthComparison> truth = step("measure", [&] {
+  auto truth = step("measure", [&] {
     return Measure(experiment, *skull, face.mesh, uncertainty, SigmaMasks(made), shared, context);
   });
-  Append(bust_model ? BustFiles(experiment.bust) : Files(), subject.inputs);
-  std::optional<Bust> bust;
-  if (bust_model) {
-    bust = step("bust", [&] { return BustOf(*bust_model, made, seedable, context); });
-  }
-  std::vector<FeatureDistortion> features =
-      MeasureFeatures(made.placed.face, made.fitted.fit.surface);
-  return {.subject = std::move(subject),
-          .shell = bone.shell,
-          .origin = skull->origin,
-          .depth = bone.depth,
-          .implicit = skull->implicit,
-          .face_from_template = made.placed.face_from_template,
-          .placed = std::move(made.placed.face),
-          .prior = std::move(made.prior),
-          .rules = std::move(made.rules),
-          .seeding = std::move(made.fitted.seeding),
-          .target = std::move(made.fitted.target),
-          .fit = std::move(made.fitted.fit),
-          .before_edits = std::move(before_edits),
-          .face = std::move(face),
-          .uncertainty = std::move(uncertainty),
-          .truth = std::move(truth),
-          .features = std::move(features),
-          .bust_model = bust_model,
-          .bust = std::move(bust),
-          .times = step.Take()};
+  auto bust = BustOf(bust_model.get(), experiment.bust, made, seedable, step, subject, context);
+  auto features = MeasureFeatures(made.placed.face, made.fitted.fit.surface);
+  RunResult result = ResultOf(*skull, std::move(subject), std::move(made));
+  result.before_edits = std::move(before_edits);
+  result.face = std::move(face);
+  result.uncertainty = std::move(uncertainty);
+  result.truth = std::move(truth);
+  result.features = std::move(features);
+  result.bust_model = bust_model;
+  result.bust = std::move(bust);
+  result.times = step.Take();
+  return result;
 }
 
 }  // namespace semblance

@@ -54,12 +54,6 @@ std::vector<double> Residuals(const Pairs& pairs, const Similarity& skull_from_a
   return residuals;
 }
 
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Whether three points span a triangle that says how a skull lies.
 bool Spans(const Vec3& a, const Vec3& b, const Vec3& c) {
   return (b - a).cross(c - a).norm() >
@@ -90,7 +84,7 @@ Similarity LeastMedian(const Pairs& pairs) {
           continue;
         }
         const Similarity candidate = OfTriple(pairs, {i, j, k});
-        const double median = Median(Residuals(pairs, candidate));
+        const double median = UpperMedian(Residuals(pairs, candidate));
         if (median < least) {
           least = median;
           best = candidate;
@@ -129,6 +123,12 @@ Similarity Reweighted(const Pairs& pairs, Similarity pose) {
 
 }  // namespace
 
+double UpperMedian(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 Vec3 AverageSite(std::string_view site) {
   const std::string landmark = WithoutSide(site);
   const auto* const found = std::ranges::find(kAverageSkull, landmark, &AverageLandmark::code);
@@ -150,7 +150,7 @@ SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand) {
   fit.mirrored = hand == Handedness::kMirrored;
   fit.skull_from_average = Reweighted(pairs, LeastMedian(pairs));
   fit.residual_mm = Residuals(pairs, fit.skull_from_average);
-  fit.median_mm = Median(fit.residual_mm);
+  fit.median_mm = UpperMedian(fit.residual_mm);
   return fit;
 }
 

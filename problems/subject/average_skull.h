@@ -35,6 +35,10 @@ struct SkullFit {
 
 enum class Handedness { kAsIs, kMirrored };
 
+// The middle value, of an even number the upper of the two, as least medians take it. Of one value
+// at least.
+double UpperMedian(std::vector<double> values);
+
 // The similarity that the sites agree on, whatever a few of them say: the one with the least median
 // residual that some three of them define (Rousseeuw 1984, all triples), then least squares with
 // weights 1 / (1 + (r / 8 mm)^2) until it rests. Throws InputError if there are fewer than three

@@ -32,12 +32,6 @@ std::vector<SitePoint> PointsOf(const LandmarkFile& file) {
   return sites;
 }
 
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // A change that people forget, and what to say of it.
 struct Change {
   std::string what, remedy;
@@ -149,7 +143,7 @@ class Search {
     for (const SitePoint& s : sites_) {
       air_mm.push_back(query_.Closest(change.apply(s.point)).distance_mm);
     }
-    return Median(air_mm);
+    return UpperMedian(air_mm);
   }
 
   std::optional<Change> BestChange() const {
@@ -180,7 +174,7 @@ class Search {
     const std::string where =
         in_air
             ? fmt::format("{} of {} sites are further than {} mm from the skull (median {:.1f} mm)",
-                          far, sites_.size(), options_.max_distance_mm, Median(air_mm_))
+                          far, sites_.size(), options_.max_distance_mm, UpperMedian(air_mm_))
             : fmt::format("the sites lie as on a skull of {:.3f} times the usual size",
                           fit_->skull_from_average.scale);
     if (const std::optional<Change> change = BestChange()) {
