@@ -267,43 +267,52 @@ double NestedSolve::Sum(const Part& part) const {
   return sum;
 }
 
-int NestedSolve::Solve(double least_gain) {
+// The residual at the present solution, and the first direction.
+NestedSolve::ChannelGain NestedSolve::Begin(int channel, double least_gain) {
   constexpr double kRounding = 1e-16, kProbe = 1e-2;  // of what there was to gain at first
-  std::array<double, 4> left{}, enough{};
+  const double at_first = Sum([&](int level) {
+    CopyOn(Runs(level), right_[level].Channel(channel), residual_[level].Channel(channel));
+    return SquaresOn(Runs(level), StepOf(level, channel).inverse,
+                     residual_[level].Channel(channel));
+  });
+  const bool probe = channel == points_.channels;
+  ChannelGain gain;
+  gain.enough = probe ? kProbe * at_first : std::max(kRounding * at_first, least_gain);
+  gain.left = Sum([&](int level) {
+    const GridStep step = StepOf(level, channel);
+    return SubtractOn(Runs(level), step.inverse, step.product, step.residual);
+  });
+  for (int level = 0; level <= Finest(); ++level) {
+    TurnOn(Runs(level), StepOf(level, channel), 0);
+  }
+  return gain;
+}
+
+// A step of conjugate gradients along a channel's direction, whose product is at hand.
+void NestedSolve::Advance(int channel, ChannelGain& gain) {
+  const double curvature = Sum([&](int level) {
+    return DotOn(Runs(level), direction_[level].Channel(channel), product_[level].Channel(channel));
+  });
+  const double length = curvature > 0 ? gain.left / curvature : 0;
+  const double next =
+      Sum([&](int level) { return AdvanceOn(Runs(level), StepOf(level, channel), length); });
+  for (int level = 0; level <= Finest(); ++level) {
+    TurnOn(Runs(level), StepOf(level, channel), gain.left > 0 ? next / gain.left : 0);
+  }
+  gain.left = next;
+}
+
+int NestedSolve::Solve(double least_gain) {
   Multiply(solution_, product_);
+  std::vector<ChannelGain> gains;
   for (int c = 0; c < Channels(); ++c) {
-    const bool probe = c == points_.channels;
-    enough[c] = Sum([&](int level) {
-      CopyOn(Runs(level), right_[level].Channel(c), residual_[level].Channel(c));
-      return SquaresOn(Runs(level), StepOf(level, c).inverse, residual_[level].Channel(c));
-    });
-    enough[c] = probe ? kProbe * enough[c] : std::max(kRounding * enough[c], least_gain);
-    left[c] = Sum([&](int level) {
-      const GridStep step = StepOf(level, c);
-      return SubtractOn(Runs(level), step.inverse, step.product, step.residual);
-    });
-    for (int level = 0; level <= Finest(); ++level) {
-      TurnOn(Runs(level), StepOf(level, c), 0);
-    }
+    gains.push_back(Begin(c, least_gain));
   }
   int steps = 0;
-  const auto done = [&] {
-    return std::equal(left.begin(), left.begin() + Channels(), enough.begin(),
-                      [](double is, double should) { return !(is > should); });
-  };
-  for (; steps < kMostSteps && !done(); ++steps) {
+  for (; steps < kMostSteps && std::ranges::any_of(gains, &ChannelGain::IsMore); ++steps) {
     Multiply(direction_, product_);
     for (int c = 0; c < Channels(); ++c) {
-      const double curvature = Sum([&](int level) {
-        return DotOn(Runs(level), direction_[level].Channel(c), product_[level].Channel(c));
-      });
-      const double length = curvature > 0 ? left[c] / curvature : 0;
-      const double next =
-          Sum([&](int level) { return AdvanceOn(Runs(level), StepOf(level, c), length); });
-      for (int level = 0; level <= Finest(); ++level) {
-        TurnOn(Runs(level), StepOf(level, c), left[c] > 0 ? next / left[c] : 0);
-      }
-      left[c] = next;
+      Advance(c, gains[c]);
     }
   }
   return steps;

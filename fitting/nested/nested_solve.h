@@ -64,6 +64,11 @@ class NestedSolve {
     Matrix16 energy;  // of a patch, at weight 1
     GridValues data_diagonal, energy_diagonal, inverse;
   };
+  // What a channel has to gain, and what is not worth a step.
+  struct ChannelGain {
+    double left = 0, enough = 0;
+    bool IsMore() const { return left > enough; }
+  };
   int Channels() const { return points_.channels + 1; }
   const GridRuns& Runs(int level) const { return (*space_)[level].runs; }
   int Finest() const { return space_->finest(); }
@@ -81,6 +86,8 @@ class NestedSolve {
   double Energy();
   double SumOfSquares();
   GridStep StepOf(int level, int channel);
+  ChannelGain Begin(int channel, double least_gain);
+  void Advance(int channel, ChannelGain& gain);
   template <class Part>
   double Sum(const Part& part) const;
 

@@ -90,24 +90,47 @@ std::string YTicks(double low, double high, double step, const Scale& y) {
   return text;
 }
 
+// Of all points.
+struct Ranges {
+  Limits across, up;
+};
+
+// Sorts each line's points by x.
+Ranges RangesOf(std::vector<AxisLine>& lines) {
+  Ranges ranges;
+  for (AxisLine& line : lines) {
+    std::ranges::stable_sort(line.points, {}, &AxisPoint::x);
+    for (const AxisPoint& p : line.points) {
+      ranges.across.Take(p.x);
+      ranges.up.Take(p.y);
+    }
+  }
+  if (!(ranges.across.low <= ranges.across.high)) {
+    ranges = {{0, 1}, {0, 1}};
+  }
+  return ranges;
+}
+
+// The n-th line with its points, and its row of the legend.
+std::string LineSvg(const AxisLine& line, const Scale& x, const Scale& y, std::size_t n) {
+  const char* const colour = svg::kColours[n % svg::kColours.size()];
+  std::string text = line.is_joined ? Polyline(line, x, y, n) : "";
+  for (const AxisPoint& p : line.points) {
+    text += svg::Dot(x.At(p.x), y.At(p.y), 5, p.name, colour);
+  }
+  const double at = kBottom + 68 + 22 * static_cast<double>(n);
+  text += line.is_joined ? svg::Line(kLeft, at, kLeft + 26, at, colour, 3)
+                         : svg::Dot(kLeft + 13, at, 5, "", colour);
+  return text + svg::Text(kLeft + 34, at + 5, svg::Shortened(line.label), "start");
+}
+
 }  // namespace
 
 std::string AxisPlotSvg(std::vector<AxisLine> lines, const std::string& x_label,
                         const std::string& y_label) {
   const std::size_t left_out = lines.size() - std::min(lines.size(), kMostLines);
   lines.resize(lines.size() - left_out);
-  Limits across, up;
-  for (AxisLine& line : lines) {
-    std::ranges::stable_sort(line.points, {}, &AxisPoint::x);
-    for (const AxisPoint& p : line.points) {
-      across.Take(p.x);
-      up.Take(p.y);
-    }
-  }
-  if (!(across.low <= across.high)) {
-    across = {0, 1};
-    up = {0, 1};
-  }
+  const auto [across, up] = RangesOf(lines);
   double low = up.low >= 0 && up.low < 0.5 * up.high ? 0 : up.low;
   double high = up.high > low ? up.high : low + 1;
   const double step = TickStep(low, high, 6);
@@ -122,17 +145,7 @@ std::string AxisPlotSvg(std::vector<AxisLine> lines, const std::string& x_label,
                      svg::Text((kLeft + kWidth - kRight) / 2, kBottom + 44,
                                x_label + (logarithmic ? " (logarithmic)" : ""), "middle");
   for (std::size_t n = 0; n < lines.size(); ++n) {
-    const char* colour = svg::kColours[n % svg::kColours.size()];
-    if (lines[n].is_joined) {
-      text += Polyline(lines[n], x, y, n);
-    }
-    for (const AxisPoint& p : lines[n].points) {
-      text += svg::Dot(x.At(p.x), y.At(p.y), 5, p.name, colour);
-    }
-    const double at = kBottom + 68 + 22 * static_cast<double>(n);
-    text += (lines[n].is_joined ? svg::Line(kLeft, at, kLeft + 26, at, colour, 3)
-                                : svg::Dot(kLeft + 13, at, 5, "", colour)) +
-            svg::Text(kLeft + 34, at + 5, svg::Shortened(lines[n].label), "start");
+    text += LineSvg(lines[n], x, y, n);
   }
   if (left_out > 0) {
     text += svg::Text(kLeft, kBottom + 73 + 22 * static_cast<double>(lines.size()),

@@ -100,13 +100,45 @@ py::tuple MeshAt(const HSplineSurface& surface, int per_patch) {
                         ArrayOf(drawn.uv));
 }
 
+// What can be asked of a surface.
+void BindQuestions(py::class_<HSplineSurface>& surface) {
+  surface.def("points", &PointsAt, py::arg("uv"), py::arg("threads") = 1, "n x 3, of n x 2 (u, v).")
+      .def("normals", &NormalsAt, py::arg("uv"), py::arg("threads") = 1,
+           "n x 3, unit; zero where the tangents vanish.")
+      .def("derivatives", &DerivativesAt, py::arg("uv"), py::arg("du"), py::arg("dv"),
+           "n x 3: so many times by u and by v, two in all at most.")
+      .def("project", &Project, py::arg("points"),
+           "(uv, distance_mm) of the closest points of the surface.")
+      .def("mesh", &MeshAt, py::arg("per_patch") = 4,
+           "(vertices, triangles, uv): so many quads along each side of a finest patch.");
+}
+
+// Its control vertices, and their edits.
+void BindNets(py::class_<HSplineSurface>& surface) {
+  surface
+      .def("net", &NetArray, py::arg("level"),
+           "The control vertices of a level, rows x columns x 3, absolute, with coarser detail.")
+      .def(
+          "set_net",
+          [](HSplineSurface& s, int level, const Doubles& net) { s.SetNet(level, NetOf(net)); },
+          py::arg("level"), py::arg("net"),
+          "Makes net(level) equal to this. Finer detail rides along.")
+      .def(
+          "edit",
+          [](HSplineSurface& s, const std::string& script) {
+            ApplyEdits(ReadEditScript(script), s);
+          },
+          py::arg("script"), "Makes the edits of a script, as `semblance edit` does.");
+}
+
 }  // namespace
 
 void BindSurface(py::module_& module) {
-  py::class_<HSplineSurface>(module, "HSpline",
-                             "A hierarchical B-spline surface: bicubic, with dyadic levels; detail "
-                             "is kept as offsets from "
-                             "the next coarser level. (u, v) lie in [0,1] x [0,1].")
+  py::class_<HSplineSurface> surface(module, "HSpline",
+                                     "A hierarchical B-spline surface: bicubic, with dyadic "
+                                     "levels; detail is kept as offsets from "
+                                     "the next coarser level. (u, v) lie in [0,1] x [0,1].");
+  surface
       .def(
           py::init(&MakeSurface), py::arg("level0"), py::arg("max_level") = 0,
           py::arg("periodic_u") = false,
@@ -124,31 +156,11 @@ void BindSurface(py::module_& module) {
                              [](const HSplineSurface& s) {
                                return py::make_tuple(s.shape().patches_u, s.shape().patches_v);
                              })
-      .def_property_readonly(
-          "periodic_u",
-          [](const HSplineSurface& s) { return s.shape().closure == Closure::kPeriodicU; })
-      .def("points", &PointsAt, py::arg("uv"), py::arg("threads") = 1, "n x 3, of n x 2 (u, v).")
-      .def("normals", &NormalsAt, py::arg("uv"), py::arg("threads") = 1,
-           "n x 3, unit; zero where the tangents vanish.")
-      .def("derivatives", &DerivativesAt, py::arg("uv"), py::arg("du"), py::arg("dv"),
-           "n x 3: so many times by u and by v, two in all at most.")
-      .def("project", &Project, py::arg("points"),
-           "(uv, distance_mm) of the closest points of the surface.")
-      .def("mesh", &MeshAt, py::arg("per_patch") = 4,
-           "(vertices, triangles, uv): so many quads along each side of a finest patch.")
-      .def("net", &NetArray, py::arg("level"),
-           "The control vertices of a level, rows x columns x 3, absolute, with coarser detail.")
-      .def(
-          "set_net",
-          [](HSplineSurface& s, int level, const Doubles& net) { s.SetNet(level, NetOf(net)); },
-          py::arg("level"), py::arg("net"),
-          "Makes net(level) equal to this. Finer detail rides along.")
-      .def(
-          "edit",
-          [](HSplineSurface& s, const std::string& script) {
-            ApplyEdits(ReadEditScript(script), s);
-          },
-          py::arg("script"), "Makes the edits of a script, as `semblance edit` does.");
+      .def_property_readonly("periodic_u", [](const HSplineSurface& s) {
+        return s.shape().closure == Closure::kPeriodicU;
+      });
+  BindQuestions(surface);
+  BindNets(surface);
 }
 
 }  // namespace semblance

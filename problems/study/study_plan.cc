@@ -338,6 +338,14 @@ StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& er
   return study;
 }
 
+// Without axes and trials.
+StudyPlan EmptyPlan(const StudyFile& study) {
+  StudyPlan plan{
+      .title = study.title, .metric = MetricOf(study), .keep = study.keep, .job = study.job};
+  plan.tags = study.tags;
+  return plan;
+}
+
 }  // namespace
 
 StudyPlan ReadStudy(const fs::path& file) {
@@ -361,9 +369,7 @@ StudyPlan ReadStudy(const fs::path& file) {
     faults.ThrowIfAny();  // the trials would repeat what is wrong with their base and axes
   }
 
-  StudyPlan plan{
-      .title = study.title, .metric = MetricOf(study), .keep = study.keep, .job = study.job};
-  plan.tags = study.tags;
+  StudyPlan plan = EmptyPlan(study);
   plan.axes = study.search ? search.axes : AxesOf(rows);
   if (study.search) {
     AddSearch(file, std::move(search), subjects, held_out, plan, faults);

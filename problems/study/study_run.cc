@@ -434,6 +434,18 @@ int CountLeftOver(const PlanThere& there, const StudyPlan& plan) {
       std::ranges::count_if(there.ids, [&](const std::string& id) { return !ids.contains(id); }));
 }
 
+// Whether the folder was begun with another plan. Throws IoError if that has no trial of this one.
+bool IsChanged(const PlanThere& there, const StudyPlan& plan, const fs::path& folder) {
+  const bool changed = !there.hash.empty() && there.hash != plan.hash;
+  if (changed && CountLeftOver(there, plan) == static_cast<int>(there.ids.size())) {
+    throw IoError(
+        fmt::format("{}: the folder holds another study (plan {}, this is {}), of which no trial "
+                    "is one of this; choose another --out",
+                    folder.string(), there.hash, plan.hash));
+  }
+  return changed;
+}
+
 bool IsAnyMissing(const StudyPlan& plan, std::size_t first, const fs::path& folder) {
   return std::any_of(plan.trials.begin() + static_cast<std::ptrdiff_t>(first), plan.trials.end(),
                      [&](const StudyTrial& trial) { return !StatusOf(folder, trial.id); });
@@ -470,13 +482,7 @@ StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const Study
   CacheOnDisk(options);            // and so is what is wrong with the cache
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
   const PlanThere there = ReadPlanThere(folder);
-  const bool changed = !there.hash.empty() && there.hash != plan.hash;
-  if (changed && CountLeftOver(there, plan) == static_cast<int>(there.ids.size())) {
-    throw IoError(
-        fmt::format("{}: the folder holds another study (plan {}, this is {}), of which no trial "
-                    "is one of this; choose another --out",
-                    folder.string(), there.hash, plan.hash));
-  }
+  const bool changed = IsChanged(there, plan, folder);
   StudyPlan grown = plan;
   StudyRunner runner(grown, folder, options, context);
   bool ended = true;

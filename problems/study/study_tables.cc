@@ -122,6 +122,16 @@ std::string AreaMetricOf(const StudyResults& results) {
   return "";
 }
 
+// Of the plan; its figures are read later.
+TrialRow RowOf(const Json& trial) {
+  TrialRow row;
+  row.id = trial.at("id");
+  row.subject = trial.at("subject");
+  row.values = trial.at("values").get<std::vector<std::string>>();
+  row.aside = trial.value("aside", false);
+  return row;
+}
+
 }  // namespace
 
 int StudyResults::Count(const std::string& status) const {
@@ -146,15 +156,10 @@ StudyResults ReadStudyResults(const fs::path& folder) {
     results.axes = plan.at("axes").get<std::vector<std::string>>();
     results.notes = plan.at("notes").get<std::vector<std::string>>();
     for (const Json& trial : plan.at("trials")) {
-      TrialRow row;
-      row.id = trial.at("id");
-      row.subject = trial.at("subject");
-      row.values = trial.at("values").get<std::vector<std::string>>();
-      row.aside = trial.value("aside", false);
-      if (row.values.size() != results.axes.size()) {
+      results.trials.push_back(RowOf(trial));
+      if (results.trials.back().values.size() != results.axes.size()) {
         throw fail();
       }
-      results.trials.push_back(std::move(row));
     }
     ReadTrials(folder, results.trials);
     results.tags = plan.value("tags", std::vector<std::string>());

@@ -73,6 +73,41 @@ Feature ParsedFeature(const json_parts::Json& json) {
   return feature;
 }
 
+// One outside 0..1 is noted.
+void CheckWeight(const Feature& feature, double weight, std::vector<std::string>& warnings) {
+  if (!std::isfinite(weight)) {
+    throw InputError(
+        fmt::format("feature {}: its weight {} is not finite; use 0..1", feature.name, weight));
+  }
+  if (weight < 0 || weight > 1) {
+    warnings.push_back(fmt::format(
+        "feature {}: the weight {} is outside 0..1, so the blend goes beyond what was measured",
+        feature.name, weight));
+  }
+}
+
+void AddWeighted(const Feature& feature, double weight, Feature& sum) {
+  sum.shape.max_level = std::max(sum.shape.max_level, feature.shape.max_level);
+  for (const auto& [vertex, offset] : feature.offsets) {
+    const Vec3 part = weight * offset;
+    const auto [entry, is_new] = sum.offsets.emplace(vertex, part);
+    if (!is_new) {
+      entry->second += part;
+    }
+  }
+}
+
+void CheckOffsets(const Feature& blend) {
+  for (const auto& [vertex, offset] : blend.offsets) {
+    if (!offset.allFinite()) {
+      throw InputError(fmt::format(
+          "feature {}: with these weights the offset of vertex ({}, {}) of level {} is no finite "
+          "number; use weights about 0..1",
+          blend.name, vertex.i, vertex.j, vertex.level));
+    }
+  }
+}
+
 }  // namespace
 
 Feature ExtractFeature(const HSplineSurface& surface, std::string name,
@@ -132,36 +167,12 @@ FeatureBlend BlendFeatures(std::string name, std::span<const Feature> features,
   FeatureBlend blend{{std::move(name), features[0].shape, {}}, {}};
   for (std::size_t k = 0; k < features.size(); ++k) {
     CheckFits(features[k], blend.feature.shape, fmt::format("feature {}", features[0].name));
-    if (!std::isfinite(weights[k])) {
-      throw InputError(fmt::format("feature {}: its weight {} is not finite; use 0..1",
-                                   features[k].name, weights[k]));
-    }
-    if (weights[k] < 0 || weights[k] > 1) {
-      blend.warnings.push_back(fmt::format(
-          "feature {}: the weight {} is outside 0..1, so the blend goes beyond what was measured",
-          features[k].name, weights[k]));
-    }
-    if (weights[k] == 0) {
-      continue;
-    }
-    blend.feature.shape.max_level =
-        std::max(blend.feature.shape.max_level, features[k].shape.max_level);
-    for (const auto& [vertex, offset] : features[k].offsets) {
-      const Vec3 part = weights[k] * offset;
-      const auto [entry, is_new] = blend.feature.offsets.emplace(vertex, part);
-      if (!is_new) {
-        entry->second += part;
-      }
+    CheckWeight(features[k], weights[k], blend.warnings);
+    if (weights[k] != 0) {
+      AddWeighted(features[k], weights[k], blend.feature);
     }
   }
-  for (const auto& [vertex, offset] : blend.feature.offsets) {
-    if (!offset.allFinite()) {
-      throw InputError(fmt::format(
-          "feature {}: with these weights the offset of vertex ({}, {}) of level {} is no finite "
-          "number; use weights about 0..1",
-          blend.feature.name, vertex.i, vertex.j, vertex.level));
-    }
-  }
+  CheckOffsets(blend.feature);
   return blend;
 }
 
