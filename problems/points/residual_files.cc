@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/points/residual_files.h"
 
-#include <fmt/compile.h>
 #include <fmt/format.h>
 
 #include <cstdint>
 #include <cstring>
-#include <iterator>
 #include <vector>
+
+#include "surfaces/base/csv.h"
 
 namespace semblance {
 namespace {
@@ -31,33 +31,41 @@ void AppendFloat(double value, std::string& bytes) {
   bytes.append(raw, sizeof number);
 }
 
+std::vector<std::string> NamesOf(const ResidualColumns& columns, bool outliers) {
+  std::vector<std::string> names = {"point", "u", "v", "residual_mm"};
+  if (outliers) {
+    names.emplace_back("outlier");
+  }
+  if (!columns.sigma_mm.empty()) {
+    names.emplace_back("sigma_mm");
+  }
+  for (const PointAttribute& attribute : columns.attributes) {
+    names.push_back(attribute.name);
+    names.push_back(attribute.name + "_residual");
+  }
+  return names;
+}
+
 }  // namespace
 
 std::string ResidualsCsv(const ResidualColumns& columns) {
   const FitResult& fit = columns.fit;
   const std::vector<char> outlier = OutliersOf(fit);
-  std::string csv = outlier.empty() ? "point,u,v,residual_mm" : "point,u,v,residual_mm,outlier";
-  csv += columns.sigma_mm.empty() ? "" : ",sigma_mm";
-  for (const PointAttribute& attribute : columns.attributes) {
-    csv += fmt::format(",{0},{0}_residual", attribute.name);
-  }
-  csv += '\n';
-  csv.reserve(fit.uv.size() * (64 + 40 * columns.attributes.size()));
-  const auto out = std::back_inserter(csv);
+  CsvWriter csv(NamesOf(columns, !outlier.empty()));
   for (std::size_t k = 0; k < fit.uv.size(); ++k) {
-    fmt::format_to(out, FMT_COMPILE("{},{},{},{}"), k, fit.uv[k].x(), fit.uv[k].y(),
-                   fit.residual_mm[k]);
-    csv += outlier.empty() ? "" : outlier[k] != 0 ? ",1" : ",0";
+    csv.Add(k, fit.uv[k].x(), fit.uv[k].y(), fit.residual_mm[k]);
+    if (!outlier.empty()) {
+      csv.Add(int{outlier[k]});
+    }
     if (!columns.sigma_mm.empty()) {
-      fmt::format_to(out, FMT_COMPILE(",{}"), columns.sigma_mm[k]);
+      csv.Add(columns.sigma_mm[k]);
     }
     for (std::size_t c = 0; c < columns.attributes.size(); ++c) {
-      fmt::format_to(out, FMT_COMPILE(",{},{}"), columns.fitted[c][k],
-                     columns.attributes[c].values[k] - columns.fitted[c][k]);
+      csv.Add(columns.fitted[c][k], columns.attributes[c].values[k] - columns.fitted[c][k]);
     }
-    csv += '\n';
+    csv.EndRow();
   }
-  return csv;
+  return csv.Text();
 }
 
 std::string ResidualsPly(const ResidualColumns& columns) {
