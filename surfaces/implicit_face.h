@@ -22,14 +22,14 @@ enum class FaceEnds { kClosed, kOpen };
 constexpr auto EnumNames(FaceEnds) { return std::to_array<std::string_view>({"closed", "open"}); }
 
 struct ImplicitFaceOptions {
-  ImplicitOptions field = {};
-  int resolution = 150;
-  Polygonizer polygonizer = NarrowBand{};
-  EdgeSearchOptions edges = {};
-  FaceEnds ends = FaceEnds::kClosed;
-  int target_triangles = 14000;
-  std::optional<double> tolerance_mm = {};
-  bool project = false;
+  ImplicitOptions field = {};               // what is polygonised
+  int resolution = 150;                     // n: cells along the longest side
+  Polygonizer polygonizer = NarrowBand{};   // the mesh is the same
+  EdgeSearchOptions edges = {};             // how crossings are found
+  FaceEnds ends = FaceEnds::kClosed;        // at the rim of the skull
+  int target_triangles = 14000;             // more, where fewer would ruin the shape
+  std::optional<double> tolerance_mm = {};  // of the decimation; null: no bound
+  bool project = false;                     // onto the implicit surface again, after it
 };
 template <class Visitor>
 void Fields(Visitor& visit, ImplicitFaceOptions& o) {

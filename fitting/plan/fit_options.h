@@ -12,11 +12,11 @@
 namespace semblance {
 
 struct FitOptions {
-  SchedulePlan plan = ListedPlan{};
-  std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};
-  FeatureRule features = RestoreFeatures{};
-  Relaxation relaxation = NoRelaxation{};
-  Solver solver = Solver::kCeres;
+  SchedulePlan plan = ListedPlan{};  // which levels are solved, in which order
+  std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}};  // of each solve
+  FeatureRule features = RestoreFeatures{};  // of eyes, nose, mouth
+  Relaxation relaxation = NoRelaxation{};    // whether and how the points' (u,v) move
+  Solver solver = Solver::kCeres;            // how a solve finds its minimum
 };
 template <class Visitor>
 void Fields(Visitor& visit, FitOptions& o) {

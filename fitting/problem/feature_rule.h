@@ -26,7 +26,7 @@ void Fields(Visitor&, FreeFeatures&) {}
 // They resist moves: as PriorTerm (term.h) from the start of a level's solve, of them alone.
 struct WeightedFeatures {
   static constexpr std::string_view kName = "weighted";
-  double weight = 1;
+  double weight = 1;  // 0 is free; more resists the fit
 };
 template <class Visitor>
 void Fields(Visitor& visit, WeightedFeatures& o) {

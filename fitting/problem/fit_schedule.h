@@ -15,8 +15,8 @@ namespace semblance {
 // One step of the fit (thesis 4.2): level L is fitted by least squares, and every control vertex
 // goes `fraction` of the way to its solution, c + fraction (c' - c).
 struct ScheduleStep {
-  int level = 0;
-  double fraction = 1;
+  int level = 0;        // 0 is the coarsest
+  double fraction = 1;  // of the way to the solution; less is more cautious
 };
 template <class Visitor>
 void Fields(Visitor& visit, ScheduleStep& o) {
@@ -71,9 +71,9 @@ void LevelwiseFields(Visitor& visit, int& sweeps, FitAim& aim) {
 // The steps of the schedule, once.
 struct ListedPlan {
   static constexpr std::string_view kName = "listed";
-  std::vector<ScheduleStep> schedule = PublishedSchedule();
-  int sweeps = 0;
-  FitAim aim = FitAim::kSurface;
+  std::vector<ScheduleStep> schedule = PublishedSchedule();  // in this order
+  int sweeps = 0;                                            // over all its levels, at the end
+  FitAim aim = FitAim::kSurface;                             // of a level
 };
 template <class Visitor>
 void Fields(Visitor& visit, ListedPlan& o) {
@@ -84,10 +84,10 @@ void Fields(Visitor& visit, ListedPlan& o) {
 // Levels 0, 1, .. finest.
 struct CoarseToFinePlan {
   static constexpr std::string_view kName = "coarse_to_fine";
-  int finest = 2;
-  double fraction = 1;
-  int sweeps = 0;
-  FitAim aim = FitAim::kSurface;
+  int finest = 2;                 // last level
+  double fraction = 1;            // of the way to the solution
+  int sweeps = 0;                 // over all levels, at the end
+  FitAim aim = FitAim::kSurface;  // of a level
 };
 template <class Visitor>
 void Fields(Visitor& visit, CoarseToFinePlan& o) {
@@ -103,11 +103,11 @@ void Fields(Visitor& visit, CoarseToFinePlan& o) {
 // The steps of the schedule again and again, while the points' root mean square distance falls.
 struct UntilPlan {
   static constexpr std::string_view kName = "until";
-  std::vector<ScheduleStep> schedule = PublishedSchedule();
-  double tolerance_mm = 0.01;
-  int max_passes = 20;
-  int sweeps = 0;
-  FitAim aim = FitAim::kSurface;
+  std::vector<ScheduleStep> schedule = PublishedSchedule();  // of a pass
+  double tolerance_mm = 0.01;                                // a pass that gains less is the last
+  int max_passes = 20;                                       // at most
+  int sweeps = 0;                                            // over all levels, at the end
+  FitAim aim = FitAim::kSurface;                             // of a level
 };
 template <class Visitor>
 void Fields(Visitor& visit, UntilPlan& o) {
@@ -128,9 +128,9 @@ void Fields(Visitor& visit, UntilPlan& o) {
 
 // A part of the domain with a tolerance of its own.
 struct ToleranceRegion {
-  std::array<double, 2> u = {0, 1};
-  std::array<double, 2> v = {0, 1};
-  double tolerance_mm = 0.5;
+  std::array<double, 2> u = {0, 1};  // from and to
+  std::array<double, 2> v = {0, 1};  // from and to
+  double tolerance_mm = 0.5;         // in place of the plan's
 
   bool Holds(double at_u, double at_v) const {
     return at_u >= u[0] && at_u <= u[1] && at_v >= v[0] && at_v <= v[1];
@@ -154,11 +154,11 @@ void Fields(Visitor& visit, ToleranceRegion& o) {
 // the next finer level, and so on.
 struct AdaptivePlan {
   static constexpr std::string_view kName = "adaptive";
-  double tolerance_mm = 0.5;
-  std::vector<ToleranceRegion> regions = {};
-  int finest = 4;
-  int margin = 0;
-  int min_points = 9;
+  double tolerance_mm = 0.5;                  // a point farther off asks for finer vertices
+  std::vector<ToleranceRegion> regions = {};  // the last one that holds a point counts
+  int finest = 4;                             // level that may be overlaid
+  int margin = 0;                             // rings of finer vertices beyond the patch
+  int min_points = 9;  // of a patch; with fewer it stays, as they may be outliers
 
   // Of a point at (u,v): that of the last region that holds it, or else the plan's.
   double ToleranceAt(double u, double v) const {
@@ -208,8 +208,8 @@ constexpr auto EnumNames(OutlierRule) { return std::to_array<std::string_view>({
 // terms are `points` and `smoothness` with `weight: auto`.
 struct AutoPlan {
   static constexpr std::string_view kName = "auto";
-  int finest = 7;
-  OutlierRule outliers = OutlierRule::kDrop;
+  int finest = 7;                             // level, however dense the points are
+  OutlierRule outliers = OutlierRule::kDrop;  // keep: every point is believed
 };
 template <class Visitor>
 void Fields(Visitor& visit, AutoPlan& o) {

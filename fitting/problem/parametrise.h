@@ -40,8 +40,8 @@ void FoldField(Visitor& visit, FoldRule& folds) {
 // Those that are given, with the ranges mapped to [0,1].
 struct GivenParameters {
   static constexpr std::string_view kName = "given";
-  std::array<double, 2> u_range = {0, 1};
-  std::array<double, 2> v_range = {0, 1};
+  std::array<double, 2> u_range = {0, 1};  // what becomes 0 and 1
+  std::array<double, 2> v_range = {0, 1};  // likewise
 };
 template <class Visitor>
 void Fields(Visitor& visit, GivenParameters& o) {
@@ -55,8 +55,8 @@ void Fields(Visitor& visit, GivenParameters& o) {
 // nearest to the plane (the first of equals).
 struct PlaneParameters {
   static constexpr std::string_view kName = "plane";
-  std::array<double, 3> normal = {0, 0, 0};
-  FoldRule folds = FoldRule::kRefuse;
+  std::array<double, 3> normal = {0, 0, 0};  // of the heights; 0: found from the points
+  FoldRule folds = FoldRule::kRefuse;        // of points that lie over each other
 };
 template <class Visitor>
 void Fields(Visitor& visit, PlaneParameters& o) {
@@ -71,8 +71,8 @@ void Fields(Visitor& visit, PlaneParameters& o) {
 // Angle around an axis and height along it, for points that go round; u is the angle, closed.
 struct CylinderParameters {
   static constexpr std::string_view kName = "cylinder";
-  std::array<double, 3> axis = {0, 0, 0};
-  FoldRule folds = FoldRule::kRefuse;
+  std::array<double, 3> axis = {0, 0, 0};  // along v; 0: found from the points
+  FoldRule folds = FoldRule::kRefuse;      // of points that lie over each other
 };
 template <class Visitor>
 void Fields(Visitor& visit, CylinderParameters& o) {
@@ -87,7 +87,7 @@ void Fields(Visitor& visit, CylinderParameters& o) {
 // The triangles between the points, laid out on the plane (mesh_map.h); u and v along its sides.
 struct MeshParameters {
   static constexpr std::string_view kName = "mesh";
-  MeshMap map = MeshMap::kLscm;
+  MeshMap map = MeshMap::kLscm;  // of the triangles to the plane
 };
 template <class Visitor>
 void Fields(Visitor& visit, MeshParameters& o) {

@@ -13,8 +13,8 @@ namespace semblance {
 // The thesis (4.2) translates and scales the template by hand. Rotation is ours: skulls come in
 // whatever pose they were scanned.
 struct PlacementOptions {
-  bool rotate = true;
-  bool scale = true;
+  bool rotate = true;  // false: shifts and scales only, as in the thesis
+  bool scale = true;   // the same along all axes
 };
 template <class Visitor>
 void Fields(Visitor& visit, PlacementOptions& o) {

@@ -23,12 +23,12 @@ enum class SeedMethod { kRay, kClosest };
 constexpr auto EnumNames(SeedMethod) { return std::to_array<std::string_view>({"ray", "closest"}); }
 
 struct SeedOptions {
-  SeedMethod method = SeedMethod::kRay;
-  int level = 2;
-  int direction_level = 0;
-  double max_distance_mm = 30;
-  double max_normal_angle_deg = 60;
-  double weight = 1;
+  SeedMethod method = SeedMethod::kRay;  // how its point on the implicit face is found
+  int level = 2;                         // a seed at the centre of each of its patches
+  int direction_level = 0;               // whose normal is its direction; coarser is smoother
+  double max_distance_mm = 30;           // from the surface
+  double max_normal_angle_deg = 60;      // between its direction and its triangle's normal
+  double weight = 1;                     // in the fit; a standard dowel has 1
 };
 template <class Visitor>
 void Fields(Visitor& visit, SeedOptions& o) {

@@ -17,11 +17,11 @@ namespace semblance {
 
 // How points move in a round, and what stops them; of every mode.
 struct PointMoves {
-  int rounds = 3;
-  double damping = 0.1;
-  double max_move_mm = 5;
-  double standard = 0;
-  bool barrier = true;
+  int rounds = 3;          // after each step of the schedule
+  double damping = 0.1;    // 0 takes whole Gauss-Newton steps
+  double max_move_mm = 5;  // of a point, in a round
+  double standard = 0;     // weight of standard landmarks' own (u,v)
+  bool barrier = true;     // no triangle of the points' network turns over
   // Labels of points that stay at their (u,v), with all points at the same place. Not among the
   // options: a caller knows of its points which were placed by hand.
   std::vector<std::string> kept = {};
@@ -61,9 +61,9 @@ void Fields(Visitor& visit, PointMoves& o) {
 // surface, whose weight is 1. All penalties are in mm^2 of the surface, so that a weight means the
 // same for every domain.
 struct NetworkMoves : PointMoves {
-  double bunching = 0.005;
-  double distortion = 0.005;
-  double crease = 0;
+  double bunching = 0.005;    // weight of the spacing in (u,v)
+  double distortion = 0.005;  // weight of distances between neighbours
+  double crease = 0;          // weight of bends between neighbours
 };
 template <class Visitor>
 void Fields(Visitor& visit, NetworkMoves& o) {
@@ -107,8 +107,8 @@ struct AlternatingRelaxation : NetworkMoves {
 // Alternating, then fits in which the points may slide along the surface, each followed by a move.
 struct TangentDistanceRelaxation : NetworkMoves {
   static constexpr std::string_view kName = "tangent_distance";
-  int tangent_rounds = 3;
-  double tangential = 0.1;
+  int tangent_rounds = 3;   // sliding fits, after the alternating rounds
+  double tangential = 0.1;  // weight along the surface, against its normal
 };
 template <class Visitor>
 void Fields(Visitor& visit, TangentDistanceRelaxation& o) {

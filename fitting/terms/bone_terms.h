@@ -13,8 +13,8 @@ namespace semblance {
 // the bone. Costs nothing where the surface is far enough out.
 struct NonPenetrationTerm {
   static constexpr std::string_view kName = "non_penetration";
-  double weight = 1;
-  double min_depth_mm = 2;
+  double weight = 1;        // of the mean square
+  double min_depth_mm = 2;  // outside bone, along the point's direction
 };
 template <class Visitor>
 void Fields(Visitor& visit, NonPenetrationTerm& o) {
@@ -34,7 +34,7 @@ void Fields(Visitor& visit, NonPenetrationTerm& o) {
 // foot.
 struct SpringTerm {
   static constexpr std::string_view kName = "spring";
-  double weight = 0.1;
+  double weight = 0.1;  // of the mean square
 };
 template <class Visitor>
 void Fields(Visitor& visit, SpringTerm& o) {

@@ -20,9 +20,9 @@ constexpr auto EnumNames(RobustLoss) {
 // a^2 / 3 (1 - (1 - s / a^2)^3) for s <= a^2, else a^2 / 3: points beyond a have no pull at all.
 struct PointTerm {
   static constexpr std::string_view kName = "points";
-  double weight = 1;
-  RobustLoss loss = RobustLoss::kNone;
-  double loss_width_mm = 5;
+  double weight = 1;                    // of the mean squared distance
+  RobustLoss loss = RobustLoss::kNone;  // tames points far off
+  double loss_width_mm = 5;             // from here on a point counts less
 };
 template <class Visitor>
 void Fields(Visitor& visit, PointTerm& o) {
@@ -43,7 +43,7 @@ void Fields(Visitor& visit, PointTerm& o) {
 // alone, mm^2.
 struct LandmarkTerm {
   static constexpr std::string_view kName = "landmarks";
-  double weight = 1;
+  double weight = 1;  // of the mean squared distance
 };
 template <class Visitor>
 void Fields(Visitor& visit, LandmarkTerm& o) {
@@ -55,7 +55,7 @@ void Fields(Visitor& visit, LandmarkTerm& o) {
 // one standard deviation everywhere: more than the points' mean square is worth following.
 struct PriorShapeTerm {
   static constexpr std::string_view kName = "prior_shape";
-  double weight = 1;
+  double weight = 1;  // of the mean square
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorShapeTerm& o) {
@@ -68,8 +68,8 @@ void Fields(Visitor& visit, PriorShapeTerm& o) {
 // about right. With tangential 1, or where there is no normal, as the points without a loss.
 struct TangentPointTerm {
   static constexpr std::string_view kName = "tangent_points";
-  double weight = 1;
-  double tangential = 0.1;
+  double weight = 1;        // of the mean squared distance
+  double tangential = 0.1;  // along the surface, against its normal
 };
 template <class Visitor>
 void Fields(Visitor& visit, TangentPointTerm& o) {

@@ -20,8 +20,8 @@ constexpr auto EnumNames(PriorTowards) {
 // |c - c0|^2, mm^2; c0 is the vertex before this solve, or the template's.
 struct PriorTerm {
   static constexpr std::string_view kName = "prior";
-  double weight = 1e-3;
-  PriorTowards towards = PriorTowards::kStart;
+  double weight = 1e-3;                         // of the mean squared move
+  PriorTowards towards = PriorTowards::kStart;  // what a vertex is held to
   bool held_only = false;  // of LevelView::held alone, the mean still over all; no option: fit.h
                            // asks for it to hold features
 };
@@ -48,9 +48,9 @@ constexpr auto EnumNames(SmoothnessOf) {
 // the default keeps waves longer than about 20 mm.
 struct SmoothnessTerm {
   static constexpr std::string_view kName = "smoothness";
-  AutoOr<double> weight = 0.01;
-  SmoothnessOf of = SmoothnessOf::kDisplacement;
-  double length_mm = 10;
+  AutoOr<double> weight = 0.01;                   // auto: from the points
+  SmoothnessOf of = SmoothnessOf::kDisplacement;  // what is smooth
+  double length_mm = 10;                          // over which bending is measured
 };
 template <class Visitor>
 void Fields(Visitor& visit, SmoothnessTerm& o) {
@@ -71,9 +71,9 @@ void Fields(Visitor& visit, SmoothnessTerm& o) {
 // there is no point, the surface moves along with its neighbourhood.
 struct MembraneTerm {
   static constexpr std::string_view kName = "membrane";
-  AutoOr<double> weight = 0.1;
-  SmoothnessOf of = SmoothnessOf::kDisplacement;
-  double length_mm = 10;
+  AutoOr<double> weight = 0.1;                    // auto: from the points
+  SmoothnessOf of = SmoothnessOf::kDisplacement;  // what resists stretching
+  double length_mm = 10;                          // over which stretching is measured
 };
 template <class Visitor>
 void Fields(Visitor& visit, MembraneTerm& o) {
@@ -98,8 +98,8 @@ void Fields(Visitor& visit, MembraneTerm& o) {
 // the domain; where a vertex is edited its mirror is too.
 struct SymmetryTerm {
   static constexpr std::string_view kName = "symmetry";
-  double weight = 0.01;
-  SmoothnessOf of = SmoothnessOf::kDisplacement;
+  double weight = 0.01;                           // of the mean square
+  SmoothnessOf of = SmoothnessOf::kDisplacement;  // what is symmetric
 };
 template <class Visitor>
 void Fields(Visitor& visit, SymmetryTerm& o) {
@@ -123,9 +123,9 @@ constexpr auto EnumNames(DistortionOf) {
 // Taken at 2 x 2 Gauss points a patch, of the level's plain B-splines. Bending is free.
 struct DistortionTerm {
   static constexpr std::string_view kName = "distortion";
-  double weight = 0.1;
-  DistortionOf of = DistortionOf::kMetric;
-  double length_mm = 10;
+  double weight = 0.1;                      // of the mean square
+  DistortionOf of = DistortionOf::kMetric;  // lengths and angles, or areas
+  double length_mm = 10;                    // over which it is measured
 };
 template <class Visitor>
 void Fields(Visitor& visit, DistortionTerm& o) {

@@ -18,8 +18,8 @@ struct AutoScheme {
   static constexpr std::string_view kName = "auto";
   std::vector<SingleScheme> schemes = {RadialBasis{}, Kriging{},
                                        Kriging{.covariance = Covariance::kMatern52}};
-  AutoTakes takes = AutoTakes::kAverage;
-  double caution = 0;  // of stacking_weights.h
+  AutoTakes takes = AutoTakes::kAverage;  // the average, or the best alone
+  double caution = 0;                     // of stacking_weights.h
 };
 template <class Visitor>
 void Fields(Visitor& visit, AutoScheme& o) {

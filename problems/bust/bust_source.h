@@ -33,7 +33,7 @@ void Fields(Visitor&, IctBust&) {}
 // The head of the template, as `semblance template --bust` writes it.
 struct HSplineBust {
   static constexpr std::string_view kName = "hspline";
-  std::filesystem::path file;
+  std::filesystem::path file;  // of `semblance template --bust`
 };
 template <class Visitor>
 void Fields(Visitor& visit, HSplineBust& o) {
@@ -46,8 +46,8 @@ void Fields(Visitor& visit, HSplineBust& o) {
 // Any head.
 struct MeshBust {
   static constexpr std::string_view kName = "mesh";
-  std::filesystem::path mesh;
-  std::filesystem::path landmarks;
+  std::filesystem::path mesh;       // a whole head in one piece, LPS, mm
+  std::filesystem::path landmarks;  // points on its skin
 };
 template <class Visitor>
 void Fields(Visitor& visit, MeshBust& o) {

@@ -17,22 +17,22 @@ namespace semblance {
 // others it replaces the vertex's offset from the coarser surface (thesis 4.1), and null takes it
 // away.
 struct VertexEdit {
-  int level = 0;
-  int i = 0;
-  int j = 0;
-  std::optional<std::array<double, 3>> offset;
+  int level = 0;                                // of the vertex
+  int i = 0;                                    // along u
+  int j = 0;                                    // along v
+  std::optional<std::array<double, 3>> offset;  // null: follows the coarser surface
 };
 
 // Takes all offsets of the levels in a part of the domain away, before the edits are made.
 struct RegionReset {
   std::array<double, 2> u = {0, 1};  // lowest, highest; lowest > highest runs across the seam
-  std::array<double, 2> v = {0, 1};
-  int first_level = 1;
+  std::array<double, 2> v = {0, 1};  // lowest and highest
+  int first_level = 1;               // coarsest that loses its detail
 };
 
 struct EditScript {
-  std::vector<RegionReset> resets;
-  std::vector<VertexEdit> edits;
+  std::vector<RegionReset> resets;  // done first
+  std::vector<VertexEdit> edits;    // vertices with another offset
 };
 
 template <class Visitor>

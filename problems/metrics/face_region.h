@@ -18,8 +18,8 @@ namespace semblance {
 
 // What is closer than radius_mm to `site` is not scored (a fracture, a moustache, an artefact).
 struct ExcludedZone {
-  std::string site;
-  double radius_mm = 20;
+  std::string site;       // at its centre
+  double radius_mm = 20;  // around it
 };
 template <class Visitor>
 void Fields(Visitor& visit, ExcludedZone& o) {
@@ -47,11 +47,11 @@ constexpr auto EnumNames(RegionExtent) {
 }
 
 struct FaceRegionOptions {
-  RegionExtent extent = RegionExtent::kFace;
-  double probe_mm = 6;                // of the ball that feels the outer skin
-  double margin_mm = 0;               // beyond the network's border
-  double reach_mm = 60;               // from the network
-  std::vector<ExcludedZone> exclude;  // not scored
+  RegionExtent extent = RegionExtent::kFace;  // the face, or before the dowel network
+  double probe_mm = 6;                        // of the ball that feels the outer skin
+  double margin_mm = 0;                       // beyond the network's border
+  double reach_mm = 60;                       // from the network
+  std::vector<ExcludedZone> exclude;          // not scored
 };
 template <class Visitor>
 void Fields(Visitor& visit, FaceRegionOptions& o) {

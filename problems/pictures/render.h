@@ -67,12 +67,12 @@ enum class Lighting { kStudio, kEven };
 constexpr auto EnumNames(Lighting) { return std::to_array<std::string_view>({"studio", "even"}); }
 
 struct RenderOptions {
-  int width = 800;        // pixels
-  int height = 800;       // pixels
-  int supersampling = 2;  // samples along each side of a pixel
-  Lighting lighting = Lighting::kStudio;
-  Colour background_top = {0.98, 0.985, 0.99};
-  Colour background_bottom = {0.89, 0.90, 0.915};
+  int width = 800;                                 // pixels
+  int height = 800;                                // pixels
+  int supersampling = 2;                           // samples along each side of a pixel
+  Lighting lighting = Lighting::kStudio;           // even for colours that mean numbers
+  Colour background_top = {0.98, 0.985, 0.99};     // sRGB
+  Colour background_bottom = {0.89, 0.90, 0.915};  // sRGB
 };
 
 template <class Visitor>

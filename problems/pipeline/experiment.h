@@ -39,9 +39,9 @@ namespace semblance {
 // A subject in files of meshes.
 struct FileSubject {
   static constexpr std::string_view kName = "files";
-  std::filesystem::path skull;
-  std::filesystem::path skin;
-  std::filesystem::path landmarks;
+  std::filesystem::path skull;                 // mesh
+  std::filesystem::path skin;                  // the true one; empty where not known
+  std::filesystem::path landmarks;             // on the skull
   Axes axes = Axes::kLps;                      // of skull and skin
   LengthUnit units = LengthUnit::kMillimetre;  // of skull and skin
   MandibleOptions mandible;                    // where it is a mesh of its own
@@ -75,11 +75,11 @@ void Fields(Visitor& visit, FileSubject& o) {
 // A subject in a CT volume: skull and true skin are taken from it.
 struct CtSubject {
   static constexpr std::string_view kName = "ct";
-  std::filesystem::path volume;
-  ReadVolumeOptions read;
-  std::filesystem::path landmarks;
-  CtImportOptions import;
-  MirrorOptions mirror;  // what one side lacks
+  std::filesystem::path volume;     // folder of DICOM files, or a file
+  ReadVolumeOptions read;           // which series, missing slices
+  std::filesystem::path landmarks;  // on the skull
+  CtImportOptions import;           // thresholds of skull and skin
+  MirrorOptions mirror;             // what one side lacks
 };
 template <class Visitor>
 void Fields(Visitor& visit, CtSubject& o) {
@@ -124,8 +124,8 @@ void Fields(Visitor& visit, CrossValidationOptions& o) {
 
 // The same experiment with some options otherwise.
 struct Alternative {
-  std::string name;
-  std::vector<std::string> set;
+  std::string name;              // of its folder below the run's
+  std::vector<std::string> set;  // what is otherwise, as --set takes it
 };
 template <class Visitor>
 void Fields(Visitor& visit, Alternative& o) {
@@ -142,7 +142,7 @@ void Fields(Visitor& visit, Alternative& o) {
 using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
 struct Experiment {
-  std::string title = "untitled";
+  std::string title = "untitled";                // of the report
   Subject subject;                               // whose skull
   PlaceOptions landmarks;                        // how they are laid onto bone
   TissueOptions tissue;                          // where the dowels' depths come from
@@ -163,7 +163,7 @@ struct Experiment {
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;             // no seeds nearer to where the scan ends
   int rounds = 1;                       // of seeding and fitting
-  FitOptions fit = {.relaxation = FootpointRelaxation{}};
+  FitOptions fit = {.relaxation = FootpointRelaxation{}};  // to dowels and seeds
   std::filesystem::path edits;              // made by hand, on the face that comes out
   UncertaintyOptions uncertainty;           // how far the face may be off
   FaceRegionOptions region;                 // which skin is scored

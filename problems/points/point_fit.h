@@ -30,20 +30,20 @@ constexpr auto EnumNames(ResidualFile) {
 }
 
 struct PointFitOptions {
-  std::string title = "untitled";
-  int patches_u = 8;
-  int patches_v = 8;
-  Closure closure = Closure::kOpen;
-  Parameters parameters;
-  std::vector<std::string> attributes = {};
+  std::string title = "untitled";            // of the result
+  int patches_u = 8;                         // of level 0
+  int patches_v = 8;                         // of level 0
+  Closure closure = Closure::kOpen;          // whether u goes round
+  Parameters parameters;                     // where the points' (u,v) come from
+  std::vector<std::string> attributes = {};  // further columns that are fitted
   FitOptions fit = {
       .plan = AutoPlan{},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
-  AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);
-  ResidualFile residuals = ResidualFile::kAuto;
-  bool sigma = false;
-  bool report = true;
+  AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);  // of surface.ply's triangles
+  ResidualFile residuals = ResidualFile::kAuto;  // auto: .csv of up to 100,000 points, else .ply
+  bool sigma = false;                            // write the standard deviation; for the plan auto
+  bool report = true;                            // write report.html
 };
 template <class Visitor>
 void Fields(Visitor& visit, PointFitOptions& o) {

@@ -16,8 +16,8 @@ namespace semblance {
 
 // A phantom as a CT scanner shows it, whose skull and skin are then taken from the volume.
 struct PhantomScan {
-  double pixel_mm = 1, slice_mm = 1;
-  CtImportOptions import;
+  double pixel_mm = 1, slice_mm = 1;  // between columns, rows; slices
+  CtImportOptions import;             // thresholds of skull and skin
 };
 template <class Visitor>
 void Fields(Visitor& visit, PhantomScan& o) {
@@ -34,14 +34,14 @@ void Fields(Visitor& visit, PhantomScan& o) {
 }
 
 struct PopulationSubject {
-  std::string name;
-  Subject subject;                        // without landmarks: they are proposed
-  bool optional = false;                  // left out where its files are not there
-  std::vector<std::string> exclude = {};  // sites
-  std::optional<Sex> sex = std::nullopt;
-  std::optional<Build> build = std::nullopt;
-  std::optional<double> age_years = std::nullopt, bmi = std::nullopt;
-  std::optional<PhantomScan> scan = std::nullopt;  // of a phantom alone
+  std::string name;                           // each once
+  Subject subject;                            // without landmarks: they are proposed
+  bool optional = false;                      // left out where its files are not there
+  std::vector<std::string> exclude = {};      // sites
+  std::optional<Sex> sex = std::nullopt;      // null: not known
+  std::optional<Build> build = std::nullopt;  // null: not known
+  std::optional<double> age_years = std::nullopt, bmi = std::nullopt;  // null: not known
+  std::optional<PhantomScan> scan = std::nullopt;                      // of a phantom alone
 };
 template <class Visitor>
 void Fields(Visitor& visit, PopulationSubject& o) {
@@ -75,7 +75,7 @@ void CheckValue(Report& report, const PopulationSubject& o) {
 
 // Made-up heads, of seeds that count up from random_seed.
 struct PhantomCrowd {
-  int count = 0;
+  int count = 0;                    // made-up heads
   PhantomOptions like;              // of the first; the others differ in their seed
   std::optional<PhantomScan> scan;  // none: skull and skin are exact
 };
@@ -93,7 +93,7 @@ void Fields(Visitor& visit, PhantomCrowd& o) {
 }
 
 struct ReferenceFiles {
-  std::filesystem::path skull, landmarks;
+  std::filesystem::path skull, landmarks;  // marked by a person
 };
 template <class Visitor>
 void Fields(Visitor& visit, ReferenceFiles& o) {
@@ -103,11 +103,11 @@ void Fields(Visitor& visit, ReferenceFiles& o) {
 
 // Depth all over the skull, on a grid of the generic face's (u,v).
 struct DenseOptions {
-  int columns = 48, rows = 48;
-  double reach_mm = 25;
-  double normal_radius_mm = 5;
-  double least_share = 0.6;
-  int modes = 5;
+  int columns = 48, rows = 48;  // of the grid
+  double reach_mm = 25;         // bone farther from the generic face is left out
+  double normal_radius_mm = 5;  // of the mean normal
+  double least_share = 0.6;     // of subjects; points that fewer have are in no mode
+  int modes = 5;                // at most
 };
 template <class Visitor>
 void Fields(Visitor& visit, DenseOptions& o) {
@@ -141,11 +141,11 @@ void Fields(Visitor& visit, DenseOptions& o) {
 
 // How one subject is measured: what its file rests on.
 struct MeasureOptions {
-  DepthConvention convention = DepthConvention::kAlongBoneNormal;
-  PlaceOptions landmarks;
-  DepthTruthOptions depth_truth;
-  DenseOptions dense;
-  std::vector<ReferenceFiles> references;
+  DepthConvention convention = DepthConvention::kAlongBoneNormal;  // where a depth ends
+  PlaceOptions landmarks;                                          // how they are laid on bone
+  DepthTruthOptions depth_truth;                                   // what counts as a depth
+  DenseOptions dense;                                              // depth all over the skull
+  std::vector<ReferenceFiles> references;                          // to propose landmarks by
 };
 template <class Visitor>
 void Fields(Visitor& visit, MeasureOptions& o) {
@@ -169,9 +169,9 @@ void CheckValue(Report& report, const MeasureOptions& o) {
 }
 
 struct OutlierOptions {
-  double site_z = 4;
-  double subject_z = 3.5;
-  bool leave_out = false;
+  double site_z = 4;       // robust deviations of a depth
+  double subject_z = 3.5;  // of a subject's depths together
+  bool leave_out = false;  // of table, modes and scores
 };
 template <class Visitor>
 void Fields(Visitor& visit, OutlierOptions& o) {
@@ -193,18 +193,18 @@ void Fields(Visitor& visit, OutlierOptions& o) {
 }
 
 struct PopulationFile {
-  std::string title = "untitled";
-  std::string id = "population";
-  std::string label;
-  std::vector<PopulationSubject> subjects;
-  PhantomCrowd phantoms;
-  MeasureOptions measure;
-  double least_confidence = 0.2;
-  OutlierOptions outliers;
-  SiteCorrelation correlation;
-  std::optional<double> shrinkage;
-  std::vector<std::string> known = {"g", "pg", "zy", "go"};
-  std::vector<std::filesystem::path> tables;
+  std::string title = "untitled";           // of report and table
+  std::string id = "population";            // of the table
+  std::string label;                        // who was measured
+  std::vector<PopulationSubject> subjects;  // who is measured
+  PhantomCrowd phantoms;                    // made-up heads beside them
+  MeasureOptions measure;                   // how each is measured
+  double least_confidence = 0.2;            // of a landmark that was proposed
+  OutlierOptions outliers;                  // what is one, and what becomes of it
+  SiteCorrelation correlation;              // the model that a sample is shrunk to
+  std::optional<double> shrinkage;          // the model's part; null: from the sample
+  std::vector<std::string> known = {"g", "pg", "zy", "go"};  // they foretell the others
+  std::vector<std::filesystem::path> tables;                 // compared with this one
 };
 template <class Visitor>
 void Fields(Visitor& visit, PopulationFile& o) {

@@ -15,9 +15,9 @@
 namespace semblance {
 
 struct MandibleOptions {
-  std::filesystem::path mesh;  // empty: none
-  std::optional<double> opening_deg;
-  std::optional<double> bite_mm;
+  std::filesystem::path mesh;         // empty: none
+  std::optional<double> opening_deg;  // above 0 opens the mouth further
+  std::optional<double> bite_mm;      // instead: so far are pr and id apart
   std::optional<std::array<double, 3>> condyle_left, condyle_right;
 };
 

@@ -16,9 +16,9 @@
 namespace semblance {
 
 struct MirrorOptions {
-  bool missing = false;
-  double counterpart_mm = 6;
-  double least_cm2 = 2;
+  bool missing = false;       // whether bone of one side alone is mirrored
+  double counterpart_mm = 6;  // within this, bone has a counterpart
+  double least_cm2 = 2;       // of a piece
 };
 
 template <class Visitor>

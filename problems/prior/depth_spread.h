@@ -18,8 +18,8 @@ namespace semblance {
 // sites was 1.4, -0.8 and 0.2 against the T-Table and 1.6, -0.5 and 0.6 against Rhine's table, and
 // the deviation about that mean 0.7 to 1.2.
 struct TableDepthOptions {
-  double own = 0.9;
-  double shared = 0.9;
+  double own = 0.9;     // of a table's sd, by which one depth errs alone
+  double shared = 0.9;  // and all of a person together
 };
 template <class Visitor>
 void Fields(Visitor& visit, TableDepthOptions& o) {
@@ -42,11 +42,11 @@ void Fields(Visitor& visit, TableDepthOptions& o) {
 // 30 mm by 5 to 7. Yet a rate makes the two whole heads worse
 // (configs/studies/implicit_worth.yaml): there the prior alone is off by more.
 struct ImplicitSpreadOptions {
-  double sd_mm = 2;
-  double share = 0.18;
-  double reach_mm = 15;
-  double rate = 0;
-  double sigma_rate = 0.1;
+  double sd_mm = 2;         // over thin tissue, near dowels
+  double share = 0.18;      // of the tissue's thickness
+  double reach_mm = 15;     // from every dowel
+  double rate = 0;          // mm per mm beyond that
+  double sigma_rate = 0.1;  // the same, for sigma
 };
 template <class Visitor>
 void Fields(Visitor& visit, ImplicitSpreadOptions& o) {

@@ -22,12 +22,12 @@ void Fields(Visitor&, NoPrior&) {}
 
 struct ModesPrior {
   static constexpr std::string_view kName = "modes";
-  std::filesystem::path mean;
-  std::filesystem::path modes;
-  std::filesystem::path sites;
-  std::filesystem::path features;
-  double scale = 1;
-  int count = 100;
+  std::filesystem::path mean;      // mesh, LPS, mm
+  std::filesystem::path modes;     // .npy, k x n x 3
+  std::filesystem::path sites;     // .csv: their points on the mean
+  std::filesystem::path features;  // .csv: the 68 facial landmarks
+  double scale = 1;                // mm per unit of the modes
+  int count = 100;                 // of modes, at most
 };
 template <class Visitor>
 void Fields(Visitor& visit, ModesPrior& o) {
@@ -60,8 +60,8 @@ void Fields(Visitor& visit, ModesPrior& o) {
 // The modes of `template` as H-splines.
 struct HSplinePrior {
   static constexpr std::string_view kName = "hspline";
-  std::filesystem::path modes;
-  int count = 100;
+  std::filesystem::path modes;  // .json of `semblance prior`
+  int count = 100;              // of modes, at most
 };
 template <class Visitor>
 void Fields(Visitor& visit, HSplinePrior& o) {
@@ -76,7 +76,7 @@ void Fields(Visitor& visit, HSplinePrior& o) {
 // The modes of configs/faces/ict, which the program carries, for `template: ict`.
 struct IctPrior {
   static constexpr std::string_view kName = "ict";
-  int count = 60;
+  int count = 60;  // of modes, at most
 };
 template <class Visitor>
 void Fields(Visitor& visit, IctPrior& o) {

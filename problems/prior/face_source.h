@@ -29,7 +29,7 @@ void Fields(Visitor&, PlacedFace&) {}
 // 1989).
 struct ThinPlateFace {
   static constexpr std::string_view kName = "thin_plate";
-  double stiffness_mm = 10;
+  double stiffness_mm = 10;  // 0 meets all tips
 };
 template <class Visitor>
 void Fields(Visitor& visit, ThinPlateFace& o) {
@@ -77,7 +77,7 @@ void PriorUseFields(Visitor& visit, PriorUse& o) {
 // The most likely face of the prior.
 struct PriorFace {
   static constexpr std::string_view kName = "prior";
-  PriorUse use;
+  PriorUse use;  // how sure depths and implicit face are
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorFace& o) {
@@ -89,10 +89,10 @@ void Fields(Visitor& visit, PriorFace& o) {
 // posterior. The implicit face has had its say in the prior's face, so its seeds weigh less here.
 struct PriorThenFit {
   static constexpr std::string_view kName = "prior_then_fit";
-  double shape_weight = 1;
-  double seed_weight = 0.001;
-  SeedTrustOptions seed_trust;
-  PriorUse use;
+  double shape_weight = 1;      // of the term prior_shape
+  double seed_weight = 0.001;   // in place of seeds.weight
+  SeedTrustOptions seed_trust;  // where that weight falls
+  PriorUse use;                 // how sure depths and implicit face are
 };
 template <class Visitor>
 void Fields(Visitor& visit, PriorThenFit& o) {

@@ -15,8 +15,8 @@
 namespace semblance {
 
 struct RuleUse {
-  bool use = true;
-  double sd_mm = kNaN;
+  bool use = true;      // false leaves it out
+  double sd_mm = kNaN;  // of what the rule predicts
 };
 template <class Visitor>
 void Fields(Visitor& visit, RuleUse& o) {

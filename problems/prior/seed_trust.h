@@ -12,7 +12,7 @@
 namespace semblance {
 
 struct SeedTrustOptions {
-  double reach_mm = 25;
+  double reach_mm = 25;  // a seed weighs exp(-(d / reach)^2)
 };
 template <class Visitor>
 void Fields(Visitor& visit, SeedTrustOptions& o) {

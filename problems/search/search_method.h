@@ -68,7 +68,7 @@ constexpr auto EnumNames(Brackets) { return std::to_array<std::string_view>({"al
 // (successive halving: Jamieson & Talwalkar 2016; with brackets, Hyperband: Li et al. 2018).
 struct HalvingSearch {
   static constexpr std::string_view kName = "halving";
-  int rungs = 3;
+  int rungs = 3;                                  // lengths of a run, the last in full
   double eta = 3;                                 // the published choice
   Brackets brackets = Brackets::kAll;             // short runs may mislead: some begin higher up
   std::vector<ConfigMap<ConfigNode>> short_runs;  // empty: by the steps of the fit

@@ -141,7 +141,7 @@ constexpr auto EnumNames(Better) { return std::to_array<std::string_view>({"lowe
 
 struct SearchedNumber {
   ConfigNode low, high;  // as they are written, because 1 and 5 ask for whole numbers and 1.0 not
-  bool log = false;
+  bool log = false;      // spread by the logarithm
 };
 template <class Visitor>
 void Fields(Visitor& visit, SearchedNumber& o) {
@@ -159,12 +159,12 @@ void Fields(Visitor& visit, SearchedNumber& o) {
 struct StudySearch {
   SearchMethod method = BayesSearch{};  // the least runs where a treatment costs minutes
   int budget = 0;                       // must be given
-  std::uint64_t random_seed = 1;
-  std::string metric;            // empty: the study's
-  std::optional<Better> better;  // none: as the metric says of itself
-  ConfigMap<SearchedNumber> ranges;
-  OptionAxes choices;
-  std::vector<StudySubject> held_out;  // empty: what is found is as good as it looks to itself
+  std::uint64_t random_seed = 1;        // of whatever the method draws
+  std::string metric;                   // empty: the study's
+  std::optional<Better> better;         // none: as the metric says of itself
+  ConfigMap<SearchedNumber> ranges;     // numbers, by option path
+  OptionAxes choices;                   // values without an order, by option path
+  std::vector<StudySubject> held_out;   // empty: what is found is as good as it looks to itself
 };
 template <class Visitor>
 void Fields(Visitor& visit, StudySearch& o) {
@@ -216,19 +216,19 @@ void CheckValue(Report& report, const StudySearch& o) {
 }
 
 struct StudyFile {
-  std::string title = "untitled";
+  std::string title = "untitled";  // of the report
   std::filesystem::path base;  // must be given: a study varies an experiment that runs by itself
-  OptionValues set;
-  std::vector<StudySubject> subjects;  // empty: the base's own subject
-  OptionAxes grid;                     // the last axis varies fastest
-  OptionAxes zip;
-  std::vector<OptionValues> list;
-  std::optional<StudySamples> sample;
-  std::optional<StudySearch> search;  // instead of grid, zip, list and sample
-  std::vector<std::string> tags;
-  std::string metric = "face.rms_mm";
-  TrialFiles keep = TrialFiles::kSummary;  // the files of a run are some 30 MB, of a summary 10 kB
-  StudyJob job = StudyJob::kFace;
+  OptionValues set;            // for all trials
+  std::vector<StudySubject> subjects;       // empty: the base's own subject
+  OptionAxes grid;                          // the last axis varies fastest
+  OptionAxes zip;                           // values side by side
+  std::vector<OptionValues> list;           // rows by hand
+  std::optional<StudySamples> sample;       // rows drawn from ranges
+  std::optional<StudySearch> search;        // instead of grid, zip, list and sample
+  std::vector<std::string> tags;            // that it is found by
+  std::string metric = "face.rms_mm";       // that the report ranks by
+  TrialFiles keep = TrialFiles::kSummary;   // the files of a run are some 30 MB, of a summary 10 kB
+  StudyJob job = StudyJob::kFace;           // face, depth, or identify
   std::optional<IdentifyOptions> identify;  // of that job only; left out, its defaults
 };
 template <class Visitor>

@@ -70,11 +70,11 @@ struct TissueGiven {
   std::map<std::string, double> depths_mm;  // by site
   std::vector<std::string> measured;        // sites of the landmarks' file, or `all`
   double error_mm = 0;                      // sd of each of these depths
-  std::optional<Sex> sex;
-  std::optional<Build> build;
-  std::optional<double> age_years, bmi;
-  std::filesystem::path spread;  // another table, for deviations and correlations
-  SiteCorrelation correlation;   // where the table has none
+  std::optional<Sex> sex;                   // where the table has the covariate
+  std::optional<Build> build;               // likewise
+  std::optional<double> age_years, bmi;     // likewise
+  std::filesystem::path spread;             // another table, for deviations and correlations
+  SiteCorrelation correlation;              // where the table has none
 
   bool HasNothing() const {
     return depths_mm.empty() && measured.empty() && !sex && !build && !age_years && !bmi;

@@ -24,7 +24,7 @@ void Fields(Visitor&, KeepAll&) {}
 // farthest from those that are kept (Gonzalez 1985). Those of 12 are among those of 16.
 struct KeepSpread {
   static constexpr std::string_view kName = "spread";
-  int n = 16;
+  int n = 16;  // as widely apart as they can be
 };
 template <class Visitor>
 void Fields(Visitor& visit, KeepSpread& o) {
@@ -38,7 +38,7 @@ void Fields(Visitor& visit, KeepSpread& o) {
 
 struct KeepNames {
   static constexpr std::string_view kName = "names";
-  std::vector<std::string> sites;
+  std::vector<std::string> sites;  // by code
 };
 template <class Visitor>
 void Fields(Visitor& visit, KeepNames& o) {
@@ -56,8 +56,8 @@ void CheckValue(Report& report, const KeepNames& o) {
 
 struct KeepRandom {
   static constexpr std::string_view kName = "random";
-  int n = 16;
-  std::uint64_t random_seed = 1;
+  int n = 16;                     // of all
+  std::uint64_t random_seed = 1;  // which
 };
 template <class Visitor>
 void Fields(Visitor& visit, KeepRandom& o) {

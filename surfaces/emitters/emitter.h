@@ -16,16 +16,16 @@ namespace semblance {
 // the finer its mesh (REFERENCE B12).
 struct ThesisEmitter {
   static constexpr std::string_view kName = "thesis";
-  double decay = 6;
-  double cut_below = 0;
+  double decay = 6;      // k: more blends less, and follows the bone more
+  double cut_below = 0;  // an emission below this is none; 0: all count
 };
 
 // Eq. 3.2: T moved out by t l emits with depth (1 - t) l; the prism under it is solid.
 struct SplitEmitter {
   static constexpr std::string_view kName = "split";
-  double decay = 6;
-  double split = 0.5;
-  double cut_below = 0;
+  double decay = 6;      // k: more blends less, and follows the bone more
+  double split = 0.5;    // t: 0 is the first emitter
+  double cut_below = 0;  // an emission below this is none; 0: all count
 };
 
 // (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the integral
@@ -41,8 +41,8 @@ constexpr auto EnumNames(EmitterDepth) {
 
 struct FlatEmitter {
   static constexpr std::string_view kName = "flat";
-  double decay = 6;
-  EmitterDepth depth = EmitterDepth::kMean;
+  double decay = 6;                          // k: more blends less, and follows the bone more
+  EmitterDepth depth = EmitterDepth::kMean;  // the corners' mean, or linear between them
 };
 
 // What an emitter gives in a box: nowhere less than `least`, nowhere more than `most`.

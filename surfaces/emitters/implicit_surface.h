@@ -15,8 +15,8 @@ namespace semblance {
 struct NeighbourList;  // neighbour_list_cache.h
 
 struct ImplicitOptions {
-  Emitter emitter = FlatEmitter{};
-  double tail_error = 1e-3;
+  Emitter emitter = FlatEmitter{};  // what a triangle emits
+  double tail_error = 1e-3;         // of the far field, where 1 is the surface
 };
 template <class Visitor>
 void Fields(Visitor& visit, ImplicitOptions& o) {

@@ -24,7 +24,7 @@ constexpr auto EnumNames(FollowedComponents) {
 // starts wherever bounds on the field do not prove that there is no surface. All threads.
 struct NarrowBand {
   static constexpr std::string_view kName = "narrow_band";
-  FollowedComponents components = FollowedComponents::kOutermost;
+  FollowedComponents components = FollowedComponents::kOutermost;  // all: at many times the cost
 };
 template <class Visitor>
 void Fields(Visitor& visit, NarrowBand& o) {
@@ -62,8 +62,8 @@ inline constexpr FieldInfo kListSums{
 // bisection, which needs but signs. One thread.
 struct McOctree {
   static constexpr std::string_view kName = "mc_octree";
-  double influence = 500;
-  ListSums sums = ListSums::kOneByOne;
+  double influence = 500;               // m of a triangle's box
+  ListSums sums = ListSums::kOneByOne;  // one by one as in the thesis, or in lanes
 };
 template <class Visitor>
 void Fields(Visitor& visit, McOctree& o) {
@@ -90,9 +90,9 @@ constexpr auto EnumNames(EmitterMinimum) {
 // emitters could add is carried along, and counts. One thread.
 struct MinMaxOctree {
   static constexpr std::string_view kName = "minmax_octree";
-  double least_emission = 1e-3;
-  EmitterMinimum minimum = EmitterMinimum::kBall;
-  ListSums sums = ListSums::kOneByOne;
+  double least_emission = 1e-3;                    // less is not listed in a box
+  EmitterMinimum minimum = EmitterMinimum::kBall;  // how the least in a box is found
+  ListSums sums = ListSums::kOneByOne;             // one by one as in the thesis, or in lanes
 };
 template <class Visitor>
 void Fields(Visitor& visit, MinMaxOctree& o) {

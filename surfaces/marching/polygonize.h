@@ -51,8 +51,8 @@ constexpr auto EnumNames(EdgeSearch) {
 }
 
 struct EdgeSearchOptions {
-  EdgeSearch method = EdgeSearch::kRegulaFalsi;
-  double tolerance = 1e-3;
+  EdgeSearch method = EdgeSearch::kRegulaFalsi;  // the same point; regula falsi asks less often
+  double tolerance = 1e-3;                       // share of the edge
 };
 template <class Visitor>
 void Fields(Visitor& visit, EdgeSearchOptions& o) {

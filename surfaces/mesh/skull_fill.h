@@ -14,10 +14,10 @@ namespace semblance {
 
 struct WrapFill {
   static constexpr std::string_view kName = "wrap";
-  double alpha_mm = 24;
-  double edge_mm = 3.5;
-  double pull_mm = 4;
-  double press_mm = 3;
+  double alpha_mm = 24;  // narrower openings are bridged
+  double edge_mm = 3.5;  // of the shell's triangles
+  double pull_mm = 4;    // closer parts are laid onto bone
+  double press_mm = 3;   // a dowel reaches out at least so far
 };
 template <class Visitor>
 void Fields(Visitor& visit, WrapFill& o) {
