@@ -38,11 +38,11 @@ struct DecimateResult {
 
 // Collapses edges, cheapest first. The cost is the squared distance from the planes of the
 // triangles that are there now, weighted by area (Garland & Heckbert 1997; memoryless as in
-// Lindstrom & Turk 1998). Vertices on a border stay on a border. The result has the topology of the
-// mesh: its components, borders and handles. Asked for fewer triangles than sound collapses can
-// give, it has more, and the summary says so. Same input, same bytes. Throws InputError if an
-// option is out of range, the mesh is not a consistently oriented manifold or a point is not
-// finite.
+// Lindstrom & Turk 1998). Vertices on a border stay on a border. Without a tolerance the vertices
+// that are left then settle among the original ones (original_vertices.h). Components, borders and
+// handles stay. Asked for fewer triangles than sound collapses can give, it leaves more, and the
+// summary says so. Same input, same bytes. Throws InputError if an option is out of range, the mesh
+// is not a consistently oriented manifold or a point is not finite.
 DecimateResult Decimate(const TriMesh& mesh, const DecimateOptions& options);
 
 }  // namespace semblance

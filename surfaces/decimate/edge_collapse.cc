@@ -263,11 +263,11 @@ double CollapseDistance::AtCrossings(const Vec3& from, const Vec3& to) const {
   const Vec3 along = to - from;
   double difference = 0;
   for (const Vec3& spoke : ring_) {
-    const double turn = Cross2(spoke, along);
-    const double on_spoke = Cross2(from, along) / turn, on_edge = Cross2(from, spoke) / turn;
-    if (on_spoke > 0 && on_spoke < 1 && on_edge > 0 && on_edge < 1) {
-      difference =
-          std::max(difference, std::abs(on_spoke * spoke.z() - from.z() - on_edge * along.z()));
+    const double turn = Cross2(spoke, along), whole = std::abs(turn), sign = turn < 0 ? -1 : 1;
+    const double on_spoke = sign * Cross2(from, along), on_edge = sign * Cross2(from, spoke);
+    if (on_spoke > 0 && on_spoke < whole && on_edge > 0 && on_edge < whole) {
+      difference = std::max(
+          difference, std::abs((on_spoke * spoke.z() - on_edge * along.z()) / whole - from.z()));
     }
   }
   return difference;

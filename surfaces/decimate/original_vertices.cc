@@ -9,6 +9,82 @@
 #include "surfaces/mesh/point_triangle.h"
 
 namespace semblance {
+namespace {
+
+constexpr int kSettleRounds = 2;
+constexpr double kSettleShare = 0.5;  // of a step, for neighbours move at once
+// Holds a point in directions in which no triangle faces.
+constexpr double kSettleDamping = 0.01;
+constexpr double kMostTurnCosine = 0.5;
+
+// What draws a point. With n a triangle's normal, h the height of an original vertex over its plane
+// and w the point's weight at the vertex's foot: the normal equations of sum (h - w n . step)^2.
+struct Pull {
+  double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;  // sum w^2 n n'
+  Vec3 right = Vec3::Zero();                              // sum w h n
+  double most_mm = 0;                                     // the largest w |h|
+
+  void Add(const Vec3& n, double w, double height_mm) {
+    const Vec3 row = w * n;
+    xx += row.x() * row.x(), xy += row.x() * row.y(), xz += row.x() * row.z();
+    yy += row.y() * row.y(), yz += row.y() * row.z(), zz += row.z() * row.z();
+    right += height_mm * row;
+    most_mm = std::max(most_mm, w * std::abs(height_mm));
+  }
+
+  Vec3 Step() const {
+    const double hold = kSettleDamping * (xx + yy + zz);
+    if (!(hold > 0)) {
+      return Vec3::Zero();
+    }
+    Mat3 a;
+    a << xx + hold, xy, xz, xy, yy + hold, yz, xz, yz, zz + hold;
+    const Vec3 step = a.inverse() * right;
+    const double length_mm = step.norm();
+    return kSettleShare * (length_mm > most_mm ? most_mm / length_mm : 1.0) * step;
+  }
+};
+
+// Of the original vertices `drawing`, on the corners t of their triangle.
+void AddPulls(const TriMesh& original, const std::vector<std::int32_t>& drawing, const Triangle& t,
+              const std::vector<Vec3>& points, std::vector<Pull>& pulls) {
+  const Vec3 &a = points[t[0]], ab = points[t[1]] - a, ac = points[t[2]] - a, m = ab.cross(ac);
+  const double square = m.squaredNorm();
+  if (!(square > 0)) {
+    return;
+  }
+  const Vec3 n = m / std::sqrt(square), to_b = ac.cross(m) / square, to_c = m.cross(ab) / square;
+  for (const std::int32_t v : drawing) {
+    const Vec3 ap = original.points[v] - a;
+    const double b = std::clamp(to_b.dot(ap), 0.0, 1.0), c = std::clamp(to_c.dot(ap), 0.0, 1 - b);
+    const double height_mm = n.dot(ap);
+    pulls[t[0]].Add(n, 1 - b - c, height_mm);
+    pulls[t[1]].Add(n, b, height_mm);
+    pulls[t[2]].Add(n, c, height_mm);
+  }
+}
+
+bool TurnsFar(const Vec3& before, const Vec3& after) {
+  return before.dot(after) < kMostTurnCosine * before.norm() * after.norm();
+}
+
+// Puts points back until no triangle turns far.
+void PutBack(const std::vector<Vec3>& before, TriMesh& mesh) {
+  const TriMesh was{before, {}};
+  for (bool more = true; more;) {
+    more = false;
+    for (const Triangle& t : mesh.triangles) {
+      if (TurnsFar(TriangleAreaVector(was, t), TriangleAreaVector(mesh, t))) {
+        for (const std::int32_t v : t) {
+          more = more || mesh.points[v] != before[v];
+          mesh.points[v] = before[v];
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
 
 OriginalVertices::OriginalVertices(const TriMesh& mesh)
     : mesh_(mesh),
@@ -71,6 +147,39 @@ double OriginalVertices::DistanceBound_mm(const Vec3& p,
     least = std::min(least, (there - p).squaredNorm());
   }
   return std::sqrt(least);
+}
+
+void OriginalVertices::Settle(const std::vector<std::int32_t>& triangles,
+                              const std::function<bool(std::int32_t)>& is_fixed, TriMesh& left) {
+  std::vector<std::int32_t> drawing;
+  for (int round = 0; round < kSettleRounds; ++round) {
+    std::vector<Pull> pulls(left.points.size());
+    for (std::size_t n = 0; n < triangles.size(); ++n) {
+      drawing.clear();
+      AppendOf(triangles[n], drawing);
+      AddPulls(mesh_, drawing, left.triangles[n], left.points, pulls);
+    }
+    const std::vector<Vec3> before = left.points;
+    for (std::int32_t v = 0; v < static_cast<std::int32_t>(before.size()); ++v) {
+      if (!is_fixed(v)) {
+        left.points[v] += pulls[v].Step();
+      }
+    }
+    PutBack(before, left);
+  }
+  TakeDistances(triangles, left);
+}
+
+void OriginalVertices::TakeDistances(const std::vector<std::int32_t>& triangles,
+                                     const TriMesh& left) {
+  for (std::size_t n = 0; n < triangles.size(); ++n) {
+    const Triangle& t = left.triangles[n];
+    const Vec3 &a = left.points[t[0]], &b = left.points[t[1]], &c = left.points[t[2]];
+    for (std::int32_t v = first_[triangles[n]]; v >= 0; v = next_[v]) {
+      const Vec3& p = mesh_.points[v];
+      distance_mm_[v] = (p - ClosestPointOnTriangle(p, a, b, c).position).norm();
+    }
+  }
 }
 
 }  // namespace semblance

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The vertices of the original mesh, carried along while it is decimated: each belongs to one
-// triangle of the mesh that is left.
+// triangle of the mesh that is left, and in the end draws it to itself.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
@@ -29,7 +30,18 @@ class OriginalVertices {
   // triangles at the nearest of the given vertices. Infinite if no vertices are given.
   double DistanceBound_mm(const Vec3& p, const std::vector<std::int32_t>& vertices) const;
 
+  // Moves the points of what is left of the mesh towards the least sum of squared distances of the
+  // original vertices from the planes of their triangles: two half steps of Gauss and Newton, in
+  // which a point goes no further than what belongs to its triangles is off. A point whose move
+  // would turn a triangle by more than 60 degrees stays, and so does a fixed one. Then takes the
+  // distances anew.
+  //   triangles: the indices of those that are left; left: they, in this order, and all points.
+  void Settle(const std::vector<std::int32_t>& triangles,
+              const std::function<bool(std::int32_t)>& is_fixed, TriMesh& left);
+
  private:
+  void TakeDistances(const std::vector<std::int32_t>& triangles, const TriMesh& left);
+
   const TriMesh& mesh_;
   std::vector<std::int32_t> first_, next_;  // a linked list per triangle; -1 ends it
   std::vector<double> distance_mm_;         // per vertex

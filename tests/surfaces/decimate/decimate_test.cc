@@ -270,6 +270,29 @@ TEST(Decimate, TrianglesWithoutAreaGo) {
   EXPECT_LE(Furthest(plate, result.mesh, kVerticesOnly), 0.2);
 }
 
+double Rms(const TriMesh& from, const TriMesh& to) {
+  const MeshQuery query(to);
+  double sum = 0;
+  for (const Vec3& p : from.points) {
+    sum += std::pow(query.Closest(p).distance_mm, 2);
+  }
+  return std::sqrt(sum / static_cast<double>(from.points.size()));
+}
+
+// With a tolerance that binds nothing, the same triangles are left, and their vertices stay.
+TEST(Decimate, WithoutAToleranceTheVerticesSettleAmongTheOriginalOnes) {
+  for (const TriMesh& mesh : {SphereMesh({3, 2, 1}, 50, 40), Noisy(Torus(80, 40), 0.2)}) {
+    const DecimateResult stay = Decimate(mesh, {.target_triangles = 400, .tolerance_mm = 1e6}),
+                         settle = Decimate(mesh, {.target_triangles = 400});
+    EXPECT_EQ(settle.mesh.triangles, stay.mesh.triangles);
+    EXPECT_LT(Rms(mesh, settle.mesh), 0.95 * Rms(mesh, stay.mesh));
+    EXPECT_LE(Furthest(mesh, settle.mesh, kVerticesOnly), settle.summary.error_mm + 1e-9);
+  }
+  const TriMesh box = Box(16);  // nothing draws its corners
+  const TriMesh left = Decimate(box, {.target_triangles = 12}).mesh;
+  EXPECT_NEAR(SignedVolume(left), 1000, 1e-6);
+}
+
 TEST(Decimate, AMovedMeshGivesTheMovedResult) {
   const TriMesh mesh = Noisy(Torus(60, 30), 0.2);
   const Similarity motion{
