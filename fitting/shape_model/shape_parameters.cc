@@ -123,7 +123,7 @@ Eigen::RowVectorXd DerivativeAlong(const Vec3& direction, const ShapeRow& row,
 
 std::vector<Vec3> PlacedPoints(const ShapeFrame& frame, const ShapeModel& model,
                                const Eigen::MatrixXd& field, const ShapeParameters& parameters) {
-  const Eigen::VectorXd moves = model.modes * parameters.coefficients;
+  const std::vector<Vec3> shape = ShapeAt(model, parameters.coefficients);
   Eigen::MatrixX3d field_moves = Eigen::MatrixX3d::Zero(field.rows(), 3);
   if (field.cols() > 0) {
     field_moves =
@@ -133,8 +133,7 @@ std::vector<Vec3> PlacedPoints(const ShapeFrame& frame, const ShapeModel& model,
   const Similarity similarity = SimilarityOf(frame, parameters);
   std::vector<Vec3> points;
   for (Eigen::Index v = 0; v < field.rows(); ++v) {
-    points.push_back(similarity * (model.mean.points[v] + moves.segment<3>(3 * v) +
-                                   field_moves.row(v).transpose()));
+    points.push_back(similarity * (shape[v] + field_moves.row(v).transpose()));
   }
   return points;
 }
