@@ -420,8 +420,6 @@ void PutVoxels(const CtVolume& volume, int slice, gdcm::Image& image) {
 
 }  // namespace
 
-bool HasItk() { return true; }
-
 VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format) {
   SilenceLibraries();
   const std::string where = file.string();

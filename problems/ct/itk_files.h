@@ -18,9 +18,6 @@
 
 namespace semblance {
 
-// Whether the program was built with ITK.
-bool HasItk();
-
 enum class VolumeFormat { kNifti, kNrrd, kMetaImage };
 
 // Reads one volume of grey values. Throws IoError if it cannot be read, InputError for colours and

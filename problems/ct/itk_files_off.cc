@@ -17,8 +17,6 @@ namespace {
 
 }  // namespace
 
-bool HasItk() { return false; }
-
 VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat) {
   ThrowNoItk(file.string());
 }

@@ -86,11 +86,6 @@ Image MakeImage(int width, int height, const Colour& colour) {
   return image;
 }
 
-Colour PixelAt(const Image& image, int x, int y) {
-  const std::uint8_t* pixel = &image.rgb.at(Offset(image, x, y));
-  return {pixel[0] / 255.0, pixel[1] / 255.0, pixel[2] / 255.0};
-}
-
 void BlendPixel(Image& image, int x, int y, const Colour& colour, double coverage) {
   if (!IsInside(image, x, y) || !(coverage > 0)) {
     return;

@@ -40,9 +40,6 @@ struct Image {
 // A picture of one colour; width, height >= 1, else InputError.
 Image MakeImage(int width, int height, const Colour& colour);
 
-// The pixel at column x, row y, which must be inside.
-Colour PixelAt(const Image& image, int x, int y);
-
 // Moves a pixel towards `colour` by `coverage` (0..1); a pixel outside the picture is left out.
 void BlendPixel(Image& image, int x, int y, const Colour& colour, double coverage);
 

@@ -13,6 +13,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/srgb.h"
+#include "tests/testing/pixels.h"
 
 namespace semblance {
 namespace {
@@ -20,6 +21,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using testing::PixelAt;
 
 // Relative luminance, 0..1 (IEC 61966-2-1).
 double Luminance(const Colour& c) {

@@ -14,10 +14,13 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "surfaces/base/srgb.h"
+#include "tests/testing/pixels.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
+
+using testing::PixelAt;
 
 constexpr Colour kBlack = {0, 0, 0};
 

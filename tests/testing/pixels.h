@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Single pixels of a picture.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "problems/pictures/image.h"
+
+namespace semblance::testing {
+
+// At column x, row y, which must be inside.
+inline Colour PixelAt(const Image& image, int x, int y) {
+  const std::uint8_t* const pixel =
+      &image.rgb.at(3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
+                         static_cast<std::size_t>(x)));
+  return {pixel[0] / 255.0, pixel[1] / 255.0, pixel[2] / 255.0};
+}
+
+}  // namespace semblance::testing
