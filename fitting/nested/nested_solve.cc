@@ -45,7 +45,7 @@ void SumUp(const GridLayout& finer, const std::vector<double>& of_finer, double 
 }
 
 // vertices^T form vertices.
-SEMBLANCE_WIDE double FormOf(const double* form, const double* vertices) {
+SEMBLANCE_WIDE double QuadraticForm(const double* form, const double* vertices) {
   double sums[16] = {};
   for (int k = 0; k < 16; ++k) {
     for (int l = 0; l < 16; ++l) {
@@ -344,7 +344,7 @@ double NestedSolve::Energy() {
       for (int i = 0; i < layout.grid.patches_u; ++i) {
         for (int c = 0; system.leaves[layout.Patch(i, j)] != 0 && c < points_.channels; ++c) {
           Gather(absolute_[level], c, i, j, vertices);
-          sum += FormOf(system.energy.data(), vertices.data());
+          sum += QuadraticForm(system.energy.data(), vertices.data());
         }
       }
     }

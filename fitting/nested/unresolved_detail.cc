@@ -37,11 +37,11 @@ struct PatchOfPoints {
 };
 
 // Of a patch's sixteen functions: the sums of w N e along each channel, and last of (w N)^2 |e|^2.
-using PatchSums = double[4][16];
+using FunctionSums = double[4][16];
 
 template <int channels>
 SEMBLANCE_INLINE void SumPatch(const EvidencePoints& of, const PatchOfPoints& patch,
-                               PatchSums& sums) {
+                               FunctionSums& sums) {
   double u[4], v[4], both[16];
   for (std::size_t n = patch.begin; n < patch.end; ++n) {
     const std::uint32_t k = of.indices[n];
@@ -66,21 +66,21 @@ SEMBLANCE_INLINE void SumPatch(const EvidencePoints& of, const PatchOfPoints& pa
 }
 
 SEMBLANCE_WIDE void SumPatchOf1(const EvidencePoints& of, const PatchOfPoints& patch,
-                                PatchSums& sums) {
+                                FunctionSums& sums) {
   SumPatch<1>(of, patch, sums);
 }
 SEMBLANCE_WIDE void SumPatchOf2(const EvidencePoints& of, const PatchOfPoints& patch,
-                                PatchSums& sums) {
+                                FunctionSums& sums) {
   SumPatch<2>(of, patch, sums);
 }
 SEMBLANCE_WIDE void SumPatchOf3(const EvidencePoints& of, const PatchOfPoints& patch,
-                                PatchSums& sums) {
+                                FunctionSums& sums) {
   SumPatch<3>(of, patch, sums);
 }
 
 // The channels' sums, and last that of squares.
 void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridValues& values) {
-  constexpr void (*kSum[])(const EvidencePoints&, const PatchOfPoints&, PatchSums&) = {
+  constexpr void (*kSum[])(const EvidencePoints&, const PatchOfPoints&, FunctionSums&) = {
       SumPatchOf1, SumPatchOf2, SumPatchOf3};
   const auto patch_of = [&](std::size_t n) {
     return PatchOn(layout.grid, level, of.points.X(of.indices[n]), of.points.Y(of.indices[n]));
@@ -90,7 +90,7 @@ void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridVa
     for (end = begin + 1; end < of.indices.size() && patch_of(end) == std::array{i, j};) {
       ++end;
     }
-    alignas(64) PatchSums sums = {};
+    alignas(64) FunctionSums sums = {};
     kSum[of.points.channels - 1](of, {begin, end, static_cast<double>(1 << level), i, j}, sums);
     for (int c = 0; c <= of.points.channels; ++c) {
       for (int b = 0; b < 4; ++b) {
