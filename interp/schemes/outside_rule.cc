@@ -32,7 +32,7 @@ Depth SiteDepth(const std::string& site, std::span<const Dowel> dowels, const Ru
 }
 
 // A triangle of the network with a sphere around it, which spares most of the closest points.
-struct Piece {
+struct NetworkTriangle {
   std::array<Vec3, 3> base;
   Vec3 depth_mm;
   Vec3 sd_mm;
@@ -40,23 +40,23 @@ struct Piece {
   double radius_mm = 0;
 };
 
-std::vector<Piece> MakePieces(const DepthInput& input) {
-  std::vector<Piece> pieces;
+std::vector<NetworkTriangle> TrianglesOf(const DepthInput& input) {
+  std::vector<NetworkTriangle> triangles;
   for (const std::array<int, 3>& area : input.network.areas) {
-    Piece piece;
+    NetworkTriangle triangle;
     for (int k = 0; k < 3; ++k) {
       const Dowel& dowel = input.dowels[area[k]];
-      piece.base[k] = dowel.base;
-      piece.depth_mm[k] = dowel.depth_mm;
-      piece.sd_mm[k] = dowel.sd_mm;
+      triangle.base[k] = dowel.base;
+      triangle.depth_mm[k] = dowel.depth_mm;
+      triangle.sd_mm[k] = dowel.sd_mm;
     }
-    piece.center = (piece.base[0] + piece.base[1] + piece.base[2]) / 3;
-    for (const Vec3& base : piece.base) {
-      piece.radius_mm = std::max(piece.radius_mm, (base - piece.center).norm());
+    triangle.center = (triangle.base[0] + triangle.base[1] + triangle.base[2]) / 3;
+    for (const Vec3& base : triangle.base) {
+      triangle.radius_mm = std::max(triangle.radius_mm, (base - triangle.center).norm());
     }
-    pieces.push_back(piece);
+    triangles.push_back(triangle);
   }
-  return pieces;
+  return triangles;
 }
 
 struct NetworkPoint {
@@ -64,17 +64,18 @@ struct NetworkPoint {
   Depth depth;
 };
 
-NetworkPoint ClosestOnNetwork(const std::vector<Piece>& pieces, const Vec3& p) {
+NetworkPoint ClosestOnNetwork(const std::vector<NetworkTriangle>& triangles, const Vec3& p) {
   NetworkPoint closest;
-  for (const Piece& piece : pieces) {
-    const double reach = closest.distance_mm + piece.radius_mm;
-    if ((p - piece.center).squaredNorm() > reach * reach) {
+  for (const NetworkTriangle& triangle : triangles) {
+    const double reach = closest.distance_mm + triangle.radius_mm;
+    if ((p - triangle.center).squaredNorm() > reach * reach) {
       continue;
     }
-    const TrianglePoint on = ClosestPointOnTriangle(p, piece.base[0], piece.base[1], piece.base[2]);
+    const TrianglePoint on =
+        ClosestPointOnTriangle(p, triangle.base[0], triangle.base[1], triangle.base[2]);
     const double distance = (p - on.position).norm();
     if (distance < closest.distance_mm) {
-      closest = {distance, {on.weights.dot(piece.depth_mm), on.weights.dot(piece.sd_mm)}};
+      closest = {distance, {on.weights.dot(triangle.depth_mm), on.weights.dot(triangle.sd_mm)}};
     }
   }
   return closest;
@@ -112,10 +113,10 @@ void Fill(const DepthInput& input, const RunContext& run, DepthField& field,
 void Apply(const ExtendNetwork& rule, const DepthInput& input, const RunContext& run,
            DepthField& field) {
   const Depth far = SiteDepth(rule.site, input.dowels, run);
-  const std::vector<Piece> pieces = MakePieces(input);
+  const std::vector<NetworkTriangle> triangles = TrianglesOf(input);
   const double tissue_mm = MeanDepth(input.dowels);
   Fill(input, run, field, [&](const Vec3& p) {
-    const NetworkPoint near = ClosestOnNetwork(pieces, p);
+    const NetworkPoint near = ClosestOnNetwork(triangles, p);
     return Mix(near.depth, far, SmoothStep(near.distance_mm, tissue_mm, rule.blend_mm));
   });
 }
