@@ -17,7 +17,7 @@ export class Faces {
     this.coloured = false;
     this.change = null;
     this.listeners = [];
-    this.asked = 0;
+    this.busy = false;       // a face is on its way
   }
 
   onChange(listener) { this.listeners.push(listener); }

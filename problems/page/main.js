@@ -80,6 +80,7 @@ async function main() {
   }
   const scene = new Scene(byId('view'));
   const bench = {scene, faces: new Faces(scene), store, opener: new Opener(byId('opening'))};
+  scene.pace.isBusy = () => bench.faces.busy;
   window.semblance = bench;  // for a look from the console, and for tests
   const job = new Job(byId('job'), byId('run'));
   const show = makeTabs(bench);

@@ -21,12 +21,13 @@ export class Scene {
   constructor(root) {
     this.root = root;
     this.blobs = {};
+    this.pace = new SemblancePace(() => [this.main, ...this.others].map(({stage}) => stage),
+                                  () => SemblanceGuides.drawCompass(this.compass, this.shared.camera.camera));
     this.drawSoon = () => this.draw();
     this.shared = {layers: new Map(), mapped: false, range_mm: 4, exaggeration: 1, camera: null, drawSoon: this.drawSoon};
     for (const id of Object.keys(LAYERS)) {
       this.shared.layers.set(id, {shown: id !== 'skin', opacity: id === 'face' ? 0.75 : id === 'skin' ? 0.4 : 1});
     }
-    this.due = false;
     this.frames = element('div', {className: 'view3d-frames'});
     root.append(this.frames);  // first: a canvas takes its ground from the page's style
     this.main = this.makeFrame('');
@@ -224,15 +225,7 @@ export class Scene {
     this.draw();
   }
 
-  draw() {
-    if (this.due || !this.shared.camera) { return; }
-    this.due = true;
-    requestAnimationFrame(() => {
-      this.due = false;
-      for (const {stage} of [this.main, ...this.others]) { stage.draw(); }
-      SemblanceGuides.drawCompass(this.compass, this.shared.camera.camera);
-    });
-  }
+  draw() { if (this.shared.camera) { this.pace.soon(); } }
 
   picture() {
     const shown = this.others.length ? this.others : [this.main];

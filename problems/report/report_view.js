@@ -30,17 +30,8 @@
   }
 
   const stages = [];
-  let due = false;
-  const drawSoon = shared.drawSoon = () => {
-    if (!due) {
-      due = true;
-      requestAnimationFrame(() => {
-        due = false;
-        for (const stage of stages) { stage.draw(); }
-        drawCompass();
-      });
-    }
-  };
+  const pace = new SemblancePace(() => stages, () => drawCompass());
+  const drawSoon = shared.drawSoon = () => pace.soon();
   const updateAll = () => {
     for (const stage of stages) { stage.update(); }
     drawLegends();

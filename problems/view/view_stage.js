@@ -2,7 +2,7 @@
 // One canvas of the 3-D view with one scene on it.
 'use strict';
 class SemblanceStage {
-  // shared: what the panel says, of all stages, and drawSoon(), which draws them all; see report_view.js.
+  // shared: what the panel says, of all stages, and drawSoon(), which draws them all (SemblancePace); see report_view.js.
   constructor(canvas, tip, shared) {
     this.canvas = canvas;
     this.tip = tip;
@@ -11,8 +11,9 @@ class SemblanceStage {
     this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
     this.paper();
     // Dark or light, as the page.
-    window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.paper(); this.draw(); });
+    window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.paper(); this.shared.drawSoon(); });
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.draft = new SemblanceDraft(this.renderer);
     this.ray = new THREE.Raycaster();
     this.material = {
       dowel: new THREE.MeshPhongMaterial({color: 0xb3261e, shininess: 25}),
@@ -151,7 +152,8 @@ class SemblanceStage {
     mesh.material.side = mesh.material.transparent ? THREE.FrontSide : THREE.DoubleSide;
   }
 
-  draw() {
+  // share: of the full resolution, which a saved picture has; see SemblancePace.
+  draw(share = 1) {
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     if (!this.scene || !this.shared.camera || width === 0 || height === 0) { return; }
     const camera = this.shared.camera.camera, size = this.renderer.getSize(new THREE.Vector2());
@@ -162,8 +164,14 @@ class SemblanceStage {
     camera.fov = 360 / Math.PI * Math.atan(half);
     camera.updateProjectionMatrix();
     this.rig.quaternion.copy(camera.quaternion);
-    this.renderer.render(this.scene, camera);
+    if (share < 1) { this.draft.draw(this.scene, camera, share); } else { this.renderer.render(this.scene, camera); }
     for (const act of this.afterDraw) { act(); }
+  }
+
+  // Waits until what was drawn is there: a pixel is read.
+  finish() {
+    const pen = this.renderer.getContext();
+    pen.readPixels(0, 0, 1, 1, pen.RGBA, pen.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   // What of the visible layers `ids` (all if none are named) lies under the pointer; null if nothing does.

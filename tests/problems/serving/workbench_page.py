@@ -31,6 +31,35 @@ TURN = "return window.semblance.scene.shared.camera.turn;"
 GROUND = """const {renderer, canvas} = window.semblance.scene.main.stage;
 return [renderer.getClearColor().getHex(), new THREE.Color(getComputedStyle(canvas).backgroundColor).getHex()];"""
 
+IS_FULL = "const {pace, shared} = window.semblance.scene; return !shared.camera || pace.isFull;"
+
+# From now on, of each picture: at which share of the full resolution it was drawn.
+WATCH_SHARES = """
+const {stage} = window.semblance.scene.main, draw = stage.draw;
+window.shares = [];
+stage.draw = function(share = 1) { window.shares.push(share); draw.call(this, share); };
+"""
+
+# As if the last full picture had taken so many milliseconds, just now; then the head turns.
+TURN_AFTER = """
+const {pace, shared: {camera}} = window.semblance.scene;
+[pace.full_ms, pace.timed_at, window.shares] = [arguments[0], performance.now(), []];
+camera.rotate(5, 0);
+"""
+
+# What a picture is that a person saves just now, and what lies in the middle of the view.
+SAVED_AND_HIT = """
+const {scene} = window.semblance, {stage, canvas} = scene.main, box = canvas.getBoundingClientRect();
+let saved = null;
+const press = HTMLAnchorElement.prototype.click;
+HTMLAnchorElement.prototype.click = function() { saved = this.href; };
+if (arguments[0] < 1) { stage.draw(arguments[0]); }
+const hit = stage.hit({clientX: box.left + box.width / 2, clientY: box.top + box.height / 2});
+scene.picture();
+HTMLAnchorElement.prototype.click = press;
+return [saved, hit && hit.point.toArray()];
+"""
+
 # The worst relative error of distances along a plane, where they are straight, over pairs of triangles.
 PLANE = """
 const plane = new THREE.PlaneBufferGeometry(2, 2, 24, 24), count = plane.index.count / 3;
@@ -213,9 +242,29 @@ def take_picture(browser, folder, name):
     """Twice, for the first may be of the frame before."""
     if folder:
         browser.run("window.semblance.scene.draw()")
-        time.sleep(0.7)
+        browser.wait(IS_FULL)
+        time.sleep(0.3)
         browser.picture(os.path.join(folder, name + ".png"))
         browser.picture(os.path.join(folder, name + ".png"))
+
+
+def expect_coarse_pictures_while_it_moves(browser):
+    """Where a full picture takes long: a coarser one at once, the full one at rest, or once the face that is on its way has come.
+    A picture that is saved is full, and what lies under the pointer the same."""
+    browser.run(WATCH_SHARES)
+    browser.run("window.semblance.faces.busy = true")
+    browser.run(TURN_AFTER, 400)
+    browser.wait("return window.shares.length > 0")
+    time.sleep(0.6)  # more than two rests
+    assert browser.run("return window.shares") == [0.5]
+    browser.run("window.semblance.faces.busy = false")
+    browser.wait(IS_FULL)
+    assert browser.run("return window.shares") == [0.5, 1]
+    browser.run(TURN_AFTER, 40)
+    browser.wait(IS_FULL)
+    assert browser.run("return window.shares") == [1]
+    coarse, full = (browser.run(SAVED_AND_HIT, share) for share in (0.5, 1))
+    assert coarse == full and full[1] and full[0].startswith("data:image/png"), (coarse[1], full[1])
 
 
 def take_skin_away(browser):
@@ -286,6 +335,7 @@ def work(browser, program, config, folder, pictures):
         found = re.search(r"depth: face ([\d.]+) mm", text)
         assert found and 1 < float(found[1]) < 15, text  # through glass
         picture("measure")
+        expect_coarse_pictures_while_it_moves(browser)
         assert browser.run(PLANE) < 0.03
 
         browser.resize(400, 800)
