@@ -4,7 +4,11 @@
 const SemblanceGeometry = (() => {
   const NO_VALUE = -32768;
 
-  const bytesOf = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0)).buffer;
+  const bytesOf = (base64) => {
+    const text = atob(base64), bytes = new Uint8Array(text.length);
+    for (let k = 0; k < text.length; ++k) { bytes[k] = text.charCodeAt(k); }
+    return bytes.buffer;
+  };
 
   const pointsOf = (blob) => {
     const numbers = new Uint16Array(bytesOf(blob.points)), positions = new Float32Array(numbers.length);
@@ -82,9 +86,14 @@ const SemblanceGeometry = (() => {
 
   const vector = (numbers) => new THREE.Vector3().fromArray(numbers);
 
+  // Rods and balls are many: all have the triangles of one.
+  const once = (make) => { let made = null; return () => made || (made = make()); };
+  const rod = once(() => new THREE.CylinderBufferGeometry(1, 1, 1, 12)), sphere = once(() => new THREE.SphereBufferGeometry(1, 16, 12));
+
   const cylinder = (from, to, radius, material) => {
     const along = to.clone().sub(from), length = along.length();
-    const mesh = new THREE.Mesh(new THREE.CylinderBufferGeometry(radius, radius, length, 12), material);
+    const mesh = new THREE.Mesh(rod(), material);
+    mesh.scale.set(radius, length, radius);
     mesh.position.copy(from).addScaledVector(along, 0.5);
     if (length > 0) {
       mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
@@ -93,7 +102,8 @@ const SemblanceGeometry = (() => {
   };
 
   const ball = (at, radius, material) => {
-    const mesh = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, 16, 12), material);
+    const mesh = new THREE.Mesh(sphere(), material);
+    mesh.scale.setScalar(radius);
     mesh.position.copy(at);
     return mesh;
   };
