@@ -99,6 +99,7 @@ async function main() {
 
 async function showMeshes(scene, state, former) {
   if (former && former.subject.revision === state.subject.revision) { return; }
+  scene.put('face', null);  // it was another head's
   const {skull, skin} = await get('meshes');
   scene.put('skull', skull);
   scene.put('skin', skin);

@@ -30,6 +30,7 @@ export class Scene {
     }
     this.frames = element('div', {className: 'view3d-frames'});
     root.append(this.frames);  // first: a canvas takes its ground from the page's style
+    this.awaitsFace = false;   // the camera goes round a skull that has none yet
     this.main = this.makeFrame('');
     this.others = [];
     this.marks = new THREE.Group();
@@ -63,7 +64,8 @@ export class Scene {
     this.blobs = {...this.blobs, [id]: blob};
     frame.stage.put({id, ...LAYERS[id], mesh: id}, {[id]: blob});
     frame.stage.update();
-    if (id === 'skull' && frame === this.main) { this.lookAt(); }
+    if (frame === this.main && id === 'skull') { this.frame(); this.shared.camera.look(25, 5); }
+    if (frame === this.main && id === 'face' && this.awaitsFace) { this.frame(); this.shared.camera.lookAgain(); }
     this.draw();
   }
 
@@ -90,7 +92,7 @@ export class Scene {
   // Of the colours that are on show.
   showLegend() {
     const shown = this.others.length ? this.others : [this.main];
-    const mapped = shown.some(({stage}) => stage.layers.get('face')?.layer.always_mapped);
+    const mapped = this.shared.layers.get('face').shown && shown.some(({stage}) => stage.layers.get('face')?.layer.always_mapped);
     this.legend.replaceChildren(...(mapped ? [SemblanceGuides.legendOf(MAPS.change, this.shared.range_mm)] : []));
   }
 
@@ -99,25 +101,24 @@ export class Scene {
     return face ? face.object.geometry : null;
   }
 
-  // The camera goes round the skull.
-  lookAt() {
-    const skull = this.main.stage.layers.get('skull');
-    skull.object.geometry.computeBoundingBox();
-    const box = skull.object.geometry.boundingBox.clone();
-    box.expandByScalar(0.12 * box.getSize(new THREE.Vector3()).length());  // room for a face
+  // The camera goes round the skull, and round the face once there is one: it may reach far below what is left of a skull.
+  frame() {
+    const {main: {stage}} = this, box = new THREE.Box3(), around = {skull: 0.12, face: 0.04};
+    for (const {layer: {id}, object: {geometry}} of stage.layers.values()) {
+      if (!around[id]) { continue; }
+      geometry.computeBoundingBox();
+      const part = geometry.boundingBox.clone();
+      box.union(part.expandByScalar(around[id] * part.getSize(new THREE.Vector3()).length()));
+    }
     if (!this.shared.camera) {
       this.shared.camera = new SemblanceCamera(box, this.drawSoon);
       this.shared.camera.attach(this.main.canvas);
       this.attachPick(this.main);
-      this.measure = new SemblanceMeasure([this.main.stage], this.drawSoon, box);
-      this.shared.camera.look(25, 5);
-      return;
+      this.measure = new SemblanceMeasure([stage], this.drawSoon, box);
     }
-    const camera = this.shared.camera;
-    camera.centre = box.getCenter(new THREE.Vector3());
-    camera.extent = box.getSize(new THREE.Vector3()).length();
+    this.shared.camera.goRound(box);
     this.measure.box = box;
-    camera.look(25, 5);
+    this.awaitsFace = !this.faceGeometry();
   }
 
   // A click that is no drag goes to whoever wants it.
@@ -222,6 +223,7 @@ export class Scene {
 
   update() {
     for (const {stage} of [this.main, ...this.others]) { stage.update(); }
+    this.showLegend();
     this.draw();
   }
 

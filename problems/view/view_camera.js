@@ -8,11 +8,16 @@ class SemblanceCamera {
     this.angle = 22;  // degrees across the shorter side: a long lens, as portraits are taken
     this.camera = new THREE.PerspectiveCamera(this.angle, 1, 1, 5000);
     this.camera.up.set(0, 0, 1);
+    this.reach = 1.85;  // times the extent: how far away it stands at first
+    this.onChange = onChange;
+    this.goRound(box);
+    this.look(0, 0);
+  }
+
+  // From the next look on.
+  goRound(box) {
     this.centre = box.getCenter(new THREE.Vector3());
     this.extent = box.getSize(new THREE.Vector3()).length();
-    this.reach = 1.75;  // times the extent: how far away it stands at first
-    this.onChange = onChange;
-    this.look(0, 0);
   }
 
   // Degrees: turn 0 looks at the face from the front, 90 at the subject's left side; rise 90 looks from above.
@@ -21,8 +26,12 @@ class SemblanceCamera {
     this.distance = this.reach * this.extent;
     this.turn = turn;
     this.rise = rise;
+    this.isShifted = false;  // moved or zoomed since
     this.update();
   }
+
+  // From the same side; not if someone has chosen what to see.
+  lookAgain() { if (!this.isShifted) { this.look(this.turn, this.rise); } }
 
   rotate(right, up) {
     this.turn -= right;
@@ -36,11 +45,13 @@ class SemblanceCamera {
     const axes = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
     this.camera.matrixWorld.extractBasis(...axes);
     this.target.addScaledVector(axes[0], -right * height).addScaledVector(axes[1], -up * height);
+    this.isShifted = true;
     this.update();
   }
 
   zoom(factor) {
     this.distance = Math.max(0.1 * this.extent, Math.min(8 * this.extent, this.distance * factor));
+    this.isShifted = true;
     this.update();
   }
 

@@ -23,14 +23,15 @@ const SemblanceGuides = (() => {
         .map((to, k) => ({name: names[k], at: new THREE.Vector3(...to).applyQuaternion(turn)}))
         .sort((a, b) => a.at.z - b.at.z);
     for (const {name, at} of axes) {
-      const x = middle + 62 * at.x, y = middle - 62 * at.y;
+      const x = middle + 54 * at.x, y = middle - 54 * at.y;
       pen.globalAlpha = at.z > -0.3 ? 1 : 0.3;
       pen.strokeStyle = pen.fillStyle = ink;
       pen.beginPath();
       pen.moveTo(middle, middle);
       pen.lineTo(x, y);
       pen.stroke();
-      if (Math.abs(at.z) < 0.93) { pen.fillText(name, middle + 84 * at.x, middle - 84 * at.y); }
+      // The names of what points away would lie under the others'.
+      if (at.z > -0.3 && at.z < 0.93) { pen.fillText(name, middle + 86 * at.x, middle - 86 * at.y); }
     }
   };
 
