@@ -30,31 +30,58 @@ void Disc(Image& image, double x, double y, double radius, const Colour& colour)
   }
 }
 
-// A disc, and its number on the left or the right of it.
-void Mark(Image& image, const Camera& camera, const Site& site, const Vec3& point, bool left) {
-  const Vec3 seen = camera.view_from_world * (point - camera.centre);
-  const double pixels = kHeight / camera.height_mm;
-  const double x = kWidth / 2.0 + pixels * seen.x(), y = kHeight / 2.0 - pixels * seen.y();
-  Disc(image, x, y, 5, HexColour(0xffffff));
-  Disc(image, x, y, 4, HexColour(0xb3261e));
-  DrawText(image, x + (left ? -9 : 9), y + 5, std::to_string(site.number),
+// Where a disc lies, in pixels, and on which side of it its number stands.
+struct Numbered {
+  double x = 0, y = 0;
+  bool left = false;
+  int number = 0;
+};
+
+bool NumbersTouch(const Numbered& a, const Numbered& b) {
+  constexpr double kWide = 20, kHigh = 13;
+  return a.left == b.left && std::abs(a.x - b.x) < kWide && std::abs(a.y - b.y) < kHigh;
+}
+
+void Mark(Image& image, const Numbered& mark) {
+  Disc(image, mark.x, mark.y, 5, HexColour(0xffffff));
+  Disc(image, mark.x, mark.y, 4, HexColour(0xb3261e));
+  DrawText(image, mark.x + (mark.left ? -9 : 9), mark.y + 5, std::to_string(mark.number),
            {.cap_height_px = 11,
             .stroke = 0.15,
             .colour = HexColour(0x16304f),
-            .anchor = left ? Anchor::kRight : Anchor::kLeft});
+            .anchor = mark.left ? Anchor::kRight : Anchor::kLeft});
+}
+
+Numbered MarkOf(const Site& site, const Vec3& point, const Camera& camera, View view) {
+  const Vec3 seen = camera.view_from_world * (point - camera.centre);
+  const double pixels = kHeight / camera.height_mm;
+  return {.x = kWidth / 2.0 + pixels * seen.x(),
+          .y = kHeight / 2.0 - pixels * seen.y(),
+          .left = view == View::kFront ? site.side != Side::kLeft : site.side == Side::kMidline,
+          .number = site.number};
+}
+
+// The sites that are seen; a number that would touch a former one stands on the other side.
+std::vector<Numbered> MarksSeenFrom(View view, const Phantom& phantom, const Camera& camera) {
+  std::vector<Numbered> marks;
+  for (std::size_t k = 0; k < phantom.sites.size(); ++k) {
+    const Site& site = StandardSites()[k];
+    if (view == View::kFront || site.side != Side::kRight) {
+      Numbered mark = MarkOf(site, phantom.sites[k].base, camera, view);
+      mark.left ^= std::ranges::any_of(
+          marks, [&](const Numbered& former) { return NumbersTouch(former, mark); });
+      marks.push_back(mark);
+    }
+  }
+  return marks;
 }
 
 Image SeenFrom(View view, const Phantom& phantom, const Box3& region, int threads) {
   const Camera camera = CameraFor(view, region, static_cast<double>(kWidth) / kHeight);
   Image image =
       Render({{SkullObject(phantom.skull)}}, camera, {.width = kWidth, .height = kHeight}, threads);
-  for (std::size_t k = 0; k < phantom.sites.size(); ++k) {
-    const Site& site = StandardSites()[k];
-    if (view == View::kFront || site.side != Side::kRight) {
-      const bool left =
-          view == View::kFront ? site.side != Side::kLeft : site.side == Side::kMidline;
-      Mark(image, camera, site, phantom.sites[k].base, left);
-    }
+  for (const Numbered& mark : MarksSeenFrom(view, phantom, camera)) {
+    Mark(image, mark);
   }
   return image;
 }
