@@ -421,7 +421,9 @@ ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   result.subject_from_model = SimilarityOf(frame_, parameters_);
   result.coefficients = parameters_.coefficients;
   result.points = placed_.points;
-  TellSpread(context, result);
+  if (target_.tells_spread) {
+    TellSpread(context, result);
+  }
   for (const ShapeTip& tip : target_.tips) {
     result.tip_residual_mm.push_back(
         (tip.position - PositionOf(tip.at, model_.mean, placed_.points))

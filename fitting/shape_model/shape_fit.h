@@ -191,13 +191,15 @@ struct ShapeTarget {
   std::vector<double> surface_error_mm = {};  // how far it is off there, for sigma; none: the same
   std::vector<ShapeMark> marks = {};
   std::vector<std::uint64_t> draws = {};  // random seeds of shapes to draw
+  bool tells_spread = true;               // sigma, and draws
 };
 
 struct ShapeEstimate {
   Similarity subject_from_model;
   Eigen::VectorXd coefficients;          // one per mode
   std::vector<Vec3> points;              // one per point of the model, in the subject's frame, mm
-  std::vector<double> sigma_mm;          // one per point: along its normal, with all its parts
+  std::vector<double> sigma_mm;          // one per point: along its normal, with all its parts;
+                                         // none where the target leaves the spread out
   std::vector<double> tip_residual_mm;   // one per tip: from the point of the shape to the tip, > 0
                                          // outside, along the shape's normal
   std::vector<double> mark_residual_mm;  // one per mark: from the shape to the mark, along its

@@ -10,9 +10,10 @@ namespace {
 TemplateFace Load(const FormulaTemplate& source) { return MakeTemplateFace(source); }
 TemplateFace Load(const FileTemplate& source) { return ReadTemplate(source); }
 TemplateFace Load(const IctTemplate&) {
-  return TemplateFrom(
+  static const TemplateFace kFace = TemplateFrom(
       {"the ICT face", "the ICT face's sites", "the ICT face's features"},
       {std::string(IctSurface()), std::string(IctSites()), std::string(IctFeatures())});
+  return kFace;
 }
 
 }  // namespace

@@ -288,8 +288,11 @@ std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOpt
 }
 
 Case MakeCase(const SubjectData& data, const Experiment& experiment) {
+  return MakeCase(data, experiment, MeshQuery(data.skull));
+}
+
+Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQuery& query) {
   CheckNetworkNamed(experiment);
-  const MeshQuery query(data.skull);
   Case subject = CaseOf(data, experiment, query);
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
   GiveDepths(data, experiment, query, subject);

@@ -58,6 +58,8 @@ void CheckNetworkNamed(const Experiment& experiment, const std::filesystem::path
 // Places the dowels on the bone and gives them their depths and network. Throws as LoadSubject and
 // CheckSubject.
 Case MakeCase(const SubjectData& subject, const Experiment& experiment);
+// The same where the query of the subject's skull is at hand.
+Case MakeCase(const SubjectData& subject, const Experiment& experiment, const MeshQuery& skull);
 
 // Of the subject's skin, which must be there.
 ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options);

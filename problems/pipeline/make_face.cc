@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 #include "problems/conditional/condition_depths.h"
 #include "problems/metrics/quantile.h"
@@ -187,19 +188,32 @@ std::map<std::string, ModelPoint> OtherSites(const FitTarget& dowels, const Load
   return others;
 }
 
-// Their points on the model, found on a face that was only placed, become those nearest to the
-// tips on the estimated face. False if there are none.
-bool MeetAnew(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& target) {
+bool HasOtherSites(const FacePrior& prior, const ShapeTarget& target) {
+  return std::ranges::any_of(target.tips,
+                             [&](const ShapeTip& tip) { return !prior.sites.contains(tip.label); });
+}
+
+// The points of other sites on the model, found on a face that was only placed, become those
+// nearest to the tips on the estimated face.
+void MeetAnew(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& target) {
   const MeshQuery query(TriMesh{shape.points, prior.model.mean.triangles});
-  bool any = false;
   for (ShapeTip& tip : target.tips) {
     if (!prior.sites.contains(tip.label)) {
       const MeshPoint at = query.Closest(tip.position);
       tip.at = {at.triangle, at.weights};
-      any = true;
     }
   }
-  return any;
+}
+
+// Twice where a dowel stands at a site that the prior lacks; spread is told of the last.
+ShapeEstimate Estimate(const FacePrior& prior, const PriorUse& use, ShapeTarget& target,
+                       const RunContext& context) {
+  if (HasOtherSites(prior, target)) {
+    const bool tells_spread = std::exchange(target.tells_spread, false);
+    MeetAnew(EstimateShape(prior.model, target, use.estimate, context), prior, target);
+    target.tells_spread = tells_spread;
+  }
+  return EstimateShape(prior.model, target, use.estimate, context);
 }
 
 // With depths of a table a person's build is not known, and the tips carry it into sigma. Around
@@ -288,10 +302,8 @@ MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceIn
   RuleMarks rules = RulesOf(in, prior.face);
   target.marks = std::move(rules.marks);
   target.draws = DrawsOf(use, in.experiment.uncertainty);
-  ShapeEstimate shape = EstimateShape(prior.face.model, target, use.estimate, context);
-  if (MeetAnew(shape, prior.face, target)) {
-    shape = EstimateShape(prior.face.model, target, use.estimate, context);
-  }
+  target.tells_spread = in.tells_sigma || !target.draws.empty();
+  ShapeEstimate shape = Estimate(prior.face, use, target, context);
   for (std::size_t k = 0; k < rules.rules.size(); ++k) {
     rules.rules[k].residual_mm = shape.mark_residual_mm[k];
   }

@@ -46,6 +46,7 @@ struct FaceInput {
   const TriMesh&
       implicit;  // what of it may be seeded; without triangles: `prior` takes the tips alone
   const TriMesh& shell;
+  bool tells_sigma = true;  // of a prior's face; a quick look does without
 };
 
 struct MadeFace {

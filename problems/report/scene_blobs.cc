@@ -76,11 +76,7 @@ std::string SceneBlobs::Add(const Json& blob) {
   return name;
 }
 
-std::string SceneBlobs::AddMesh(const TriMesh& mesh) {
-  Json blob = PointsJson(mesh.points);
-  blob["triangles"] = Indices(std::span<const Triangle>(mesh.triangles), mesh.points.size());
-  return Add(blob);
-}
+std::string SceneBlobs::AddMesh(const TriMesh& mesh) { return Add(BlobOfMesh(mesh)); }
 
 std::string SceneBlobs::AddLines(std::span<const Vec3> points, std::span<const Segment> segments) {
   Json blob = PointsJson(points);
@@ -97,6 +93,12 @@ std::string SceneBlobs::AddValues(std::span<const double> values_mm) {
                                                                  : static_cast<long>(kNone)));
   }
   return Add({{"values", Base64(bytes)}});
+}
+
+Json BlobOfMesh(const TriMesh& mesh) {
+  Json blob = PointsJson(mesh.points);
+  blob["triangles"] = Indices(std::span<const Triangle>(mesh.triangles), mesh.points.size());
+  return blob;
 }
 
 TriMesh MeshOfBlob(const Json& blob) {

@@ -33,6 +33,9 @@ class SceneBlobs {
   nlohmann::ordered_json blobs_ = nlohmann::ordered_json::object();
 };
 
+// What AddMesh adds.
+nlohmann::ordered_json BlobOfMesh(const TriMesh& mesh);
+
 // What AddMesh has made of a mesh, as a mesh again; a coordinate is off by half a step at most.
 // Throws InputError, or what the JSON library throws, for a blob that is no mesh.
 TriMesh MeshOfBlob(const nlohmann::ordered_json& blob);

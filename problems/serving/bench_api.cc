@@ -5,9 +5,7 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <new>
 #include <nlohmann/json.hpp>
@@ -174,12 +172,7 @@ BenchReply Files(Bench& bench, const BenchRequest&) {
   return JsonReply(json.dump());
 }
 
-BenchReply Timed(const std::function<BenchFace()>& make) {
-  const auto start = std::chrono::steady_clock::now();
-  const BenchFace face = make();
-  return JsonReply(FaceJson(
-      face, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()));
-}
+BenchReply FaceReply(const BenchFace& face) { return JsonReply(FaceJson(face)); }
 
 BenchVariant VariantAsked(const BenchRequest& request) {
   const auto asked = request.query.find("variant");
@@ -189,19 +182,16 @@ BenchVariant VariantAsked(const BenchRequest& request) {
 BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
   const auto path = request.query.find("path"), value = request.query.find("value");
   if (path != request.query.end() && value != request.query.end()) {
-    return Timed([&] { return bench.CoarseWith({path->second, value->second}); });
+    return FaceReply(bench.CoarseWith({path->second, value->second}));
   }
-  const BenchVariant variant = VariantAsked(request);
-  return Timed([&] { return bench.Coarse(variant); });
+  return FaceReply(bench.Coarse(VariantAsked(request)));
 }
 
 BenchReply VariantReply(Bench& bench, const BenchRequest& request) {
-  return Timed([&] { return bench.FullVariant(VariantAsked(request)); });
+  return FaceReply(bench.FullVariant(VariantAsked(request)));
 }
 
-BenchReply FullReply(Bench& bench, const BenchRequest&) {
-  return Timed([&] { return bench.Full(); });
-}
+BenchReply FullReply(Bench& bench, const BenchRequest&) { return FaceReply(bench.Full()); }
 
 BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
   const auto format = request.query.find("format");

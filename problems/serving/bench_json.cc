@@ -105,12 +105,6 @@ Json DowelsJson(const std::vector<Dowel>& dowels) {
   return json;
 }
 
-Json BlobOf(const TriMesh& mesh) {
-  SceneBlobs blobs;
-  const std::string name = blobs.AddMesh(mesh);
-  return blobs.All().at(name);
-}
-
 Json SiteJson(const Site& site) {
   Json json = {{"site", site.code},
                {"name", site.name},
@@ -162,12 +156,12 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string FaceJson(const BenchFace& face, double seconds) {
-  return Json{{"mesh", BlobOf(Tessellate(face.surface, kShownQuadsPerPatch).mesh)},
+std::string FaceJson(const BenchFace& face) {
+  return Json{{"mesh", BlobOfMesh(Tessellate(face.surface, kShownQuadsPerPatch).mesh)},
               {"dowels", DowelsJson(face.dowels)},
               {"notes", face.notes},
               {"finest_level", face.surface.shape().max_level},
-              {"seconds", seconds}}
+              {"seconds", Number(face.seconds)}}
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -201,10 +195,10 @@ std::string BroughtJson(const Brought& brought) {
 std::string MeshesJson(const BenchSubject& subject) {
   Json json = {{"skull", nullptr}, {"skin", nullptr}};
   if (!subject.skull.view.triangles.empty()) {
-    json["skull"] = BlobOf(subject.skull.view);
+    json["skull"] = BlobOfMesh(subject.skull.view);
   }
   if (subject.skin) {
-    json["skin"] = BlobOf(subject.skin->view);
+    json["skin"] = BlobOfMesh(subject.skin->view);
   }
   return json.dump();
 }

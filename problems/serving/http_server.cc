@@ -151,6 +151,7 @@ struct HttpServer::Impl {
 
   void Prepare() {
     server.set_keep_alive_max_count(1000);
+    server.set_tcp_nodelay(true);  // head and body are written apart: the rest of a body would wait
     server.set_read_timeout(10, 0);
     server.set_payload_max_length(options.most_upload_bytes);
     server.set_default_headers({{"Content-Security-Policy", kPagePolicy},

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <utility>
 
@@ -357,6 +358,21 @@ void Bench::BlendFeature(const std::string& name, double weight) {
             TakeEdits(Now(history_), WithOffsets(Now(history_).edits, offsets))));
 }
 
+// What was tried out is asked for again once it is kept.
+BenchFace Bench::CoarseOf(const BenchSubject& subject, const Experiment& experiment,
+                          const BenchState& state) const {
+  if (!subject.bone) {
+    throw InputError("there is no skull yet; open one first");
+  }
+  const std::string key = KeyOfRun(experiment, state, folder_.Root()) + EditsText(state);
+  return *coarse_.Get<BenchFace>(key, [&] {
+    const auto start = std::chrono::steady_clock::now();
+    BenchFace face = CoarseFace(subject, experiment, state, models_, Context());
+    face.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return face;
+  });
+}
+
 BenchFace Bench::Coarse(BenchVariant variant) const {
   std::shared_ptr<const BenchSubject> subject;
   Experiment experiment;
@@ -367,15 +383,10 @@ BenchFace Bench::Coarse(BenchVariant variant) const {
     experiment = experiment_;
     state = Now(history_);
   }
-  if (!subject->bone) {
-    throw InputError("there is no skull yet; open one first");
-  }
-  BenchFace face = CoarseFace(*subject, experiment, state, models_, Context());
-  if (variant != BenchVariant::kAsIs) {
-    face = CoarseFace(*subject, VariantOf(experiment, variant, face.dowels, kUsualSd_mm), state,
-                      models_, Context());
-  }
-  return face;
+  BenchFace face = CoarseOf(*subject, experiment, state);
+  return variant == BenchVariant::kAsIs
+             ? face
+             : CoarseOf(*subject, VariantOf(experiment, variant, face.dowels, kUsualSd_mm), state);
 }
 
 BenchFace Bench::CoarseWith(const BenchSetting& setting) const {
@@ -386,10 +397,7 @@ BenchFace Bench::CoarseWith(const BenchSetting& setting) const {
     subject = subject_;
     state = ChangeSetting(Now(history_), setting.path, setting.value);
   }
-  if (!subject->bone) {
-    throw InputError("there is no skull yet; open one first");
-  }
-  return CoarseFace(*subject, folder_.ExperimentOf(state), state, models_, Context());
+  return CoarseOf(*subject, folder_.ExperimentOf(state), state);
 }
 
 BenchFace Bench::Full() const {

@@ -124,6 +124,8 @@ class Bench {
   void MakeVariant(BenchVariant variant, int revision, const RunContext& context);
   std::string Propose(const RunContext& context);
   std::string Open(const OpenRequest& request, const RunContext& context);
+  BenchFace CoarseOf(const BenchSubject& subject, const Experiment& experiment,
+                     const BenchState& state) const;
   const RunFace& FreshFace() const;
   HSplineSurface Edited(const RunFace& face) const;
   RunContext Context() const;
@@ -141,6 +143,7 @@ class Bench {
   std::optional<RunFace> face_;
   VariantFaces variants_;
   mutable StageCache models_{6};  // templates and priors: they come from no file of the folder
+  mutable StageCache coarse_{8};  // coarse faces: those that were tried out last, those compared
   std::shared_ptr<StageCache> run_stages_;  // of one set of landmarks
   BenchJob job_;                            // last: it is stopped first
 };

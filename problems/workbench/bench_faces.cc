@@ -55,7 +55,7 @@ SubjectData ThinnedOut(const BenchSubject& subject, const BenchState& state) {
 
 Case CoarseCase(const BenchSubject& subject, const Experiment& experiment,
                 const BenchState& state) {
-  return MakeCase(ThinnedOut(subject, state), experiment);
+  return MakeCase(ThinnedOut(subject, state), experiment, *subject.view_bone);
 }
 
 BenchFace CoarseFace(const BenchSubject& subject, const Experiment& given, const BenchState& state,
@@ -68,8 +68,14 @@ BenchFace CoarseFace(const BenchSubject& subject, const Experiment& given, const
   });
   const auto prior = GivenPrior(experiment, *generic, cache, context);
   const TriMesh none;
-  MadeFace made =
-      MakeFace({experiment, *generic, prior.get(), head, none, subject.skull.view}, context);
+  MadeFace made = MakeFace({.experiment = experiment,
+                            .generic = *generic,
+                            .prior = prior.get(),
+                            .subject = head,
+                            .implicit = none,
+                            .shell = subject.skull.view,
+                            .tells_sigma = false},
+                           context);
   ApplyEdits(state.edits, made.fitted.fit.surface);
   return {.surface = std::move(made.fitted.fit.surface),
           .dowels = std::move(head.dowels_on_bone),

@@ -18,10 +18,11 @@ struct BenchFace {
   HSplineSurface surface;
   std::vector<Dowel> dowels;
   std::vector<std::string> notes;
+  double seconds = kNaN;  // that making a coarse face took
 };
 
-// The head as a run takes it, but on the thinned-out skull: dowels with their depths, and notes.
-// Throws as MakeCase.
+// The head, which has a skull, as a run takes it, but on the thinned-out one: dowels with their
+// depths, and notes. Throws as MakeCase.
 Case CoarseCase(const BenchSubject& subject, const Experiment& experiment, const BenchState& state);
 
 // The face without the implicit surface and without a fit: the prior's most likely face given the

@@ -135,6 +135,7 @@ BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& contex
   Check(subject.skull.mesh, files.skull, subject);
   subject.skull.view = ForView(subject.skull.mesh, kSkullTriangles);
   subject.bone = std::make_shared<const MeshQuery>(subject.skull.mesh);
+  subject.view_bone = std::make_shared<const MeshQuery>(subject.skull.view);
   if (!files.skin.empty()) {
     context.Report("read skin");
     BenchMesh skin{.mesh = ReadInMm(files.skin, files), .view = {}};

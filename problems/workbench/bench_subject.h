@@ -23,8 +23,9 @@ struct BenchMesh {
 struct BenchSubject {
   BenchMesh skull;                // with the mandible, where that is a mesh of its own, as it lies
   std::optional<BenchMesh> skin;  // where it is known
-  std::shared_ptr<const MeshQuery> bone;  // of the whole skull
-  std::vector<std::string> faults;        // why a run would refuse the meshes
+  std::shared_ptr<const MeshQuery> bone;       // of the whole skull
+  std::shared_ptr<const MeshQuery> view_bone;  // of the thinned-out one
+  std::vector<std::string> faults;             // why a run would refuse the meshes
   std::vector<std::string> notes;
 };
 

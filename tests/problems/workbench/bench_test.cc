@@ -194,6 +194,23 @@ TEST_F(WorkbenchBench, ACoarseFaceFollowsADepth) {
   EXPECT_FALSE(bench.Look().experiment.tissue.set_mm.contains("g")) << "only tried out";
 }
 
+// Faces are kept by all that they are made of.
+TEST_F(WorkbenchBench, ACoarseFaceIsOfThePresentState) {
+  const auto points = [](const BenchFace& face) {
+    return Tessellate(face.surface, kShownQuadsPerPatch).mesh.points;
+  };
+  Bench bench(Options());
+  const auto before = points(bench.Coarse()),
+             tried = points(bench.CoarseWith({"tissue.set_mm.g", "14"}));
+  bench.Do("set", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.g", "14"); });
+  EXPECT_EQ(points(bench.Coarse()), tried);
+  bench.Do("removed n", [](BenchState s) { return RemoveLandmark(std::move(s), "n"); });
+  EXPECT_NE(points(bench.Coarse()), tried);
+  bench.Undo();
+  bench.Undo();
+  EXPECT_EQ(points(bench.Coarse()), before);
+}
+
 TEST_F(WorkbenchBench, VariantsDifferAsTheirDepthsDo) {
   Bench bench(Options());
   const BenchFace thin = bench.Coarse(BenchVariant::kThinner);
