@@ -120,9 +120,9 @@ StudySummary RunTold(const StudyPlan& plan, const fs::path& root, StudyRunOption
 void TellChange(const StudySummary& summary, const fs::path& root) {
   if (summary.changed) {
     Tell(
-        "note: the study has changed since {} was written: {} of its trials were there already; {} "
-        "of the earlier plan are no longer in it, and stay in trials/\n",
-        root.string(), summary.skipped, summary.left_over);
+        "note: the study has changed since {} was written: of the {} trials asked for now {} were "
+        "there already; {} of the earlier plan are no longer in it, and stay in trials/\n",
+        root.string(), summary.trials, summary.skipped, summary.left_over);
   }
 }
 

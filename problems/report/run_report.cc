@@ -489,7 +489,9 @@ void WriteReport(OutputFolder& folder) {
     folder.Write("report.html",
                  ReportHtml(BuildReport(ParseJson(ReadFileBytes(file), file.string()), folder)));
   } catch (const nlohmann::json::exception& e) {
-    throw IoError(fmt::format("{}: not the result of a run: {}", file.string(), JsonFault(e)));
+    throw IoError(fmt::format(
+        "{}: not the result of a run ({}); a report is made anew of a run or a study alone",
+        file.string(), JsonFault(e)));
   }
 }
 
