@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The packages in a Debian 12 that has nothing else: apt installs them, the demo is run, and its figures are those of README.md; Python imports the
+# module; manual page and completions are there. As root. ROOT is made by debootstrap where it is not there.
+#
+# usage: clean_debian.sh PACKAGES ROOT
+set -euo pipefail
+packages=$(realpath "$1")
+root=$(realpath -m "$2")
+source=$(realpath "$(dirname "$0")/../..")
+
+[ -d "$root/usr" ] || debootstrap --variant=minbase bookworm "$root" "${MIRROR:-http://deb.debian.org/debian}"
+mkdir -p "$root/proc" "$root/packages"
+mountpoint -q "$root/proc" || mount -t proc proc "$root/proc"
+trap 'umount "$root/proc"' EXIT
+cp "$packages"/*.deb "$root/packages/"
+
+inside() {
+  chroot "$root" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive sh -euc "cd /root; $1"
+}
+
+inside 'apt-get update -qq'
+# The demo's head comes with what semblance recommends.
+inside 'cd /packages && apt-get install -y -qq --reinstall ./semblance_*.deb ./python3-semblance_*.deb ./libsemblance-dev_*.deb'
+
+inside 'rm -rf demo && semblance run /usr/share/semblance/configs/demo.yaml --out demo --quiet'
+row=$(grep -F 'semblance run configs/demo.yaml' "$source/README.md" | grep -F '%')
+inside "python3 - '$row'" <<'END'
+import json, re, sys
+face = json.load(open("demo/result.json"))["face"]
+ours = ", ".join("%.2f" % face[name] for name in ("mean_abs_mm", "rms_mm", "median_mm", "p95_mm")) + " mm, %.1f %%" % (100 * face["within_2_5mm"])
+lengths, share = re.findall(r"\| ([\d., ]+ mm) \| ([\d.]+ %)", sys.argv[1])[0]
+print("here:  ", ours)
+print("README:", lengths + ", " + share)
+sys.exit(ours != lengths + ", " + share)
+END
+
+inside 'python3 -c "import semblance; print(semblance.__doc__.splitlines()[0])"'
+inside 'cd /usr/share && test -s man/man1/semblance.1* && test -s bash-completion/completions/semblance && test -s zsh/vendor-completions/_semblance &&
+  test -s fish/vendor_completions.d/semblance.fish'
+echo "the packages install in a clean Debian 12, and the demo gives the figures of README.md"
