@@ -16,7 +16,6 @@ const SemblanceGuides = (() => {
     const turn = camera.quaternion.clone().inverse();
     pen.clearRect(0, 0, compass.width, compass.height);
     pen.font = '20px system-ui, sans-serif';
-    pen.textAlign = 'center';
     pen.textBaseline = 'middle';
     const ink = getComputedStyle(compass).color;
     const axes = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
@@ -30,8 +29,10 @@ const SemblanceGuides = (() => {
       pen.moveTo(middle, middle);
       pen.lineTo(x, y);
       pen.stroke();
-      // The names of what points away would lie under the others'.
-      if (at.z > -0.3 && at.z < 0.93) { pen.fillText(name, middle + 86 * at.x, middle - 86 * at.y); }
+      // The names of what points away would lie under the others'; what points sideways is named beside its end.
+      const sideways = Math.abs(at.x) > 0.2, reach = sideways ? 60 : 86;
+      pen.textAlign = sideways ? (at.x > 0 ? 'left' : 'right') : 'center';
+      if (at.z > -0.3 && at.z < 0.93) { pen.fillText(name, middle + reach * at.x, middle - reach * at.y); }
     }
   };
 
