@@ -23,13 +23,13 @@ struct ShapeFitOptions {
   double mode_sd = 1;                 // of a coefficient
   SmoothFieldOptions field;           // what the modes cannot express
   int surface_points = 300;           // drawn to the implicit face; 0: the dowels alone
-  double surface_worth = 80;          // how many independent points those count as
+  double surface_worth = 40;          // how many independent points those count as
   double surface_sd_mm = 2.5;         // of the surface along its normal, where it states none
   double surface_loss_width = 0.8;    // Huber, in standard deviations
   double surface_reach_mm = 15;       // farther off a point is not drawn
   double surface_max_angle_deg = 60;  // nor where normals differ by more
   double surface_range_mm = 60;       // nor farther than this from every dowel
-  double surface_length_mm = 20;      // over which the surface's errors resemble; for sigma
+  double surface_length_mm = 5;       // over which the surface's errors resemble; for sigma
   int rounds = 12;                    // at most
   double population_sd = 1.3;         // of a coefficient among people; for sigma
   double discrepancy_mm = 1.25;       // what neither modes nor field can express; for sigma

@@ -39,11 +39,11 @@ void Fields(Visitor& visit, TableDepthOptions& o) {
 
 // On two whole heads and a part of one, with measured depths, the implicit face is off by 1.4 mm
 // (RMS) where tissue is 4 to 7 mm thick, by 2.4 at 12 and by 4.3 at 19 mm; where no dowel is within
-// 30 mm by 5 to 7. Yet a rate makes the two whole heads worse
-// (configs/studies/implicit_worth.yaml): there the prior alone is off by more.
+// 30 mm by 5 to 7. So sd^2 = 0.7^2 + (0.22 thickness)^2 near dowels. Yet a rate makes the two whole
+// heads worse (configs/studies/implicit_worth.yaml): there the prior alone is off by more.
 struct ImplicitSpreadOptions {
-  double sd_mm = 2;         // over thin tissue, near dowels
-  double share = 0.18;      // of the tissue's thickness
+  double sd_mm = 0.7;       // over thin tissue, near dowels
+  double share = 0.22;      // of the tissue's thickness
   double reach_mm = 15;     // from every dowel
   double rate = 0;          // mm per mm beyond that
   double sigma_rate = 0.1;  // the same, for sigma
