@@ -14,6 +14,7 @@
 #include "surfaces/decimate/edge_collapse.h"
 #include "surfaces/decimate/original_vertices.h"
 #include "surfaces/mesh/half_edges.h"
+#include "surfaces/mesh/neighbour_order.h"
 
 namespace semblance {
 namespace {
@@ -122,10 +123,17 @@ struct MergeTarget {
   Vec3 position = Vec3::Constant(kNaN);
 };
 
+// What is left, in the order that the mesh has.
+struct Remains {
+  TriMesh mesh;                         // with all points of that mesh
+  std::vector<std::int32_t> triangles;  // of each of its triangles, the index in that mesh
+  DecimateSummary summary;
+};
+
 class Decimator {
  public:
   Decimator(const TriMesh& mesh, const DecimateOptions& options);
-  DecimateResult Run();
+  Remains Run();
 
  private:
   void AddQuadrics(std::int32_t triangle, double times);
@@ -245,7 +253,7 @@ bool Decimator::IsStale(HalfEdgeIndex edge) const {
          costs_[edge].evaluated;
 }
 
-DecimateResult Decimator::Run() {
+Remains Decimator::Run() {
   int gained_from = triangles_;
   EvaluateAll();
   while (triangles_ > options_.target_triangles) {
@@ -263,7 +271,7 @@ DecimateResult Decimator::Run() {
     EvaluateAll();
   }
   TriMesh mesh = RemainingMesh();
-  return {std::move(mesh), Summary()};
+  return {std::move(mesh), std::move(alive_), Summary()};
 }
 
 DecimateSummary Decimator::Summary() const {
@@ -458,8 +466,8 @@ void Decimator::EvaluateAround() {
   }
 }
 
-// Vertices and triangles keep their order. Without a tolerance the vertices settle: where there is
-// one, they stay where they were proven to be within it.
+// Without a tolerance the vertices settle: where there is one, they stay where they were proven to
+// be within it.
 TriMesh Decimator::RemainingMesh() {
   TriMesh all;
   all.points.reserve(vertices_.size());
@@ -474,7 +482,7 @@ TriMesh Decimator::RemainingMesh() {
     originals_.Settle(
         alive_, [this](std::int32_t v) { return edges_.IsOnBorder(v); }, all);
   }
-  return Submesh(all, std::vector<bool>(all.triangles.size(), true));
+  return all;
 }
 
 void CheckDecimation(const TriMesh& mesh, const DecimateOptions& options) {
@@ -502,7 +510,13 @@ DecimateResult Decimate(const TriMesh& mesh, const DecimateOptions& options) {
   if (triangles <= options.target_triangles) {
     return {mesh, {triangles, 0, DecimateStop::kTarget}};
   }
-  return Decimator(mesh, options).Run();
+  const bool scattered = IsScattered(mesh);
+  const OrderedMesh ordered = scattered ? InOrderOfNeighbours(mesh) : OrderedMesh{};
+  Remains left = Decimator(scattered ? ordered.mesh : mesh, options).Run();
+  if (scattered) {
+    PutBackInOrder(ordered, left.triangles, left.mesh);
+  }
+  return {Submesh(left.mesh, std::vector<bool>(left.mesh.triangles.size(), true)), left.summary};
 }
 
 }  // namespace semblance

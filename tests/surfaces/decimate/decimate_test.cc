@@ -10,12 +10,14 @@
 #include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/shuffled.h"
 
 namespace semblance {
 namespace {
 
 using testing::Joined;
 using testing::Plate;
+using testing::Shuffled;
 using testing::SphereMesh;
 
 TriMesh Torus(int around, int across) {
@@ -291,6 +293,24 @@ TEST(Decimate, WithoutAToleranceTheVerticesSettleAmongTheOriginalOnes) {
   const TriMesh box = Box(16);  // nothing draws its corners
   const TriMesh left = Decimate(box, {.target_triangles = 12}).mesh;
   EXPECT_NEAR(SignedVolume(left), 1000, 1e-6);
+}
+
+TEST(Decimate, AMeshInNoOrderIsDecimatedAsWellAndKeepsItsOrder) {
+  const TriMesh torus = Torus(160, 80), mesh = Shuffled(torus);
+  const DecimateResult sorted = Decimate(torus, {.target_triangles = 1000}),
+                       result = Decimate(mesh, {.target_triangles = 1000});
+  ExpectSameTopology(mesh, result.mesh);
+  EXPECT_EQ(result.summary.triangles, 1000);
+  EXPECT_LT(Rms(mesh, result.mesh), 1.1 * Rms(torus, sorted.mesh));
+  // After one collapse all points but one are where they were, or one place further in front.
+  const int one_less = static_cast<int>(mesh.triangles.size()) - 2;
+  const TriMesh once = Decimate(mesh, {.target_triangles = one_less, .tolerance_mm = 1e6}).mesh;
+  ASSERT_EQ(once.points.size(), mesh.points.size() - 1);
+  std::size_t kept = 0;
+  for (std::size_t v = 0; v < once.points.size(); ++v) {
+    kept += once.points[v] == mesh.points[v] || once.points[v] == mesh.points[v + 1] ? 1 : 0;
+  }
+  EXPECT_EQ(kept, once.points.size() - 1);
 }
 
 TEST(Decimate, AMovedMeshGivesTheMovedResult) {
