@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -92,6 +93,26 @@ class Trust : public ::testing::Test {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
     ASSERT_TRUE(fs::exists(path)) << path;
+  }
+
+  // Before, a signal would end the program where it stands, whatever the program does with it.
+  static void WaitUntilCaught(pid_t child, int signal) {
+    const Clock::time_point start = Clock::now();
+    while (!Catches(child, signal) && SecondsSince(start) < 60) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    ASSERT_TRUE(Catches(child, signal));
+  }
+
+  // By what the kernel says of the process: a bit per signal, from the lowest.
+  static bool Catches(pid_t child, int signal) {
+    std::ifstream status(fmt::format("/proc/{}/status", child));
+    for (std::string line; std::getline(status, line);) {
+      if (line.starts_with("SigCgt:")) {
+        return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
+      }
+    }
+    return false;
   }
 
   static int CodeOf(pid_t child) {
@@ -277,7 +298,9 @@ TEST_F(Trust, AReaderThatHangsIsEndedAfterASecondAndByASecondSignalAtOnce) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe.yaml").c_str(), 0600), 0);
   const auto start_reader = [&] {
     const pid_t child = Start({"check", "pipe.yaml"});
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    WaitUntilCaught(child, SIGINT);
+    WaitUntilCaught(child, SIGTERM);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until it reads
     return child;
   };
   pid_t child = start_reader();
