@@ -203,7 +203,7 @@ struct PopulationFile {
   OutlierOptions outliers;                  // what is one, and what becomes of it
   SiteCorrelation correlation;              // the model that a sample is shrunk to
   std::optional<double> shrinkage;          // the model's part; null: from the sample
-  std::vector<std::string> known = {"g", "pg", "zy", "go"};  // they foretell the others
+  std::vector<std::string> known = {"g", "pg", "zy", "go"};  // the others follow from these
   std::vector<std::filesystem::path> tables;                 // compared with this one
 };
 template <class Visitor>
