@@ -45,6 +45,16 @@ std::string ColumnName(double x, const std::string& name) {
                      kHead - 8, text, svg::Title(name));
 }
 
+// As many digits behind the point as the largest number needs to have three in all.
+std::string NumberText(double value, const Limits& limits) {
+  const double largest = std::max(std::abs(limits.low), std::abs(limits.high));
+  if (!(largest >= 1e-3 && largest < 1e5)) {
+    return fmt::format("{:.3g}", value);
+  }
+  const int digits = std::max(0, 2 - static_cast<int>(std::floor(std::log10(largest))));
+  return fmt::format("{:.{}f}", value, digits);
+}
+
 std::string Cell(const HeatMap& map, std::size_t r, std::size_t c, const Limits& limits,
                  double width) {
   const double value = map.values[r][c], x = kLabels + width * static_cast<double>(c),
@@ -64,8 +74,8 @@ std::string Cell(const HeatMap& map, std::size_t r, std::size_t c, const Limits&
   if (width >= kRoomForNumber) {
     text += fmt::format(
         "<text class=\"in-cell\" x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"middle\" font-size=\"12\" "
-        "fill=\"{}\" pointer-events=\"none\">{:.3g}</text>\n",
-        x + width / 2, y + kRow / 2 + 4, share > 0.6 ? "#000" : "#fff", value);
+        "fill=\"{}\" pointer-events=\"none\">{}</text>\n",
+        x + width / 2, y + kRow / 2 + 4, share > 0.6 ? "#000" : "#fff", NumberText(value, limits));
   }
   const bool leads = r < map.links.size() && c < map.links[r].size() && !map.links[r][c].empty();
   return leads ? fmt::format("<a href=\"{}\">{}</a>\n", EscapeHtml(map.links[r][c]), text) : text;

@@ -53,6 +53,9 @@ const std::map<std::string_view, std::string_view>& Words() {
 constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kUnits = {
     {{"_mm", "mm"}, {"_cm2", "cm²"}, {"_cm3", "cm³"}, {"_deg", "°"}, {"_s", "s"}, {"_mm2", "mm²"}}};
 
+constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kSides = {
+    {{"_l", ", left"}, {"_r", ", right"}}};
+
 // The words of a list of pairs; empty where there are none.
 template <std::size_t N>
 std::string_view Find(const std::array<std::pair<std::string_view, std::string_view>, N>& pairs,
@@ -77,9 +80,14 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kOfWhat =
      {"depth_truth", "of the depths from the true ones"},
      {"cross_validation", "at markers left out"}}};
 
-// Underscores as blanks, the unit in brackets.
+// Underscores as blanks, the unit in brackets, the side in words.
 std::string Spelt(std::string_view key) {
   std::string words(key), unit;
+  for (const auto& [ending, side] : kSides) {
+    if (key.ends_with(ending) && key.size() > ending.size()) {
+      words.replace(key.size() - ending.size(), ending.size(), side);
+    }
+  }
   for (const auto& [ending, name] : kUnits) {
     if (key.ends_with(ending) && key.size() > ending.size()) {
       words.resize(key.size() - ending.size());
@@ -105,6 +113,11 @@ std::string WordsOfMetric(std::string_view path) {
     return std::string(path);
   }
   return fmt::format("{} {} ({})", measure, of_what, path);
+}
+
+std::string WordsOfMeasure(std::string_view key) {
+  const std::string_view words = Find(kMeasures, key);
+  return std::string(words.empty() ? key : words);
 }
 
 std::string WordsOfSite(std::string_view site) {

@@ -15,6 +15,9 @@ std::string WordsOfKey(std::string_view key);
 // beside its words, for it is what a study names.
 std::string WordsOfMetric(std::string_view path);
 
+// "RMS distance (mm)" of its last key, rms_mm; the key itself where it has no words.
+std::string WordsOfMeasure(std::string_view key);
+
 // "Gonion, left (go_l)"; the code alone where it is no site that is known.
 std::string WordsOfSite(std::string_view site);
 

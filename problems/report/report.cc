@@ -292,8 +292,9 @@ std::string SectionHtml(const ReportSection& section, std::size_t number) {
 
 }  // namespace
 
-std::string TableNumber(double value) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, std::abs(value) < 1e5 ? 3 : 0) : "";
+std::string TableNumber(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, std::abs(value) < 1e5 ? digits : 0)
+                              : "";
 }
 
 ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,

@@ -29,8 +29,8 @@ struct ReportTable {
   bool filter = false;  // a field above it that hides the rows without the words typed there
 };
 
-// A table's number: three decimals, none from 100,000 on; nothing where it is not finite.
-std::string TableNumber(double value);
+// A table's number: `digits` decimals, none from 100,000 on; nothing where it is not finite.
+std::string TableNumber(double value, int digits = 3);
 
 struct ReportImage {
   std::string bytes;    // of a PNG or SVG file

@@ -25,6 +25,9 @@ std::string Number(const Json& value, int digits = 2) {
   if (value.is_number_float()) {
     return fmt::format("{:.{}f}", value.get<double>(), digits);
   }
+  if (value.is_boolean()) {
+    return value.get<bool>() ? "yes" : "no";
+  }
   return value.is_null() ? "" : value.is_string() ? value.get<std::string>() : value.dump();
 }
 
@@ -93,7 +96,8 @@ std::vector<double> Numbers(const Json& list) {
   return numbers;
 }
 
-ReportImage ConvergencePlot(const Json& fit) {
+// None where fewer than two steps have a distance.
+std::vector<ReportImage> ConvergencePlots(const Json& fit) {
   BoxRow row{"last round", {}};
   for (const Json& level : fit.at("levels")) {
     if (row.values.empty() && level.at("rms_before_mm").is_number()) {
@@ -102,9 +106,12 @@ ReportImage ConvergencePlot(const Json& fit) {
     row.values.push_back(
         level.at("rms_after_mm").is_number() ? level.at("rms_after_mm").get<double>() : kNaN);
   }
-  return {ConvergencePlotSvg({row}, "RMS distance of the fitted points (mm)"),
-          "How far the fitted points are from the surface, step by step.",
-          "root mean square distance by step of the schedule"};
+  if (std::ranges::count_if(row.values, [](double v) { return std::isfinite(v); }) < 2) {
+    return {};
+  }
+  return {{ConvergencePlotSvg({row}, "RMS distance of the fitted points (mm)"),
+           "How far the fitted points are from the surface, step by step.",
+           "root mean square distance by step of the schedule"}};
 }
 
 std::string OutOf(const Json& level, const char* part, const char* all) {
@@ -131,12 +138,16 @@ ReportTable RelaxationTable(const Json& fit) {
   return table;
 }
 
+// Without rows where there was nothing to fit: the features are those of the generic face.
 ReportTable FeaturesTable(const Json& fit) {
   ReportTable table{
       "What the fit did to the generic face's features: strain against the template",
       {"part", "area (cm²)", "RMS strain (%)", "largest strain (%)", "RMS change of area (%)"},
       {}};
   const Json parts = fit.value("feature_distortion", Json::object());
+  if (fit.at("levels").empty()) {
+    return table;
+  }
   for (const auto& [part, d] : parts.items()) {
     table.rows.push_back({WordsOfKey(part), Number(d.at("area_cm2"), 1),
                           Percent(d.at("rms_strain")), Percent(d.at("max_strain")),
@@ -355,16 +366,18 @@ ReportSection UncertaintySection(const Json& result, const OutputFolder& folder)
 ReportSection RulesSection(const Json& rules) {
   ReportSection section{
       .heading = "Rules for what bone does not carry",
-      .paragraphs = {"Each is one observation among the depth markers. What is left over goes from "
+      .paragraphs = {"Each is one observation among the depth markers. What is left goes from "
                      "the face to what the rule foresaw."},
       .folded = true};
+  ReportTable table{
+      "The rules at work", {"rule", "point", "coordinate", "left (mm)", "SD (mm)", "source"}, {}};
   for (const Json& rule : rules) {
-    section.paragraphs.push_back(
-        fmt::format("{} ({}, {}): {} mm left, standard deviation {} mm. {}.",
-                    rule.at("rule").get<std::string>(), rule.at("point").get<std::string>(),
-                    rule.at("coordinate").get<std::string>(), Number(rule.at("residual_mm")),
-                    Number(rule.at("sd_mm")), rule.at("source").get<std::string>()));
+    table.rows.push_back({WordsOfKey(rule.at("rule").get<std::string>()),
+                          WordsOfKey(rule.at("point").get<std::string>()),
+                          rule.at("coordinate").get<std::string>(), Number(rule.at("residual_mm")),
+                          Number(rule.at("sd_mm")), rule.at("source").get<std::string>()});
   }
+  section.tables = {std::move(table)};
   return section;
 }
 
@@ -382,7 +395,7 @@ std::vector<std::string> Notes(const Json& result) {
 
 ReportSection FitSection(const Json& fit) {
   return {.heading = "The fit",
-          .images = {ConvergencePlot(fit)},
+          .images = ConvergencePlots(fit),
           .tables = Filled({LevelsTable(fit), RelaxationTable(fit), FeaturesTable(fit),
                             CountsTable("Counts of the fit", fit)}),
           .folded = true};

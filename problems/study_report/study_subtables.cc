@@ -17,6 +17,7 @@ namespace {
 // A column of a table: its head and the metric in it.
 struct Column {
   std::string head, metric;
+  int digits = 3;  // behind the point
 };
 
 // Over the trials of the treatment that are done, in the order of the plan; NaN for none.
@@ -50,7 +51,8 @@ ReportTable TableOf(const StudyResults& results, const std::vector<Treatment>& r
     if (is_known(column.metric)) {
       table.header.push_back(column.head);
       for (std::size_t n = 0; n < ranked.size(); ++n) {
-        table.rows[n].push_back(TableNumber(MeanOf(results, ranked[n], column.metric, Itself)));
+        table.rows[n].push_back(
+            TableNumber(MeanOf(results, ranked[n], column.metric, Itself), column.digits));
       }
     }
   }
@@ -129,10 +131,10 @@ ReportTable RegionsTable(const StudyResults& results, const std::vector<Treatmen
   for (const std::string& name : NamesBetween(results, prefix, suffix)) {
     columns.push_back({name, prefix + name + suffix});
   }
-  return TableOf(
-      results, ranked,
-      fmt::format("{} by part of the face, means over subjects{}", leaf, Direction(results)),
-      columns);
+  return TableOf(results, ranked,
+                 fmt::format("{} by part of the face, means over subjects{}", WordsOfMeasure(leaf),
+                             Direction(results)),
+                 columns);
 }
 
 constexpr const char* kTruthScores = "depth_truth.along_direction.scores.all.";
@@ -154,7 +156,7 @@ ReportTable ScoresTable(const StudyResults& results, const std::vector<Treatment
             {"within 50 %", "coverage_50"},
             {"within 90 %", "coverage_90"},
             {"within 95 %", "coverage_95"}})) {
-    columns.push_back({head, prefix + name});
+    columns.push_back({head, prefix + name, std::string_view(name) == "n" ? 0 : 3});
   }
   return TableOf(results, ranked, caption, columns);
 }

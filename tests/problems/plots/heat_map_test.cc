@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <pugixml.hpp>
+#include <string>
+#include <vector>
 
 #include "problems/pictures/colour_map.h"
 #include "surfaces/base/error.h"
@@ -13,6 +15,7 @@
 namespace semblance {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 TEST(HeatMap, ACellHasItsNumberItsColourAndItsLink) {
@@ -35,6 +38,24 @@ TEST(HeatMap, ACellHasItsNumberItsColourAndItsLink) {
   EXPECT_STREQ(cells[2].node().parent().attribute("href").value(), "#t-\"4");
   EXPECT_STREQ(cells[1].node().parent().name(), "svg");
   EXPECT_THAT(svg, HasSubstr("mm: 1 dark to 3 yellow"));
+}
+
+TEST(HeatMap, ItsNumbersHaveAsManyDecimalsAsOneAnother) {
+  const auto shown = [](double a, double b) {
+    pugi::xml_document document;
+    const std::string svg =
+        HeatMapSvg({.rows = {"r"}, .columns = {"a", "b"}, .values = {{a, b}}, .title = ""});
+    EXPECT_TRUE(document.load_string(svg.c_str()));
+    std::vector<std::string> texts;
+    for (const auto& cell : document.select_nodes("//text[@class='in-cell']")) {
+      texts.push_back(cell.node().text().as_string());
+    }
+    return texts;
+  };
+  EXPECT_THAT(shown(2, 1.957), ElementsAre("2.00", "1.96"));
+  EXPECT_THAT(shown(-12.34, 5), ElementsAre("-12.3", "5.0"));
+  EXPECT_THAT(shown(1234, 0.5), ElementsAre("1234", "0"));
+  EXPECT_THAT(shown(2e-7, 0), ElementsAre("2e-07", "0"));
 }
 
 TEST(HeatMap, RowsOfAnotherLengthAreRefused) {

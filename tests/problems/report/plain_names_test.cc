@@ -11,6 +11,10 @@ TEST(PlainNames, AKeyBecomesWordsWithItsUnit) {
   EXPECT_EQ(WordsOfKey("some_new_count"), "some new count");
   EXPECT_EQ(WordsOfKey("some_new_area_cm2"), "some new area (cm²)");
   EXPECT_EQ(WordsOfKey("_mm"), " mm");
+  EXPECT_EQ(WordsOfKey("eye_l"), "eye, left");
+  EXPECT_EQ(WordsOfKey("_r"), " r");
+  EXPECT_EQ(WordsOfMeasure("rms_mm"), "RMS distance (mm)");
+  EXPECT_EQ(WordsOfMeasure("coverage_90"), "coverage_90");
 }
 
 TEST(PlainNames, AMetricKeepsThePathThatAStudyNamesItBy) {
