@@ -39,7 +39,13 @@ code { background: var(--code); border-radius: 4px; padding: 1px 3px; font: 0.88
 .wide { overflow-x: auto } table { border-collapse: collapse; font-size: 14px }
 th, td { text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); padding: 6px 12px 6px 0; min-width: 5em }
 summary { cursor: pointer; color: var(--link) } nav details { display: none }
-@media (max-width: 800px) { .page { display: block; padding: 12px 16px 40px } nav > div { display: none } nav details { display: block } }
+/* A shadow at the side to which a table goes on. */
+.wide { background: linear-gradient(to right, var(--paper) 50%, transparent) left / 40px 100% local no-repeat,
+  linear-gradient(to left, var(--paper) 50%, transparent) right / 40px 100% local no-repeat,
+  linear-gradient(to right, var(--line), transparent) left / 14px 100% scroll no-repeat,
+  linear-gradient(to left, var(--line), transparent) right / 14px 100% scroll no-repeat }
+@media (max-width: 800px) { .wide table:has(th:nth-child(4)) { width: max-content } th, td { max-width: 15em } td code { overflow-wrap: anywhere }
+  .page { display: block; padding: 12px 16px 40px } nav > div { display: none } nav details { display: block } }
 """
 
 
