@@ -3,11 +3,14 @@
 'use strict';
 (() => {
   const root = document.getElementById('view3d');
+  // What there is to look at instead: a run's page has pictures, a study's leads to its trials.
+  const instead = () => document.querySelector('figure img') ? 'The pictures on this page show the same from fixed sides.'
+                                                             : 'All else on this page does without.';
   if (!SemblanceGuides.canShow()) {
     const words = document.createElement('p');
     words.className = 'no-view';
     words.textContent = 'There is no 3-D view here: WebGL is off in this browser, or this machine has none. '
-        + 'The pictures on this page show the same from fixed sides.';
+        + instead();
     root.replaceChildren(words);
     return;
   }
@@ -188,6 +191,6 @@
     new ResizeObserver(drawSoon).observe(frames);
   } catch (error) {
     root.replaceChildren(element('p', {className: 'no-view',
-      textContent: `The 3-D view could not start (${error.message}). The pictures on this page show the same from fixed sides.`}));
+      textContent: `The 3-D view could not start (${error.message}). ${instead()}`}));
   }
 })();
