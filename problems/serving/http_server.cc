@@ -8,7 +8,9 @@
 
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -207,10 +209,17 @@ std::string HttpServer::Url() const {
 }
 
 void HttpServer::Serve(const std::stop_token& stop) {
-  const std::stop_callback end(stop, [this] { impl_->server.stop(); });
-  if (!stop.stop_requested()) {
-    impl_->server.listen_after_bind();
+  constexpr std::chrono::milliseconds kLook(20);
+  auto listening = std::async(std::launch::async, [this] { impl_->server.listen_after_bind(); });
+  bool is_asked = false;
+  while (listening.wait_for(kLook) != std::future_status::ready) {
+    // Of a server that does not run yet, stop() would be lost.
+    if (!is_asked && stop.stop_requested() && impl_->server.is_running()) {
+      impl_->server.stop();
+      is_asked = true;
+    }
   }
+  listening.get();
 }
 
 std::string RandomToken() {

@@ -33,7 +33,7 @@ class HttpServer {
   int Port() const;
   std::string Url() const;  // with the token
 
-  // Answers until a stop is asked for.
+  // Answers until a stop is asked for, be it before it begins.
   void Serve(const std::stop_token& stop);
 
  private:

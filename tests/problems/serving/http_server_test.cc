@@ -11,6 +11,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <string>
 #include <thread>
 #include <vector>
@@ -272,6 +273,14 @@ TEST_F(WorkbenchServer, ASecondWorkbenchOnTheFolderIsRefused) {
   } catch (const IoError& error) {
     EXPECT_THAT(error.what(), HasSubstr("another process"));
   }
+}
+
+TEST_F(WorkbenchServer, AStopAtAnyMomentOfItsStartEndsIt) {
+  for (int k = 0; k < 40; ++k) {
+    HttpServer server(bench_, Listening());
+    const std::jthread serving([&](const std::stop_token& stop) { server.Serve(stop); });
+    std::this_thread::sleep_for(std::chrono::microseconds(10 * k));
+  }  // each is stopped and awaited here
 }
 
 TEST_F(WorkbenchServer, NoOtherAddressAnswers) {
