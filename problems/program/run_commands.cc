@@ -139,7 +139,7 @@ CheckFindings CheckStudy(const std::string& file, const Arguments& arguments, In
         "{}: --set is for experiments and fits; write it into the study, under set:", file));
   }
   CheckFindings findings;
-  const StudyPlan plan = ReadStudy(file);
+  const StudyPlan plan = ReadStudy(file, WithoutSubjects::kNote);
   findings.warnings = plan.notes;
   for (const StudyTrial& trial : plan.trials) {
     if (!arguments.without_inputs) {

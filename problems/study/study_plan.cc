@@ -315,11 +315,13 @@ void AddGallery(const fs::path& file, std::initializer_list<const std::vector<Su
 }
 
 // Whether someone is left, with what the metric needs.
-void CheckSubjects(const fs::path& file, const ConfigNode& tree, const StudyPlan& plan,
-                   TrialFaults& faults) {
-  if (plan.trials.empty()) {
-    faults.Add(
-        fmt::format("{}: no subject is left; all are optional and lack files", file.string()));
+void CheckSubjects(const fs::path& file, const ConfigNode& tree, WithoutSubjects without_subjects,
+                   StudyPlan& plan, TrialFaults& faults) {
+  constexpr const char* kNone = "no subject is left; all are optional and lack files";
+  if (plan.trials.empty() && without_subjects == WithoutSubjects::kNote) {
+    plan.notes.emplace_back(kNone);
+  } else if (plan.trials.empty()) {
+    faults.Add(fmt::format("{}: {}", file.string(), kNone));
   } else if (NeedsTrueSkin(plan.metric) && NoneHasSkin(plan)) {
     faults.Add(fmt::format(
         "{}: metric: '{}' is measured against the true skin, which no subject has; name the skins "
@@ -348,7 +350,7 @@ StudyPlan EmptyPlan(const StudyFile& study) {
 
 }  // namespace
 
-StudyPlan ReadStudy(const fs::path& file) {
+StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
   ConfigErrors errors;
   ConfigNode tree;
   const StudyFile study = ReadSizedFile(file, tree, errors);
@@ -383,7 +385,7 @@ StudyPlan ReadStudy(const fs::path& file) {
     AddGallery(file, {&subjects, &others}, plan, faults);
   }
   faults.ThrowIfAny();
-  CheckSubjects(file, tree, plan, faults);
+  CheckSubjects(file, tree, without_subjects, plan, faults);
   NameTrials(file, plan, faults);
   faults.ThrowIfAny();
   return plan;

@@ -50,10 +50,15 @@ struct StudyPlan {
   bool search_ended = false;  // its budget is spent
 };
 
+// Where all subjects are optional and lack files: a fault, or a note, for who only looks whether
+// the study is right.
+enum class WithoutSubjects { kFault, kNote };
+
 // Throws IoError if the file cannot be read; ConfigError with all faults, each once and at its
 // line: those of the file, of every trial's experiment, a metric that no trial can have, and trials
-// that are the same experiment.
-StudyPlan ReadStudy(const std::filesystem::path& file);
+// that are the same experiment. Without subjects (kNote) the plan has no trials.
+StudyPlan ReadStudy(const std::filesystem::path& file,
+                    WithoutSubjects without_subjects = WithoutSubjects::kFault);
 
 // Which of the trials a condition (value_filter.h) holds for; all for an empty one. Its names are
 // `subject`, `tag`, `id` and the axes; values are those of the plan. Throws InputError as

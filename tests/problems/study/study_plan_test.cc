@@ -133,6 +133,19 @@ TEST_F(StudyPlanTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorI
   EXPECT_THAT(Faults(missing + "}]\n"), HasSubstr("subject b: no such file"));
 }
 
+TEST_F(StudyPlanTest, WithoutSubjectsItIsAFaultOrForWhoOnlyLooksANote) {
+  const std::string text =
+      "subjects: [{name: b, optional: true, set: {subject: {type: files, skull: none.ply, "
+      "landmarks: none.yaml}}}]\n";
+  EXPECT_THAT(Faults(text), HasSubstr("study.yaml: no subject is left"));
+  const StudyPlan plan = ReadStudy(Write(kBase + text), WithoutSubjects::kNote);
+  EXPECT_TRUE(plan.trials.empty());
+  EXPECT_THAT(plan.notes,
+              ElementsAre(HasSubstr("subject b: skipped"), HasSubstr("no subject is left")));
+  EXPECT_THROW(ReadStudy(Write(kBase + text + "grid: {rounds: [one]}\n"), WithoutSubjects::kNote),
+               ConfigError);
+}
+
 TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
   EXPECT_THAT(
       Faults("keep: everything\njob: [face]\n"),
