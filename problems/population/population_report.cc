@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "interp/evaluation/calibration.h"
 #include "problems/pictures/image.h"
@@ -163,13 +164,15 @@ ReportSection OutlierSection(const PopulationResult& result) {
                           TableNumber(outlier.z)});
   }
   ReportSection section{.heading = "Outliers"};
+  if (table.rows.empty()) {
+    section.paragraphs = {"None was found."};
+    return section;
+  }
   section.paragraphs = {
       result.file.outliers.leave_out
           ? "They are left out of the table, the modes (whole subjects) and the scores."
           : "They are listed alone; outliers.leave_out takes them out of all else."};
-  if (!table.rows.empty()) {
-    section.tables = {table};
-  }
+  section.tables = {std::move(table)};
   return section;
 }
 
