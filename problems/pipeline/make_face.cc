@@ -144,7 +144,7 @@ FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, cons
     for (std::size_t k = 0; k < dowels.points.size(); ++k) {
       dowels.points[k].uv = fit.uv[k];  // where relaxation has left them
     }
-    result.emplace(std::move(seeding), std::move(target), std::move(fit));
+    result.emplace(FaceFit{std::move(seeding), std::move(target), std::move(fit)});
   }
   return std::move(*result);
 }

@@ -9,7 +9,6 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <ranges>
 #include <set>
 #include <thread>
 #include <utility>
@@ -99,11 +98,11 @@ std::map<std::string, double> BySubject(const StudyResults& results, const Treat
 
 // The names of all metrics that a trial has, sorted.
 std::set<std::string> MetricsOf(const StudyResults& results) {
+  const auto name = [](const auto& metric) -> const std::string& { return metric.first; };
   std::set<std::string> metrics;
   for (const TrialRow& row : results.trials) {
-    const auto names = std::views::keys(row.metrics);
-    if (!std::ranges::includes(metrics, names)) {  // most trials have the same
-      metrics.insert(names.begin(), names.end());
+    if (!std::ranges::includes(metrics, row.metrics, {}, {}, name)) {  // most trials have the same
+      std::ranges::transform(row.metrics, std::inserter(metrics, metrics.end()), name);
     }
   }
   return metrics;

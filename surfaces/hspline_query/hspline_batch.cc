@@ -59,11 +59,12 @@ struct Row {  // along s, of one power of t
   return {middle * s + c0, (c3 * s + high) * s + middle};
 }
 
+[[gnu::always_inline]] inline Vec4 Next(const Vec4& v) {
+  return __builtin_shufflevector(v, v, 1, 2, 0, 3);
+}
+
 [[gnu::always_inline]] inline Vec4 Cross(const Vec4& a, const Vec4& b) {
-  using Order = std::int64_t __attribute__((vector_size(32)));
-  constexpr Order kNext = {1, 2, 0, 3};
-  return __builtin_shuffle(a * __builtin_shuffle(b, kNext) - b * __builtin_shuffle(a, kNext),
-                           kNext);
+  return Next(a * Next(b) - b * Next(a));
 }
 
 [[gnu::always_inline]] inline double SquaredNorm(const Vec4& v) {

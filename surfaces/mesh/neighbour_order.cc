@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <numeric>
-#include <ranges>
 #include <utility>
 
 namespace semblance {
@@ -90,7 +89,8 @@ void PutBackInOrder(const OrderedMesh& ordered, const std::vector<std::int32_t>&
   }
   std::ranges::sort(sorted);
   part.points = std::move(points);
-  std::ranges::copy(std::views::values(sorted), part.triangles.begin());
+  std::ranges::transform(sorted, part.triangles.begin(),
+                         [](const auto& placed) { return placed.second; });
 }
 
 }  // namespace semblance
