@@ -28,7 +28,8 @@ std::vector<SitePoint> PointsOf(const LandmarkFile& file) {
   for (const Landmark& l : file.landmarks) {
     sites.push_back({l.site, {l.point[0], l.point[1], l.point[2]}});
   }
-  std::ranges::stable_partition(sites, IsStandardSite, &SitePoint::site);
+  std::stable_partition(sites.begin(), sites.end(),
+                        [](const SitePoint& point) { return IsStandardSite(point.site); });
   return sites;
 }
 
