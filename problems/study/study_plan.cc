@@ -314,13 +314,18 @@ void AddGallery(const fs::path& file, std::initializer_list<const std::vector<Su
   }
 }
 
+// Whether someone is left to try on; those held out of a search are not.
+bool NoSubjectIsLeft(const StudyPlan& plan) {
+  return plan.search ? plan.search->subjects.empty() : plan.trials.empty();
+}
+
 // Whether someone is left, with what the metric needs.
 void CheckSubjects(const fs::path& file, const ConfigNode& tree, WithoutSubjects without_subjects,
                    StudyPlan& plan, TrialFaults& faults) {
   constexpr const char* kNone = "no subject is left; all are optional and lack files";
-  if (plan.trials.empty() && without_subjects == WithoutSubjects::kNote) {
+  if (NoSubjectIsLeft(plan) && without_subjects == WithoutSubjects::kNote) {
     plan.notes.emplace_back(kNone);
-  } else if (plan.trials.empty()) {
+  } else if (NoSubjectIsLeft(plan)) {
     faults.Add(fmt::format("{}: {}", file.string(), kNone));
   } else if (NeedsTrueSkin(plan.metric) && NoneHasSkin(plan)) {
     faults.Add(fmt::format(

@@ -56,7 +56,8 @@ enum class WithoutSubjects { kFault, kNote };
 
 // Throws IoError if the file cannot be read; ConfigError with all faults, each once and at its
 // line: those of the file, of every trial's experiment, a metric that no trial can have, and trials
-// that are the same experiment. Without subjects (kNote) the plan has no trials.
+// that are the same experiment. Without subjects (kNote) the plan has no trials but those on the
+// subjects held out of a search.
 StudyPlan ReadStudy(const std::filesystem::path& file,
                     WithoutSubjects without_subjects = WithoutSubjects::kFault);
 

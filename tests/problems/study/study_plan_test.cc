@@ -146,6 +146,16 @@ TEST_F(StudyPlanTest, WithoutSubjectsItIsAFaultOrForWhoOnlyLooksANote) {
                ConfigError);
 }
 
+TEST_F(StudyPlanTest, ASubjectHeldOutOfASearchIsNoneToSearchOn) {
+  const std::string text =
+      "subjects: [{name: b, optional: true, set: {subject: {type: files, skull: none.ply, "
+      "landmarks: none.yaml}}}]\n"
+      "search: {budget: 4, choices: {rounds: [1, 2]}, held_out: [{name: c}]}\n";
+  EXPECT_THAT(Faults(text), HasSubstr("study.yaml: no subject is left"));
+  EXPECT_THAT(ReadStudy(Write(kBase + text), WithoutSubjects::kNote).notes,
+              ElementsAre(HasSubstr("subject b: skipped"), HasSubstr("no subject is left")));
+}
+
 TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
   EXPECT_THAT(
       Faults("keep: everything\njob: [face]\n"),
