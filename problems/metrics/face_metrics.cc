@@ -173,7 +173,7 @@ void RequireScored(const FaceRegion& region) {
   if (std::find(region.scored.begin(), region.scored.end(), true) == region.scored.end()) {
     throw InputError(
         "face metrics: no vertex of the true skin is scored; check that skull and skin share a "
-        "frame, and the excluded zones");
+        "frame, and what of the skin `region` asks for (extent, reach_mm, exclude)");
   }
 }
 
