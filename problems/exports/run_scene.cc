@@ -42,7 +42,7 @@ GlbNode SkullNode(const fs::path& file) {
       }
     }
   } catch (const Json::exception& e) {
-    throw IoError(fmt::format("{}: no scene of a run: {}", file.string(), e.what()));
+    throw IoError(fmt::format("{}: no scene of a run: {}", file.string(), JsonFault(e)));
   } catch (const InputError& e) {
     throw IoError(fmt::format("{}: {}", file.string(), e.what()));
   }

@@ -25,7 +25,20 @@ fs::path FileOf(const fs::path& folder, const std::string& id) {
   return folder / "subjects" / (id + ".json");
 }
 
-// Nothing if it is not there, cut short or another subject's.
+// Whether it is what MeasurePopulation writes of that subject.
+bool IsWhole(const Json& json, const std::string& id) try {
+  if (json.at("status") == "done") {
+    SubjectDepthsOf(json.at("depths"));
+  }
+  return json.at("id") == id && json.at("status").is_string() &&
+         json.value("reason", Json("")).is_string();
+} catch (const Json::exception&) {
+  return false;
+} catch (const IoError&) {
+  return false;
+}
+
+// Nothing if it is not there, cut short, damaged or another subject's.
 std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id) {
   const fs::path file = FileOf(folder, id);
   if (!fs::exists(file)) {
@@ -33,9 +46,7 @@ std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id) {
   }
   try {
     Json json = ParseJson(ReadFileBytes(file), file.string());
-    const bool whole = json.is_object() && json.value("id", Json()) == id &&
-                       json.contains("status") && json["status"].is_string();
-    return whole ? std::optional(std::move(json)) : std::nullopt;
+    return IsWhole(json, id) ? std::optional(std::move(json)) : std::nullopt;
   } catch (const IoError&) {
     return std::nullopt;
   }
@@ -148,7 +159,7 @@ std::vector<MeasuredSubject> ReadMeasured(const PopulationPlan& plan, const fs::
     subject.status = (*json)["status"].get<std::string>();
     subject.reason = json->value("reason", "");
     if (subject.status == "done") {
-      subject.depths = SubjectDepthsOf((*json)["depths"]);
+      subject.depths = SubjectDepthsOf(json->at("depths"));
     }
   }
   return measured;

@@ -13,6 +13,7 @@
 #include "problems/propose/propose_landmarks.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/mesh/outer_surface.h"
 
 namespace semblance {
@@ -234,7 +235,7 @@ SubjectDepths SubjectDepthsOf(const Json& json) try {
   }
   return depths;
 } catch (const nlohmann::json::exception& error) {
-  throw IoError(fmt::format("a subject's depths: {}", error.what()));
+  throw IoError(fmt::format("a subject's depths: {}", JsonFault(error)));
 }
 
 }  // namespace semblance

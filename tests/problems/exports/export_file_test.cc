@@ -27,6 +27,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::ThrowsMessage;
 using Json = nlohmann::json;
 
@@ -131,6 +132,15 @@ TEST_F(ExportFile, AMeshGoesToEveryFormatOfMeshes) {
   EXPECT_EQ(Values(vtu, "height_mm"),
             PlyVertexScalar(ReadFileBytes(sphere), "scalar_height_mm", ""));
   EXPECT_EQ(DocumentOf(Export(sphere, ".glb"))["nodes"][0]["name"], "sphere");
+}
+
+TEST_F(ExportFile, ASceneThatIsNoneIsRefusedInOurWords) {
+  WriteFileAtomically(scratch_ / "result.json", "{}");
+  WriteFileAtomically(scratch_ / "scene.json",
+                      R"({"layers": [{"id": "skull", "mesh": {"a": 1}}], "blobs": {}})");
+  EXPECT_THAT([&] { Export(scratch_.Path(), ".glb"); },
+              ThrowsMessage<IoError>(AllOf(HasSubstr("scene.json: no scene of a run"),
+                                           Not(HasSubstr("json.exception")))));
 }
 
 TEST_F(ExportFile, WhatDoesNotGoTogetherIsRefusedWithWhatDoes) {

@@ -51,9 +51,15 @@ TEST(MeasurePopulation, GoesOnWhereItWasAndShardsGiveTheSameBytes) {
   const std::string bytes = ReadFileBytes(folder / "a" / first);
   fs::remove(folder / "a" / first);
   WriteFileAtomically(folder / "a" / ("subjects/" + plan.entries[2].id + ".json"), "{\"id\": ");
+  const std::string& damaged = plan.entries[3].id;
+  for (const char* rest : {"}", ", \"depths\": {\"name\": 3}}", ", \"reason\": []}"}) {
+    WriteFileAtomically(folder / "a" / ("subjects/" + damaged + ".json"),
+                        fmt::format("{{\"id\": \"{}\", \"status\": \"done\"{}", damaged, rest));
+    EXPECT_EQ(ReadMeasured(plan, folder / "a").at(3).status, "missing");
+  }
   const PopulationRunSummary again = MeasurePopulation(plan, folder / "a", {}, {});
-  EXPECT_EQ(again.skipped, kFew - 2);
-  EXPECT_EQ(again.done, 2);
+  EXPECT_EQ(again.skipped, kFew - 3);
+  EXPECT_EQ(again.done, 3);
   EXPECT_EQ(ReadFileBytes(folder / "a" / first), bytes);
   EXPECT_EQ(MeasurePopulation(plan, folder / "b", {.shard = 0, .shards = 2}, {}).done, kFew / 2);
   EXPECT_EQ(MeasurePopulation(plan, folder / "c", {.shard = 1, .shards = 2}, {}).done, kFew / 2);
