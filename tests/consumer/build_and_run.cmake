@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Installs the package from BUILD below OUT, builds the consumer in SOURCE against it with CXX, and runs it on points of a known
-# surface. Nothing of the checkout is on its include path, and no private header is installed.
+# surface. Nothing of the checkout is on its include path, and no private header is installed. LINKER_FLAGS: what sanitized libraries
+# ask for; else empty.
 file(REMOVE_RECURSE ${OUT})
 execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${OUT}/prefix OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 if(NOT EXISTS ${OUT}/prefix/include/semblance/fitting/fit.h)
@@ -10,7 +11,7 @@ if(EXISTS ${OUT}/prefix/include/semblance/fitting/least_squares/sparse_factor.h)
   message(FATAL_ERROR "fitting/least_squares/sparse_factor.h is private, and yet installed")
 endif()
 execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE} -B ${OUT}/build -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release
-  -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_PREFIX_PATH=${OUT}/prefix OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+  -DCMAKE_CXX_COMPILER=${CXX} "-DCMAKE_EXE_LINKER_FLAGS=${LINKER_FLAGS}" -DCMAKE_PREFIX_PATH=${OUT}/prefix OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND ${CMAKE_COMMAND} --build ${OUT}/build OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 
 # A paraboloid over [-20, 20] x [-20, 20].
