@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
@@ -156,16 +157,20 @@ void WritePopulation(const PopulationResult& result, OutputFolder& folder) {
     attributes.scalars.push_back(
         {fmt::format("mode_{}_mm", k + 1), OnVertices(mesh, result.dense.modes_mm[k])});
   }
-  folder.Write("table.yaml",
-               "# SPDX-License-Identifier: GPL-3.0-or-later\n" + WriteConfig(result.table));
-  folder.Write("depths.csv", DepthsCsv(result));
-  folder.Write("subjects.csv", SubjectsCsv(result));
-  folder.Write("outliers.csv", OutliersCsv(result));
-  folder.Write("leave_one_out.csv", LeaveOneOutCsv(result));
-  folder.Write("dense.csv", DenseCsv(result.dense));
-  folder.Write("dense.ply", EncodeMesh(mesh.mesh, ".ply", attributes));
-  folder.Write("population.json", SummaryJson(result).dump(2) + "\n");
-  folder.Write("report.html", PopulationReport(result));
+  // First what can still be refused.
+  const std::vector<std::pair<const char*, std::string>> files = {
+      {"table.yaml", "# SPDX-License-Identifier: GPL-3.0-or-later\n" + WriteConfig(result.table)},
+      {"depths.csv", DepthsCsv(result)},
+      {"subjects.csv", SubjectsCsv(result)},
+      {"outliers.csv", OutliersCsv(result)},
+      {"leave_one_out.csv", LeaveOneOutCsv(result)},
+      {"dense.csv", DenseCsv(result.dense)},
+      {"dense.ply", EncodeMesh(mesh.mesh, ".ply", attributes)},
+      {"population.json", SummaryJson(result).dump(2) + "\n"},
+      {"report.html", PopulationReport(result)}};
+  for (const auto& [name, bytes] : files) {
+    folder.Write(name, bytes);
+  }
 }
 
 }  // namespace semblance

@@ -25,10 +25,14 @@ fs::path FileOf(const fs::path& folder, const std::string& id) {
   return folder / "subjects" / (id + ".json");
 }
 
+bool IsOfGrid(const DenseDepths& depths, const DenseOptions& grid) {
+  return depths.columns == grid.columns && depths.rows == grid.rows;
+}
+
 // Whether it is what MeasurePopulation writes of that subject.
-bool IsWhole(const Json& json, const std::string& id) try {
-  if (json.at("status") == "done") {
-    SubjectDepthsOf(json.at("depths"));
+bool IsWhole(const Json& json, const std::string& id, const DenseOptions& grid) try {
+  if (json.at("status") == "done" && !IsOfGrid(SubjectDepthsOf(json.at("depths")).dense, grid)) {
+    return false;
   }
   return json.at("id") == id && json.at("status").is_string() &&
          json.value("reason", Json("")).is_string();
@@ -39,17 +43,24 @@ bool IsWhole(const Json& json, const std::string& id) try {
 }
 
 // Nothing if it is not there, cut short, damaged or another subject's.
-std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id) {
+std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id,
+                                const PopulationPlan& plan) {
   const fs::path file = FileOf(folder, id);
   if (!fs::exists(file)) {
     return std::nullopt;
   }
   try {
     Json json = ParseJson(ReadFileBytes(file), file.string());
-    return IsWhole(json, id) ? std::optional(std::move(json)) : std::nullopt;
+    return IsWhole(json, id, plan.file.measure.dense) ? std::optional(std::move(json))
+                                                      : std::nullopt;
   } catch (const IoError&) {
     return std::nullopt;
   }
+}
+
+void WriteSubject(const fs::path& folder, const Json& json, Durability durability) {
+  WriteFileAtomically(FileOf(folder, json.at("id").get<std::string>()), json.dump() + "\n",
+                      durability);
 }
 
 class PopulationRunner {
@@ -75,7 +86,7 @@ class PopulationRunner {
 
  private:
   bool IsThere(const std::string& id) const {
-    const auto json = ReadSubject(folder_, id);
+    const auto json = ReadSubject(folder_, id, plan_);
     return json && !(options_.rerun_failed && (*json)["status"] != "done");
   }
 
@@ -119,7 +130,7 @@ class PopulationRunner {
 
   void Measure(const PopulationEntry& entry) {
     const Json json = TryToMeasure(entry);
-    WriteFileAtomically(FileOf(folder_, entry.id), json.dump() + "\n", Durability::kUnsynced);
+    WriteSubject(folder_, json, Durability::kUnsynced);
     const std::lock_guard lock(mutex_);
     const auto status = json["status"].get<std::string>();
     ++(status == "done" ? summary_.done : summary_.failed);
@@ -152,7 +163,7 @@ std::vector<MeasuredSubject> ReadMeasured(const PopulationPlan& plan, const fs::
   for (const PopulationEntry& entry : plan.entries) {
     MeasuredSubject& subject =
         measured.emplace_back(MeasuredSubject{.person = entry.subject, .id = entry.id});
-    const auto json = ReadSubject(folder, entry.id);
+    const auto json = ReadSubject(folder, entry.id, plan);
     if (!json) {
       continue;
     }
@@ -171,8 +182,9 @@ int GatherSubjects(const PopulationPlan& plan, const fs::path& folder,
   fs::create_directories(folder / "subjects");
   for (const PopulationEntry& entry : plan.entries) {
     for (const fs::path& other : others) {
-      if (!ReadSubject(folder, entry.id) && ReadSubject(other, entry.id)) {
-        WriteFileAtomically(FileOf(folder, entry.id), ReadFileBytes(FileOf(other, entry.id)));
+      const auto json = ReadSubject(other, entry.id, plan);
+      if (json && !ReadSubject(folder, entry.id, plan)) {
+        WriteSubject(folder, *json, Durability::kSynced);
         ++taken;
       }
     }

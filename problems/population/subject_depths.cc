@@ -135,7 +135,23 @@ Json Numbers(const std::vector<double>& values) {
   return list;
 }
 
-double NumberOf(const Json& json) { return json.is_null() ? kNaN : json.get<double>(); }
+// NaN for null.
+double NumberOf(const Json& json) {
+  constexpr double kLargest = 1e5;  // farther no mesh may lie (mesh_check.h)
+  const double number = json.is_null() ? kNaN : json.get<double>();
+  if (std::abs(number) > kLargest) {
+    throw IoError(fmt::format("a subject's depths: {} is beyond every head", number));
+  }
+  return number;
+}
+
+std::string SiteOf(const Json& json) {
+  const auto site = json.get<std::string>();
+  if (!IsStandardSite(site) && !IsFurtherSite(site)) {
+    throw IoError(fmt::format("a subject's depths: '{}' is no site that is known", site));
+  }
+  return site;
+}
 
 // A phantom's skull and skin as they come out of a scan of it.
 void Scan(const PhantomOptions& phantom, const PhantomScan& scan, SubjectData& data,
@@ -214,7 +230,7 @@ SubjectDepths SubjectDepthsOf(const Json& json) try {
   depths.thickness = NumberOf(json.at("thickness"));
   depths.notes = json.at("notes").get<std::vector<std::string>>();
   for (const Json& site : json.at("sites")) {
-    depths.sites.push_back({.site = site.at("site").get<std::string>(),
+    depths.sites.push_back({.site = SiteOf(site.at("site")),
                             .depth_mm = NumberOf(site.at("depth_mm")),
                             .confidence = NumberOf(site.at("confidence")),
                             .why_not = site.at("why_not").get<std::string>()});
@@ -230,7 +246,8 @@ SubjectDepths SubjectDepthsOf(const Json& json) try {
     depths.dense.bone.emplace_back(NumberOf(bone[k]), NumberOf(bone[k + 1]), NumberOf(bone[k + 2]));
   }
   const std::size_t cells = static_cast<std::size_t>(depths.dense.columns) * depths.dense.rows;
-  if (depths.dense.bone.size() != cells || depths.dense.depth_mm.size() != cells) {
+  if (depths.dense.columns < 1 || depths.dense.rows < 1 || depths.dense.bone.size() != cells ||
+      depths.dense.depth_mm.size() != cells) {
     throw IoError("a subject's depths: the grid has not as many values as cells");
   }
   return depths;

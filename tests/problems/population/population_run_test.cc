@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "problems/config/config.h"
 #include "problems/landmark_files/read_landmarks.h"
@@ -52,10 +53,18 @@ TEST(MeasurePopulation, GoesOnWhereItWasAndShardsGiveTheSameBytes) {
   fs::remove(folder / "a" / first);
   WriteFileAtomically(folder / "a" / ("subjects/" + plan.entries[2].id + ".json"), "{\"id\": ");
   const std::string& damaged = plan.entries[3].id;
-  for (const char* rest : {"}", ", \"depths\": {\"name\": 3}}", ", \"reason\": []}"}) {
+  const std::string good = ReadFileBytes(folder / "a" / ("subjects/" + damaged + ".json"));
+  for (const auto& [from, to] :
+       {std::pair{"\"done\"", "[]"}, std::pair{"\"depths\"", "\"deep\""},
+        std::pair{"\"site\":\"g\"", "\"site\":\"gg\""},
+        std::pair{"\"columns\":16", "\"columns\":-16"}, std::pair{"\"rows\":16", "\"rows\":1.5e99"},
+        std::pair{"\"bone\":[", "\"bone\":[-1e308,"}}) {
+    std::string changed = good;
+    const std::size_t at = changed.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
     WriteFileAtomically(folder / "a" / ("subjects/" + damaged + ".json"),
-                        fmt::format("{{\"id\": \"{}\", \"status\": \"done\"{}", damaged, rest));
-    EXPECT_EQ(ReadMeasured(plan, folder / "a").at(3).status, "missing");
+                        changed.replace(at, std::string(from).size(), to));
+    EXPECT_EQ(ReadMeasured(plan, folder / "a").at(3).status, "missing") << to;
   }
   const PopulationRunSummary again = MeasurePopulation(plan, folder / "a", {}, {});
   EXPECT_EQ(again.skipped, kFew - 3);
