@@ -416,6 +416,24 @@ def runs(world):
         yield Case("runs", f"{name}: {what}", words, files, outputs=outputs)
 
 
+def populations(world):
+    """A population whose file is damaged, or what was measured of a subject, in its folder or another shard's."""
+    draw = world.draw("populations")
+    good = world.good("crowd.yaml")
+    measured = sorted(p.name for p in (world.folder / "crowd/subjects").iterdir())
+    while True:
+        if draw.random() < 0.4:
+            what, data = mutations.yaml(good, draw)
+            words = draw.choice([["check", "hostile.yaml"], ["population", "hostile.yaml", "--list"]])
+            yield Case("populations", f"file: {what}", words, {"hostile.yaml": data}, most_lines=YAML_LINES)
+            continue
+        name = "subjects/" + draw.choice(measured)
+        what, data = mutations.json_text(world.good("crowd/" + name), draw)
+        words, outputs = draw.choice([(["--out", "hostile"], ("hostile",)), (["--out", "out", "--from", "hostile"], ("out",))])
+        yield Case("populations", f"{name}: {what}", ["population", GOOD + "crowd.yaml", *words, *QUIET],
+                   {"hostile": Copy("crowd"), "hostile/" + name: data}, outputs=outputs)
+
+
 # ---------------------------------------------------------------------------------------------- command lines
 
 
@@ -613,7 +631,7 @@ def surroundings(world):
         yield Case("surroundings", f"{shard}", ["study", GOOD + "study.yaml", "--out", "out", "--quiet"], env=shard, names=("shard",))
 
 
-SHARES = {meshes: 260, volumes: 170, dicom: 60, landmarks: 190, points: 170, faces: 190, priors: 40, configurations: 230, options: 230, studies: 120, runs: 60,
+SHARES = {meshes: 260, volumes: 170, dicom: 60, landmarks: 190, points: 170, faces: 190, priors: 40, configurations: 230, options: 230, studies: 120, runs: 60, populations: 60,
           command_lines: 260, names: 260, many: 80, surroundings: 80}
 
 

@@ -187,6 +187,7 @@ class Maker:
                    "  - {level: 0, i: 2, j: 2, offset: [0, 0, 1]}\n")
         self.write("study.yaml", "title: attacked\nbase: experiment.yaml\njob: depth\nsubjects:\n  - {name: a, set: {subject.random_seed: 1}}\n"
                    "  - {name: b, set: {subject.random_seed: 2}}\ngrid: {interp: [nearest, mean]}\nmetric: depth_truth.along_direction.rms_mm\n")
+        self.write("crowd.yaml", "title: crowd\nphantoms: {count: 4, like: {rings: 16}}\nmeasure: {dense: {columns: 16, rows: 16, modes: 1}}\n")
         self.write("faces.yaml", "title: faces\nbase: experiment.yaml\ngrid: {interp: [nearest, mean]}\nkeep: run\n")
         for name in ("tables/t_table_2023.yaml", "networks/standard32.yaml", "landmarks/cranium.yaml"):
             self.write(pathlib.Path(name).name, (self.configs / name).read_bytes())
@@ -212,6 +213,7 @@ class Maker:
             self.call("study", f"{name}.yaml", "--out", name, "--quiet", allowed=(0, 1))
         for shard in (0, 1):
             self.call("study", "study.yaml", "--out", f"shard{shard}", "--shard", f"{shard}/2", "--quiet")
+        self.call("population", "crowd.yaml", "--out", "crowd", "--quiet")
 
 
 def make(program, configs, folder):
