@@ -465,7 +465,7 @@ def command_lines(world):
             for value in draw.sample(WORDS, 5):
                 rows.append((command, [*words, *base, f"{option}={value}"], (option[:20], option.lstrip("-")[:20], value[:20] or " ", "nosuch")))
             rows.append((command, [*words, *base, option], (option[:20], "nosuch")))
-            rows.append((command, [*words, option, *base, option], (option[:20], "nosuch", *base)))
+            rows.append((command, [*words, option, *base, option], (option[:20], "nosuch", "is required", *base)))  # it may take the base as its value
         for cut in range(len(base)):
             rows.append((command, [*words, *base[:cut]], ("",)))
         for word in draw.sample(WORDS, 8):
