@@ -97,6 +97,13 @@ bool AtRest(double move, double last_move) {
   return move <= kLeastMove || (move <= 1e-9 && move >= last_move);
 }
 
+// In exact arithmetic no step is longer than the first. One that is, by more than rounding, tells
+// of a matrix so close to singular that its factor leads away from the solution.
+bool Diverges(double length, double first_length, double move) {
+  constexpr double kRounding = 1e-6;
+  return length > first_length && move > kRounding;
+}
+
 }  // namespace
 
 SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
@@ -114,13 +121,15 @@ SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, C
                                 static_cast<Eigen::Index>(3 * vertices));
   outcome.usable = factor.usable();
   outcome.termination = outcome.usable ? "no_convergence" : "failure";
-  double move = 1e300;
+  double move = 1e300, first_length = 1e300;
   while (outcome.usable && outcome.iterations < kMostSteps) {
     const Eigen::VectorXd step = factor.Solve(Downhill(blocks, vertices));
     x += step;
     ++outcome.iterations;
-    outcome.usable = step.allFinite();
-    const double last_move = std::exchange(move, step.norm() / std::max(x.norm(), 1e-13));
+    const double length = step.norm();
+    const double last_move = std::exchange(move, length / std::max(x.norm(), 1e-13));
+    first_length = outcome.iterations == 1 ? length : first_length;
+    outcome.usable = step.allFinite() && !Diverges(length, first_length, move);
     if (outcome.usable && AtRest(move, last_move)) {
       outcome.termination = "convergence";
       break;
