@@ -68,8 +68,9 @@ def experiment_space(schema, folder):
             ".sweeps": [0, 2], ".max_passes": [1, 3], "rounds": [1, 3], "estimate.rounds": [3, 5], ".surface_points": [0, 300],
             "field.centres": [0, 40], "prior[ict].count": [1, 60], "edge_mm": [2, 20], "alpha_mm": [10, 200],
             "edges.tolerance": [1e-6, 0.5], "random_seed": [0, 7], "probe_mm": [5, 50],
+            "outside[constant].depth_mm": [2, 100],  # emitters grow with its inverse square
             # At these ends it hangs on the head whether anything is left: the trial says that nothing is.
-            ".max_angle_deg": [60, 180], "landmarks.max_distance_mm": [5, 50], "landmarks.keep[random].n": [8, 30],
+            ".max_angle_deg": [60, 180], "region.reach_mm": [30, 200], "landmarks.max_distance_mm": [5, 50], "landmarks.keep[random].n": [8, 30],
             "landmarks.keep[spread].n": [8, 30], "implicit.resolution": [12, 24], ".decay": [3, 12],
         },
         beside={
@@ -98,7 +99,7 @@ def fit_space(schema, folder):
     return OptionSpace(
         schema,
         lists={"fit.plan[listed].schedule": [steps[:1], steps], "fit.plan[until].schedule": [steps]},
-        work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 2], ".sweeps": [0, 2], ".max_passes": [1, 3],
+        work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 2], ".sweeps": [0, 2], ".max_passes": [1, 3], "[adaptive].margin": [0, 2],
               "rounds": [1, 3], "chord_mm": [0.01, 1000], "fit.plan[auto].finest": [0, 3]},
         beside={}, files={("fit.plan", "until"): FEW_PASSES}, defaults={"parameters": "given", "fit.plan": "listed", "fit.solver": "ceres"})
 
