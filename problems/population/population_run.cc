@@ -182,8 +182,10 @@ int GatherSubjects(const PopulationPlan& plan, const fs::path& folder,
   fs::create_directories(folder / "subjects");
   for (const PopulationEntry& entry : plan.entries) {
     for (const fs::path& other : others) {
-      const auto json = ReadSubject(other, entry.id, plan);
-      if (json && !ReadSubject(folder, entry.id, plan)) {
+      if (ReadSubject(folder, entry.id, plan)) {
+        break;
+      }
+      if (const auto json = ReadSubject(other, entry.id, plan)) {
         WriteSubject(folder, *json, Durability::kSynced);
         ++taken;
       }
