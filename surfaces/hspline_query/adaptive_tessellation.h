@@ -6,9 +6,6 @@
 
 namespace semblance {
 
-// The cells that TessellateToChord makes at most.
-inline constexpr double kMostCells = 1e7;
-
 // No point of a triangle is further than chord_mm (> 0) from the surface's point of the same (u,v):
 // guaranteed, by a bound of the second derivatives (Filip et al. 1986). A quadtree of the domain,
 // whose neighbours differ by one level at most and share all their vertices: watertight, also
@@ -17,10 +14,5 @@ inline constexpr double kMostCells = 1e7;
 // or so small that more than ten million cells would be needed; these are counted before any is
 // made.
 Tessellation TessellateToChord(const HSplineSurface& surface, double chord_mm, int threads = 1);
-
-// How many cells, of two triangles or a few more, keep the chord (> 0): a lower bound, as
-// neighbours may have to be split too. Infinite where cells would be smaller than a double can
-// tell.
-double CellsToChord(const HSplineSurface& surface, double chord_mm);
 
 }  // namespace semblance

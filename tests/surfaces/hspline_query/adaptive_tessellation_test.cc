@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "surfaces/base/error.h"
+#include "surfaces/hspline_query/surface_cells.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "surfaces/hspline_query/cell_triangles.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "surfaces/hspline_query/hspline_batch.h"
+
+namespace semblance {
+namespace {
+
+// Triangles over a quadtree's cells; vertices by their (v, u) on the finest lattice.
+class Triangulation {
+ public:
+  Triangulation(const HSplineShape& shape, const std::set<DomainCell>& cells) : shape_(shape) {
+    for (const DomainCell& cell : cells) {
+      const std::array<std::int64_t, 3> box = Box(cell);
+      for (int k = 0; k < 4; ++k) {
+        Vertex(box[0] + k % 2 * box[2], box[1] + k / 2 * box[2]);
+      }
+    }
+    const std::map<std::pair<std::int64_t, std::int64_t>, int> corners = vertices_;
+    for (const DomainCell& cell : cells) {
+      Emit(Box(cell), corners);
+    }
+  }
+
+  Tessellation Take() && { return std::move(result_); }
+
+ private:
+  // Lowest u and v, and size, in units of the lattice.
+  static std::array<std::int64_t, 3> Box(const DomainCell& cell) {
+    const std::int64_t size = 2 << (kDeepestCell - cell.level);
+    return {cell.i * size, cell.j * size, size};
+  }
+
+  std::pair<std::int64_t, std::int64_t> Key(std::int64_t x, std::int64_t y) const {
+    const std::int64_t columns = shape_.patches_u * (std::int64_t{2} << kDeepestCell);
+    return {y, shape_.closure == Closure::kPeriodicU ? x % columns : x};
+  }
+
+  int Vertex(std::int64_t x, std::int64_t y) {
+    const auto [vertex, is_new] = vertices_.emplace(Key(x, y), static_cast<int>(result_.uv.size()));
+    if (is_new) {
+      const double unit = 2 << kDeepestCell;
+      result_.uv.emplace_back(vertex->first.second / (shape_.patches_u * unit),
+                              vertex->first.first / (shape_.patches_v * unit));
+    }
+    return vertex->second;
+  }
+
+  void Emit(const std::array<std::int64_t, 3>& box,
+            const std::map<std::pair<std::int64_t, std::int64_t>, int>& corners) {
+    const auto [x, y, size] = box;
+    const std::int64_t half = size / 2;
+    // Counter-clockwise from the lowest corner; in between, where a neighbour is finer.
+    const std::array<std::pair<std::int64_t, std::int64_t>, 8> around = {{{x, y},
+                                                                          {x + half, y},
+                                                                          {x + size, y},
+                                                                          {x + size, y + half},
+                                                                          {x + size, y + size},
+                                                                          {x + half, y + size},
+                                                                          {x, y + size},
+                                                                          {x, y + half}}};
+    std::vector<int> ring;
+    for (const auto& [px, py] : around) {
+      if (const auto found = corners.find(Key(px, py)); found != corners.end()) {
+        ring.push_back(found->second);
+      }
+    }
+    std::vector<Triangle>& triangles = result_.mesh.triangles;
+    if (ring.size() == 4) {
+      triangles.push_back({ring[0], ring[1], ring[2]});
+      triangles.push_back({ring[0], ring[2], ring[3]});
+      return;
+    }
+    const int center = Vertex(x + half, y + half);
+    for (std::size_t k = 0; k < ring.size(); ++k) {
+      triangles.push_back({center, ring[k], ring[(k + 1) % ring.size()]});
+    }
+  }
+
+  HSplineShape shape_;
+  std::map<std::pair<std::int64_t, std::int64_t>, int> vertices_;
+  Tessellation result_;
+};
+
+}  // namespace
+
+Tessellation TessellateCells(const HSplineSurface& surface, std::set<DomainCell> cells,
+                             int threads) {
+  BalanceCells(surface.shape(), cells);
+  Tessellation result = Triangulation(surface.shape(), cells).Take();
+  SurfaceSamples samples = HSplineBatch(surface).PointsAndNormals(result.uv, threads);
+  result.mesh.points = std::move(samples.points);
+  result.normals = std::move(samples.normals);
+  return result;
+}
+
+}  // namespace semblance
