@@ -9,6 +9,7 @@
 #include <set>
 
 #include "problems/metrics/quantile.h"
+#include "surfaces/base/parallel.h"
 #include "surfaces/hspline/patch_tree.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
@@ -75,20 +76,31 @@ DistanceQuantiles QuantilesOf(const FitResult& fit) {
           .max_mm = *std::ranges::max_element(known)};
 }
 
-std::vector<Triangle> GridTriangles(int columns, int rows) {
+namespace {
+
+// Two per cell, but for those that are trimmed away.
+std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
   std::vector<Triangle> triangles;
-  for (int j = 0; j + 1 < rows; ++j) {
-    for (int i = 0; i + 1 < columns; ++i) {
-      const int a = i + columns * j, b = a + 1, c = a + columns, d = c + 1;
-      triangles.push_back({a, b, d});
-      triangles.push_back({a, d, c});
+  const auto add = [&](const Triangle& t) {
+    const auto kept = [&](int corner) { return grid.kept.empty() ? 1 : grid.kept[corner]; };
+    if (kept(t[0]) + kept(t[1]) + kept(t[2]) >= 2) {
+      triangles.push_back(t);
+    }
+  };
+  for (int j = 0; j + 1 < grid.rows; ++j) {
+    for (int i = 0; i + 1 < grid.columns; ++i) {
+      const int a = i + grid.columns * j, b = a + 1, c = a + grid.columns, d = c + 1;
+      add({a, b, d});
+      add({a, d, c});
     }
   }
   return triangles;
 }
 
+}  // namespace
+
 FitGrid GridOf(const FitResult& fit, int threads) {
-  FitGrid grid{.columns = kGrid, .rows = kGrid, .mesh = {}, .rms_mm = {}};
+  FitGrid grid{.columns = kGrid, .rows = kGrid, .mesh = {}, .rms_mm = {}, .kept = {}};
   std::vector<Vec2> uv;
   for (int j = 0; j < grid.rows; ++j) {
     for (int i = 0; i < grid.columns; ++i) {
@@ -96,9 +108,38 @@ FitGrid GridOf(const FitResult& fit, int threads) {
     }
   }
   grid.mesh.points = HSplineBatch(fit.surface).Points(uv, threads);
-  grid.mesh.triangles = GridTriangles(grid.columns, grid.rows);
+  grid.mesh.triangles = TrianglesOf(grid);
   AddSquares(fit, grid);
   return grid;
+}
+
+void TrimGrid(const TrimmedTo& trim, int threads, FitGrid& grid) {
+  constexpr std::size_t kBlock = 256;
+  grid.kept.assign(grid.mesh.points.size(), 0);
+  ParallelFor(grid.kept.size(), threads, kBlock, [&](std::size_t k) {
+    grid.kept[k] = trim.places.DistanceTo(grid.mesh.points[k]) <= trim.distance_mm;
+  });
+  grid.mesh.triangles = TrianglesOf(grid);
+}
+
+FitGrid Halved(const FitGrid& grid) {
+  FitGrid half{.columns = (grid.columns + 1) / 2,
+               .rows = (grid.rows + 1) / 2,
+               .mesh = {},
+               .rms_mm = {},
+               .kept = {}};
+  for (int j = 0; j < half.rows; ++j) {
+    for (int i = 0; i < half.columns; ++i) {
+      const std::size_t at = static_cast<std::size_t>(2 * j) * grid.columns + 2 * i;
+      half.mesh.points.push_back(grid.mesh.points[at]);
+      half.rms_mm.push_back(grid.rms_mm[at]);
+      if (!grid.kept.empty()) {
+        half.kept.push_back(grid.kept[at]);
+      }
+    }
+  }
+  half.mesh.triangles = TrianglesOf(half);
+  return half;
 }
 
 std::vector<FitCell> CellsOf(const FitResult& fit) {

@@ -8,6 +8,7 @@
 
 #include "fitting/plan/fit_result.h"
 #include "fitting/problem/fit_schedule.h"
+#include "problems/points/fit_trim.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
@@ -23,10 +24,13 @@ struct FitGrid {
   int columns = 0, rows = 0;   // of vertices, from (0,0) to (1,1); row by row
   TriMesh mesh;                // mm
   std::vector<double> rms_mm;  // of the points around the vertex; NaN: none
+  std::vector<char> kept;      // of a trimmed surface: whether the vertex is part of it; else empty
 };
 FitGrid GridOf(const FitResult& fit, int threads);
-// Two triangles a cell, of columns x rows vertices, row by row.
-std::vector<Triangle> GridTriangles(int columns, int rows);
+// Leaves out the triangles that have more than one vertex beyond the distance.
+void TrimGrid(const TrimmedTo& trim, int threads, FitGrid& grid);
+// Every other vertex.
+FitGrid Halved(const FitGrid& grid);
 
 // A leaf of the surface's patch tree (patch_tree.h), and the points in it.
 struct FitCell {

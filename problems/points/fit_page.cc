@@ -181,9 +181,12 @@ ReportSection RoundsSection(const FitResult& fit) {
 }  // namespace
 
 std::string FitPageHtml(const PointFitOptions& options, const PointSource& source,
-                        const PointFit& result, int threads) {
+                        const PointFit& result, const PageTrim& trim, int threads) {
   const Figures figures = FiguresOf(options, result);
-  const FitGrid grid = GridOf(result.fit, threads);
+  FitGrid grid = GridOf(result.fit, threads);
+  if (trim.kept != nullptr) {
+    TrimGrid(*trim.kept, threads, grid);
+  }
   const std::vector<FitCell> cells = CellsOf(result.fit);
   Report report;
   report.title = options.title == PointFitOptions().title ? source.name : options.title;
@@ -191,6 +194,9 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
       "An H-spline surface through {} of {}",
       Counted(static_cast<long long>(result.fit.residual_mm.size()), "point"), source.name);
   report.notes = Notes(result, figures);
+  if (trim.report) {
+    report.notes.push_back(TrimText(*trim.report) + ", in surface.ply and here");
+  }
   report.scenes = FitScene(grid);
   report.scenes_note = "Thinned out for looking; surface.hspline.json is exact.";
   report.main_images = {

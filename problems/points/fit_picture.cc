@@ -35,12 +35,19 @@ Vec3 MeanNormal(const TriMesh& mesh) {
   return area > 0 ? Vec3(sum / area) : Vec3::Zero();
 }
 
-// Frames all points.
-Camera Framed(const TriMesh& mesh, const Mat3& view_from_world) {
+// Of what the triangles show: a trimmed grid has points beyond.
+Box3 BoxShown(const TriMesh& mesh, const Mat3& view_from_world) {
   Box3 box;
-  for (const Vec3& point : mesh.points) {
-    box.extend(view_from_world * point);
+  for (const Triangle& t : mesh.triangles) {
+    for (const int corner : t) {
+      box.extend(view_from_world * mesh.points[corner]);
+    }
   }
+  return box;
+}
+
+Camera Framed(const TriMesh& mesh, const Mat3& view_from_world) {
+  const Box3 box = BoxShown(mesh, view_from_world);
   constexpr double kMargin = 1.08;
   return {.view_from_world = view_from_world,
           .centre = view_from_world.transpose() * box.center(),
@@ -69,10 +76,7 @@ Camera CameraOf(const TriMesh& mesh) {
   if (normal.norm() >= kHeightField) {
     return FromAbove(mesh, normal);
   }
-  Box3 box;
-  for (const Vec3& point : mesh.points) {
-    box.extend(point);
-  }
+  const Box3 box = BoxShown(mesh, Mat3::Identity());
   return Framed(mesh, CameraFor(View::kThreeQuarter, box, 1).view_from_world);
 }
 
@@ -136,27 +140,8 @@ ColourMap DistanceColours(const FitGrid& grid) {
   return SequentialMap(0, high > 0 ? high : 1);
 }
 
-namespace {
-
-// Every other vertex: enough for a picture, whose lights would cost four times as much.
-FitGrid Halved(const FitGrid& grid) {
-  FitGrid half{
-      .columns = (grid.columns + 1) / 2, .rows = (grid.rows + 1) / 2, .mesh = {}, .rms_mm = {}};
-  for (int j = 0; j < half.rows; ++j) {
-    for (int i = 0; i < half.columns; ++i) {
-      const std::size_t at = static_cast<std::size_t>(2 * j) * grid.columns + 2 * i;
-      half.mesh.points.push_back(grid.mesh.points[at]);
-      half.rms_mm.push_back(grid.rms_mm[at]);
-    }
-  }
-  half.mesh.triangles = GridTriangles(half.columns, half.rows);
-  return half;
-}
-
-}  // namespace
-
 std::string SurfacePng(const FitGrid& fine, int threads) {
-  const FitGrid grid = Halved(fine);
+  const FitGrid grid = Halved(fine);  // the lights of all would cost four times as much
   const Camera camera = CameraOf(grid.mesh);
   Scene plain, mapped;
   plain.objects = {{.mesh = grid.mesh, .material = PlasticMaterial({0.62, 0.70, 0.78})}};
@@ -180,15 +165,43 @@ std::string DomainPng(const FitGrid& grid, const std::vector<FitCell>& cells) {
                               .legend = DistanceLegend(grid)}));
 }
 
+namespace {
+
+// A mesh and the points' distances at its vertices.
+struct ShownGrid {
+  TriMesh mesh;
+  std::vector<double> rms_mm;
+};
+
+// Without the vertices of no triangle: the view frames all that it is given.
+ShownGrid ShownOf(const FitGrid& grid) {
+  std::vector<int> now(grid.mesh.points.size(), -1);
+  ShownGrid shown;
+  for (Triangle t : grid.mesh.triangles) {
+    for (int& corner : t) {
+      if (now[corner] < 0) {
+        now[corner] = static_cast<int>(shown.rms_mm.size());
+        shown.mesh.points.push_back(grid.mesh.points[corner]);
+        shown.rms_mm.push_back(grid.rms_mm[corner]);
+      }
+      corner = now[corner];
+    }
+    shown.mesh.triangles.push_back(t);
+  }
+  return shown;
+}
+
+}  // namespace
+
 std::string FitScene(const FitGrid& grid) {
   const ColourMap map = DistanceColours(grid);
   const double scale = map.high_mm / 100;  // what is written has whole hundredths
-  std::vector<double> values = grid.rms_mm;
-  for (double& value : values) {
+  ShownGrid shown = grid.kept.empty() ? ShownGrid{grid.mesh, grid.rms_mm} : ShownOf(grid);
+  for (double& value : shown.rms_mm) {
     value /= scale;
   }
   SceneBlobs blobs;
-  const std::string mesh = blobs.AddMesh(grid.mesh);
+  const std::string mesh = blobs.AddMesh(shown.mesh);
   Json colours = Json::array();
   for (int k = 0; k <= 32; ++k) {
     colours.push_back(HexText(ColourAt(map, map.high_mm * k / 32)));
@@ -213,7 +226,7 @@ std::string FitScene(const FitGrid& grid) {
          {"shown", true},
          {"map", "distance"},
          {"always_mapped", true},
-         {"values", blobs.AddValues(values)}},
+         {"values", blobs.AddValues(shown.rms_mm)}},
         {{"id", "surface"}, {"label", "Surface, plain"}, {"colour", "#9fb2c4"}, {"mesh", mesh}}}},
       {"blobs", blobs.All()}};
   return CollectScenes({{"surface", scene.dump()}}, 0).json;

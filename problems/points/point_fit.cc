@@ -119,8 +119,13 @@ Json ToleranceJson(const ToleranceReport& tolerance) {
   return json;
 }
 
-Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
-                  const PointFit& result) {
+Json TrimJson(const TrimReport& trim) {
+  return {
+      {"distance_mm", trim.distance_mm}, {"kept_mm2", trim.kept_mm2}, {"cut_mm2", trim.cut_mm2}};
+}
+
+Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, const PointFit& result,
+                  const std::optional<TrimReport>& trim) {
   const DistanceQuantiles distance = QuantilesOf(result.fit);
   Json json = {{"title", options.title},
                {"version", SEMBLANCE_VERSION},
@@ -152,6 +157,9 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
   }
   if (const auto tolerance = ToleranceOf(options, result)) {
     json["tolerance"] = ToleranceJson(*tolerance);
+  }
+  if (trim) {
+    json["trim"] = TrimJson(*trim);
   }
   json.update(StepsToJson(result.fit));
   return json;
@@ -434,6 +442,7 @@ std::vector<std::string> PointFit::Faults() const {
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
   CheckChord(options.chord_mm, table.positions);
+  CheckTrim(options.trim, table.positions);
   std::vector<PointAttribute> attributes = AttributesAsked(table, options);
   StepClock step(context);
   Parametrisation parameters = step("parameters", [&] { return ParametersOf(table, options); });
@@ -476,21 +485,27 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
   context.Report("write");
   // First what can still be refused.
   const double chord_mm = ChordFor(result.fit.surface, options.chord_mm);
-  const std::string mesh = SurfacePly(result, chord_mm, context.threads);
+  const std::optional<TrimmedTo> trim =
+      result.Faults().empty() ? TrimOf(options.trim, result.fit, context.threads) : std::nullopt;
+  const SurfaceMesh mesh = SurfacePly(result, chord_mm, trim ? &*trim : nullptr, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
-  folder.Write("surface.ply", mesh);
+  folder.Write("surface.ply", mesh.ply);
   WriteResiduals(options.residuals, result, folder);
   WriteAttributes(result, folder);
   if (options.report && result.Faults().empty()) {
-    folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
+    folder.Write("report.html", FitPageHtml(options, source, result,
+                                            {trim ? &*trim : nullptr, mesh.trim}, context.threads));
   }
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write(
-      "result.json",
-      ResultJsonOf(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
-          "\n");
-  return NotesOf(options, result, chord_mm);
+  folder.Write("result.json", ResultJsonOf(options, source, result, mesh.trim)
+                                      .dump(2, ' ', false, Json::error_handler_t::replace) +
+                                  "\n");
+  std::vector<std::string> notes = NotesOf(options, result, chord_mm);
+  if (mesh.trim) {
+    notes.push_back(TrimText(*mesh.trim));
+  }
+  return notes;
 }
 
 }  // namespace semblance

@@ -18,6 +18,7 @@
 #include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
 #include "problems/points/fit_maps.h"
+#include "problems/points/fit_trim.h"
 #include "problems/points/point_table.h"
 #include "surfaces/base/auto_or.h"
 
@@ -41,6 +42,7 @@ struct PointFitOptions {
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);  // of surface.ply's triangles
+  Trim trim;                                             // what surface.ply and pictures leave out
   ResidualFile residuals = ResidualFile::kAuto;  // auto: .csv of up to 100,000 points, else .ply
   bool sigma = false;                            // write the standard deviation; for the plan auto
   bool report = true;                            // write report.html
@@ -70,6 +72,10 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                 .doc = "how far a triangle of surface.ply may be from the surface; auto: 1/5000 "
                        "of the points' extent, or more where that would be millions of triangles"},
       o.chord_mm);
+  visit(FieldInfo{.name = "trim",
+                  .doc = "what surface.ply and the report leave out: none: nothing; cloud: what is "
+                         "far from every point. surface.hspline.json stays whole"},
+        o.trim);
   visit(FieldInfo{.name = "residuals",
                   .doc = "what is written of each point: csv: residuals.csv; ply: residuals.ply, "
                          "binary, faster and smaller; none: nothing; auto: csv of up to 100000 "
