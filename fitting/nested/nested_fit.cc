@@ -33,6 +33,8 @@ constexpr double kDense = 1.25;        // points for a patch of the next level
 constexpr double kCheapDense = 0.3;    // the same where all patches together are few
 constexpr std::size_t kCheap = 50000;  // points
 constexpr double kSure = 1;            // standard errors of a correlation
+// Of the extent. What is left below it is rounding: the mean square is a difference of sums.
+constexpr double kRounding = 1e-8;
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("fit: plan auto: " + what); }
 
@@ -83,6 +85,7 @@ class NestedFitter {
         context_(context),
         points_(std::move(points)),
         solve_(points_, MeanLengths(start)),
+        rounding_mm_(kRounding * MeanLengths(start).norm()),
         space_(start.shape()),
         cap_(plan.finest),
         outlier_(points_.size(), 0) {
@@ -100,7 +103,7 @@ class NestedFitter {
       context_.Report("fit",
                       fmt::format("{} vertices to level {}", space_.Vertices(), space_.finest()));
       FitRound();
-      if (!Refine()) {
+      if (IsMet() || !Refine()) {
         break;
       }
     }
@@ -162,7 +165,7 @@ class NestedFitter {
       const Vec3& value = points_.value[k];
       residuals_.push_back({{value[0], value[1], value[2]}});
     });
-    FindOutliers(points_, every_, Residuals(), 0, outlier_);
+    FindOutliers(points_, every_, Residuals(), LeastSd(0), outlier_);
   }
 
   void FitRound() {
@@ -199,7 +202,8 @@ class NestedFitter {
                                         : std::accumulate(squares.begin(), squares.end(), 0.0) /
                                               std::ssize(squares) / points_.channels;
     if (plan_.outliers == OutlierRule::kDrop) {
-      outliers_ = FindOutliers(points_, every_, Residuals(), HeldSd(std::move(squares)), outlier_);
+      const double least_sd_mm = LeastSd(HeldSd(std::move(squares)));
+      outliers_ = FindOutliers(points_, every_, Residuals(), least_sd_mm, outlier_);
     }
     report_.rounds.push_back({.finest = space_.finest(),
                               .vertices = space_.Vertices(),
@@ -216,6 +220,15 @@ class NestedFitter {
                        .held_square = held,
                        .round = static_cast<int>(report_.rounds.size()) - 1};
     }
+  }
+
+  // Points without noise, on a surface that the space holds.
+  bool IsMet() const { return report_.rounds.back().held_out_rms_mm <= rounding_mm_; }
+
+  // For outliers. Rounding lets the smoothness show, which is more at a border than elsewhere.
+  double LeastSd(double sd_mm) const {
+    constexpr double kAtBorders = 10;
+    return std::max(sd_mm, kAtBorders * rounding_mm_);
   }
 
   // Along one axis, by the median.
@@ -355,7 +368,7 @@ class NestedFitter {
     const ResidualsBetween between = [&](std::size_t begin, std::size_t end) {
       return residuals.Of(begin, end);
     };
-    FindOutliers(points_, every_, between, least_sd_mm, outlier_);
+    FindOutliers(points_, every_, between, LeastSd(least_sd_mm), outlier_);
     return before != outlier_;
   }
 
@@ -372,7 +385,9 @@ class NestedFitter {
 
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
-    report_.limited_by_density = finest_ < cap_ && FinestOfMost() >= finest_;
+    report_.met_to_rounding = report_.held_out_rms_mm <= rounding_mm_;
+    report_.limited_by_density =
+        !report_.met_to_rounding && finest_ < cap_ && FinestOfMost() >= finest_;
     const Indices kept = Kept();
     const double left = 1 - chosen.degrees_of_freedom / static_cast<double>(kept.size());
     report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, 0.02));
@@ -442,6 +457,7 @@ class NestedFitter {
   const RunContext& context_;
   NestedPoints points_;
   NestedSolve solve_;
+  double rounding_mm_;
   NestedSpace space_;
   int cap_;  // level
   std::vector<char> outlier_;

@@ -27,7 +27,8 @@ NestedWeight NestedWeightSearch::Try(double weight) {
   }
   solve_.SetWeight(weight);
   steps_ += solve_.Solve(least_gain_);
-  const double mean_square = solve_.MeanSquare(), trace = solve_.Trace(), left = 1 - trace / count_;
+  const double mean_square = std::max(solve_.MeanSquare(), 0.0);  // less is rounding
+  const double trace = solve_.Trace(), left = 1 - trace / count_;
   constexpr double kGain = 0.01, kLeast = 0.02;
   least_gain_ = kGain * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
   at->second = {.weight = weight,
@@ -60,6 +61,10 @@ void NestedWeightSearch::Climb(double factor, double from) {
     const double at = std::isnan(best_.weight) ? from : best_.weight;
     if (at * factor <= smoothest) {
       Try(at * factor);
+    }
+    if (std::isnan(best_.weight)) {
+      from *= factor;  // so rough that no point is left to judge by
+      continue;
     }
     if (best_.weight == at) {
       Try(at / factor);

@@ -26,6 +26,9 @@ bool LeavesDetail(const AutoReport& r) {
 }
 
 std::string Verdict(const AutoReport& r) {
+  if (r.met_to_rounding) {
+    return "points are met to a hundred-millionth of their extent: what is left is rounding";
+  }
   if (r.limited_by_density) {
     return "detail goes down to the points' spacing: denser points would show more";
   }
@@ -42,6 +45,7 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"held_out_rms_mm", r.held_out_rms_mm},
                {"weight", r.weight},
                {"neighbour_correlation", r.neighbour_correlation},
+               {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},
                {"verdict", Verdict(r)},
                {"chosen_round", r.chosen_round},

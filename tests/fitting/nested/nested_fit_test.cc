@@ -104,6 +104,40 @@ TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
   EXPECT_GT(ErrorAgainst(FrankePoint, kept.surface, 100).rms, 1e-2);
 }
 
+// A paraboloid is a bicubic spline: of points on a ring of it only rounding is left, which once
+// made thousands of vertices, or no smoothness that could be judged.
+TEST(NestedFit, AnExactShapeIsMetToRoundingAndNotRefined) {
+  for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    Random random(seed);
+    FitTarget target;
+    const auto add = [&](const Vec2& uv, const Vec3& position) {
+      target.points.push_back({.label = "", .position = position, .uv = uv});
+    };
+    while (target.points.size() < 4000) {
+      const Vec2 p(random.Uniform(-40, 40), random.Uniform(-40, 40));
+      if (p.norm() < 40 && p.norm() > 15) {
+        add((p + Vec2(40, 40)) / 80, Vec3(p.x(), p.y(), 0.002 * p.squaredNorm()));
+      }
+    }
+    add({0.5, 0.5}, {0, 0, 60});
+    const NestedFitResult fit = FitAuto(target);
+    EXPECT_TRUE(fit.report.met_to_rounding) << seed;
+    EXPECT_FALSE(fit.report.limited_by_density) << seed;
+    EXPECT_EQ(fit.surface.Offsets().size(), 0u) << seed;
+    EXPECT_THAT(fit.report.outliers, ::testing::ElementsAre(4000u)) << seed;
+    EXPECT_LT(*std::max_element(fit.residual_mm.begin(), fit.residual_mm.end() - 1), 3e-5) << seed;
+    EXPECT_GE(fit.report.noise_mm, 0) << seed;
+  }
+}
+
+// Without noise, but not a spline: refined as far as the points go.
+TEST(NestedFit, AShapeThatIsNoSplineIsRefinedWithoutNoiseToo) {
+  const NestedFitResult fit = FitAuto(Heights(FrankePoint, 20000, 0));
+  EXPECT_FALSE(fit.report.met_to_rounding);
+  EXPECT_GE(fit.surface.shape().max_level, 2);
+  EXPECT_LT(ErrorAgainst(FrankePoint, fit.surface, 100).rms, 1e-5);
+}
+
 TEST(NestedFit, TheOrderOfThePointsHasNoEffect) {
   FitTarget target = Heights(FrankePoint, 3000, 1e-3);
   const NestedFitResult first = FitAuto(target);
