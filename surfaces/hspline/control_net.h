@@ -11,7 +11,7 @@
 namespace semblance {
 
 // The absolute control vertices of one level. `columns` run along u, `rows` along v. For a domain
-// of m x n patches: rows = n + 3; columns = m + 3 if u is open, m if it is periodic.
+// of m x n patches: columns = m + 3 if u is open, m if it is closed; rows = n + 3 or n, likewise.
 struct ControlNet {
   int columns = 0;
   int rows = 0;
@@ -24,7 +24,7 @@ struct ControlNet {
 };
 
 // S(u,v) = sum_k weight[k] * net.vertices[index[k]], exactly the bicubic B-spline of the level at
-// (u,v). With periodic u and few columns an index may stand twice.
+// (u,v). Along a closed direction with few vertices an index may stand twice.
 struct Stencil {
   std::array<int, 16> index{};
   std::array<double, 16> weight{};  // sum 1 for a point, 0 for a derivative

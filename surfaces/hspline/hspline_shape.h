@@ -2,16 +2,30 @@
 // The levels of an H-spline: their sizes, and each of them as a plain bicubic B-spline.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <string_view>
 
 #include "surfaces/hspline/control_net.h"
 
 namespace semblance {
 
-enum class Closure { kOpen, kPeriodicU };
+// Whether the surface goes round: not at all, along u, or along u and v, as a torus does.
+enum class Closure { kOpen, kPeriodicU, kPeriodicUv };
 constexpr auto EnumNames(Closure) {
-  return std::to_array<std::string_view>({"open", "periodic_u"});
+  return std::to_array<std::string_view>({"open", "periodic_u", "periodic_uv"});
+}
+
+// u or v as a number of [0,1]: wrapped along a closed direction, clamped along an open one.
+inline double IntoUnit(double x, bool closed) {
+  return closed ? x - std::floor(x) : std::clamp(x, 0.0, 1.0);
+}
+
+// The place of k among `count` vertices or patches, which may lie across a seam; -1 beyond a
+// border.
+constexpr int PlaceAmong(int count, int k, bool closed) {
+  return closed ? ((k % count) + count) % count : k >= 0 && k < count ? k : -1;
 }
 
 // The axes of an offset: the frame of the next coarser surface, so that detail turns with it, or
@@ -23,20 +37,23 @@ constexpr auto EnumNames(OffsetReference) {
 
 // The domain is [0,1] x [0,1]; level L has patches_u 2^L x patches_v 2^L patches.
 struct HSplineShape {
-  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (periodic); at most 8192 on the finest level
-  int patches_v = 8;  // of level 0; >= 1; likewise
+  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (closed); at most 8192 on the finest level
+  int patches_v = 8;  // likewise
   int max_level = 3;  // finest level that may hold detail; 0..8
   Closure closure = Closure::kOpen;
   OffsetReference reference = OffsetReference::kFrame;
 
+  bool ClosedU() const { return closure != Closure::kOpen; }
+  bool ClosedV() const { return closure == Closure::kPeriodicUv; }
   int PatchesU(int level) const { return patches_u << level; }
   int PatchesV(int level) const { return patches_v << level; }
-  int Columns(int level) const { return PatchesU(level) + (closure == Closure::kOpen ? 3 : 0); }
-  int Rows(int level) const { return PatchesV(level) + 3; }
-  // The column of a vertex that may lie across the seam of a periodic surface.
+  int Columns(int level) const { return PatchesU(level) + (ClosedU() ? 0 : 3); }
+  int Rows(int level) const { return PatchesV(level) + (ClosedV() ? 0 : 3); }
+  // The column and the row of a vertex that may lie across a seam.
   int Column(int level, int i) const {
-    return closure == Closure::kOpen ? i : (i + Columns(level)) % Columns(level);
+    return ClosedU() ? (i + Columns(level)) % Columns(level) : i;
   }
+  int Row(int level, int j) const { return ClosedV() ? (j + Rows(level)) % Rows(level) : j; }
   bool operator==(const HSplineShape&) const = default;
 };
 
@@ -76,7 +93,7 @@ void CheckShape(const HSplineShape& shape);
 // Throws InputError for a level that is not there or a (u,v) that is not finite.
 void CheckParameter(const HSplineShape& shape, int level, const Vec2& uv);
 
-// The patch of `level` at uv: u is clamped (open) or wrapped (periodic), v is clamped to [0,1]. The
+// The patch of `level` at uv: u and v each clamped (open) or wrapped (closed) into [0,1]. The
 // arguments are not checked.
 PatchPoint PatchPointAt(const HSplineShape& shape, int level, const Vec2& uv);
 
@@ -90,7 +107,7 @@ std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPoint&
 // Throws as CheckParameter.
 Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order = {});
 
-// The (u,v) where a control vertex has the greatest influence, clamped (open) or wrapped (periodic)
+// The (u,v) where a control vertex has the greatest influence, clamped (open) or wrapped (closed)
 // into the domain.
 Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex);
 

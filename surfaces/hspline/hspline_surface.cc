@@ -99,7 +99,7 @@ HSplineSurface::HSplineSurface(const HSplineShape& shape, const ControlNet& leve
   CheckNet(shape, 0, level0);
   levels_.resize(shape.max_level + 1);
   levels_[0] = {RowTable(LayoutOf(shape, {})[0].reached, shape.patches_v),
-                SparseNet::WholeNet(level0)};
+                SparseNet::WholeNet(level0, StoredRows(shape, 0))};
 }
 
 PatchPoint HSplineSurface::FinestPatch(int level, const Vec2& uv) const {
@@ -148,11 +148,11 @@ SurfaceFrame HSplineSurface::LevelFrame(int level, const Vec2& uv) const {
 ControlNet HSplineSurface::Net(int level) const {
   CheckParameter(shape_, level, Vec2::Zero());
   int l = level;  // the finest level of which all vertices are stored
-  while (levels_[l].net.size() < static_cast<std::size_t>(Columns(l)) * Rows(l)) {
+  while (levels_[l].net.size() < static_cast<std::size_t>(Columns(l)) * StoredRows(shape_, l)) {
     --l;
   }
   ControlNet net{Columns(l), Rows(l), {}};
-  net.vertices.resize(levels_[l].net.size());
+  net.vertices.resize(static_cast<std::size_t>(net.columns) * net.rows);
   levels_[l].net.CopyTo(net);
   for (; l < level; ++l) {
     net = Refine(shape_, net, l);
@@ -178,7 +178,7 @@ void HSplineSurface::SetNet(int level, const ControlNet& net) {
   CheckNet(shape_, level, net);
   HSplineSurface next = *this;  // so that a failure leaves the surface as it was
   if (level == 0) {
-    next.levels_[0].net = SparseNet::WholeNet(net);
+    next.levels_[0].net = SparseNet::WholeNet(net, StoredRows(shape_, 0));
   } else {
     for (const auto& [vertex, offset] : OffsetsThatGive(level, net)) {
       next.offsets_[vertex] = offset;
@@ -231,7 +231,7 @@ void HSplineSurface::RebuildFrom(int level) {
   const std::vector<LevelLayout> layout = LayoutOf(shape_, offsets_);
   for (int l = 1; l <= shape_.max_level; ++l) {
     RowTable reached(layout[l].reached, shape_.PatchesV(l)),
-        rows(VerticesOf(shape_, l, layout[l].needed), Rows(l));
+        rows(VerticesOf(shape_, l, layout[l].needed), StoredRows(shape_, l));
     if (l < level && reached == levels_[l].reached && rows == levels_[l].net.rows()) {
       continue;
     }
@@ -239,7 +239,10 @@ void HSplineSurface::RebuildFrom(int level) {
     for (auto it = offsets_.lower_bound({l, 0, 0}); it != offsets_.end() && it->first.level == l;
          ++it) {
       const Reference reference = ReferenceOf(*this, it->first);
-      *net.Find(it->first.i, it->first.j) = reference.origin + reference.axes * it->second;
+      const Vec3 place = reference.origin + reference.axes * it->second;
+      for (int row = it->first.j; row < StoredRows(shape_, l); row += Rows(l)) {
+        *net.Find(it->first.i, row) = place;
+      }
     }
     levels_[l] = {std::move(reached), std::move(net)};
   }

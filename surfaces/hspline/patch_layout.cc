@@ -39,20 +39,28 @@ ColumnSpans United(const ColumnSpans& a, const ColumnSpans& b) {
   return both;
 }
 
+// The rows of patches that a row of vertices reaches. Those across the seam go first, so that the
+// last span is the one that the next row may join.
+void AddRowsReached(const HSplineShape& shape, int level, int row, std::vector<RowSpan>& spans) {
+  const int patches = shape.PatchesV(level), begin = std::max(row - 3, 0),
+            end = std::min(row + 1, patches);
+  if (!spans.empty() && begin <= spans.back().end) {
+    spans.back().end = end;
+  } else {
+    spans.push_back({begin, end});
+  }
+  if (shape.ClosedV() && row < 3) {
+    spans.insert(spans.begin(), {patches + row - 3, patches});
+  }
+}
+
 ColumnSpans ReachedPatches(const HSplineShape& shape, int level,
                            const std::map<VertexId, Vec3>& offsets) {
   ColumnSpans rows;  // of patches, for each column of vertices
   for (auto it = offsets.lower_bound({level, 0, 0});
        it != offsets.end() && it->first.level == level; ++it) {
     rows.resize(shape.Columns(level));
-    std::vector<RowSpan>& spans = rows[it->first.i];
-    const int begin = std::max(it->first.j - 3, 0),
-              end = std::min(it->first.j + 1, shape.PatchesV(level));
-    if (!spans.empty() && begin <= spans.back().end) {
-      spans.back().end = end;
-    } else {
-      spans.push_back({begin, end});
-    }
+    AddRowsReached(shape, level, it->first.j, rows[it->first.i]);
   }
   return Gathered(shape.PatchesU(level), rows, [&](int patch) {
     return std::array{shape.Column(level, patch), shape.Column(level, patch + 1),

@@ -22,7 +22,7 @@ std::vector<LevelLayout> LayoutOf(const HSplineShape& shape,
 // The patches of the next coarser level that hold the given ones.
 ColumnSpans Parents(const ColumnSpans& patches);
 
-// The vertices of the given patches of a level.
+// The vertices of the given patches of a level, as stored (sparse_net.h).
 ColumnSpans VerticesOf(const HSplineShape& shape, int level, const ColumnSpans& patches);
 
 }  // namespace semblance

@@ -2,7 +2,6 @@
 #include "surfaces/hspline/patch_tree.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "surfaces/hspline/patch_layout.h"
 
@@ -58,9 +57,7 @@ void PatchTree::MakeGrid() {
 }
 
 Vec2 PatchTree::IntoDomain(const Vec2& uv) const {
-  const double u = shape_.closure == Closure::kPeriodicU ? uv.x() - std::floor(uv.x())
-                                                         : std::clamp(uv.x(), 0.0, 1.0);
-  return {u, std::clamp(uv.y(), 0.0, 1.0)};
+  return {IntoUnit(uv.x(), shape_.ClosedU()), IntoUnit(uv.y(), shape_.ClosedV())};
 }
 
 std::int32_t PatchTree::LeafAt(const Vec2& uv) const {

@@ -60,11 +60,11 @@ SparseNet::SparseNet(RowTable rows) : rows_(std::move(rows)) {
   vertices_.resize(count, Vec3::Zero());
 }
 
-SparseNet SparseNet::WholeNet(const ControlNet& net) {
-  SparseNet whole(RowTable(ColumnSpans(net.columns, {{0, net.rows}}), net.rows));
+SparseNet SparseNet::WholeNet(const ControlNet& net, int stored_rows) {
+  SparseNet whole(RowTable(ColumnSpans(net.columns, {{0, stored_rows}}), stored_rows));
   for (int i = 0; i < net.columns; ++i) {
-    for (int j = 0; j < net.rows; ++j) {
-      whole.vertices_[static_cast<std::size_t>(i) * net.rows + j] = net.At(i, j);
+    for (int j = 0; j < stored_rows; ++j) {
+      whole.vertices_[static_cast<std::size_t>(i) * stored_rows + j] = net.At(i, j % net.rows);
     }
   }
   return whole;
@@ -75,7 +75,7 @@ void SparseNet::CopyTo(ControlNet& net) const {
     for (int span = rows_.First(i); span < rows_.First(i + 1); ++span) {
       const RowSpan& rows = rows_.Span(span);
       for (int j = rows.begin; j < rows.end; ++j) {
-        net.At(i, j) = vertices_[first_[span] + (j - rows.begin)];
+        net.At(i, j % net.rows) = vertices_[first_[span] + (j - rows.begin)];
       }
     }
   }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The control vertices of one level, of which only some exist: per column, runs of rows.
+// The control vertices of one level, of which only some exist: per column, runs of rows. Where v is
+// closed, the first three rows follow the last one again, so that the vertices of each patch stand
+// in a row, also across the seam: there are always StoredRows(level).
 #pragma once
 
 #include <cstddef>
@@ -19,6 +21,8 @@ struct RowSpan {
 
 using ColumnSpans =
     std::vector<std::vector<RowSpan>>;  // one list per column; empty if there are none
+
+inline int StoredRows(const HSplineShape& shape, int level) { return shape.PatchesV(level) + 3; }
 
 // Sorts the spans and merges those that overlap or touch.
 std::vector<RowSpan> Merged(std::vector<RowSpan> spans);
@@ -69,13 +73,14 @@ class RowTable {
 class SparseNet {
  public:
   SparseNet() = default;
-  explicit SparseNet(RowTable rows);                 // vertices at the origin
-  static SparseNet WholeNet(const ControlNet& net);  // all vertices exist
+  explicit SparseNet(RowTable rows);  // vertices at the origin
+  // All vertices exist.
+  static SparseNet WholeNet(const ControlNet& net, int stored_rows);
 
   const RowTable& rows() const { return rows_; }
   std::size_t size() const { return vertices_.size(); }
 
-  // The vertices (i, j) to (i, j + count - 1) of the level, contiguous; null unless all exist.
+  // The vertices (i, j) to (i, j + count - 1) as stored, contiguous; null unless all exist.
   const Vec3* Find(int i, int j, int count) const {
     if (rows_.whole() > 0) {
       return vertices_.data() + static_cast<std::size_t>(i) * rows_.whole() + j;
@@ -89,7 +94,7 @@ class SparseNet {
     return const_cast<Vec3*>(static_cast<const SparseNet*>(this)->Find(i, j, 1));
   }
 
-  // Copies the vertices that exist into a dense net.
+  // Copies the vertices that exist into a dense net of the level.
   void CopyTo(ControlNet& net) const;
 
   std::size_t Bytes() const;

@@ -114,11 +114,12 @@ Feature ExtractFeature(const HSplineSurface& surface, std::string name,
                        const FeatureRegion& region) {
   CheckName(name);
   Feature feature{std::move(name), surface.shape(), {}};
+  const bool has_rows = surface.shape().ClosedV() || region.lowest_v <= region.highest_v;
   for (const auto& [vertex, offset] : surface.Offsets()) {
     const Vec2 uv = surface.ParameterOf(vertex);
     if (vertex.level >= region.first_level && vertex.level <= region.last_level &&
-        Holds(region.lowest_u, region.highest_u, uv.x()) && uv.y() >= region.lowest_v &&
-        uv.y() <= region.highest_v) {
+        Holds(region.lowest_u, region.highest_u, uv.x()) && has_rows &&
+        Holds(region.lowest_v, region.highest_v, uv.y())) {
       feature.offsets.emplace(vertex, offset);
     }
   }
@@ -181,7 +182,7 @@ Feature MirrorFeature(const Feature& feature) {
   Feature mirrored{feature.name, shape, {}};
   for (const auto& [vertex, offset] : feature.offsets) {
     const int knot = shape.PatchesU(vertex.level) + 2 - vertex.i;  // of 1 - u
-    const int i = shape.closure == Closure::kPeriodicU ? knot % shape.Columns(vertex.level) : knot;
+    const int i = shape.ClosedU() ? knot % shape.Columns(vertex.level) : knot;
     // In the mirrored frame the u-tangent runs the other way, the two other axes are the mirrored
     // ones: there too only the first component turns round.
     mirrored.offsets.emplace(VertexId{vertex.level, i, vertex.j},

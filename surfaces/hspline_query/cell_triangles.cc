@@ -39,8 +39,9 @@ class Triangulation {
   }
 
   std::pair<std::int64_t, std::int64_t> Key(std::int64_t x, std::int64_t y) const {
-    const std::int64_t columns = shape_.patches_u * (std::int64_t{2} << kDeepestCell);
-    return {y, shape_.closure == Closure::kPeriodicU ? x % columns : x};
+    const std::int64_t columns = shape_.patches_u * (std::int64_t{2} << kDeepestCell),
+                       rows = shape_.patches_v * (std::int64_t{2} << kDeepestCell);
+    return {shape_.ClosedV() ? y % rows : y, shape_.ClosedU() ? x % columns : x};
   }
 
   int Vertex(std::int64_t x, std::int64_t y) {

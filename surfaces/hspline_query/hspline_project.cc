@@ -33,11 +33,14 @@ void CheckPoint(const Vec3& point) {
   }
 }
 
-Vec2 IntoDomain(const HSplineShape& shape, Vec2 uv) {
-  const double u = uv.x() - std::floor(uv.x());
-  uv.x() = shape.closure == Closure::kPeriodicU ? (u < 1 ? u : 0) : std::clamp(uv.x(), 0.0, 1.0);
-  uv.y() = std::clamp(uv.y(), 0.0, 1.0);
-  return uv;
+// Below 1 along a closed direction, where rounding may give 1.
+double IntoDomain(double x, bool closed) {
+  const double inside = IntoUnit(x, closed);
+  return closed && !(inside < 1) ? 0 : inside;
+}
+
+Vec2 IntoDomain(const HSplineShape& shape, const Vec2& uv) {
+  return {IntoDomain(uv.x(), shape.ClosedU()), IntoDomain(uv.y(), shape.ClosedV())};
 }
 
 // Half the squared distance at one (u,v), with what a step needs to know.
@@ -68,7 +71,7 @@ Slope SlopeAt(const HSplineSurface& surface, const Vec3& point, const Vec2& uv) 
 // Borders that the gradient presses against: these coordinates stay.
 void HoldBorders(const HSplineShape& shape, const Vec2& uv, Slope& s) {
   for (int k = 0; k < 2; ++k) {
-    const bool has_border = k == 1 || shape.closure == Closure::kOpen;
+    const bool has_border = k == 0 ? !shape.ClosedU() : !shape.ClosedV();
     const bool presses = (uv[k] <= 0 && s.gradient[k] > 0) || (uv[k] >= 1 && s.gradient[k] < 0);
     if (has_border && presses) {
       s.gradient[k] = 0;
@@ -109,9 +112,11 @@ Vec2 Backtrack(const HSplineSurface& surface, const Vec3& point, const Vec2& uv,
   for (double a = 1; a > 1e-9; a /= 2) {
     Vec2 moved = a * step;
     const Vec2 next = IntoDomain(surface.shape(), uv + moved);
-    moved.y() = next.y() - uv.y();
-    if (surface.shape().closure == Closure::kOpen) {
+    if (!surface.shape().ClosedU()) {
       moved.x() = next.x() - uv.x();
+    }
+    if (!surface.shape().ClosedV()) {
+      moved.y() = next.y() - uv.y();
     }
     const double value = (surface.Point(next) - point).squaredNorm() / 2;
     if (value <= s.Value() + slack + 1e-4 * s.gradient.dot(moved)) {
@@ -167,12 +172,14 @@ SurfaceProjector::SurfaceProjector(const HSplineSurface& surface, const ProjectO
     : surface_(surface), options_(options) {
   CheckOptions(options);
   const HSplineShape& shape = surface.shape();
-  const int level = GridLevel(surface), quads_u = options.samples_per_patch * shape.PatchesU(level);
-  columns_ = shape.closure == Closure::kOpen ? quads_u + 1 : quads_u;
-  rows_ = options.samples_per_patch * shape.PatchesV(level) + 1;
+  const int level = GridLevel(surface);
+  quads_u_ = options.samples_per_patch * shape.PatchesU(level);
+  quads_v_ = options.samples_per_patch * shape.PatchesV(level);
+  columns_ = quads_u_ + (shape.ClosedU() ? 0 : 1);
+  rows_ = quads_v_ + (shape.ClosedV() ? 0 : 1);
   for (int j = 0; j < rows_; ++j) {
     for (int i = 0; i < columns_; ++i) {
-      samples_.push_back(surface.Point({double(i) / quads_u, double(j) / (rows_ - 1)}));
+      samples_.push_back(surface.Point({double(i) / quads_u_, double(j) / quads_v_}));
     }
   }
   const PatchTree tree(surface);
@@ -186,14 +193,16 @@ SurfaceProjector::SurfaceProjector(const HSplineSurface& surface, const ProjectO
 }
 
 std::vector<Vec2> SurfaceProjector::Starts(const Vec3& point) const {
-  const bool periodic = surface_.shape().closure == Closure::kPeriodicU;
-  const int quads_u = periodic ? columns_ : columns_ - 1;
+  const HSplineShape& shape = surface_.shape();
   std::vector<double> squared(samples_.size());
   std::transform(samples_.begin(), samples_.end(), squared.begin(),
                  [&](const Vec3& s) { return (s - point).squaredNorm(); });
+  const auto beside = [](int k, int count, bool closed) {
+    return closed ? (k + count) % count : std::clamp(k, 0, count - 1);
+  };
   const auto at = [&](int i, int j) {
-    i = periodic ? (i + columns_) % columns_ : std::clamp(i, 0, columns_ - 1);
-    return squared[i + columns_ * std::clamp(j, 0, rows_ - 1)];
+    return squared[beside(i, columns_, shape.ClosedU()) +
+                   columns_ * beside(j, rows_, shape.ClosedV())];
   };
   std::vector<std::pair<double, int>> valleys;
   for (int j = 0; j < rows_; ++j) {
@@ -210,7 +219,7 @@ std::vector<Vec2> SurfaceProjector::Starts(const Vec3& point) const {
   std::vector<Vec2> starts;
   for (std::size_t k = 0; k < count; ++k) {
     const int i = valleys[k].second % columns_, j = valleys[k].second / columns_;
-    starts.emplace_back(double(i) / quads_u, double(j) / (rows_ - 1));
+    starts.emplace_back(double(i) / quads_u_, double(j) / quads_v_);
   }
   const auto nearest =
       std::min_element(fine_.begin(), fine_.end(), [&](const Vec3& a, const Vec3& b) {

@@ -45,9 +45,10 @@ class SurfaceProjector {
 
   const HSplineSurface& surface_;
   ProjectOptions options_;
-  int columns_ = 0, rows_ = 0;  // of the grid
-  std::vector<Vec3> samples_;   // rows_ x columns_
-  std::vector<Vec2> fine_uv_;   // the middles of patches finer than the grid
+  int quads_u_ = 0, quads_v_ = 0;  // of the grid
+  int columns_ = 0, rows_ = 0;     // of its samples
+  std::vector<Vec3> samples_;      // rows_ x columns_
+  std::vector<Vec2> fine_uv_;      // the middles of patches finer than the grid
   std::vector<Vec3> fine_;
 };
 

@@ -131,10 +131,11 @@ void BalanceCells(const HSplineShape& shape, std::set<DomainCell>& cells) {
     }
     for (const auto& [i, j] : {std::pair{cell.i - 1, cell.j}, std::pair{cell.i + 1, cell.j},
                                std::pair{cell.i, cell.j - 1}, std::pair{cell.i, cell.j + 1}}) {
-      const int columns = shape.patches_u << cell.level, rows = shape.patches_v << cell.level;
-      const bool periodic = shape.closure == Closure::kPeriodicU;
-      if (j >= 0 && j < rows && (periodic || (i >= 0 && i < columns))) {
-        RefineAt({cell.level, (i + columns) % columns, j}, cells, open);
+      const DomainCell beside{cell.level,
+                              PlaceAmong(shape.PatchesU(cell.level), i, shape.ClosedU()),
+                              PlaceAmong(shape.PatchesV(cell.level), j, shape.ClosedV())};
+      if (beside.i >= 0 && beside.j >= 0) {
+        RefineAt(beside, cells, open);
       }
     }
   }

@@ -16,7 +16,7 @@ struct Tessellation {
 };
 
 // Uniform: `per_patch` (>= 1) quads along each side of each patch of the finest level, two
-// triangles each; vertices on the seam of a periodic surface are shared.
+// triangles each; vertices on a seam are shared.
 Tessellation Tessellate(const HSplineSurface& surface, int per_patch);
 
 }  // namespace semblance

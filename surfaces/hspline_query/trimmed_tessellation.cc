@@ -199,14 +199,10 @@ class Crossings {
   Vec2 Along(const CutEdge& edge, double t) const {
     const Vec2& from = whole_.uv[edge.first];
     Vec2 way = whole_.uv[edge.second] - from;
-    if (shape_.closure == Closure::kPeriodicU) {
-      way.x() -= std::round(way.x());
-    }
-    Vec2 at = from + t * way;
-    if (shape_.closure == Closure::kPeriodicU) {
-      at.x() -= std::floor(at.x());
-    }
-    return at;
+    way.x() -= shape_.ClosedU() ? std::round(way.x()) : 0;
+    way.y() -= shape_.ClosedV() ? std::round(way.y()) : 0;
+    const Vec2 at = from + t * way;
+    return {IntoUnit(at.x(), shape_.ClosedU()), IntoUnit(at.y(), shape_.ClosedV())};
   }
 
   HSplineShape shape_;

@@ -2,22 +2,33 @@
 // Random H-spline surfaces for law tests.
 #pragma once
 
+#include <cmath>
+#include <numbers>
+
 #include "surfaces/base/random.h"
 #include "surfaces/hspline/hspline_surface.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {
 
-// Level 0 over a bent sheet (open) or a tube (periodic), shaken a little; no edits yet.
+// A bent sheet (open), a tube (closed in u) or a torus (closed in both).
+inline Vec3 SmoothPlace(const HSplineShape& shape, double u, double v) {
+  const double angle = (shape.ClosedU() ? 2 * std::numbers::pi : 2.0) * u;
+  if (!shape.ClosedV()) {
+    return {50 * std::cos(angle), 50 * std::sin(angle), 80 * v};
+  }
+  const double around = 2 * std::numbers::pi * v, distance = 50 + 20 * std::cos(around);
+  return {distance * std::cos(angle), distance * std::sin(angle), 40 + 20 * std::sin(around)};
+}
+
+// Level 0 over that, shaken a little; no edits yet.
 inline HSplineSurface SmoothSurface(const HSplineShape& shape, std::uint64_t random_seed) {
   Random random(random_seed);
   ControlNet net{shape.Columns(0), shape.Rows(0), {}};
   for (int j = 0; j < net.rows; ++j) {
     for (int i = 0; i < net.columns; ++i) {
       const double u = (i - 1.0) / shape.patches_u, v = (j - 1.0) / shape.patches_v;
-      const double angle = (shape.closure == Closure::kOpen ? 2.0 : 2 * std::numbers::pi) * u;
-      net.vertices.push_back(Vec3(50 * std::cos(angle), 50 * std::sin(angle), 80 * v) +
-                             random.InBox(-1, 1));
+      net.vertices.push_back(SmoothPlace(shape, u, v) + random.InBox(-1, 1));
     }
   }
   return HSplineSurface(shape, net);

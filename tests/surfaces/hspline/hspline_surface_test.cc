@@ -11,6 +11,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/tessellate.h"
+#include "tests/testing/scratch_file.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -50,10 +51,11 @@ TEST_P(HSplineLaws, PointIsTheBSplineOfTheFinestNet) {
   for (int k = 0; k < 50; ++k) {
     const Vec2 uv(random.Uniform(0, 0.999), random.Uniform(0, 0.999));
     Vec3 expected = Vec3::Zero();
-    for (int j = 0; j < net.rows; ++j) {
+    for (int j = 0; j < shape().PatchesV(level) + 3; ++j) {
       for (int i = 0; i < shape().PatchesU(level) + 3; ++i) {
         expected += DeBoor(i - 3, 3, uv.x() * shape().PatchesU(level)) *
-                    DeBoor(j - 3, 3, uv.y() * shape().PatchesV(level)) * net.At(i % net.columns, j);
+                    DeBoor(j - 3, 3, uv.y() * shape().PatchesV(level)) *
+                    net.At(i % net.columns, j % net.rows);
       }
     }
     EXPECT_LT((surface.Point(uv) - expected).norm(), 1e-10);
@@ -71,7 +73,7 @@ double MonomialVertex(double t, double h, int n) {
 }
 
 TEST_P(HSplineLaws, StencilsReproduceCubicsAndTheirDerivatives) {
-  if (shape().closure == Closure::kPeriodicU) {
+  if (shape().closure != Closure::kOpen) {
     GTEST_SKIP() << "a power of u is not periodic; the open shapes cover it";
   }
   Random random(3);
@@ -127,19 +129,23 @@ TEST_P(HSplineLaws, RefinementKeepsTheShape) {
 TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
   const HSplineSurface before = RandomSurface(shape(), 5);
   HSplineSurface after = before;
-  const VertexId vertex{2, 9, 9};  // odd: it lies on a vertex of level 1, the centre of an overlay
+  // odd: it lies on a vertex of level 1, the centre of an overlay; near the seams where there are
+  // any
+  const VertexId vertex{2, shape().ClosedU() ? 1 : 9, shape().ClosedV() ? 1 : 9};
   after.SetOffsets({{vertex, Vec3(0, 0, 5)}});
   const Vec2 center = ParameterOf(shape(), vertex);
+  const auto apart = [](double a, double b, bool closed) {
+    const double straight = std::abs(a - b);
+    return closed ? std::min(straight, 1 - straight) : straight;
+  };
   const double reach_u = 1.0 / shape().PatchesU(1), reach_v = 1.0 / shape().PatchesV(1);
   int touched = 0;
   for (int a = 0; a < 60; ++a) {
     for (int b = 0; b < 60; ++b) {
       const Vec2 uv((a + 0.5) / 60, (b + 0.5) / 60);
-      double du = std::abs(uv.x() - center.x());
-      du = shape().closure == Closure::kPeriodicU ? std::min(du, 1 - du) : du;
       constexpr double kBorder = 1e-12;  // a border is of the patches on both sides
-      const bool inside =
-          du < reach_u + kBorder && std::abs(uv.y() - center.y()) < reach_v + kBorder;
+      const bool inside = apart(uv.x(), center.x(), shape().ClosedU()) < reach_u + kBorder &&
+                          apart(uv.y(), center.y(), shape().ClosedV()) < reach_v + kBorder;
       const double moved = (after.Point(uv) - before.Point(uv)).norm();
       EXPECT_TRUE(inside || moved == 0) << uv.transpose();
       touched += moved > 0;
@@ -164,13 +170,37 @@ TEST_P(HSplineLaws, IsC2AcrossPatchBordersAndTheSeam) {
                    surface.Derivative({other, border + h}, order))
                       .norm(),
                   1e-4 * size);
-        if (shape().closure == Closure::kPeriodicU) {
+        if (shape().ClosedU()) {
           EXPECT_LT(
               (surface.Derivative({1 - h, other}, order) - surface.Derivative({h, other}, order))
                   .norm(),
               1e-4 * size);
         }
+        if (shape().ClosedV()) {
+          EXPECT_LT(
+              (surface.Derivative({other, 1 - h}, order) - surface.Derivative({other, h}, order))
+                  .norm(),
+              1e-4 * size);
+        }
       }
+    }
+  }
+}
+
+TEST_P(HSplineLaws, BothEndsOfAClosedDirectionAreOnePlace) {
+  const HSplineSurface surface = RandomSurface(shape(), 13);
+  const double end = std::nextafter(1.0, 0.0);
+  for (const double other : {0.0, 0.13, 0.5, 0.77, end}) {
+    for (const DerivativeOrder order :
+         {DerivativeOrder{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}}) {
+      const double size = 100 * std::pow(shape().PatchesU(shape().max_level), order.u + order.v);
+      const auto off = [&](const Vec2& a, const Vec2& b) {
+        return (surface.Derivative(a, order) - surface.Derivative(b, order)).norm() / size;
+      };
+      EXPECT_LT(shape().ClosedU() ? off({0, other}, {end, other}) : 0, 1e-13);
+      EXPECT_LT(shape().ClosedV() ? off({other, 0}, {other, end}) : 0, 1e-13);
+      EXPECT_EQ(shape().ClosedU() ? off({0, other}, {1, other}) : 0, 0);
+      EXPECT_EQ(shape().ClosedV() ? off({other, 0}, {other, 1}) : 0, 0);
     }
   }
 }
@@ -275,8 +305,12 @@ TEST_P(HSplineLaws, TessellationLiesOnTheSurfaceAndIsConsistent) {
   const EdgeReport edges = CheckEdges(t.mesh);
   const int quads_u = 2 * shape().PatchesU(shape().max_level),
             quads_v = 2 * shape().PatchesV(shape().max_level);
-  EXPECT_EQ(edges.boundary, 2 * quads_u + (shape().closure == Closure::kOpen ? 2 * quads_v : 0));
+  EXPECT_EQ(edges.boundary,
+            (shape().ClosedV() ? 0 : 2 * quads_u) + (shape().ClosedU() ? 0 : 2 * quads_v));
   EXPECT_EQ(edges.non_manifold + edges.inconsistent, 0);
+  if (shape().ClosedV()) {  // each edge has two triangles, and Euler's characteristic is a torus's
+    EXPECT_EQ(2 * t.mesh.points.size(), t.mesh.triangles.size());
+  }
   EXPECT_GT(TriangleAreaVector(t.mesh, t.mesh.triangles[5]).dot(t.normals[t.mesh.triangles[5][0]]),
             0);
 }
@@ -287,6 +321,8 @@ INSTANTIATE_TEST_SUITE_P(
         HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 3},
         HSplineShape{
             .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicU},
+        HSplineShape{
+            .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicUv},
         HSplineShape{
             .patches_u = 4, .patches_v = 4, .max_level = 2, .reference = OffsetReference::kWorld}));
 
@@ -332,11 +368,11 @@ TEST(HSpline, AnOffsetIsKeptInTheFrameOfTheCoarserSurface) {
 }
 
 TEST(HSpline, AVertexInfluencesMostItsParameter) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
     const HSplineShape shape{.patches_u = 4, .patches_v = 5, .max_level = 1, .closure = closure};
-    for (int j = 1; j + 1 < shape.Rows(1); ++j) {
-      for (int i = closure == Closure::kOpen ? 1 : 0; i < 9; ++i) {
-        const int column = i % shape.Columns(1);
+    const int border_u = shape.ClosedU() ? 0 : 1, border_v = shape.ClosedV() ? 0 : 1;
+    for (int j = border_v; j < shape.Rows(1) - border_v; ++j) {
+      for (int column = border_u; column < shape.Columns(1) - border_u; ++column) {
         const Stencil stencil = StencilAt(shape, 1, ParameterOf(shape, {1, column, j}));
         const int most =
             static_cast<int>(std::max_element(stencil.weight.begin(), stencil.weight.end()) -
@@ -379,6 +415,10 @@ TEST(HSpline, RefusesWhatDoesNotFit) {
   EXPECT_THROW(HSplineSurface(shape, ControlNet{6, 7, std::vector<Vec3>(42)}), InputError);
   EXPECT_THROW(HSplineSurface({.patches_u = 3, .closure = Closure::kPeriodicU}, ControlNet{}),
                InputError);
+  EXPECT_EQ(testing::WordsOf<InputError>([] {
+              CheckShape({.patches_u = 4, .patches_v = 3, .closure = Closure::kPeriodicUv});
+            }),
+            "H-spline: 4 x 3 patches are not allowed; with finest level 3, use 4..1024 x 4..1024");
   HSplineSurface surface = SmoothSurface(shape, 1);
   EXPECT_THROW(surface.SetOffsets({{{0, 1, 1}, Vec3(0, 0, 1)}}), InputError);
   EXPECT_THROW(surface.SetOffsets({{{1, 11, 1}, Vec3(0, 0, 1)}}), InputError);

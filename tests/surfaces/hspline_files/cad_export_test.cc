@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <BRepCheck_Analyzer.hxx>
 #include <BRep_Tool.hxx>
 #include <Geom_BSplineSurface.hxx>
 #include <Geom_RectangularTrimmedSurface.hxx>
@@ -43,7 +44,7 @@ std::vector<Handle(Geom_Surface)> SurfacesOf(const TopoDS_Shape& shape) {
   return surfaces;
 }
 
-std::vector<Handle(Geom_Surface)> ReadBack(const CadFormat& format, const std::string& bytes) {
+TopoDS_Shape ShapeIn(const CadFormat& format, const std::string& bytes) {
   Message::DefaultMessenger()->ChangePrinters().Clear();
   const testing::ScratchFolder folder;
   const std::filesystem::path path = folder.Path() / (std::string("face") + format.ending);
@@ -54,7 +55,11 @@ std::vector<Handle(Geom_Surface)> ReadBack(const CadFormat& format, const std::s
       format.ending == std::string(".step") ? static_cast<XSControl_Reader&>(step) : iges;
   EXPECT_EQ(reader.ReadFile(path.c_str()), IFSelect_RetDone);
   reader.TransferRoots();
-  return SurfacesOf(reader.OneShape());
+  return reader.OneShape();
+}
+
+std::vector<Handle(Geom_Surface)> ReadBack(const CadFormat& format, const std::string& bytes) {
+  return SurfacesOf(ShapeIn(format, bytes));
 }
 
 class CadExport : public ::testing::TestWithParam<std::tuple<HSplineShape, CadFormat>> {
@@ -100,6 +105,15 @@ TEST_P(CadExport, AFaceWithMuchDetailIsOneSurface) {
   EXPECT_LT((Vec3(p.X(), p.Y(), p.Z()) - surface.Point({0.3, 0.4})).norm(), 1e-9);
 }
 
+TEST_P(CadExport, ASurfaceThatClosesDoesSoInTheFile) {
+  const TopoDS_Shape read = ShapeIn(format(), format().write(testing::SmoothSurface(shape(), 4)));
+  const std::vector<Handle(Geom_Surface)> faces = SurfacesOf(read);
+  ASSERT_EQ(faces.size(), 1u);
+  EXPECT_EQ(faces[0]->IsUClosed(), shape().ClosedU());
+  EXPECT_EQ(faces[0]->IsVClosed(), shape().ClosedV());
+  EXPECT_TRUE(BRepCheck_Analyzer(read).IsValid());
+}
+
 TEST_P(CadExport, BytesDoNotDependOnTheTime) {
   const HSplineSurface surface = RandomSurface(shape(), 3);
   const std::string first = format().write(surface);
@@ -113,7 +127,9 @@ INSTANTIATE_TEST_SUITE_P(
         ::testing::Values(
             HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 5},
             HSplineShape{
-                .patches_u = 5, .patches_v = 4, .max_level = 5, .closure = Closure::kPeriodicU}),
+                .patches_u = 5, .patches_v = 4, .max_level = 5, .closure = Closure::kPeriodicU},
+            HSplineShape{
+                .patches_u = 4, .patches_v = 5, .max_level = 5, .closure = Closure::kPeriodicUv}),
         ::testing::Values(CadFormat{".step", &SurfaceToStep}, CadFormat{".igs", &SurfaceToIges})));
 
 }  // namespace

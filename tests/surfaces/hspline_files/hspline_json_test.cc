@@ -32,15 +32,19 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
 }
 
 TEST(HSplineJson, RoundTripsToTheBit) {
-  const HSplineSurface surface = RandomSurface(kShape, 3);
-  const std::string text = HSplineToJson(surface);
-  const HSplineSurface read = HSplineFromJson(text, "a.json");
-  EXPECT_EQ(read.shape(), surface.shape());
-  EXPECT_EQ(read.Offsets(), surface.Offsets());
-  for (int level = 0; level <= kShape.max_level; ++level) {
-    EXPECT_EQ(read.Net(level).vertices, surface.Net(level).vertices);
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
+    HSplineShape shape = kShape;
+    shape.closure = closure;
+    const HSplineSurface surface = RandomSurface(shape, 3);
+    const std::string text = HSplineToJson(surface);
+    const HSplineSurface read = HSplineFromJson(text, "a.json");
+    EXPECT_EQ(read.shape(), surface.shape());
+    EXPECT_EQ(read.Offsets(), surface.Offsets());
+    for (int level = 0; level <= shape.max_level; ++level) {
+      EXPECT_EQ(read.Net(level).vertices, surface.Net(level).vertices);
+    }
+    EXPECT_EQ(HSplineToJson(read), text);
   }
-  EXPECT_EQ(HSplineToJson(read), text);
 }
 
 TEST(HSplineJson, RefusesEveryOtherText) {

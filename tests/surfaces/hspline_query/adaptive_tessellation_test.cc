@@ -14,12 +14,14 @@ using testing::RandomSurface;
 
 class ChordLaws : public ::testing::TestWithParam<HSplineShape> {};
 
-// The (u,v) of a triangle's corners, those on the seam moved next to the others.
+// The (u,v) of a triangle's corners, those on a seam moved next to the others.
 std::array<Vec2, 3> Corners(const Tessellation& t, const Triangle& triangle) {
   std::array<Vec2, 3> uv = {t.uv[triangle[0]], t.uv[triangle[1]], t.uv[triangle[2]]};
-  for (Vec2& corner : uv) {
-    if (corner.x() == 0 && std::max({uv[0].x(), uv[1].x(), uv[2].x()}) > 0.5) {
-      corner.x() = 1;
+  for (const int axis : {0, 1}) {
+    const double last = std::max({uv[0][axis], uv[1][axis], uv[2][axis]}),
+                 first = std::min({uv[0][axis], uv[1][axis], uv[2][axis]});
+    for (Vec2& corner : uv) {
+      corner[axis] += corner[axis] == 0 && last - first > 0.5 ? 1 : 0;
     }
   }
   return uv;
@@ -54,12 +56,15 @@ TEST_P(ChordLaws, IsWatertightAndFacesOutward) {
   const Tessellation t = TessellateToChord(surface, 0.1);
   const EdgeReport edges = CheckEdges(t.mesh);
   EXPECT_EQ(edges.non_manifold + edges.inconsistent, 0);
-  const bool open = GetParam().closure == Closure::kOpen;
+  const bool open_u = !GetParam().ClosedU(), open_v = !GetParam().ClosedV();
   std::int64_t border = 0;  // vertices on the domain's border: one edge each
   for (const Vec2& uv : t.uv) {
-    border += uv.y() == 0 || uv.y() == 1 || (open && (uv.x() == 0 || uv.x() == 1));
+    border += (open_v && (uv.y() == 0 || uv.y() == 1)) || (open_u && (uv.x() == 0 || uv.x() == 1));
   }
   EXPECT_EQ(edges.boundary, border);
+  if (!open_v) {  // each edge has two triangles, and Euler's characteristic is a torus's
+    EXPECT_EQ(2 * t.mesh.points.size(), t.mesh.triangles.size());
+  }
   EXPECT_EQ(ConnectedComponents(t.mesh).count, 1);
   double area = 0;  // of the domain, covered once
   for (const Triangle& triangle : t.mesh.triangles) {
@@ -85,12 +90,25 @@ TEST_P(ChordLaws, VerticesAndNormalsAreTheSurfaces) {
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, ChordLaws,
-    ::testing::Values(HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 2},
-                      HSplineShape{.patches_u = 1, .patches_v = 1, .max_level = 5},
-                      HSplineShape{.patches_u = 5,
-                                   .patches_v = 4,
-                                   .max_level = 2,
-                                   .closure = Closure::kPeriodicU}));
+    ::testing::Values(
+        HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 2},
+        HSplineShape{.patches_u = 1, .patches_v = 1, .max_level = 5},
+        HSplineShape{
+            .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicU},
+        HSplineShape{
+            .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicUv}));
+
+TEST(AdaptiveTessellation, ACellIsNoMoreThanTwiceItsNeighbourAcrossASeam) {
+  const HSplineShape shape{
+      .patches_u = 8, .patches_v = 8, .max_level = 6, .closure = Closure::kPeriodicUv};
+  HSplineSurface surface = testing::SmoothSurface(shape, 1);
+  surface.SetOffset({6, 200, 1}, Vec3(0, 0, 2));  // at v = 0
+  surface.SetOffset({6, 1, 300}, Vec3(0, 0, 2));  // at u = 0
+  const Tessellation t = TessellateToChord(surface, 0.5);
+  const EdgeReport edges = CheckEdges(t.mesh);
+  EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
+  EXPECT_EQ(2 * t.mesh.points.size(), t.mesh.triangles.size());
+}
 
 TEST(AdaptiveTessellation, DetailCostsTrianglesOnlyWhereItIs) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 6};

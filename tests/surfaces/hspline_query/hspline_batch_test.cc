@@ -45,7 +45,7 @@ TEST_P(BatchLaws, PointsAndNormalsAreThoseOfTheSurface) {
 
 TEST_P(BatchLaws, PointsAreThoseOfThePlainBSplineOfTheFinestNet) {
   const HSplineShape shape = GetParam();
-  if (shape.closure == Closure::kPeriodicU) {
+  if (shape.closure != Closure::kOpen) {
     GTEST_SKIP() << "the oracle is of open nets";
   }
   const HSplineSurface surface = RandomSurface(shape, 2);
@@ -87,12 +87,13 @@ TEST_P(BatchLaws, NoByteDependsOnTheNumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, BatchLaws,
-    ::testing::Values(HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 3},
-                      HSplineShape{.patches_u = 3, .patches_v = 2, .max_level = 6},
-                      HSplineShape{.patches_u = 5,
-                                   .patches_v = 4,
-                                   .max_level = 2,
-                                   .closure = Closure::kPeriodicU}));
+    ::testing::Values(
+        HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 3},
+        HSplineShape{.patches_u = 3, .patches_v = 2, .max_level = 6},
+        HSplineShape{
+            .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicU},
+        HSplineShape{
+            .patches_u = 4, .patches_v = 5, .max_level = 3, .closure = Closure::kPeriodicUv}));
 
 TEST(HSplineBatch, MemoryGrowsWithTheDetailAndNotWithTheLevel) {
   HSplineSurface surface =

@@ -24,13 +24,13 @@ constexpr double kChord = 0.1;
 
 class TrimLaws : public ::testing::TestWithParam<HSplineShape> {};
 
-// On the surface, in part of the domain, across u = 0 too.
+// On the surface, in part of the domain, across its borders too.
 std::vector<Vec3> Scattered(const HSplineSurface& surface, int count) {
   Random random(5);
   std::vector<Vec3> points;
   for (int k = 0; k < count; ++k) {
-    const double u = random.Uniform(-0.15, 0.3), v = random.Uniform(0, 0.6);
-    points.push_back(surface.Point({u - std::floor(u), v}));
+    const double u = random.Uniform(-0.15, 0.3), v = random.Uniform(-0.15, 0.3);
+    points.push_back(surface.Point({u - std::floor(u), v - std::floor(v)}));
   }
   return points;
 }
@@ -44,9 +44,8 @@ bool Covers(const HSplineShape& shape, const Tessellation& t, const Triangle& tr
   std::array<Vec2, 3> corners;
   for (int k = 0; k < 3; ++k) {
     corners[k] = t.uv[triangle[k]] - place;
-    if (shape.closure == Closure::kPeriodicU) {
-      corners[k].x() -= std::round(corners[k].x());
-    }
+    corners[k].x() -= shape.ClosedU() ? std::round(corners[k].x()) : 0;
+    corners[k].y() -= shape.ClosedV() ? std::round(corners[k].y()) : 0;
   }
   constexpr double kRounding = 1e-12;
   return Cross(corners[0], corners[1]) >= -kRounding &&
@@ -130,12 +129,13 @@ TEST_P(TrimLaws, ThreadsChangeNoByte) {
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, TrimLaws,
-    ::testing::Values(HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 2},
-                      HSplineShape{.patches_u = 1, .patches_v = 1, .max_level = 5},
-                      HSplineShape{.patches_u = 5,
-                                   .patches_v = 4,
-                                   .max_level = 2,
-                                   .closure = Closure::kPeriodicU}));
+    ::testing::Values(
+        HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 2},
+        HSplineShape{.patches_u = 1, .patches_v = 1, .max_level = 5},
+        HSplineShape{
+            .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicU},
+        HSplineShape{
+            .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicUv}));
 
 // A square of 100 mm.
 HSplineSurface Plate() {
