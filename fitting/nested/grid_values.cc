@@ -91,13 +91,24 @@ Columns ColumnsOf(const GridRun& run, const GridLayout& layout) {
 
 }  // namespace
 
+std::array<int, 4> RowsOfPatches(const PatchGrid& grid, int row) {
+  std::array<int, 4> rows;
+  for (int b = 0; b < 4; ++b) {
+    rows[b] = PlaceAmong(grid.patches_v, row - 3 + b, grid.periodic_v);
+  }
+  return rows;
+}
+
 GridRuns RunsAround(const GridLayout& layout, const std::vector<char>& patches) {
-  const int columns = layout.grid.Columns(), last = layout.grid.patches_v - 1;
+  const int columns = layout.grid.Columns();
   GridRuns runs;
   std::vector<char> wanted(columns);
   for (int row = 0; row < layout.grid.Rows(); ++row) {
     std::fill(wanted.begin(), wanted.end(), 0);
-    for (int j = std::max(row - 3, 0); j <= std::min(row, last); ++j) {
+    for (const int j : RowsOfPatches(layout.grid, row)) {
+      if (j < 0) {
+        continue;
+      }
       const char* const there = patches.data() + layout.Patch(0, j);
       for (int i = 0; i < layout.grid.patches_u; ++i) {
         for (int a = 0; there[i] != 0 && a < 4; ++a) {
@@ -169,15 +180,35 @@ void GridValues::FillHalo(const GridRuns& runs) {
       }
     }
   }
+  for (int c = 0; layout_.grid.periodic_v && c < channels_; ++c) {
+    for (int k = 0; k < GridLayout::kHalo; ++k) {
+      std::copy_n(Row(c, k % layout_.grid.Rows()) - GridLayout::kHalo, layout_.Stride(),
+                  Row(c, layout_.grid.Rows() + k) - GridLayout::kHalo);
+    }
+  }
 }
 
 void GridValues::FoldHalo(const GridRuns& runs) {
-  const int rows = layout_.grid.Rows();
+  const int last = layout_.grid.Rows() - 1 + (layout_.grid.periodic_v ? GridLayout::kHalo : 0);
   for (int c = 0; c < channels_; ++c) {
     int next = 0;
     for (const GridRun& run : runs) {
-      for (next = std::max(next, run.row); next <= std::min(run.row + 3, rows - 1); ++next) {
+      for (next = std::max(next, run.row); next <= std::min(run.row + 3, last); ++next) {
         FoldRow(Row(c, next));
+      }
+    }
+  }
+  FoldRows();
+}
+
+void GridValues::FoldRows() {
+  const int rows = layout_.grid.Rows(), columns = layout_.grid.Columns();
+  for (int c = 0; layout_.grid.periodic_v && c < channels_; ++c) {
+    for (int k = 0; k < GridLayout::kHalo; ++k) {
+      double *const behind = Row(c, rows + k), *const row = Row(c, k % rows);
+      for (int i = 0; i < columns; ++i) {
+        row[i] += behind[i];
+        behind[i] = 0;
       }
     }
   }

@@ -2,6 +2,7 @@
 // Numbers at the control vertices of one level, and their way to the next finer level and back.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdlib>
 #include <memory>
@@ -12,8 +13,10 @@
 namespace semblance {
 
 // How the vertices of a level lie in memory: row by row, each row with kHalo places more at either
-// end. Of a periodic level these are copies of the columns across the seam, of an open one nothing.
-// Room for a block follows, so that work in blocks may reach beyond a row.
+// end. Along periodic u these are copies of the columns across the seam, along open u nothing. Room
+// for a block follows, so that work in blocks may reach beyond a row. Before the first row and
+// behind the last one there are kHalo rows more; along periodic v those behind are copies of the
+// first ones, which is all that is asked for across that seam.
 struct GridLayout {
   static constexpr int kHalo = 3, kBlock = 8;
   PatchGrid grid;
@@ -22,7 +25,7 @@ struct GridLayout {
     return static_cast<std::size_t>(grid.Columns()) + 2 * kHalo + kBlock;
   }
   std::size_t Size() const { return Stride() * static_cast<std::size_t>(grid.Rows()); }
-  // i: -kHalo .. Columns() + kHalo - 1.
+  // i: -kHalo .. Columns() + kHalo - 1; j: likewise of rows.
   std::size_t At(int i, int j) const {
     return static_cast<std::size_t>(j) * Stride() + static_cast<std::size_t>(i + kHalo);
   }
@@ -33,7 +36,8 @@ struct GridLayout {
   GridLayout Finer() const {
     return {{.patches_u = 2 * grid.patches_u,
              .patches_v = 2 * grid.patches_v,
-             .periodic_u = grid.periodic_u}};
+             .periodic_u = grid.periodic_u,
+             .periodic_v = grid.periodic_v}};
   }
 };
 
@@ -46,6 +50,9 @@ struct GridRun {
 };
 // Row by row, and by column; no two share a place.
 using GridRuns = std::vector<GridRun>;
+
+// The rows of patches that a row of vertices belongs to; -1 where one would lie beyond a border.
+std::array<int, 4> RowsOfPatches(const PatchGrid& grid, int row);
 
 // Those that hold the sixteen vertices of every patch that is not 0 (GridLayout::Patch).
 GridRuns RunsAround(const GridLayout& layout, const std::vector<char>& patches);
@@ -65,17 +72,18 @@ class GridValues {
   const double* Row(int c, int j) const { return Channel(c) + layout_.At(0, j); }
 
   void Clear(const GridRuns& runs);
-  // Copies the columns across the seam into the halo of the runs' rows.
+  // Copies the columns across the seam into the halo of the runs' rows, then the rows across it.
   void FillHalo(const GridRuns& runs);
-  // Adds what the halo has gathered to the columns that it stands for, and empties it; also of the
+  // Adds what the halo has gathered to the vertices that it stands for, and empties it; also of the
   // three rows beneath each run.
   void FoldHalo(const GridRuns& runs);
+  // The same of the rows behind the last one alone.
+  void FoldRows();
 
  private:
   struct Free {
     void operator()(double* values) const { std::free(values); }
   };
-  // Three rows stand before and behind the channel's own.
   std::size_t Start(int c) const {
     const std::size_t apart = GridLayout::kHalo * layout_.Stride();
     return static_cast<std::size_t>(c) * (layout_.Size() + 2 * apart) + apart;

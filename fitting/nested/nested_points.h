@@ -31,6 +31,7 @@ struct NestedPoints {
   std::vector<Vec2> uv;        // in [0,1] x [0,1], as given
   Vec2 patches = {1, 1};       // of level 0
   bool periodic_u = false;     // u = 1 is u = 0
+  bool periodic_v = false;     // likewise
   std::vector<double> weight;  // > 0; or none: all 1
   std::vector<Vec3> value;     // displacement along each channel's axis, mm; zero beyond those
   std::vector<std::uint32_t> given;
@@ -42,7 +43,9 @@ struct NestedPoints {
   double X(std::size_t k) const {
     return periodic_u && uv[k].x() == 1 ? 0 : uv[k].x() * patches.x();
   }
-  double Y(std::size_t k) const { return uv[k].y() * patches.y(); }
+  double Y(std::size_t k) const {
+    return periodic_v && uv[k].y() == 1 ? 0 : uv[k].y() * patches.y();
+  }
   double Weight(std::size_t k) const { return weight.empty() ? 1 : weight[k]; }
 };
 

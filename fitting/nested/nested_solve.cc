@@ -28,9 +28,9 @@ std::array<double, 16> MeanSquares() {
 // Adds factor * entries to the sixteen vertices of a patch.
 void Scatter(const GridLayout& layout, int i, int j, const std::array<double, 16>& entries,
              double factor, double* to) {
-  const int columns = layout.grid.Columns();
+  const int columns = layout.grid.Columns(), rows = layout.grid.Rows();
   for (int k = 0; k < 16; ++k) {
-    to[layout.At((i + k % 4) % columns, j + k / 4)] += factor * entries[k];
+    to[layout.At((i + k % 4) % columns, (j + k / 4) % rows)] += factor * entries[k];
   }
 }
 

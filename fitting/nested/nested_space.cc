@@ -23,14 +23,17 @@ int NestedSpace::Overlay(int level, int i, int j) {
   }
   const PatchGrid& coarse = levels_[level].layout.grid;
   NestedLevel& finer = levels_[level + 1];
-  const bool open = !coarse.periodic_u;
-  const int columns = finer.layout.grid.Columns(), first_u = open && i == 0 ? 0 : 2 * i + 1,
-            last_u = 2 * i + (open && i == coarse.patches_u - 1 ? 4 : 3),
-            first_v = j == 0 ? 0 : 2 * j + 1, last_v = 2 * j + (j == coarse.patches_v - 1 ? 4 : 3);
+  const auto first = [](int k, bool closed) { return !closed && k == 0 ? 0 : 2 * k + 1; };
+  const auto last = [](int k, int patches, bool closed) {
+    return 2 * k + (!closed && k == patches - 1 ? 4 : 3);
+  };
+  const int columns = finer.layout.grid.Columns(), rows = finer.layout.grid.Rows(),
+            last_u = last(i, coarse.patches_u, coarse.periodic_u),
+            last_v = last(j, coarse.patches_v, coarse.periodic_v);
   int added = 0;
-  for (int b = first_v; b <= last_v; ++b) {
-    for (int a = first_u; a <= last_u; ++a) {
-      char& active = finer.active[finer.layout.At(a % columns, b)];
+  for (int b = first(j, coarse.periodic_v); b <= last_v; ++b) {
+    for (int a = first(i, coarse.periodic_u); a <= last_u; ++a) {
+      char& active = finer.active[finer.layout.At(a % columns, b % rows)];
       added += active == 0 ? 1 : 0;
       active = 1;
     }
@@ -53,7 +56,10 @@ void NestedSpace::SplitAbove(int level) {
         across[i] |= active[i + a < columns ? i + a : (i + a) % columns];
       }
     }
-    for (int j = std::max(row - 3, 0); j <= std::min(row, grid.patches_v - 1); ++j) {
+    for (const int j : RowsOfPatches(grid, row)) {
+      if (j < 0) {
+        continue;
+      }
       char* const above = split.data() + levels_[level - 1].layout.Patch(0, j / 2);
       for (int i = 0; i < grid.patches_u; ++i) {
         above[i / 2] |= across[i];
@@ -129,11 +135,11 @@ bool NestedSpace::IsCovered(int level, int i, int j) const {
     return false;
   }
   const GridLayout& finer = levels_[level + 1].layout;
-  const int columns = finer.grid.Columns();
-  for (int b = std::max(2 * j - 3, 0); b <= std::min(2 * j + 1, finer.grid.Rows() - 1); ++b) {
-    for (int a = 2 * i - 3; a <= 2 * i + 1; ++a) {
-      const bool inside = finer.grid.periodic_u || (a >= 0 && a < columns);
-      if (inside && levels_[level + 1].active[finer.At((a + columns) % columns, b)] == 0) {
+  for (int b = 2 * j - 3; b <= 2 * j + 1; ++b) {
+    const int row = PlaceAmong(finer.grid.Rows(), b, finer.grid.periodic_v);
+    for (int a = 2 * i - 3; row >= 0 && a <= 2 * i + 1; ++a) {
+      const int column = PlaceAmong(finer.grid.Columns(), a, finer.grid.periodic_u);
+      if (column >= 0 && levels_[level + 1].active[finer.At(column, row)] == 0) {
         return false;
       }
     }

@@ -107,12 +107,13 @@ std::size_t StencilMatrix::RunWith(int row, int column) const {
 }
 
 void StencilMatrix::AddPatch(int i, int j, const Matrix16& matrix) {
-  const int columns = layout_.grid.Columns();
+  const int columns = layout_.grid.Columns(), rows = layout_.grid.Rows();
   for (int b = 0; b < 4; ++b) {
-    std::size_t run = RunWith(j + b, i);
+    const int row = j + b < rows ? j + b : j + b - rows;
+    std::size_t run = RunWith(row, i);
     for (int a = 0; a < 4; ++a) {
       const int column = (i + a) % columns, k = a + 4 * b;
-      run = a > 0 && column == 0 ? RunWith(j + b, column) : run;
+      run = a > 0 && column == 0 ? RunWith(row, column) : run;
       const std::size_t length = Length(runs_[run]);
       double* const entries = entries_.data() + starts_[run] + kBefore + column - runs_[run].begin;
       for (int l = k; l < 16; ++l) {

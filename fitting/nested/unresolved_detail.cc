@@ -103,16 +103,18 @@ void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridVa
   }
 }
 
-// What stands beyond the seam belongs to the columns across it.
+// What stands beyond a seam belongs to the columns and rows across it.
 void FoldSeam(GridValues& values) {
   const PatchGrid& grid = values.layout().grid;
+  const int rows = grid.Rows() + (grid.periodic_v ? GridLayout::kHalo : 0);
   for (int c = 0; grid.periodic_u && c < values.channels(); ++c) {
-    for (int j = 0; j < grid.Rows(); ++j) {
+    for (int j = 0; j < rows; ++j) {
       for (int k = 0; k < GridLayout::kHalo; ++k) {
         values.Row(c, j)[k % grid.Columns()] += values.Row(c, j)[grid.Columns() + k];
       }
     }
   }
+  values.FoldRows();
 }
 
 Evidence EvidenceOn(const EvidencePoints& of, const GridLayout& layout, int level) {
@@ -157,9 +159,12 @@ std::vector<char> PatchesSeen(const GridLayout& layout, const GridLayout& coarse
   for (int j = 0; j < grid.patches_v; ++j) {
     std::fill(together.begin(), together.end(), 0.0);
     std::fill(apart.begin(), apart.end(), 0.0);
-    for (int row = 2 * j; row <= std::min(2 * j + 4, layout.grid.Rows() - 1); ++row) {
-      AddWindows(layout, evidence.together, row, together);
-      AddWindows(layout, evidence.apart, row, apart);
+    for (int b = 2 * j; b <= 2 * j + 4; ++b) {
+      const int row = PlaceAmong(layout.grid.Rows(), b, layout.grid.periodic_v);
+      if (row >= 0) {
+        AddWindows(layout, evidence.together, row, together);
+        AddWindows(layout, evidence.apart, row, apart);
+      }
     }
     for (int i = 0; i < grid.patches_u; ++i) {
       seen[coarser.Patch(i, j)] = apart[i] > 0 && together[i] / apart[i] - 1 > kWorthIt ? 1 : 0;

@@ -16,7 +16,7 @@ namespace {
 
 struct Patches {
   int u = 0, v = 0;
-  bool periodic_u = false;
+  bool periodic_u = false, periodic_v = false;
   Vec2 Center(int i, int j) const { return {(i + 0.5) / u, (j + 0.5) / v}; }
 };
 
@@ -149,11 +149,9 @@ bool Reversed(const Seed& a, const Seed& b) {
 // How many of the four neighbours of patch (i, j) have changed places with it.
 int CountReversed(const std::vector<Seed>& seeds, const Patches& patches, int i, int j) {
   const auto at = [&](int a, int b) -> const Seed* {
-    if (patches.periodic_u) {
-      a = (a + patches.u) % patches.u;
-    }
-    const bool inside = a >= 0 && a < patches.u && b >= 0 && b < patches.v;
-    return inside ? &seeds[a + patches.u * b] : nullptr;
+    a = PlaceAmong(patches.u, a, patches.periodic_u);
+    b = PlaceAmong(patches.v, b, patches.periodic_v);
+    return a >= 0 && b >= 0 ? &seeds[a + patches.u * b] : nullptr;
   };
   const Seed& seed = *at(i, j);
   int count = 0;
@@ -198,7 +196,8 @@ SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
   CheckMasks(masks);
   const Patches patches{.u = placed.shape().PatchesU(options.level),
                         .v = placed.shape().PatchesV(options.level),
-                        .periodic_u = placed.shape().closure == Closure::kPeriodicU};
+                        .periodic_u = placed.shape().ClosedU(),
+                        .periodic_v = placed.shape().ClosedV()};
   SeedResult result{.points = {}, .masked = 0, .missed = 0, .folded = 0};
   const Seeder seeder(implicit, implicit_mesh, options);
   std::vector<Seed> seeds = FindSeeds(placed, seeder, patches, masks, options, result);

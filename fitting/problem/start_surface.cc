@@ -13,15 +13,25 @@
 namespace semblance {
 namespace {
 
+Vec3 Around(double turns) {
+  const double angle = 2 * std::numbers::pi * turns;
+  return {1, std::cos(angle), std::sin(angle)};
+}
+
 // The functions of (u,v) whose sums the surface is taken from.
 template <Closure closure>
 auto Functions(const Vec2& uv) {
   if constexpr (closure == Closure::kOpen) {
     return Vec3(1, uv.x(), uv.y());
-  } else {
-    const double angle = 2 * std::numbers::pi * uv.x(), c = std::cos(angle), s = std::sin(angle);
+  } else if constexpr (closure == Closure::kPeriodicU) {
+    const Vec3 u = Around(uv.x());
     Eigen::Matrix<double, 6, 1> f;
-    f << 1, c, s, uv.y(), uv.y() * c, uv.y() * s;
+    f << u, uv.y() * u;
+    return f;
+  } else {
+    const Vec3 u = Around(uv.x()), v = Around(uv.y());
+    Eigen::Matrix<double, 9, 1> f;
+    f << u, v[1] * u, v[2] * u;
     return f;
   }
 }
@@ -62,9 +72,10 @@ HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> pos
                     "(u,v) for each",
                     positions.size(), uv.size()));
   }
-  return HSplineSurface(shape, shape.closure == Closure::kOpen
-                                   ? NetOf<Closure::kOpen>(shape, positions, uv)
-                                   : NetOf<Closure::kPeriodicU>(shape, positions, uv));
+  const auto net_of = shape.ClosedV()   ? NetOf<Closure::kPeriodicUv>
+                      : shape.ClosedU() ? NetOf<Closure::kPeriodicU>
+                                        : NetOf<Closure::kOpen>;
+  return HSplineSurface(shape, net_of(shape, positions, uv));
 }
 
 }  // namespace semblance

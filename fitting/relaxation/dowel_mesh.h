@@ -14,7 +14,7 @@ namespace semblance {
 enum class DowelLinks { kDelaunay, kNone };
 
 // The Delaunay triangles of the points' (u,v), in mm of the template. Points of the same (u,v)
-// share a corner. With a periodic u the network is cut at u = 0, which no point passes. Without
+// share a corner. Where u or v is closed the network is cut at 0, which no point passes. Without
 // links it is the points alone, each its own corner.
 class DowelMesh {
  public:

@@ -138,9 +138,9 @@ Vec2 Relaxer::LongestMove(int corner) const {
 
 // Without a network nothing keeps a point from going round a closed surface.
 Vec2 Relaxer::Inside(const Vec2& uv) const {
-  const bool round = surface_.shape().closure == Closure::kPeriodicU && mesh_.triangles().empty();
-  const double u = round ? uv.x() - std::floor(uv.x()) : std::clamp(uv.x(), 0.0, 1.0);
-  return {u, std::clamp(uv.y(), 0.0, 1.0)};
+  const bool loose = mesh_.triangles().empty();
+  return {IntoUnit(uv.x(), loose && surface_.shape().ClosedU()),
+          IntoUnit(uv.y(), loose && surface_.shape().ClosedV())};
 }
 
 void Relaxer::SetUv(const std::vector<Vec2>& uv) {

@@ -14,22 +14,21 @@ namespace {
 std::vector<VertexId> MissingOver(const HierarchicalSplineSpace& space, const PatchId& patch,
                                   int margin) {
   const HSplineShape& shape = space.shape();
-  const int level = patch.level + 1, columns = shape.Columns(level), rows = shape.Rows(level);
-  const bool periodic = shape.closure == Closure::kPeriodicU;
-  const auto first = [&](int k) { return k == 0 ? 0 : 2 * k + 1; };
-  const auto last = [&](int k, int patches) { return 2 * k + (k == patches - 1 ? 4 : 3); };
-  const int i0 = (periodic ? 2 * patch.i + 1 : first(patch.i)) - margin,
-            i1 = (periodic ? 2 * patch.i + 3 : last(patch.i, shape.PatchesU(patch.level))) + margin,
-            j0 = std::max(first(patch.j) - margin, 0),
-            j1 = std::min(last(patch.j, shape.PatchesV(patch.level)) + margin, rows - 1);
+  const int level = patch.level + 1;
+  const auto first = [&](int k, bool closed) {
+    return (!closed && k == 0 ? 0 : 2 * k + 1) - margin;
+  };
+  const auto last = [&](int k, int patches, bool closed) {
+    return 2 * k + (!closed && k == patches - 1 ? 4 : 3) + margin;
+  };
+  const int last_u = last(patch.i, shape.PatchesU(patch.level), shape.ClosedU()),
+            last_v = last(patch.j, shape.PatchesV(patch.level), shape.ClosedV());
   std::vector<VertexId> missing;
-  for (int j = j0; j <= j1; ++j) {
-    for (int i = i0; i <= i1; ++i) {
-      if (!periodic && (i < 0 || i >= columns)) {
-        continue;
-      }
-      const VertexId vertex{level, ((i % columns) + columns) % columns, j};
-      if (!space.IsEdited(vertex)) {
+  for (int b = first(patch.j, shape.ClosedV()); b <= last_v; ++b) {
+    for (int a = first(patch.i, shape.ClosedU()); a <= last_u; ++a) {
+      const VertexId vertex{level, PlaceAmong(shape.Columns(level), a, shape.ClosedU()),
+                            PlaceAmong(shape.Rows(level), b, shape.ClosedV())};
+      if (vertex.i >= 0 && vertex.j >= 0 && !space.IsEdited(vertex)) {
         missing.push_back(vertex);
       }
     }
@@ -52,11 +51,10 @@ class PatchCounts {
     const std::size_t own = counts_.at(KeyOf(patch));
     std::vector<PatchId> emptier;
     for (int k = 0; k < 9; ++k) {
-      PatchId other{patch.level, patch.i + k % 3 - 1, patch.j + k / 3 - 1};
-      if (shape_.closure == Closure::kPeriodicU) {
-        const int around = shape_.PatchesU(patch.level);
-        other.i = (other.i + around) % around;
-      }
+      const PatchId other{
+          patch.level,
+          PlaceAmong(shape_.PatchesU(patch.level), patch.i + k % 3 - 1, shape_.ClosedU()),
+          PlaceAmong(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, shape_.ClosedV())};
       const auto found = counts_.find(KeyOf(other));
       if (found != counts_.end() && 4 * found->second < own) {
         emptier.push_back(other);

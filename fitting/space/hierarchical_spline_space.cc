@@ -28,9 +28,8 @@ struct PatchSlot {
 };
 
 PatchSlot SlotOf(const HSplineShape& shape, const VertexId& v) {
-  const int i =
-      shape.closure == Closure::kPeriodicU ? v.i : std::min(v.i, shape.PatchesU(v.level) - 1);
-  const int j = std::min(v.j, shape.PatchesV(v.level) - 1);
+  const int i = std::min(v.i, shape.PatchesU(v.level) - 1),
+            j = std::min(v.j, shape.PatchesV(v.level) - 1);
   return {{v.level, i, j}, v.i - i + 4 * (v.j - j)};
 }
 
@@ -147,12 +146,12 @@ void HierarchicalSplineSpace::Edit(std::span<const VertexId> vertices) {
       continue;
     }
     AddDof(v, Vec3::Zero());
-    for (int j = std::max(v.j - 3, 0); j <= std::min(v.j, shape_.PatchesV(v.level) - 1); ++j) {
-      for (int a = v.i - 3; a <= v.i; ++a) {
-        const int n = shape_.PatchesU(v.level);
-        if (shape_.closure == Closure::kPeriodicU || (a >= 0 && a < n)) {
-          EnsureNode({v.level, (a % n + n) % n, j});
-        }
+    for (int k = 0; k < 16; ++k) {
+      const PatchId patch{v.level,
+                          PlaceAmong(shape_.PatchesU(v.level), v.i - 3 + k % 4, shape_.ClosedU()),
+                          PlaceAmong(shape_.PatchesV(v.level), v.j - 3 + k / 4, shape_.ClosedV())};
+      if (patch.i >= 0 && patch.j >= 0) {
+        EnsureNode(patch);
       }
     }
   }
@@ -166,11 +165,11 @@ bool HierarchicalSplineSpace::IsCovered(const VertexId& v) const {
   if (level > shape_.max_level) {
     return false;
   }
-  const bool periodic = shape_.closure == Closure::kPeriodicU;
-  for (int j = std::max(2 * v.j - 3, 0); j <= std::min(2 * v.j + 1, shape_.Rows(level) - 1); ++j) {
-    for (int i = 2 * v.i - 3; i <= 2 * v.i + 1; ++i) {
-      const bool inside = periodic || (i >= 0 && i < shape_.Columns(level));
-      if (inside && !IsEdited({level, (i + shape_.Columns(level)) % shape_.Columns(level), j})) {
+  for (int b = 2 * v.j - 3; b <= 2 * v.j + 1; ++b) {
+    const int j = PlaceAmong(shape_.Rows(level), b, shape_.ClosedV());
+    for (int a = 2 * v.i - 3; j >= 0 && a <= 2 * v.i + 1; ++a) {
+      const int i = PlaceAmong(shape_.Columns(level), a, shape_.ClosedU());
+      if (i >= 0 && !IsEdited({level, i, j})) {
         return false;
       }
     }
@@ -186,8 +185,8 @@ void HierarchicalSplineSpace::LinkDofs() {
   for (QuadtreeNode& node : nodes_) {
     const PatchId& p = node.patch;
     for (int k = 0; k < 16; ++k) {
-      const int i = shape_.Column(p.level, p.i + k % 4);
-      const auto found = dof_of_.find(KeyOf(p.level, i, p.j + k / 4));
+      const int i = shape_.Column(p.level, p.i + k % 4), j = shape_.Row(p.level, p.j + k / 4);
+      const auto found = dof_of_.find(KeyOf(p.level, i, j));
       node.dofs[k] = found == dof_of_.end() ? -1 : found->second;
     }
   }

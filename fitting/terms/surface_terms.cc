@@ -123,8 +123,8 @@ double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNe
 
 VertexId MirrorOf(const HSplineShape& shape, const VertexId& vertex) {
   const int columns = shape.Columns(vertex.level);
-  const int mirrored = shape.closure == Closure::kPeriodicU ? (columns + 2 - vertex.i) % columns
-                                                            : columns - 1 - vertex.i;
+  const int mirrored =
+      shape.ClosedU() ? (columns + 2 - vertex.i) % columns : columns - 1 - vertex.i;
   return {vertex.level, mirrored, vertex.j};
 }
 
@@ -171,7 +171,8 @@ std::vector<Control> ControlsOf(const LevelView& view) {
     const SplineElement element = view.Element(e);
     const PatchId& p = element.patch;
     for (int k = 0; k < 16; ++k) {
-      const VertexId vertex{p.level, shape.Column(p.level, p.i + k % 4), p.j + k / 4};
+      const VertexId vertex{p.level, shape.Column(p.level, p.i + k % 4),
+                            shape.Row(p.level, p.j + k / 4)};
       if (index.try_emplace(vertex, static_cast<int>(controls.size())).second) {
         controls.push_back(ControlOf(element, k));
       }

@@ -26,7 +26,8 @@ using testing::SmoothSurface;
 const std::vector<Term> kPointsOnly = {PointTerm{}};
 
 HSplineShape Shape(Closure closure = Closure::kOpen) {
-  return {.patches_u = 4, .patches_v = 3, .max_level = 3, .closure = closure};
+  const int patches_v = closure == Closure::kPeriodicUv ? 5 : 3;
+  return {.patches_u = 4, .patches_v = patches_v, .max_level = 3, .closure = closure};
 }
 
 // Points of `surface` at random (u,v), moved by `shift` and a random vector of at most noise_mm.
@@ -79,7 +80,7 @@ double LargestDistance(const HSplineSurface& a, const HSplineSurface& b,
 }
 
 TEST(Fit, ReproducesASurfaceOfTheSpace) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
     HSplineShape shape = Shape(closure);
     shape.max_level = 1;
     const HSplineSurface truth = RandomSurface(shape, 1), start = SmoothSurface(shape, 2);
@@ -351,15 +352,13 @@ TEST(Fit, BackFittingSweepsComeNearer) {
             Fit(start, target, {}, without, {}).point_rms_mm);
 }
 
-// The same displacement costs the same at each level, in both domains.
+// The same displacement costs the same at each level, in all domains.
 TEST(Fit, SmoothnessMeansTheSameAtEveryLevel) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
     const HSplineSurface rest = SmoothSurface(Shape(closure), 2),
                          moved = SmoothSurface(Shape(closure), 3);
     const auto costs = [&](int level) {
-      LevelView view{.grid = {.patches_u = rest.shape().PatchesU(level),
-                              .patches_v = rest.shape().PatchesV(level),
-                              .periodic_u = closure == Closure::kPeriodicU},
+      LevelView view{.grid = PatchGrid::Of(rest.shape(), level),
                      .start = moved.Net(level),
                      .rest = rest.Net(level),
                      .lengths_mm = Vec2(130, 80),

@@ -83,24 +83,31 @@ TEST(PatchEnergy, RootsReproduceTheFormsAndShowTheirNullSpaces) {
   EXPECT_LT((b.transpose() * b - membrane).cwiseAbs().maxCoeff(), 1e-13 * membrane.maxCoeff());
 }
 
-// Vertices of a translation-invariant periodic net: shifting them by one column changes nothing.
+// Shifting the vertices by one along a closed direction changes nothing.
 TEST(PatchEnergy, PeriodicEnergyKnowsNoSeam) {
-  const PatchGrid grid{.patches_u = 6, .patches_v = 3, .periodic_u = true};
-  Random random(2);
-  ControlNet net{.columns = 6, .rows = 6, .vertices = {}};
-  for (int k = 0; k < 36; ++k) {
-    net.vertices.push_back(random.InBox(-1, 1));
-  }
-  ControlNet shifted = net;
-  for (int j = 0; j < 6; ++j) {
-    for (int i = 0; i < 6; ++i) {
-      shifted.At((i + 1) % 6, j) = net.At(i, j);
+  for (const bool torus : {false, true}) {
+    const PatchGrid grid{.patches_u = 6, .patches_v = 5, .periodic_u = true, .periodic_v = torus};
+    Random random(2);
+    ControlNet net{.columns = grid.Columns(), .rows = grid.Rows(), .vertices = {}};
+    for (int k = 0; k < net.columns * net.rows; ++k) {
+      net.vertices.push_back(random.InBox(-1, 1));
+    }
+    ControlNet along_u = net, along_v = net;
+    for (int j = 0; j < net.rows; ++j) {
+      for (int i = 0; i < net.columns; ++i) {
+        along_u.At((i + 1) % net.columns, j) = net.At(i, j);
+        along_v.At(i, (j + 1) % net.rows) = net.At(i, j);
+      }
+    }
+    for (const ElementStiffness& form : {ThinPlateStiffness(1, 2), MembraneStiffness(1, 2)}) {
+      const double energy = StiffnessEnergy(form, grid, net);
+      EXPECT_GT(energy, 0);
+      EXPECT_NEAR(StiffnessEnergy(form, grid, along_u), energy, 1e-12 * energy);
+      if (torus) {
+        EXPECT_NEAR(StiffnessEnergy(form, grid, along_v), energy, 1e-12 * energy);
+      }
     }
   }
-  const ElementStiffness form = ThinPlateStiffness(1, 2);
-  const double energy = StiffnessEnergy(form, grid, net);
-  EXPECT_GT(energy, 0);
-  EXPECT_NEAR(StiffnessEnergy(form, grid, shifted), energy, 1e-12 * energy);
 }
 
 }  // namespace

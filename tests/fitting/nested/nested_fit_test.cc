@@ -23,10 +23,11 @@ using testing::ErrorAgainst;
 using testing::FrankePoint;
 using ::testing::HasSubstr;
 using testing::HeadPoint;
+using testing::RingPoint;
 using testing::Scattered;
 
 NestedFitResult FitAuto(const FitTarget& target, Closure closure = Closure::kOpen,
-                        const AutoPlan& plan = {}) {
+                        const AutoPlan& plan = {}, const RunContext& context = {}) {
   std::vector<Vec3> positions;
   std::vector<Vec2> uv;
   for (const FitPoint& p : target.points) {
@@ -34,7 +35,7 @@ NestedFitResult FitAuto(const FitTarget& target, Closure closure = Closure::kOpe
     uv.push_back(p.uv);
   }
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0, .closure = closure};
-  return FitNested(StartSurface(shape, positions, uv), {positions, uv}, plan, {});
+  return FitNested(StartSurface(shape, positions, uv), {positions, uv}, plan, context);
 }
 
 // A height field: noise in z alone.
@@ -64,6 +65,42 @@ TEST(NestedFit, AClosedSurfaceInSpaceIsFoundAndCloses) {
   EXPECT_LT(ErrorAgainst(HeadPoint, fit.surface, 100).rms, 1.5e-4);
   const Vec3 left = fit.surface.Point({1 - 1e-12, 0.4}), right = fit.surface.Point({0, 0.4});
   EXPECT_LT((left - right).norm(), 1e-9);
+}
+
+// Untuned, the error is a fraction of the noise; by one thread or two the same bytes.
+TEST(NestedFit, ATorusIsFoundAndClosesBothWays) {
+  constexpr double kNoise = 1e-3;
+  const FitTarget target = Scattered(RingPoint, 20000, kNoise, 3);
+  const NestedFitResult fit = FitAuto(target, Closure::kPeriodicUv);
+  EXPECT_LT(ErrorAgainst(RingPoint, fit.surface, 100).rms, kNoise);
+  EXPECT_NEAR(fit.report.noise_mm, kNoise, 1e-4);
+  EXPECT_THAT(fit.report.outliers, ::testing::IsEmpty());
+  for (const double other : {0.0, 0.3, 0.98}) {
+    EXPECT_LT((fit.surface.Normal({1 - 1e-12, other}) - fit.surface.Normal({0, other})).norm(),
+              1e-7);
+    EXPECT_LT((fit.surface.Normal({other, 1 - 1e-12}) - fit.surface.Normal({other, 0})).norm(),
+              1e-7);
+  }
+  RunContext two;
+  two.threads = 2;
+  const NestedFitResult again = FitAuto(target, Closure::kPeriodicUv, {}, two);
+  EXPECT_EQ(again.surface.Net(0).vertices, fit.surface.Net(0).vertices);
+  EXPECT_EQ(again.surface.Offsets(), fit.surface.Offsets());
+}
+
+// Where the seams run does not matter, but for points that are left out by their place on a curve.
+TEST(NestedFit, ATorusIsFoundAsWellWithItsSeamsElsewhere) {
+  FitTarget target = Scattered(RingPoint, 10000, 1e-3, 3);
+  const double here =
+      ErrorAgainst(RingPoint, FitAuto(target, Closure::kPeriodicUv).surface, 100).rms;
+  const Vec2 shift(3.0 / 8, 5.0 / 8);
+  for (FitPoint& p : target.points) {
+    p.uv = (p.uv + shift).unaryExpr([](double x) { return x - std::floor(x); });
+  }
+  const auto shifted = [&](const Vec2& uv) { return RingPoint(uv - shift); };
+  const double there =
+      ErrorAgainst(shifted, FitAuto(target, Closure::kPeriodicUv).surface, 100).rms;
+  EXPECT_NEAR(there, here, 0.1 * here);
 }
 
 // On the coarse levels the waves look like noise, and are smoothed away; on the finer ones the

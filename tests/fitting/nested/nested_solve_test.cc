@@ -4,12 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "fitting/solve/level_fit.h"
 #include "surfaces/base/random.h"
+#include "tests/testing/plain_bspline.h"
 #include "tests/testing/scattered_data.h"
 
 namespace semblance {
@@ -17,7 +20,15 @@ namespace {
 
 using testing::HeadPoint;
 using testing::PlainStart;
+using testing::RingPoint;
 using testing::Scattered;
+
+constexpr Closure kClosures[] = {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv};
+
+FitTarget PointsFor(Closure closure, int count, double noise) {
+  return closure == Closure::kPeriodicUv ? Scattered(RingPoint, count, noise, 4)
+                                         : Scattered(HeadPoint, count, noise, 4);
+}
 
 NestedPoints DisplacementsOf(const HSplineSurface& start, const FitTarget& target) {
   std::vector<Vec3> positions;
@@ -29,8 +40,8 @@ NestedPoints DisplacementsOf(const HSplineSurface& start, const FitTarget& targe
   return DisplacementsFrom(start, {positions, uv}, 1);
 }
 
-GridLayout Layout(bool periodic) {
-  return {{.patches_u = 8, .patches_v = 5, .periodic_u = periodic}};
+GridLayout Layout(Closure closure) {
+  return {PatchGrid::Of({.patches_u = 8, .patches_v = 5, .closure = closure}, 0)};
 }
 
 GridValues RandomValues(const GridLayout& layout, std::uint64_t seed) {
@@ -61,8 +72,8 @@ double Product(const GridValues& a, const GridValues& b) {
 }
 
 TEST(NestedSolve, RestrictionIsTheTransposeOfRefinement) {
-  for (const bool periodic : {false, true}) {
-    const GridLayout coarse = Layout(periodic), fine = coarse.Finer();
+  for (const Closure closure : kClosures) {
+    const GridLayout coarse = Layout(closure), fine = coarse.Finer();
     GridValues x = RandomValues(coarse, 1), y = RandomValues(fine, 2);
     const GridRuns all = AllOf(fine);
     x.FillHalo(AllOf(coarse));
@@ -75,7 +86,7 @@ TEST(NestedSolve, RestrictionIsTheTransposeOfRefinement) {
 }
 
 TEST(NestedSolve, RefinementIsThatOfTheSurface) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+  for (const Closure closure : kClosures) {
     const HSplineShape shape{.patches_u = 8, .patches_v = 5, .max_level = 1, .closure = closure};
     const GridLayout coarse = {PatchGrid::Of(shape, 0)};
     GridValues x = RandomValues(coarse, 3);
@@ -98,7 +109,7 @@ TEST(NestedSolve, RefinementIsThatOfTheSurface) {
   }
 }
 
-// Some of the patches, apart from each other and across the seam.
+// Some of the patches, apart from each other and across the seams.
 std::vector<char> SomePatches(const GridLayout& layout) {
   std::vector<char> some(layout.Patches(), 0);
   for (const auto& [i, j] :
@@ -109,11 +120,11 @@ std::vector<char> SomePatches(const GridLayout& layout) {
 }
 
 TEST(NestedSolve, RunsHoldEachVertexOfThePatchesOnce) {
-  for (const bool periodic : {false, true}) {
-    const GridLayout layout = Layout(periodic).Finer().Finer();  // rows of several runs
+  for (const Closure closure : kClosures) {
+    const GridLayout layout = Layout(closure).Finer().Finer();  // rows of several runs
     std::vector<char> patches(layout.Patches(), 0);
     for (const int i : {0, 1, 13, 31}) {
-      patches[layout.Patch(i, 5)] = 1;
+      patches[layout.Patch(i, 5)] = patches[layout.Patch(i, 19)] = 1;
     }
     std::vector<int> held(layout.Size(), 0);
     for (const GridRun& run : RunsAround(layout, patches)) {
@@ -124,9 +135,11 @@ TEST(NestedSolve, RunsHoldEachVertexOfThePatchesOnce) {
     }
     EXPECT_LE(*std::max_element(held.begin(), held.end()), 1);
     for (const int i : {0, 1, 13, 31}) {
-      for (const int vertex : layout.grid.PatchVertices(i, 5)) {
-        EXPECT_EQ(held[layout.At(vertex % layout.grid.Columns(), vertex / layout.grid.Columns())],
-                  1);
+      for (const int j : {5, 19}) {
+        for (const int vertex : layout.grid.PatchVertices(i, j)) {
+          EXPECT_EQ(held[layout.At(vertex % layout.grid.Columns(), vertex / layout.grid.Columns())],
+                    1);
+        }
       }
     }
   }
@@ -134,8 +147,8 @@ TEST(NestedSolve, RunsHoldEachVertexOfThePatchesOnce) {
 
 // The definition: the sum of the patches' products.
 TEST(NestedSolve, AStencilsProductIsTheSumOfThoseOfThePatches) {
-  for (const bool periodic : {false, true}) {
-    const GridLayout layout = Layout(periodic);
+  for (const Closure closure : kClosures) {
+    const GridLayout layout = Layout(closure);
     const std::vector<char> patches = SomePatches(layout);
     const GridRuns runs = RunsAround(layout, patches);
     StencilMatrix matrix(layout, runs);
@@ -168,10 +181,10 @@ TEST(NestedSolve, AStencilsProductIsTheSumOfThoseOfThePatches) {
 
 // All vertices of level 1 overlaid is level 1 as a plain B-spline, which a direct factor solves.
 TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
+  for (const Closure closure : kClosures) {
     const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1, .closure = closure};
     const HSplineSurface start = PlainStart(shape);
-    const FitTarget target = Scattered(HeadPoint, 1000, 0.01, 4);
+    const FitTarget target = PointsFor(closure, 1000, 0.01);
     const NestedPoints points = DisplacementsOf(start, target);
     NestedSpace space(shape);
     for (int patch = 0; patch < 64; ++patch) {
@@ -202,30 +215,109 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
   }
 }
 
-TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
-  const HSplineShape shape{
-      .patches_u = 8, .patches_v = 8, .max_level = 2, .closure = Closure::kPeriodicU};
-  const HSplineSurface start = PlainStart(shape);
-  const NestedPoints points = DisplacementsOf(start, Scattered(HeadPoint, 3000, 0.01, 4));
-  NestedSpace space(shape);
-  space.Overlay(0, 7, 3);
-  space.Overlay(0, 0, 3);
-  space.Link();
-  NestedSolve solve(points, MeanLengths(start));
-  PointChoice used{.every = 2, .left_out = std::vector<char>(points.size(), 0)};
-  for (std::size_t k = 0; k < points.size(); k += 14) {
-    used.left_out[k] = 1;
+// Of a vertex of a closed direction, at x patches, from the definition.
+double Around(double x, int vertex, int patches, int order) {
+  double sum = 0;
+  for (const int turn : {-1, 0, 1}) {
+    sum += testing::CubicBSpline(x - (vertex + turn * patches) + 3, order);
   }
-  solve.Begin(space, used);
-  for (const double weight : {1e-3, 1e-7}) {
-    solve.SetWeight(weight);
-    solve.Solve(1e-6);
-    double sum = 0;
-    for (const NestedResidual& residual : solve.ResidualsOf(used)) {
-      sum += residual.Square();
+  return sum * std::pow(patches, order);
+}
+
+// A row of all vertices' functions of a torus, or of their derivatives.
+Eigen::RowVectorXd TorusRow(const HSplineShape& shape, const Vec2& uv, DerivativeOrder order) {
+  const int m = shape.patches_u, n = shape.patches_v;
+  Eigen::RowVectorXd row(m * n);
+  for (int k = 0; k < m * n; ++k) {
+    row[k] = Around(uv.x() * m, k % m, m, order.u) * Around(uv.y() * n, k / m, n, order.v);
+  }
+  return row;
+}
+
+// The mean over the domain of |S_ss|^2 + 2 |S_st|^2 + |S_tt|^2, s and t in mm, by four Gauss points
+// a patch each way, which are exact.
+Eigen::MatrixXd TorusEnergy(const HSplineShape& shape, const Vec2& lengths_mm) {
+  constexpr std::array<std::array<double, 2>, 4> kGauss = {
+      {{0.06943184420297371, 0.1739274225687269},
+       {0.33000947820757187, 0.3260725774312731},
+       {0.6699905217924281, 0.3260725774312731},
+       {0.9305681557970263, 0.1739274225687269}}};
+  const int m = shape.patches_u, n = shape.patches_v;
+  Eigen::MatrixXd energy = Eigen::MatrixXd::Zero(m * n, m * n);
+  for (int k = 0; k < 16 * m * n; ++k) {
+    const auto& [s, weight_s] = kGauss[k % 4];
+    const auto& [t, weight_t] = kGauss[k / 4 % 4];
+    const Vec2 uv((k / 16 % m + s) / m, (k / 16 / m + t) / n);
+    const double share = weight_s * weight_t / (m * n);
+    for (const auto& [order, factor] : {std::pair{DerivativeOrder{2, 0}, 1.0},
+                                        {DerivativeOrder{1, 1}, 2.0},
+                                        {DerivativeOrder{0, 2}, 1.0}}) {
+      const Eigen::RowVectorXd row =
+          TorusRow(shape, uv, order) /
+          (std::pow(lengths_mm.x(), order.u) * std::pow(lengths_mm.y(), order.v));
+      energy += factor * share * row.transpose() * row;
     }
-    const double expected = sum / static_cast<double>(used.Count(points)) / points.channels;
-    EXPECT_NEAR(solve.MeanSquare(), expected, 1e-9 * expected);
+  }
+  return energy;
+}
+
+TEST(NestedSolve, OnATorusItIsDenseLeastSquares) {
+  const HSplineShape shape{
+      .patches_u = 5, .patches_v = 4, .max_level = 0, .closure = Closure::kPeriodicUv};
+  const HSplineSurface start = PlainStart(shape);
+  const FitTarget target = Scattered(RingPoint, 300, 0.01, 4);
+  const NestedPoints points = DisplacementsOf(start, target);
+  const NestedSpace space(shape);
+  constexpr double kWeight = 1e-4;
+  NestedSolve solve(points, MeanLengths(start));
+  solve.Begin(space, {});
+  solve.SetWeight(kWeight);
+  solve.Solve(0);
+  Eigen::MatrixXd rows(300, 20);
+  Eigen::MatrixX3d moved(300, 3);
+  for (int k = 0; k < 300; ++k) {
+    rows.row(k) = TorusRow(shape, target.points[k].uv, {});
+    moved.row(k) = (target.points[k].position - start.Point(target.points[k].uv)).transpose();
+  }
+  const Eigen::MatrixXd normal =
+      rows.transpose() * rows + 300 * kWeight * TorusEnergy(shape, MeanLengths(start));
+  const Eigen::MatrixX3d dense = normal.ldlt().solve(rows.transpose() * moved);
+  const NestedValues& displacements = solve.Displacements();
+  for (int k = 0; k < 20; ++k) {
+    Vec3 found = Vec3::Zero();
+    for (int c = 0; c < points.channels; ++c) {
+      found += displacements[0].Row(c, k / 5)[k % 5] * points.axes.col(c);
+    }
+    EXPECT_LT((found - dense.row(k).transpose()).norm(), 1e-7) << k;
+  }
+}
+
+TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
+  for (const Closure closure : {Closure::kPeriodicU, Closure::kPeriodicUv}) {
+    const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 2, .closure = closure};
+    const HSplineSurface start = PlainStart(shape);
+    const NestedPoints points = DisplacementsOf(start, PointsFor(closure, 3000, 0.01));
+    NestedSpace space(shape);
+    for (const auto& [i, j] : {std::array{7, 3}, std::array{0, 3}, std::array{5, 7}}) {
+      space.Overlay(0, i, j);
+    }
+    space.Link();
+    NestedSolve solve(points, MeanLengths(start));
+    PointChoice used{.every = 2, .left_out = std::vector<char>(points.size(), 0)};
+    for (std::size_t k = 0; k < points.size(); k += 14) {
+      used.left_out[k] = 1;
+    }
+    solve.Begin(space, used);
+    for (const double weight : {1e-3, 1e-7}) {
+      solve.SetWeight(weight);
+      solve.Solve(1e-6);
+      double sum = 0;
+      for (const NestedResidual& residual : solve.ResidualsOf(used)) {
+        sum += residual.Square();
+      }
+      const double expected = sum / static_cast<double>(used.Count(points)) / points.channels;
+      EXPECT_NEAR(solve.MeanSquare(), expected, 1e-9 * expected);
+    }
   }
 }
 

@@ -196,6 +196,18 @@ TEST(Relaxation, APointOnTheSurfaceArrivesAtIt) {
   EXPECT_LT(summary.after.distance, 1e-12);
 }
 
+TEST(Relaxation, WithoutANetworkAPointCrossesTheSeamsOfATorus) {
+  HSplineShape shape = Shape();
+  shape.closure = Closure::kPeriodicUv;
+  const HSplineSurface rest = SmoothSurface(shape, 2);
+  const Vec2 truth(0.01, 0.98);
+  FitTarget target{{{.label = "a", .position = rest.Point(truth), .uv = Vec2(0.97, 0.03)}}};
+  const DowelMesh mesh(rest, Places(target), DowelLinks::kNone);
+  const FootpointRelaxation footpoint{{.rounds = 20, .damping = 0}};
+  Relax(rest, rest, mesh, *MovesOf(footpoint), target);
+  EXPECT_LT((target.points[0].uv - truth).norm(), 1e-8);
+}
+
 TEST(Relaxation, IsEquivariantUnderRigidMotion) {
   const Similarity pose = {.scale = 1,
                            .rotation = Eigen::AngleAxisd(1.1, Vec3(1, 2, -1).normalized()).matrix(),
