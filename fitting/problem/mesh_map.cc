@@ -96,7 +96,8 @@ Border OnlyBorder(LayoutMesh& mesh) {
   if (borders.empty()) {
     FailLayout(
         "it is closed and has no border; cut it open, or, if it goes round an axis, take "
-        "parameters: cylinder with closure: periodic_u");
+        "parameters: cylinder with closure: periodic_u, or, if it is a ring, parameters: torus "
+        "with closure: periodic_uv");
   }
   const auto longest = std::max_element(
       borders.begin(), borders.end(),

@@ -26,10 +26,12 @@ struct Sample {
 };
 
 // The shorter way round.
-Vec2 Way(const Vec2& from, const Vec2& to, double period_mm) {
+Vec2 Way(const Vec2& from, const Vec2& to, const Vec2& period_mm) {
   Vec2 way = to - from;
-  if (period_mm > 0) {
-    way.x() -= period_mm * std::round(way.x() / period_mm);
+  for (const int c : {0, 1}) {
+    if (period_mm[c] > 0) {
+      way[c] -= period_mm[c] * std::round(way[c] / period_mm[c]);
+    }
   }
   return way;
 }
@@ -145,7 +147,7 @@ struct Neighbourhood {
 
 class Prober {
  public:
-  Prober(std::vector<Sample> samples, double period_mm, std::size_t most_probes)
+  Prober(std::vector<Sample> samples, const Vec2& period_mm, std::size_t most_probes)
       : period_mm_(period_mm), samples_(std::move(samples)), most_probes_(most_probes) {}
 
   MapFaults Run() const {
@@ -293,7 +295,7 @@ class Prober {
     return (mean[0] - mean[1]).norm() < kApart * radii;
   }
 
-  double period_mm_;
+  Vec2 period_mm_;
   std::vector<Sample> samples_;
   std::size_t most_probes_;
 };

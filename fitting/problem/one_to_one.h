@@ -13,8 +13,8 @@ namespace semblance {
 // Both in mm, so that lengths can be compared.
 struct PlaneMap {
   std::span<const Vec3> positions;
-  std::span<const Vec2> at;  // one per position
-  double period_mm = 0;      // along the first coordinate; 0: the map does not go round
+  std::span<const Vec2> at;       // one per position
+  Vec2 period_mm = Vec2::Zero();  // along each coordinate; 0: the map does not go round
 };
 
 // Shares of the surface, 0 to 1.

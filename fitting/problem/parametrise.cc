@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
+#include "fitting/problem/torus.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -70,7 +72,7 @@ Parametrisation ParametersOf(const Scan& points, const GivenParameters& given) {
   if (points.given_uv.empty()) {
     Fail(
         "type 'given' needs each point's (u,v) (of a table, the columns u and v); give them, or "
-        "take 'plane' or 'cylinder'");
+        "take 'plane', 'cylinder' or 'torus'");
   }
   return TakeGiven({points.given_uv.begin(), points.given_uv.end()}, given);
 }
@@ -102,7 +104,7 @@ PlaneAxes PlaneAcross(const Vec3& normal) {
 struct Candidate {
   std::string how;
   std::vector<Vec2> at;  // mm
-  double period_mm = 0;
+  Vec2 period_mm = Vec2::Zero();
   MapFaults faults = {};
   int number = 0;  // among those that may be taken
 };
@@ -200,7 +202,8 @@ Parametrisation TakePlane(Candidate plane) {
 
 constexpr char kOtherWays[] =
     "give u and v, or triangles between the points (a PLY, OBJ, STL or OFF with faces) with "
-    "parameters: mesh, or, for what goes round, parameters: cylinder with closure: periodic_u";
+    "parameters: mesh, or, for what goes round, parameters: cylinder with closure: periodic_u, or "
+    "parameters: torus with closure: periodic_uv";
 
 Parametrisation ParametersOf(const Scan& points, const PlaneParameters& plane) {
   std::vector<Candidate> planes = PlanesOver(points, plane);
@@ -293,7 +296,7 @@ Candidate OnCylinder(const CylinderAxis& axis, std::span<const Vec3> positions) 
   Candidate cylinder{.how = fmt::format("the cylinder along [{:.3g}, {:.3g}, {:.3g}]",
                                         axis.direction.x(), axis.direction.y(), axis.direction.z()),
                      .at = AroundAxis(axis, positions),
-                     .period_mm = period_mm};
+                     .period_mm = Vec2(period_mm, 0)};
   for (Vec2& p : cylinder.at) {
     p.x() *= period_mm;
   }
@@ -323,6 +326,69 @@ Parametrisation ParametersOf(const Scan& points, const CylinderParameters& cylin
   TurnToTriangles(best.faults, 1, result.uv);
   Normalise(1, "the cylinder's axis", result.uv);
   return result;
+}
+
+// The widest part of a turn in which no value lies.
+double WidestGap(std::vector<double> turns) {
+  std::sort(turns.begin(), turns.end());
+  double widest = turns.front() + 1 - turns.back();
+  for (std::size_t k = 1; k < turns.size(); ++k) {
+    widest = std::max(widest, turns[k] - turns[k - 1]);
+  }
+  return widest;
+}
+
+// A sphere, a tube or a cloud has a nearest torus too.
+void CheckTorus(const Torus& torus, const std::vector<Vec2>& turns) {
+  constexpr double kMostGap = 0.25, kMostOff = 0.35;  // turns, tube radii
+  std::vector<double> u, v;
+  for (const Vec2& p : turns) {
+    u.push_back(p.x());
+    v.push_back(p.y());
+  }
+  const double gap_u = WidestGap(std::move(u)), gap_v = WidestGap(std::move(v));
+  const bool is_torus = torus.tube_mm > 0 && torus.ring_mm > torus.tube_mm &&
+                        torus.median_off_mm < kMostOff * torus.tube_mm && gap_u < kMostGap &&
+                        gap_v < kMostGap;
+  if (!is_torus) {
+    Fail(fmt::format(
+        "the points are no torus: the nearest has a ring of radius {:.4g} mm and a tube of {:.4g} "
+        "mm, half of the points are more than {:.3g} mm off it, and its widest gaps are {} of a "
+        "turn around the axis and {} around the ring; give another axis, or u and v",
+        torus.ring_mm, torus.tube_mm, torus.median_off_mm, Percent(gap_u), Percent(gap_v)));
+  }
+}
+
+Parametrisation ParametersOf(const Scan& points, const TorusParameters& asked) {
+  const Vec3 axis(asked.axis[0], asked.axis[1], asked.axis[2]);
+  if (!axis.allFinite()) {
+    Fail("the torus's axis is not finite; give three numbers");
+  }
+  const Torus torus = TorusThrough(points.positions, axis);
+  std::vector<Vec2> turns = TurnsAround(torus, points.positions);
+  CheckTorus(torus, turns);
+  Candidate best{.how = fmt::format(
+                     "the torus around [{:.3g}, {:.3g}, {:.3g}] of radii {:.4g} and {:.4g} mm",
+                     torus.axis.x(), torus.axis.y(), torus.axis.z(), torus.ring_mm, torus.tube_mm),
+                 .at = turns,
+                 .period_mm = 2 * std::numbers::pi * Vec2(torus.ring_mm, torus.tube_mm)};
+  for (Vec2& p : best.at) {
+    p = p.cwiseProduct(best.period_mm);
+  }
+  best.faults = FaultsOf(points, best);
+  if (!MayBeTaken(best, asked.folds)) {
+    Fail(
+        fmt::format("the points fold over the torus: {}; give another axis, or u and v; or write "
+                    "folds: accept",
+                    FaultsText({best})));
+  }
+  for (Vec2& p : turns) {
+    p.y() = best.faults.mirrored ? 1 - p.y() : p.y();
+  }
+  return {.uv = std::move(turns),
+          .source = ParameterSource::kTorus,
+          .how = best.how,
+          .faults = best.faults};
 }
 
 void CheckTriangles(const Scan& points) {
@@ -365,7 +431,10 @@ Parametrisation ParametersOf(const Scan& points, const AutoParameters&) {
   if (!points.given_uv.empty()) {
     return ParametersOf(points, GivenParameters{});
   }
-  if (points.closure != Closure::kOpen) {
+  if (points.closure == Closure::kPeriodicUv) {
+    return ParametersOf(points, TorusParameters{});
+  }
+  if (points.closure == Closure::kPeriodicU) {
     return ParametersOf(points, CylinderParameters{});
   }
   std::vector<Candidate> planes = PlanesOver(points, {});

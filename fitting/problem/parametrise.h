@@ -17,16 +17,16 @@
 
 namespace semblance {
 
-// The parameters that are given, if there are any. Otherwise a surface that goes round takes the
-// cylinder's, and an open one a plane's. Where every plane folds and there are triangles, the mesh
-// is laid out.
+// The parameters that are given, if there are any. Otherwise a surface that goes round both ways
+// takes a torus's, one that goes round in u the cylinder's, and an open one a plane's. Where every
+// plane folds and there are triangles, the mesh is laid out.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
 template <class Visitor>
 void Fields(Visitor&, AutoParameters&) {}
 
-// What becomes of a plane or cylinder over which the points fold.
+// What becomes of a plane, cylinder or torus over which the points fold.
 enum class FoldRule { kRefuse, kAccept };
 constexpr auto EnumNames(FoldRule) { return std::to_array<std::string_view>({"refuse", "accept"}); }
 template <class Visitor>
@@ -84,6 +84,22 @@ void Fields(Visitor& visit, CylinderParameters& o) {
   FoldField(visit, o.folds);
 }
 
+// Angles around an axis and around the ring's circle about it, for points that go round both ways;
+// the ring and its tube are those of the torus nearest to the points (torus.h).
+struct TorusParameters {
+  static constexpr std::string_view kName = "torus";
+  std::array<double, 3> axis = {0, 0, 0};  // that u goes round; 0: found from the points
+  FoldRule folds = FoldRule::kRefuse;      // of points that lie over each other
+};
+template <class Visitor>
+void Fields(Visitor& visit, TorusParameters& o) {
+  visit(FieldInfo{.name = "axis",
+                  .doc = "direction that u goes round; [0, 0, 0] takes that of the torus nearest "
+                         "to the points"},
+        o.axis);
+  FoldField(visit, o.folds);
+}
+
 // The triangles between the points, laid out on the plane (mesh_map.h); u and v along its sides.
 struct MeshParameters {
   static constexpr std::string_view kName = "mesh";
@@ -100,11 +116,11 @@ void Fields(Visitor& visit, MeshParameters& o) {
 }
 
 using Parameters = std::variant<AutoParameters, GivenParameters, PlaneParameters,
-                                CylinderParameters, MeshParameters>;
+                                CylinderParameters, TorusParameters, MeshParameters>;
 
-enum class ParameterSource { kGiven, kPlane, kCylinder, kMesh };
+enum class ParameterSource { kGiven, kPlane, kCylinder, kTorus, kMesh };
 constexpr auto EnumNames(ParameterSource) {
-  return std::to_array<std::string_view>({"given", "plane", "cylinder", "mesh"});
+  return std::to_array<std::string_view>({"given", "plane", "cylinder", "torus", "mesh"});
 }
 
 struct Parametrisation {
@@ -129,8 +145,8 @@ Parametrisation TakeGiven(std::vector<Vec2> given_uv, const GivenParameters& giv
 // where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are
 // any. Throws InputError for no points, `given` without given_uv, a number of given_uv that is not
 // that of the points, an empty range, given_uv outside of it, points that span no plane or have no
-// extent along the axis, points that fold over every plane or cylinder that may be taken, `mesh`
-// without triangles, a corner that is no point, and as LayOut.
+// extent along the axis, points that are no torus or fold over every plane, cylinder or torus that
+// may be taken, `mesh` without triangles, a corner that is no point, and as LayOut.
 Parametrisation Parametrise(const Scan& scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},

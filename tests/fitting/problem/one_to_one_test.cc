@@ -20,7 +20,7 @@ constexpr double kNone = 0.01;
 struct Cloud {
   std::vector<Vec3> positions;
   std::vector<Vec2> at;
-  double period_mm = 0;
+  Vec2 period_mm = Vec2::Zero();
 
   MapFaults Faults() const { return FaultsOfPoints({positions, at, period_mm}); }
 };
@@ -90,7 +90,7 @@ TEST(OneToOne, ACliffIsNoFold) {
 TEST(OneToOne, LidsCollapseOnACylinder) {
   const auto around = [](bool lids) {
     Random random(1);
-    Cloud cloud{.positions = {}, .at = {}, .period_mm = 2 * std::numbers::pi};
+    Cloud cloud{.positions = {}, .at = {}, .period_mm = Vec2(2 * std::numbers::pi, 0)};
     for (int k = 0; k < 20000; ++k) {
       const bool lid = lids && k % 3 == 0;
       const double turn = 2 * std::numbers::pi * random.Uniform(), place = random.Uniform();
@@ -102,6 +102,22 @@ TEST(OneToOne, LidsCollapseOnACylinder) {
   };
   EXPECT_LT(around(false).Sum(), kNone);
   EXPECT_GT(around(true).Sum(), 0.15);
+}
+
+// A ring by its two angles is one-to-one across both seams; with the tube gone round twice, one
+// half of it lies on the other.
+TEST(OneToOne, ATorusIsAcrossBothSeams) {
+  const auto around = [](double turns) {
+    Cloud cloud{.positions = {}, .at = {}, .period_mm = 2 * std::numbers::pi * Vec2(1, 0.4)};
+    for (const FitPoint& p : testing::Scattered(testing::RingPoint, 20000, 1e-3, 1).points) {
+      cloud.positions.push_back(p.position);
+      const double v = turns * p.uv.y();
+      cloud.at.push_back(Vec2(p.uv.x(), v - std::floor(v)).cwiseProduct(cloud.period_mm));
+    }
+    return cloud.Faults();
+  };
+  EXPECT_LT(around(1).Sum(), kNone);
+  EXPECT_GT(around(2).folded, 0.5);
 }
 
 // 0.4 of a sheet is folded back over the rest.
