@@ -309,7 +309,7 @@ class NestedFitter {
   NestedFitResult Finish() {
     Snapshot best = std::move(*best_);
     best_.reset();
-    residuals_ = {};
+    residuals_ = std::vector<Residual>();  // frees it, which {} would not
     every_ = 1;
     space_ = std::move(best.space);
     solve_.Enter(space_);

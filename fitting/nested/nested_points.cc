@@ -120,8 +120,8 @@ NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoint
 }
 
 std::vector<Vec2> UvAsGiven(NestedPoints points) {
-  points.value = {};
-  points.weight = {};
+  points.value = std::vector<Vec3>();  // frees it, which {} would not
+  points.weight = std::vector<double>();
   std::vector<double> column(points.size());
   for (const int c : {0, 1}) {
     for (std::size_t k = 0; k < points.size(); ++k) {

@@ -70,7 +70,7 @@ struct SurfaceSigma::Model {
         space(empty, empty, cloud),
         elements(space) {
     const auto count = static_cast<double>(points.size());
-    points = {};
+    points = std::vector<Observation>();  // frees it, which {} would not
     space.Measure({}, /*threads=*/1, nullptr);
     const double scale = 1 / cloud.weight_sum();
     const std::vector<Term> smooth = {

@@ -353,8 +353,8 @@ Parametrisation ParametersOf(PointTable& table, const PointFitOptions& options) 
                                             .triangles = table.triangles,
                                             .closure = options.closure},
                                            options.parameters);
-  table.uv = {};
-  table.triangles = {};
+  table.uv = std::vector<Vec2>();  // frees it, which {} would not
+  table.triangles = std::vector<Triangle>();
   CheckClosure(parameters.source, options.closure);
   return parameters;
 }
