@@ -28,6 +28,12 @@ void Check(const Pull& pull, const HSplineSurface& face) {
   }
 }
 
+// The shorter way round, of two places in 0..1.
+double Apart(double a, double b, bool closed) {
+  const double straight = std::abs(a - b);
+  return closed ? std::min(straight, 1 - straight) : straight;
+}
+
 // How much each vertex of the level goes along with the point at uv, [index]; the surface there
 // moves by 1 if each vertex moves by its share.
 std::vector<double> SharesAround(const HSplineShape& shape, int level, const Vec2& uv,
@@ -36,10 +42,10 @@ std::vector<double> SharesAround(const HSplineShape& shape, int level, const Vec
   for (int j = 0; j < shape.Rows(level); ++j) {
     for (int i = 0; i < shape.Columns(level); ++i) {
       const Vec2 at = ParameterOf(shape, {level, i, j});
-      double du = std::abs(at.x() - uv.x());
-      du = shape.closure == Closure::kPeriodicU ? std::min(du, 1 - du) : du;
-      const double squared = std::pow(du * shape.PatchesU(level), 2) +
-                             std::pow((at.y() - uv.y()) * shape.PatchesV(level), 2);
+      const double du = Apart(at.x(), uv.x(), shape.ClosedU()),
+                   dv = Apart(at.y(), uv.y(), shape.ClosedV());
+      const double squared =
+          std::pow(du * shape.PatchesU(level), 2) + std::pow(dv * shape.PatchesV(level), 2);
       shares[i + static_cast<std::size_t>(shape.Columns(level)) * j] =
           std::pow(std::max(0.0, 1 - squared / (reach * reach)), 2);
     }

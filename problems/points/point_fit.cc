@@ -45,10 +45,13 @@ std::string_view NameOf(ParameterSource source) {
 
 // Empty if they go together.
 std::string ClosureFault(ParameterSource source, Closure closure) {
-  if (source == ParameterSource::kCylinder && closure == Closure::kOpen) {
-    return "parameters on a cylinder go round; write closure: periodic_u";
+  if (source == ParameterSource::kCylinder && closure != Closure::kPeriodicU) {
+    return "parameters on a cylinder go round in u alone; write closure: periodic_u";
   }
-  if (closure == Closure::kPeriodicU &&
+  if (source == ParameterSource::kTorus && closure != Closure::kPeriodicUv) {
+    return "parameters on a torus go round both ways; write closure: periodic_uv";
+  }
+  if (closure != Closure::kOpen &&
       (source == ParameterSource::kPlane || source == ParameterSource::kMesh)) {
     return fmt::format("parameters on a {} do not go round; write closure: open", NameOf(source));
   }
@@ -67,6 +70,8 @@ std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
              ? std::optional(ParameterSource::kPlane)
          : std::holds_alternative<CylinderParameters>(parameters)
              ? std::optional(ParameterSource::kCylinder)
+         : std::holds_alternative<TorusParameters>(parameters)
+             ? std::optional(ParameterSource::kTorus)
          : std::holds_alternative<MeshParameters>(parameters)
              ? std::optional(ParameterSource::kMesh)
              : std::nullopt;
@@ -219,12 +224,18 @@ std::string AttributesFault(const std::vector<std::string>& names) {
   return "";
 }
 
-// Whether there is a surface of so many patches; empty if there is.
-std::string ShapeFault(const PointFitOptions& options) try {
-  CheckShape(ShapeOf(options));
+// Empty if there is a surface of so many patches.
+std::string ShapeFault(const HSplineShape& shape) try {
+  CheckShape(shape);
   return "";
 } catch (const InputError& error) {
   return error.what();
+}
+
+// That of v where as many as along u would do.
+std::string_view WrongPatches(HSplineShape shape) {
+  shape.patches_v = shape.patches_u;
+  return ShapeFault(shape).empty() ? "patches_v" : "patches_u";
 }
 
 }  // namespace
@@ -236,8 +247,8 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
       faults.push_back({"closure", std::move(fault)});
     }
   }
-  if (const std::string fault = ShapeFault(options); !fault.empty()) {
-    faults.push_back({"patches_u", fault});
+  if (const std::string fault = ShapeFault(ShapeOf(options)); !fault.empty()) {
+    faults.push_back({std::string(WrongPatches(ShapeOf(options))), fault});
   }
   if (options.sigma && !IsAlone(options.fit)) {
     faults.push_back({"sigma",

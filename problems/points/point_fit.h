@@ -34,7 +34,7 @@ struct PointFitOptions {
   std::string title = "untitled";            // of the result
   int patches_u = 8;                         // of level 0
   int patches_v = 8;                         // of level 0
-  Closure closure = Closure::kOpen;          // whether u goes round
+  Closure closure = Closure::kOpen;          // whether u, or u and v, go round
   Parameters parameters;                     // where the points' (u,v) come from
   std::vector<std::string> attributes = {};  // further columns that are fitted
   FitOptions fit = {
@@ -57,7 +57,10 @@ void Fields(Visitor& visit, PointFitOptions& o) {
         o.patches_u);
   visit(FieldInfo{.name = "patches_v", .min = 1, .max = 4096, .doc = "of level 0 along v"},
         o.patches_v);
-  visit(FieldInfo{.name = "closure", .doc = "periodic_u for surfaces that go round"}, o.closure);
+  visit(FieldInfo{.name = "closure",
+                  .doc = "open; periodic_u for surfaces that go round in u, as a tube does; "
+                         "periodic_uv for those that go round both ways, as a torus does"},
+        o.closure);
   visit(FieldInfo{.name = "parameters", .doc = "where the points' (u,v) come from"}, o.parameters);
   visit(FieldInfo{.name = "attributes",
                   .doc = "further columns of the points (properties of a PLY) that are fitted over "
@@ -97,7 +100,7 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
-  std::string parameters;  // given, plane, cylinder or mesh
+  std::string parameters;  // given, plane, cylinder, torus or mesh
   std::string how;         // which of them, in words; empty of given ones
   MapFaults map_faults;    // of what was chosen
   FitResult fit;
@@ -120,9 +123,9 @@ struct PointFit {
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
 // Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a closure that does
-// not suit the parameters (a cylinder is periodic, a plane and a mesh are not), for attributes that
-// the table has not, and for a chord so fine that a coarse fit of some of the points has already
-// shown surface.ply to be too large.
+// not suit the parameters (a cylinder goes round in u, a torus both ways, a plane and a mesh do
+// not), for attributes that the table has not, and for a chord so fine that a coarse fit of some of
+// the points has already shown surface.ply to be too large.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),

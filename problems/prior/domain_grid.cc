@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/prior/domain_grid.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -43,7 +45,8 @@ std::size_t DomainGrid::NearestTo(const Vec2& uv) const {
 DomainGrid GridOf(const HSplineShape& shape) {
   constexpr int kPerPatch = 3, kPatches = 32;  // at least so many patches' worth
   if (shape.closure != Closure::kOpen) {
-    throw InputError("template: the surface is periodic in u; a prior needs one that is open");
+    throw InputError(fmt::format("template: the surface is {}; a prior needs one that is open",
+                                 EnumNames(shape.closure)[static_cast<int>(shape.closure)]));
   }
   const auto samples = [=](int patches) { return kPerPatch * std::max(patches, kPatches) + 1; };
   return {samples(shape.PatchesU(shape.max_level)), samples(shape.PatchesV(shape.max_level))};

@@ -24,7 +24,7 @@ struct DomainGrid {
 };
 
 // At least three samples along each side of a patch of the finest level. Throws InputError for a
-// surface that is periodic in u.
+// surface that is not open.
 DomainGrid GridOf(const HSplineShape& shape);
 
 // The plain B-spline of one level that is closest to the samples, by least squares; mm. On such a

@@ -206,14 +206,14 @@ class SceneWriter {
     const HSplineSurface& surface = result_.fit.surface;
     const ControlNet& net = surface.Net(level);
     std::vector<SceneBlobs::Segment> segments;
-    const bool periodic = surface.shape().closure == Closure::kPeriodicU;
+    const HSplineShape& shape = surface.shape();
     for (int j = 0; j < net.rows; ++j) {
       for (int i = 0; i < net.columns; ++i) {
-        if (i + 1 < net.columns || periodic) {
+        if (i + 1 < net.columns || shape.ClosedU()) {
           segments.push_back({net.Index(i, j), net.Index((i + 1) % net.columns, j)});
         }
-        if (j + 1 < net.rows) {
-          segments.push_back({net.Index(i, j), net.Index(i, j + 1)});
+        if (j + 1 < net.rows || shape.ClosedV()) {
+          segments.push_back({net.Index(i, j), net.Index(i, (j + 1) % net.rows)});
         }
       }
     }

@@ -23,6 +23,7 @@ seeds() {
       { printf c; head -20 "$source/configs/fit/points.csv"; } > corpus/$1/points
       printf 'n\x93NUMPY\x01\x00\x46\x00{"descr": "<f8", "fortran_order": False, "shape": (1, 1), }         \n12345678' > corpus/$1/npy
       printf 'h{"format": "semblance-hspline", "version": 1, "patches": [1, 1], "max_level": 0, "closure": "open", "offset_reference": "frame", "units": "mm", "level0": [[0,0,0],[1,0,0],[2,0,0],[3,0,0],[0,1,0],[1,1,0],[2,1,0],[3,1,0],[0,2,0],[1,2,0],[2,2,0],[3,2,0],[0,3,0],[1,3,0],[2,3,0],[3,3,0]], "offsets": []}' > corpus/$1/hspline
+      printf 'h{"format": "semblance-hspline", "version": 1, "patches": [4, 4], "max_level": 1, "closure": "periodic_uv", "offset_reference": "world", "units": "mm", "level0": [[0,0,0],[1,0,0],[2,0,0],[3,0,0],[0,1,0],[1,1,1],[2,1,2],[3,1,0],[0,2,0],[1,2,2],[2,2,1],[3,2,0],[0,3,0],[1,3,0],[2,3,0],[3,3,0]], "offsets": [[1,0,7,0,0,1]]}' > corpus/$1/torus
       printf 'f# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n1,1,2,3,0,0,0,1,1,1,0,g,,\n' > corpus/$1/fcsv
       printf 'm{"markups": [{"type": "Fiducial", "coordinateSystem": "LPS", "controlPoints": [{"label": "g", "position": [1, 2, 3]}]}]}' > corpus/$1/markups
       printf 'p<!DOCTYPE PickedPoints>\n<PickedPoints><point x="1" y="2" z="3" name="g" active="1"/></PickedPoints>' > corpus/$1/picked

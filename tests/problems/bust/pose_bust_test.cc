@@ -25,6 +25,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_folder.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
@@ -316,6 +317,12 @@ TEST(WholeHead, RoundTripsThroughItsFile) {
   EXPECT_EQ(head.eyeballs.size(), 2u);
   EXPECT_THAT([] { WholeHeadFromJson("{}", "bust.json"); },
               ThrowsMessage<IoError>(HasSubstr("bust.json: ")));
+  const HSplineSurface torus = testing::SmoothSurface({.closure = Closure::kPeriodicUv}, 1);
+  EXPECT_THAT(
+      [&] {
+        WholeHeadFromJson(WholeHeadToJson({torus, {}}), "bust.json");
+      },
+      ThrowsMessage<IoError>(HasSubstr("must go round in u alone")));
 }
 
 TEST(WholeHead, ItsMeshIsOnePieceOpenAtTheNeckAlone) {

@@ -277,6 +277,65 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
   }
 }
 
+// A ring without (u,v), turned: the torus is found, and the surface closes both ways.
+TEST(PointFit, TorusParametersCloseTheRingBothWays) {
+  const Mat3 turn = Eigen::AngleAxisd(0.8, Vec3(1, -2, 0.5).normalized()).matrix();
+  const auto ring = [&](const Vec2& uv) -> Vec3 { return 30 * (turn * testing::RingPoint(uv)); };
+  const PointTable table = TableOf(Scattered(ring, 20000, 0.01, 3));
+  for (const Parameters& parameters :
+       {Parameters(AutoParameters{}), Parameters(TorusParameters{})}) {
+    const PointFit result =
+        FitPoints(table, {.closure = Closure::kPeriodicUv, .parameters = parameters}, {});
+    EXPECT_EQ(result.parameters, "torus");
+    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
+    EXPECT_LT(result.fit.point_rms_mm, 0.02);
+    const SurfaceProjector projector(result.fit.surface);
+    for (const FitPoint& p : Scattered(ring, 200, 0, 4).points) {
+      EXPECT_LT(projector.Project(p.position).distance_mm, 0.02);
+    }
+    for (const double other : {0.0, 0.4, 0.97}) {
+      const HSplineSurface& surface = result.fit.surface;
+      EXPECT_LT((surface.Point({1 - 1e-12, other}) - surface.Point({0, other})).norm(), 1e-8);
+      EXPECT_LT((surface.Point({other, 1 - 1e-12}) - surface.Point({other, 0})).norm(), 1e-8);
+    }
+  }
+}
+
+// Every plan, solver and extra on one torus with given (u,v).
+TEST_F(PointFitCommand, ATorusIsFittedByEveryPlan) {
+  Write("ring.csv", Csv(Scattered(testing::RingPoint, 3000, 1e-3, 1), /*with_uv=*/true));
+  const std::string level_2 = "fit.plan={type: listed, schedule: [{level: 2}]}";
+  const std::vector<std::pair<std::string, std::vector<std::string>>> ways = {
+      {"untuned", {"sigma=true"}},
+      {"ceres", {"fit.solver=ceres"}},
+      {"adaptive", {"fit.plan={type: adaptive, tolerance_mm: 0.004, finest: 2}"}},
+      {"listed", {level_2}},
+      {"loss",
+       {level_2,
+        "fit.terms=[{type: points, loss: tukey, loss_width_mm: 0.1}, {type: smoothness, weight: "
+        "1e-9}]"}},
+      {"regions",
+       {"fit.plan={type: adaptive, tolerance_mm: 0.1, finest: 2, regions: [{v: [0.9, 1], "
+        "tolerance_mm: 0.004}]}"}},
+      {"footpoint", {level_2, "fit.relaxation=footpoint"}},
+      {"joint", {level_2, "fit.relaxation={type: joint, rounds: 1}"}}};
+  for (const auto& [name, settings] : ways) {
+    std::string call = "fit ring.csv --quiet --set closure=periodic_uv --set chord_mm=0.02";
+    for (const std::string& setting : settings) {
+      call += fmt::format(" --set '{}'", setting);
+    }
+    const auto outcome = Call(fmt::format("{} --out {}", call, name));
+    ASSERT_EQ(outcome.code, 0) << name << ": " << outcome.err;
+    const HSplineSurface surface = ReadHSpline(folder_ / name / "surface.hspline.json");
+    EXPECT_EQ(surface.shape().closure, Closure::kPeriodicUv);
+    EXPECT_LT(ErrorAgainst(testing::RingPoint, surface, 60).rms, 0.05) << name;
+    const TriMesh mesh = ReadMesh(folder_ / name / "surface.ply");
+    const EdgeReport edges = CheckEdges(mesh);
+    EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0) << name;
+    EXPECT_EQ(2 * mesh.points.size(), mesh.triangles.size()) << name;
+  }
+}
+
 // Noise of 1e-3 and twenty points a parameter or so: sigma is a fraction of it, and more at
 // borders.
 TEST(PointFit, SigmaIsKnownWhereItIsAskedFor) {
@@ -350,6 +409,13 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("fit: {terms: [symmetry]}\n"),
               HasSubstr("the auto plan weighs 'points' without a loss"));
   EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
+  EXPECT_THAT(read("parameters: cylinder\nclosure: periodic_uv\n"),
+              HasSubstr("go round in u alone; write closure: periodic_u"));
+  EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"),
+              HasSubstr("closure: parameters on a torus go round both ways"));
+  EXPECT_THAT(read("parameters: mesh\nclosure: periodic_uv\n"), HasSubstr("do not go round"));
+  EXPECT_THAT(read("patches_v: 3\nclosure: periodic_uv\n"),
+              HasSubstr("patches_v: H-spline: 8 x 3 patches are not allowed"));
   EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
   EXPECT_THAT(read("patches_u: 1\nclosure: periodic_u\n"), HasSubstr("patches_u: H-spline: 1 x 8"));
   for (const char* term : {"landmarks", "prior_shape", "spring", "non_penetration"}) {

@@ -18,6 +18,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
+#include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -128,6 +129,10 @@ TEST(DomainGrid, SurfaceThroughItsOwnSamplesIsTheSurface) {
   for (std::size_t k = 0; k < grid.size(); k += 97) {
     EXPECT_LT((again.Point(grid.UvAt(k)) - samples[k]).norm(), 0.05);
     EXPECT_EQ(grid.NearestTo(grid.UvAt(k)), k);
+  }
+  for (const Closure closure : {Closure::kPeriodicU, Closure::kPeriodicUv}) {
+    EXPECT_THAT(testing::WordsOf<InputError>([&] { GridOf({.closure = closure}); }),
+                HasSubstr("needs one that is open"));
   }
 }
 
