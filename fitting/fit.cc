@@ -276,6 +276,7 @@ class Fitter {
                     .held = Held(),
                     .solver = options_.solver,
                     .threads = context_.threads});
+    all.AddAsked(plan.finest);
     const auto solve = [&](std::span<const Term>) {
       SeePoints(all);
       const LevelSummary summary = all.Solve(SolveTolerance::kLoose);
@@ -323,7 +324,8 @@ class Fitter {
     const std::vector<Term> weighed = WithSmoothness(terms, result_.automatic->weight);
     const bool exact = !kept.exact.empty();
     const HSplineSurface start =
-        exact ? WithLevels(result_.surface, MostLevels(result_.surface.shape())) : result_.surface;
+        exact ? WithLevels(result_.surface, FinestAllowed(options_.plan, result_.surface.shape()))
+              : result_.surface;
     const HSplineSurface flat(start.shape(), rest);
     SpaceSolve all({.start = start,
                     .rest = flat,
@@ -332,9 +334,10 @@ class Fitter {
                     .solver = options_.solver,
                     .threads = context_.threads,
                     .settled = true});
-    LevelSummary summary = all.Settle();
     const AdaptivePlan where_unmet{.tolerance_mm = std::numeric_limits<double>::infinity(),
                                    .finest = start.shape().max_level};
+    all.AddAsked(where_unmet.finest);
+    LevelSummary summary = all.Settle();
     while (exact && all.Refine(where_unmet)) {
       summary = all.Settle();
     }
@@ -342,16 +345,6 @@ class Fitter {
     result_.surface = exact ? WithLevels(all.Surface(), all.finest()) : all.Surface();
     summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
     return summary;
-  }
-
-  // As many as a surface may have, and the plan allows.
-  int MostLevels(const HSplineShape& shape) const {
-    constexpr int kMostPatches = 8192;  // along one side (HSplineShape)
-    int levels = std::get<AutoPlan>(options_.plan).finest;
-    while ((std::max(shape.patches_u, shape.patches_v) << levels) > kMostPatches) {
-      --levels;
-    }
-    return std::max(levels, shape.max_level);
   }
 
   void SeePoints(SpaceSolve& all) const {

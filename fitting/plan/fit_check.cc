@@ -218,7 +218,6 @@ void CheckOptions(const FitOptions& options, int max_level) {
 }
 
 void CheckExact(std::span<const ExactPoint> exact, const FitOptions& options) {
-  constexpr std::size_t kMost = 500;
   if (exact.empty()) {
     return;
   }
@@ -230,8 +229,9 @@ void CheckExact(std::span<const ExactPoint> exact, const FitOptions& options) {
         "exact points need plan: auto or adaptive, solver: fastest, terms that treat x, y and z "
         "alike, and relaxation: none");
   }
-  if (exact.size() > kMost) {
-    Fail(fmt::format("{} exact points are more than {}; leave some out", exact.size(), kMost));
+  if (exact.size() > kMostExactPoints) {
+    Fail(fmt::format("{} exact points are more than {}; leave some out", exact.size(),
+                     kMostExactPoints));
   }
   for (const ExactPoint& point : exact) {
     if (!point.position.allFinite() || !point.normal.allFinite() ||

@@ -11,7 +11,13 @@
 namespace semblance {
 namespace {
 
-constexpr std::array<DerivativeOrder, 3> kOrders = {{{0, 0}, {1, 0}, {0, 1}}};
+constexpr DerivativeOrder kPlace = {0, 0}, kAlongU = {1, 0}, kAlongV = {0, 1};
+
+std::vector<DerivativeOrder> OrdersOf(HeldTangents tangents) {
+  return tangents == HeldTangents::kAlongU   ? std::vector{kAlongU}
+         : tangents == HeldTangents::kAlongV ? std::vector{kAlongV}
+                                             : std::vector{kAlongU, kAlongV};
+}
 
 }  // namespace
 
@@ -33,13 +39,13 @@ ExactEquations::ExactEquations(const HierarchicalSplineSpace& space,
   };
   for (int k = 0; k < points_; ++k) {
     const ExactPoint& point = points[k];
-    const int place = add(point.uv, kOrders[0]);
+    const int place = add(point.uv, kPlace);
     for (int c = 0; c < 3; ++c) {
       equations_.push_back({place, Vec3::Unit(c), point.position[c], k});
     }
     if (point.normal.squaredNorm() > 0) {
-      for (const int tangent : {1, 2}) {
-        equations_.push_back({add(point.uv, kOrders[tangent]), point.normal.normalized(), 0, k});
+      for (const DerivativeOrder tangent : OrdersOf(point.tangents)) {
+        equations_.push_back({add(point.uv, tangent), point.normal.normalized(), 0, k});
       }
     }
   }

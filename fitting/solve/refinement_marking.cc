@@ -93,21 +93,25 @@ bool Misses(const HSplineShape& shape, const QuadtreeNode& leaf, const AdaptiveP
 std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
                                         const AdaptivePlan& plan, const PointCloud& cloud,
                                         std::span<const double> squares,
-                                        std::span<const Vec2> unmet) {
-  std::set<int> asked;  // leaves
-  for (const Vec2& uv : unmet) {
-    asked.insert(space.LeafAt(uv));
+                                        std::span<const FinerPlace> places) {
+  std::map<int, int> asked;  // of leaves, the finest level of vertices
+  for (const FinerPlace& place : places) {
+    int& level = asked[space.LeafAt(place.uv)];
+    level = std::max(level, place.level);
   }
   const PatchCounts counts(space);
   std::set<VertexId> finer;
   for (int node = 0; node < std::ssize(space.nodes()); ++node) {
     const QuadtreeNode& leaf = space.nodes()[node];
     const bool enough = leaf.range.size() >= static_cast<std::size_t>(plan.min_points);
-    if (leaf.children >= 0 ||
-        !((enough && Misses(space.shape(), leaf, plan, cloud, squares)) || asked.contains(node))) {
+    if (leaf.children >= 0) {
       continue;
     }
-    for (int level = 0; level <= leaf.patch.level && level < plan.finest; ++level) {
+    const bool missed = enough && Misses(space.shape(), leaf, plan, cloud, squares);
+    const auto found = asked.find(node);
+    const int wanted = missed ? plan.finest : found == asked.end() ? 0 : found->second;
+    for (int level = 0; level <= leaf.patch.level && level < std::min(plan.finest, wanted);
+         ++level) {
       const int shift = leaf.patch.level - level;
       const PatchId patch{level, leaf.patch.i >> shift, leaf.patch.j >> shift};
       const std::vector<VertexId> missing = MissingOver(space, patch, plan.margin);

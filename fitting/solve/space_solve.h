@@ -10,6 +10,7 @@
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/solve/ceres_solver.h"
 #include "fitting/solve/level_fit.h"
+#include "fitting/solve/refinement_marking.h"
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
@@ -50,6 +51,8 @@ class SpaceSolve {
   void SeePoints();
   // Chooses `weight: auto`, then goes to the minimum.
   LevelSummary Solve(SolveTolerance until);
+  // Adds the vertices that exact points ask for, to level `finest` at most.
+  void AddAsked(int finest);
   // Adds the vertices that the plan asks for, those over exact points that are not met, and with a
   // term that pairs vertices their mirrors; false if there are none.
   bool Refine(const AdaptivePlan& plan);
@@ -97,7 +100,7 @@ class SpaceSolve {
   SolverOutcome Reweigh(double least_move);
   bool GoesDirectly() const;
   bool HasExact() const { return target_ != nullptr && !target_->exact.empty(); }
-  std::vector<Vec2> Unmet() const;
+  std::vector<FinerPlace> Unmet() const;
   void Measure();
   std::vector<double> FactorsOf(const std::vector<double>& squares) const;
   std::vector<int> HeldRows() const;
