@@ -8,12 +8,14 @@
 #include <map>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "problems/config/config.h"
 #include "problems/plots/histogram.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
 #include "problems/points/fit_report.h"
+#include "problems/points/join_report.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/report.h"
 
@@ -45,6 +47,9 @@ std::vector<std::string> Notes(const PointFit& result, const Figures& figures) {
   }
   if (figures.tolerance) {
     notes.push_back(ToleranceText(*figures.tolerance));
+  }
+  for (std::string& line : JoinLines(result.joins)) {
+    notes.push_back(std::move(line));
   }
   if (result.fit.automatic) {
     std::istringstream lines(AutoText(*result.fit.automatic));

@@ -20,6 +20,7 @@
 #include "problems/metrics/quantile.h"
 #include "problems/points/fit_page.h"
 #include "problems/points/fit_report.h"
+#include "problems/points/join_report.h"
 #include "problems/points/residual_files.h"
 #include "problems/points/surface_ply.h"
 #include "problems/report/fit_json.h"
@@ -148,6 +149,9 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
   }
+  if (!result.joins.empty()) {
+    json["joins"] = JoinsJson(result.joins);
+  }
   if (!result.attributes.empty()) {
     json["attributes"] = AttributesJson(result);
   }
@@ -238,6 +242,40 @@ std::string_view WrongPatches(HSplineShape shape) {
   return ShapeFault(shape).empty() ? "patches_v" : "patches_u";
 }
 
+// An edge is where the points' u or v is 0 or 1. A plane, a cylinder and a mesh laid out draw it
+// where the points happen to end, and no given edge need be there.
+std::string JoinParametersFault(ParameterSource source) {
+  return source == ParameterSource::kGiven
+             ? ""
+             : fmt::format(
+                   "an edge of the new surface is where its points' own u or v is 0 or 1, "
+                   "and parameters on a {} lay it elsewhere; give columns u and v, and "
+                   "parameters: given",
+                   NameOf(source));
+}
+
+void AddJoinFaults(const PointFitOptions& options, std::vector<OptionFault>& faults) {
+  if (options.joins.empty()) {
+    return;
+  }
+  if (const auto source = SourceAsked(options.parameters)) {
+    faults.push_back({"joins", JoinParametersFault(*source)});
+  }
+  if (std::string fault = JoinPlanFault(options.fit); !fault.empty()) {
+    faults.push_back({"joins", std::move(fault)});
+  }
+  for (OptionFault& fault : JoinFaults(options.joins, options.closure)) {
+    faults.push_back(std::move(fault));
+  }
+}
+
+void CheckJoinParameters(ParameterSource source, const PointFitOptions& options) {
+  if (const std::string fault = JoinParametersFault(source);
+      !fault.empty() && !options.joins.empty()) {
+    throw InputError("joins: " + fault);
+  }
+}
+
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
@@ -258,6 +296,7 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
   if (const std::string fault = AttributesFault(options.attributes); !fault.empty()) {
     faults.push_back({"attributes", fault});
   }
+  AddJoinFaults(options, faults);
   for (std::size_t k = 0; k < options.fit.terms.size(); ++k) {
     const Term& term = options.fit.terms[k];
     if (const std::string_view missing = WhatIsMissing(term);
@@ -289,6 +328,9 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   std::vector<std::string> notes;
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
+  }
+  for (std::string& line : JoinLines(result.joins)) {
+    notes.push_back(std::move(line));
   }
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
     notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,
@@ -380,18 +422,20 @@ std::vector<ExactPoint> ExactOf(const PointTable& table, std::span<const Vec2> u
   return exact;
 }
 
-FitResult FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
-                   const FitOptions& options, const RunContext& context) {
-  if (!exact.empty()) {
+JoinedFit FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
+                   std::span<const OpenedJoin> joins, const FitOptions& options,
+                   const RunContext& context) {
+  if (!exact.empty() || !joins.empty()) {
     FitTarget target = TargetOf(points.positions, points.uv, points.weights);
     target.exact = std::move(exact);
-    return Fit(start, target, {}, options, context);
+    return joins.empty() ? JoinedFit{Fit(start, target, {}, options, context), {}}
+                         : FitJoined(start, std::move(target), joins, options, context);
   }
   if (!IsAlone(options)) {
-    return Fit(start, points.View(), options, context);
+    return {Fit(start, points.View(), options, context), {}};
   }
   CheckFit(start, points.View(), options);
-  return FitAlone(start, std::move(points), std::get<AutoPlan>(options.plan), context);
+  return {FitAlone(start, std::move(points), std::get<AutoPlan>(options.plan), context), {}};
 }
 
 }  // namespace
@@ -455,8 +499,10 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   CheckChord(options.chord_mm, table.positions);
   CheckTrim(options.trim, table.positions);
   std::vector<PointAttribute> attributes = AttributesAsked(table, options);
+  const std::vector<OpenedJoin> joins = OpenJoins(options.joins, options.closure);
   StepClock step(context);
   Parametrisation parameters = step("parameters", [&] { return ParametersOf(table, options); });
+  CheckJoinParameters(parameters.source, options);
   const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
   CheckChord(options.chord_mm, start, {table.positions, parameters.uv}, context);
   const double root_weight = RootOfMeanWeight(table);
@@ -465,14 +511,14 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   const Box3 box = BoxOf(table.positions);
   OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
                      std::move(table.weights)};
+  JoinedFit joined = step("fit", [&] {
+    return FitOwned(start, std::move(points), std::move(exact), joins, options.fit, context);
+  });
   PointFit result{.parameters = std::string(NameOf(parameters.source)),
                   .how = std::move(parameters.how),
                   .map_faults = parameters.faults,
-                  .fit = step("fit",
-                              [&] {
-                                return FitOwned(start, std::move(points), std::move(exact),
-                                                options.fit, context);
-                              }),
+                  .fit = std::move(joined.fit),
+                  .joins = std::move(joined.joins),
                   .attributes = std::move(attributes),
                   .attribute_at = {},
                   .attribute_fit = {},

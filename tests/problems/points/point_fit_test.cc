@@ -218,6 +218,60 @@ TEST_F(PointFitCommand, FurtherColumnsAreFittedOverTheSurface) {
               HasSubstr("attributes: 'x' has a meaning of its own"));
 }
 
+// The two tables of docs/fit.md: the second patch continues the first.
+TEST_F(PointFitCommand, AJoinIsToldInEveryPlace) {
+  ASSERT_EQ(Call(fmt::format("fit {}/left.csv --out left --quiet", kConfigs)).code, 0);
+  const auto outcome =
+      Call(fmt::format("fit {}/right.csv --out right --quiet --set "
+                       "'joins=[{{surface: left/surface.hspline.json, edge: u0, its_edge: u1}}]'",
+                       kConfigs));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string line = "u0 joined to u1 of left/surface.hspline.json (tangent_plane, ";
+  EXPECT_THAT(outcome.out, HasSubstr(line));
+  EXPECT_THAT(outcome.out, ::testing::Not(HasSubstr("that is more than")));
+  EXPECT_THAT(ReadFileBytes(folder_ / "right/report.html"), HasSubstr(line));
+  const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "right/result.json"));
+  EXPECT_EQ(json["points"], 800);
+  ASSERT_EQ(json["joins"].size(), 1u);
+  EXPECT_EQ(json["joins"][0]["surface_sha256"],
+            Sha256OfFile(folder_ / "left/surface.hspline.json"));
+  EXPECT_LT(json["joins"][0]["largest_gap_mm"], 1e-9);
+  EXPECT_LT(json["joins"][0]["largest_angle_deg"], 0.1);
+  EXPECT_EQ(json["joins"][0]["holds"], true);
+  const std::string residuals = ReadFileBytes(folder_ / "right/residuals.csv");
+  EXPECT_EQ(std::count(residuals.begin(), residuals.end(), '\n'), 801);
+  const auto again = Call(fmt::format(
+      "fit {}/right.csv right/resolved.yaml --out again --quiet --threads 2", kConfigs));
+  ASSERT_EQ(again.code, 0) << again.err;
+  for (const char* file : {"surface.hspline.json", "result.json", "report.html"}) {
+    EXPECT_EQ(ReadFileBytes(folder_ / "again" / file), ReadFileBytes(folder_ / "right" / file));
+  }
+}
+
+TEST_F(PointFitCommand, AJoinThatCannotBeIsRefusedInOneLine) {
+  Write("xyz.csv", Csv(Scattered(FrankePoint, 300, 1e-3, 1), /*with_uv=*/false));
+  Write("no.json", "{}");
+  ASSERT_EQ(Call(fmt::format("fit {}/left.csv --out left --quiet", kConfigs)).code, 0);
+  const auto refused = [&](const std::string& points, const std::string& options,
+                           const std::string& words) {
+    const auto outcome =
+        Call(fmt::format("fit {} --out out --quiet --set 'joins=[{{{}", points, options));
+    EXPECT_EQ(outcome.code, 2) << options;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out" / "result.json"));
+  };
+  const std::string right = kConfigs + "/right.csv", left = "surface: left/surface.hspline.json";
+  refused(right, "surface: none.json}]'", "none.json");
+  refused(right, "surface: no.json}]'", "no.json: not an H-spline");
+  refused("xyz.csv", left + "}]'", "joins: an edge of the new surface is where its points' own");
+  refused(right, left + ", reversed: true}]'", "write reversed: false");
+  refused(right, left + "}]' --set fit.plan.type=listed", "joins: edges are held with fit.plan");
+  const auto checked = Call("check left/resolved.yaml --set 'joins=[{surface: none.json}]'");
+  EXPECT_EQ(checked.code, 2);
+  EXPECT_THAT(checked.out + checked.err, HasSubstr("joins[0].surface"));
+}
+
 TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
   Write("bad.csv", "x,y,z\n0,0,zero\n");
