@@ -130,22 +130,28 @@ Json TrimJson(const TrimReport& trim) {
       {"distance_mm", trim.distance_mm}, {"kept_mm2", trim.kept_mm2}, {"cut_mm2", trim.cut_mm2}};
 }
 
+// What every fit has.
+Json FiguresJson(const PointFitOptions& options, const PointSource& source,
+                 const PointFit& result) {
+  const DistanceQuantiles distance = QuantilesOf(result.fit);
+  return {{"title", options.title},
+          {"version", SEMBLANCE_VERSION},
+          {"points_file", source.name},
+          {"points_sha256", source.sha256},
+          {"points", result.fit.residual_mm.size()},
+          {"parameters", result.parameters},
+          {"rms_mm", result.fit.point_rms_mm},
+          {"median_mm", distance.median_mm},
+          {"p95_mm", distance.p95_mm},
+          {"max_mm", distance.max_mm},
+          {"control_vertices", VerticesJson(result.fit.surface)},
+          {"usable", result.Faults().empty()},
+          {"faults", result.Faults()}};
+}
+
 Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, const PointFit& result,
                   const std::optional<TrimReport>& trim) {
-  const DistanceQuantiles distance = QuantilesOf(result.fit);
-  Json json = {{"title", options.title},
-               {"version", SEMBLANCE_VERSION},
-               {"points_file", source.name},
-               {"points_sha256", source.sha256},
-               {"points", result.fit.residual_mm.size()},
-               {"parameters", result.parameters},
-               {"rms_mm", result.fit.point_rms_mm},
-               {"median_mm", distance.median_mm},
-               {"p95_mm", distance.p95_mm},
-               {"max_mm", distance.max_mm},
-               {"control_vertices", VerticesJson(result.fit.surface)},
-               {"usable", result.Faults().empty()},
-               {"faults", result.Faults()}};
+  Json json = FiguresJson(options, source, result);
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
   }
@@ -459,6 +465,29 @@ void AddAttributes(std::span<const double> weights, const RunContext& context, S
   }
 }
 
+void AddSigma(const HSplineSurface& start, std::span<const double> weights, StepClock& step,
+              PointFit& result) {
+  if (result.Faults().empty()) {
+    result.sigma = step("sigma", [&] { return SigmaOver(result, start, weights); });
+    result.sigma_mm = result.sigma->At(result.fit.uv);
+  }
+}
+
+PointFit FoundBy(Parametrisation parameters, JoinedFit joined,
+                 std::vector<PointAttribute> attributes) {
+  return {.parameters = std::string(NameOf(parameters.source)),
+          .how = std::move(parameters.how),
+          .map_faults = parameters.faults,
+          .fit = std::move(joined.fit),
+          .joins = std::move(joined.joins),
+          .attributes = std::move(attributes),
+          .attribute_at = {},
+          .attribute_fit = {},
+          .sigma = nullptr,
+          .sigma_mm = {},
+          .times = {}};
+}
+
 Box3 BoxOf(std::span<const Vec3> points) {
   Box3 box;
   for (const Vec3& p : points) {
@@ -514,23 +543,12 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   JoinedFit joined = step("fit", [&] {
     return FitOwned(start, std::move(points), std::move(exact), joins, options.fit, context);
   });
-  PointFit result{.parameters = std::string(NameOf(parameters.source)),
-                  .how = std::move(parameters.how),
-                  .map_faults = parameters.faults,
-                  .fit = std::move(joined.fit),
-                  .joins = std::move(joined.joins),
-                  .attributes = std::move(attributes),
-                  .attribute_at = {},
-                  .attribute_fit = {},
-                  .sigma = nullptr,
-                  .sigma_mm = {},
-                  .times = {}};
+  PointFit result = FoundBy(std::move(parameters), std::move(joined), std::move(attributes));
   result.sigma_factor = result.fit.automatic ? result.fit.automatic->noise_mm * root_weight : kNaN;
   result.reach = ReachBeyond(result.fit.surface, box);
   AddAttributes(weights, context, step, result);
-  if (options.sigma && result.Faults().empty()) {
-    result.sigma = step("sigma", [&] { return SigmaOver(result, start, weights); });
-    result.sigma_mm = result.sigma->At(result.fit.uv);
+  if (options.sigma) {
+    AddSigma(start, weights, step, result);
   }
   result.times = step.Take();
   return result;

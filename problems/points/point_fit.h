@@ -46,7 +46,7 @@ struct PointFitOptions {
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);  // of surface.ply's triangles
-  Trim trim;                                             // what surface.ply and pictures leave out
+  Trim trim = {};                                        // what surface.ply and pictures leave out
   ResidualFile residuals = ResidualFile::kAuto;  // auto: .csv of up to 100,000 points, else .ply
   bool sigma = false;                            // write the standard deviation; for the plan auto
   bool report = true;                            // write report.html
