@@ -247,8 +247,11 @@ TEST_F(Trust, TooLittleMemoryToBeginWithIsSaidToo) {
     const Outcome outcome = with(megabytes);
     EXPECT_THAT(outcome.code, AnyOf(1, 126, 127))
         << megabytes;  // the last two: the system's loader
-    EXPECT_THAT(outcome.err,
-                outcome.code == 1 ? HasSubstr("semblance: not enough memory") : HasSubstr(""));
+    // The second is the Fortran runtime's, which some BLAS bring and which begins before main.
+    if (outcome.code == 1) {
+      EXPECT_THAT(outcome.err, AnyOf(HasSubstr("semblance: not enough memory"),
+                                     HasSubstr("Cannot allocate memory")));
+    }
   }
 }
 
