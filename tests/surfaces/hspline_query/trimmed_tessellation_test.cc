@@ -37,15 +37,19 @@ std::vector<Vec3> Scattered(const HSplineSurface& surface, int count) {
 
 double Cross(const Vec2& a, const Vec2& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// Whether a triangle of the domain covers a place; corners on the other side of a seam are brought
-// to it.
+// The shorter way round where the surface is closed.
+Vec2 Way(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
+  const Vec2 way = to - from;
+  return {way.x() - (shape.ClosedU() ? std::round(way.x()) : 0),
+          way.y() - (shape.ClosedV() ? std::round(way.y()) : 0)};
+}
+
+// Whether a triangle of the domain covers a place; it is brought there over a seam as a whole.
 bool Covers(const HSplineShape& shape, const Tessellation& t, const Triangle& triangle,
             const Vec2& place) {
-  std::array<Vec2, 3> corners;
-  for (int k = 0; k < 3; ++k) {
-    corners[k] = t.uv[triangle[k]] - place;
-    corners[k].x() -= shape.ClosedU() ? std::round(corners[k].x()) : 0;
-    corners[k].y() -= shape.ClosedV() ? std::round(corners[k].y()) : 0;
+  std::array<Vec2, 3> corners = {Way(shape, place, t.uv[triangle[0]])};
+  for (const int k : {1, 2}) {
+    corners[k] = corners[0] + Way(shape, t.uv[triangle[0]], t.uv[triangle[k]]);
   }
   constexpr double kRounding = 1e-12;
   return Cross(corners[0], corners[1]) >= -kRounding &&
