@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>  // program_invocation_short_name
 #include <cmath>
 #include <cstdio>
 
@@ -56,9 +57,9 @@ void Print(const std::string& name, double ours, double peer, double goal, const
   };
   fmt::print(
       "{{\"name\":\"{}\",\"ours\":{},\"peer\":{},\"ratio\":{},\"goal\":{},\"met\":{},\"unit\":\"{}"
-      "\",\"command\":\"fit_bench\"}}\n",
+      "\",\"command\":\"{}\"}}\n",
       name, number(ours), number(peer), number(ratio), number(goal),
-      std::isnan(goal) ? "null" : (met ? "true" : "false"), unit);
+      std::isnan(goal) ? "null" : (met ? "true" : "false"), unit, program_invocation_short_name);
   std::fflush(stdout);
 }
 

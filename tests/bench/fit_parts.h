@@ -33,10 +33,6 @@ void RunRelaxation();
 // 1e6 points on one level against a direct solve of the same normal equations.
 void RunLinear();
 
-// The second half of a surface joined to the first (problems/points/fit_joins.h); the peer is the
-// fit that knows nothing of it.
-void RunJoined();
-
 // `count` points of the head with noise 1e-4; finer vertices where a point is farther off than the
 // tolerance. Errors on a grid of 400 x 400 that was not fitted.
 Measured MeasureHead(int count, double tolerance);

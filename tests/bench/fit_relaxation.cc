@@ -63,7 +63,7 @@ void RunRelaxation() {
     }
   }
   const bool reached = measured.rms_mm <= 1e-4;
-  Print("fit.relax_1e5_seconds_to_geometric_rms_1e-4", reached ? measured.seconds : kNaN, kNaN, 18,
+  Print("fit.relax_1e5_seconds_to_geometric_rms_1e-4", reached ? measured.seconds : kNaN, kNaN, 5,
         "s");
   Print("fit.relax_1e5_geometric_rms", measured.rms_mm, kNaN, 1e-4, "mm");
   Print("fit.relax_1e5_tangent_rounds", rounds, kNaN, kNaN, "1");

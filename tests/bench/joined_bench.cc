@@ -11,7 +11,7 @@
 #include "fitting/fit.h"
 #include "fitting/problem/start_surface.h"
 #include "problems/points/fit_joins.h"
-#include "tests/bench/fit_parts.h"
+#include "tests/bench/fit_measure.h"
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::bench {
@@ -92,12 +92,14 @@ void RunOne(const JoinedCase& one) {
   Print(name + "_cpu", joined_s, free_s, kNaN, "s");
 }
 
-}  // namespace
-
-void RunJoined() {
+void RunAll() {
   for (const JoinedCase& one : Cases()) {
     RunOne(one);
   }
 }
 
+}  // namespace
 }  // namespace semblance::bench
+
+// The peer is the fit that knows nothing of the join.
+int main() { semblance::bench::RunAll(); }
