@@ -16,22 +16,22 @@
 namespace semblance {
 namespace {
 
-// Empty if the new surface has it.
-std::string EdgeFault(SurfaceEdge edge, Closure closure) {
-  return HasEdge({.closure = closure}, edge)
-             ? ""
-             : fmt::format("a surface that goes round in u has no border at {}; join v0 or v1",
-                           NameOf(edge));
+// Empty if the surface has it. option: that the edge stands at.
+std::string EdgeFault(const HSplineShape& shape, SurfaceEdge edge, std::string_view option) {
+  if (HasEdge(shape, edge)) {
+    return "";
+  }
+  return shape.ClosedV() ? "goes round both ways and has no border; leave the join out"
+                         : fmt::format("goes round in u and has no border at {}; give {}: v0 or v1",
+                                       NameOf(edge), option);
 }
 
 void CheckItsEdge(const OpenedJoin& opened, std::string_view option, Closure closure) {
   const PatchJoin& join = opened.join;
   const HSplineShape& its = opened.surface.shape();
   const std::string where = fmt::format("{}: {}", option, join.surface.filename().string());
-  if (!HasEdge(its, join.its_edge)) {
-    throw InputError(
-        fmt::format("{} goes round in u and has no border at {}; give its_edge: v0 or v1", where,
-                    NameOf(join.its_edge)));
+  if (const std::string fault = EdgeFault(its, join.its_edge, "its_edge"); !fault.empty()) {
+    throw InputError(where + " " + fault);
   }
   const bool ours_closed = IsClosedAlong({.closure = closure}, join.edge);
   if (IsClosedAlong(its, join.its_edge) != ours_closed) {
@@ -51,8 +51,9 @@ std::vector<OptionFault> JoinFaults(std::span<const PatchJoin> joins, Closure cl
     if (joins[k].surface.empty()) {
       faults.push_back({option + ".surface", "it names no file; give an H-spline's"});
     }
-    if (std::string fault = EdgeFault(joins[k].edge, closure); !fault.empty()) {
-      faults.push_back({option + ".edge", std::move(fault)});
+    if (const std::string fault = EdgeFault({.closure = closure}, joins[k].edge, "edge");
+        !fault.empty()) {
+      faults.push_back({option + ".edge", "a surface of this closure " + fault});
     }
     const auto earlier = joins.first(k);
     if (std::ranges::find(earlier, joins[k].edge, &PatchJoin::edge) != earlier.end()) {

@@ -46,11 +46,11 @@ Vec2 OnEdge(SurfaceEdge edge, double t) {
 }
 
 bool HasEdge(const HSplineShape& shape, SurfaceEdge edge) {
-  return shape.closure == Closure::kOpen || !RunsAlongV(edge);
+  return RunsAlongV(edge) ? !shape.ClosedU() : !shape.ClosedV();
 }
 
 bool IsClosedAlong(const HSplineShape& shape, SurfaceEdge edge) {
-  return shape.closure == Closure::kPeriodicU && !RunsAlongV(edge);
+  return RunsAlongV(edge) ? shape.ClosedV() : shape.ClosedU();
 }
 
 int PatchesAlong(const HSplineShape& shape, SurfaceEdge edge) {

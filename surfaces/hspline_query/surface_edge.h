@@ -25,7 +25,8 @@ constexpr bool RunsAlongV(SurfaceEdge edge) {
 // t: in [0,1], the edge's free parameter: v along u0 and u1, u along v0 and v1.
 Vec2 OnEdge(SurfaceEdge edge, double t);
 
-// A surface that goes round has no border at u = 0 and u = 1, and one that closes at v = 0 and 1.
+// A surface that goes round in u has no border at u = 0 and u = 1, and closed ones at v = 0 and 1;
+// one that goes round both ways has none.
 bool HasEdge(const HSplineShape& shape, SurfaceEdge edge);
 bool IsClosedAlong(const HSplineShape& shape, SurfaceEdge edge);
 

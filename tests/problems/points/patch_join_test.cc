@@ -33,6 +33,11 @@ class PatchJoins : public ::testing::Test {
         SmoothSurface(
             {.patches_u = 4, .patches_v = 4, .max_level = 0, .closure = Closure::kPeriodicU},
             /*random_seed=*/1));
+    WriteHSpline(
+        folder_ / "torus.json",
+        SmoothSurface(
+            {.patches_u = 4, .patches_v = 4, .max_level = 0, .closure = Closure::kPeriodicUv},
+            /*random_seed=*/1));
   }
 
   std::vector<OpenedJoin> Open(const std::string& name, SurfaceEdge edge, SurfaceEdge its_edge,
@@ -80,6 +85,10 @@ TEST_F(PatchJoins, EdgesThatAreNoneAreRefused) {
               HasSubstr("its edge v1 is closed and the new edge u0 is open"));
   EXPECT_THAT(refusal("open.json", SurfaceEdge::kV0, SurfaceEdge::kV1, Closure::kPeriodicU),
               HasSubstr("its edge v1 is open and the new edge v0 is closed"));
+  for (const SurfaceEdge its_edge : {SurfaceEdge::kU0, SurfaceEdge::kV1}) {
+    EXPECT_THAT(refusal("torus.json", SurfaceEdge::kV0, its_edge, Closure::kPeriodicU),
+                HasSubstr("torus.json goes round both ways and has no border"));
+  }
   EXPECT_EQ(Open("tube.json", SurfaceEdge::kV0, SurfaceEdge::kV1, Closure::kPeriodicU).size(), 1u);
   EXPECT_THAT(WordsOf<IoError>([&] { Open("none.json", SurfaceEdge::kU0, SurfaceEdge::kU1); }),
               HasSubstr("none.json"));
@@ -96,8 +105,11 @@ TEST(PatchJoin, WhatIsWrongIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("joins: [{edge: u0}]\n"), HasSubstr("joins[0].surface: it names no file"));
   EXPECT_THAT(read("joins: [{surface: a.json}, {surface: b.json}]\n"),
               HasSubstr("joins[1].edge: u0 is joined already"));
-  EXPECT_THAT(read("closure: periodic_u\n" + join),
-              HasSubstr("joins[0].edge: a surface that goes round in u has no border at u0"));
+  EXPECT_THAT(
+      read("closure: periodic_u\n" + join),
+      HasSubstr("joins[0].edge: a surface of this closure goes round in u and has no border at "
+                "u0; give edge: v0 or v1"));
+  EXPECT_THAT(read("closure: periodic_uv\n" + join), HasSubstr("goes round both ways"));
   for (const char* parameters : {"plane", "mesh"}) {
     EXPECT_THAT(read("parameters: " + std::string(parameters) + "\n" + join),
                 AllOf(HasSubstr("joins: an edge of the new surface is where its points' own"),

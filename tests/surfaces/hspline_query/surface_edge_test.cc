@@ -132,6 +132,11 @@ TEST(SurfaceEdge, WhatGoesRoundHasNoEdgeAcross) {
   EXPECT_FALSE(HasEdge(tube, SurfaceEdge::kU0));
   EXPECT_TRUE(HasEdge(tube, SurfaceEdge::kV1));
   EXPECT_TRUE(IsClosedAlong(tube, SurfaceEdge::kV1));
+  const HSplineShape torus{.closure = Closure::kPeriodicUv};
+  for (const SurfaceEdge edge : kEdges) {
+    EXPECT_FALSE(HasEdge(torus, edge));
+    EXPECT_TRUE(IsClosedAlong(torus, edge));
+  }
   EXPECT_TRUE(HasEdge({}, SurfaceEdge::kU1));
   EXPECT_FALSE(IsClosedAlong({}, SurfaceEdge::kV0));
 }
