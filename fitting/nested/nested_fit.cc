@@ -25,7 +25,6 @@ using Residual = NestedResidual;
 using Indices = std::vector<std::uint32_t>;
 
 constexpr int kMostRounds = 24;
-constexpr int kMostPatches = 8192;  // along one side (HSplineShape)
 constexpr std::size_t kFewestLooked = 100000, kPointsPerVertex = 24;
 constexpr double kAsGood = 1.001;      // of the mean square held out
 constexpr double kFewNew = 0.005;      // of the vertices: not worth a round
@@ -87,11 +86,8 @@ class NestedFitter {
         solve_(points_, MeanLengths(start)),
         rounding_mm_(kRounding * MeanLengths(start).norm()),
         space_(start.shape()),
-        cap_(plan.finest),
+        cap_(FinestAllowed(plan, start.shape())),
         outlier_(points_.size(), 0) {
-    while ((std::max(start.shape().patches_u, start.shape().patches_v) << cap_) > kMostPatches) {
-      --cap_;
-    }
     finest_ = FinestByDensity(points_, 1, space_[0].layout, cap_);
   }
 

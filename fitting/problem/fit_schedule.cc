@@ -41,7 +41,6 @@ int FinestLevelOf(const SchedulePlan& plan) {
 }
 
 int FinestAllowed(const SchedulePlan& plan, const HSplineShape& shape) {
-  constexpr int kMostPatches = 8192;  // along one side (HSplineShape)
   const auto* const automatic = std::get_if<AutoPlan>(&plan);
   int finest = automatic != nullptr ? automatic->finest : FinestLevelOf(plan);
   while (finest > 0 && (std::max(shape.patches_u, shape.patches_v) << finest) > kMostPatches) {

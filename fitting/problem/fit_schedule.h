@@ -242,7 +242,7 @@ FitAim AimOf(const SchedulePlan& plan);
 // The finest level that a plan names; 0 of the auto plan, which takes the levels that it needs.
 int FinestLevelOf(const SchedulePlan& plan);
 // The finest level that a surface of this shape may come to by the plan: with the auto plan its
-// finest, or as many as 8192 patches along a side allow.
+// finest, or as many as kMostPatches allow.
 int FinestAllowed(const SchedulePlan& plan, const HSplineShape& shape);
 
 }  // namespace semblance

@@ -24,7 +24,7 @@ double Power(double x, int order) { return order == 0 ? 1 : order == 1 ? x : x *
 }  // namespace
 
 void CheckShape(const HSplineShape& shape) {
-  constexpr int kMostLevels = 8, kMostPatches = 8192;  // a side of the finest level
+  constexpr int kMostLevels = 8;
   const int least_u = shape.ClosedU() ? 4 : 1, least_v = shape.ClosedV() ? 4 : 1;
   if (shape.max_level < 0 || shape.max_level > kMostLevels) {
     throw InputError(fmt::format("H-spline: the finest level is {}; it must be in 0..{}",

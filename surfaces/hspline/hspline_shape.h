@@ -35,9 +35,12 @@ constexpr auto EnumNames(OffsetReference) {
   return std::to_array<std::string_view>({"frame", "world"});
 }
 
+// Along one side of the finest level.
+inline constexpr int kMostPatches = 8192;
+
 // The domain is [0,1] x [0,1]; level L has patches_u 2^L x patches_v 2^L patches.
 struct HSplineShape {
-  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (closed); at most 8192 on the finest level
+  int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (closed); at most kMostPatches
   int patches_v = 8;  // likewise
   int max_level = 3;  // finest level that may hold detail; 0..8
   Closure closure = Closure::kOpen;
