@@ -204,7 +204,6 @@ std::vector<JoinCorner> CornersOf(std::span<const OpenedJoin> joins) {
 }
 
 void CheckCorners(std::span<const OpenedJoin> joins, double extent_mm) {
-  constexpr double kApart = 1e-6, kMostAngle_deg = 0.1;
   for (const JoinCorner& corner : CornersOf(joins)) {
     const OpenedJoin &a = joins[corner.first], &b = joins[corner.second];
     const SurfaceFrame at_a = a.surface.Frame(a.ItsPlace(corner.first_t)),
@@ -212,7 +211,7 @@ void CheckCorners(std::span<const OpenedJoin> joins, double extent_mm) {
     const std::string where =
         fmt::format("joins[{}] and joins[{}]: at the corner of {} and {}", corner.first,
                     corner.second, NameOf(a.join.edge), NameOf(b.join.edge));
-    if (const double gap_mm = (at_a.point - at_b.point).norm(); gap_mm > kApart * extent_mm) {
+    if (const double gap_mm = (at_a.point - at_b.point).norm(); gap_mm > kMostJoinGap * extent_mm) {
       throw InputError(fmt::format(
           "{} the given surfaces are {:.3g} mm apart; choose other edges or `reversed`, or join "
           "one of them",
@@ -220,7 +219,7 @@ void CheckCorners(std::span<const OpenedJoin> joins, double extent_mm) {
     }
     const double angle_deg = std::max(Leaving_deg(a, at_a, TangentAlong(b, at_b)),
                                       Leaving_deg(b, at_b, TangentAlong(a, at_a)));
-    if (angle_deg > kMostAngle_deg) {
+    if (angle_deg > kMostJoinAngle_deg) {
       throw InputError(fmt::format(
           "{} one edge leaves the other's tangent plane by {:.3g} degrees; join with continuity: "
           "position, or one of them",

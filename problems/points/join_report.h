@@ -11,9 +11,6 @@
 
 namespace semblance {
 
-inline constexpr double kMostJoinGap = 1e-6;  // of the points' extent
-inline constexpr double kMostJoinAngle_deg = 0.1;
-
 // Over 1,000 places of the edge at which it is not held (MeetingsAlong).
 struct JoinReport {
   PatchJoin join;

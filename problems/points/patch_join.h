@@ -21,6 +21,10 @@ constexpr auto EnumNames(JoinContinuity) {
   return std::to_array<std::string_view>({"position", "tangent_plane"});
 }
 
+// What a join that holds leaves at most.
+inline constexpr double kMostJoinGap = 1e-6;  // of the points' extent
+inline constexpr double kMostJoinAngle_deg = 0.1;
+
 struct PatchJoin {
   std::filesystem::path surface = {};                         // of an H-spline
   SurfaceEdge edge = SurfaceEdge::kU0;                        // of the new surface
