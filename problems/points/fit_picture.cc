@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -175,18 +176,9 @@ struct ShownGrid {
 
 // Without the vertices of no triangle: the view frames all that it is given.
 ShownGrid ShownOf(const FitGrid& grid) {
-  std::vector<int> now(grid.mesh.points.size(), -1);
-  ShownGrid shown;
-  for (Triangle t : grid.mesh.triangles) {
-    for (int& corner : t) {
-      if (now[corner] < 0) {
-        now[corner] = static_cast<int>(shown.rms_mm.size());
-        shown.mesh.points.push_back(grid.mesh.points[corner]);
-        shown.rms_mm.push_back(grid.rms_mm[corner]);
-      }
-      corner = now[corner];
-    }
-    shown.mesh.triangles.push_back(t);
+  ShownGrid shown{.mesh = grid.mesh, .rms_mm = {}};
+  for (const std::int32_t vertex : DropUnusedPoints(shown.mesh)) {
+    shown.rms_mm.push_back(grid.rms_mm[vertex]);
   }
   return shown;
 }
@@ -196,7 +188,7 @@ ShownGrid ShownOf(const FitGrid& grid) {
 std::string FitScene(const FitGrid& grid) {
   const ColourMap map = DistanceColours(grid);
   const double scale = map.high_mm / 100;  // what is written has whole hundredths
-  ShownGrid shown = grid.kept.empty() ? ShownGrid{grid.mesh, grid.rms_mm} : ShownOf(grid);
+  ShownGrid shown = ShownOf(grid);
   for (double& value : shown.rms_mm) {
     value /= scale;
   }

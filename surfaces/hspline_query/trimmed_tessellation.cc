@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -132,15 +131,6 @@ std::vector<char> WithinDistance(std::span<const Vec3> points, const PointQuery&
   return within;
 }
 
-double AreaOf(const TriMesh& mesh) {
-  double twice = 0;
-  for (const Triangle& t : mesh.triangles) {
-    const Vec3& a = mesh.points[t[0]];
-    twice += (mesh.points[t[1]] - a).cross(mesh.points[t[2]] - a).norm();
-  }
-  return twice / 2;
-}
-
 // An edge that the border crosses: from the corner within the distance to the one beyond it.
 using CutEdge = std::pair<int, int>;
 
@@ -259,23 +249,21 @@ void AddVertices(const HSplineBatch& surface, const std::vector<Vec2>& uv, int t
   t.normals.insert(t.normals.end(), added.normals.begin(), added.normals.end());
 }
 
-// Without vertices that no triangle uses.
-Tessellation Compacted(Tessellation t) {
-  std::vector<int> now(t.uv.size(), -1);
-  Tessellation result;
-  for (Triangle& triangle : t.mesh.triangles) {
-    for (int& corner : triangle) {
-      if (now[corner] < 0) {
-        now[corner] = static_cast<int>(result.uv.size());
-        result.uv.push_back(t.uv[corner]);
-        result.mesh.points.push_back(t.mesh.points[corner]);
-        result.normals.push_back(t.normals[corner]);
-      }
-      corner = now[corner];
-    }
+template <class T>
+std::vector<T> Taken(const std::vector<T>& from, std::span<const std::int32_t> indices) {
+  std::vector<T> taken;
+  taken.reserve(indices.size());
+  for (const std::int32_t index : indices) {
+    taken.push_back(from[index]);
   }
-  result.mesh.triangles = std::move(t.mesh.triangles);
-  return result;
+  return taken;
+}
+
+Tessellation WithoutUnused(Tessellation t) {
+  const std::vector<std::int32_t> left = DropUnusedPoints(t.mesh);
+  t.uv = Taken(t.uv, left);
+  t.normals = Taken(t.normals, left);
+  return t;
 }
 
 }  // namespace
@@ -288,7 +276,7 @@ TrimmedTessellation TessellateNear(const HSplineSurface& surface, double chord_m
   }
   Tessellation mesh = TessellateCells(
       surface, CellsWithBorder(surface, chord_mm, near, distance_mm, threads), threads);
-  const double whole_mm2 = AreaOf(mesh.mesh);
+  const double whole_mm2 = Area(mesh.mesh);
   const std::vector<char> within = WithinDistance(mesh.mesh.points, near, distance_mm, threads);
   Crossings crossings(surface.shape(), mesh, within);
   const HSplineBatch batch(surface);
@@ -299,8 +287,8 @@ TrimmedTessellation TessellateNear(const HSplineSurface& surface, double chord_m
   }
   AddVertices(batch, crossings.Places(), threads, mesh);
   mesh.mesh.triangles = std::move(triangles);
-  TrimmedTessellation result{.kept = Compacted(std::move(mesh))};
-  result.kept_mm2 = AreaOf(result.kept.mesh);
+  TrimmedTessellation result{.kept = WithoutUnused(std::move(mesh))};
+  result.kept_mm2 = Area(result.kept.mesh);
   result.cut_mm2 = std::max(0.0, whole_mm2 - result.kept_mm2);
   return result;
 }

@@ -155,26 +155,35 @@ std::vector<MeshEdge> BorderEdges(const TriMesh& mesh) {
   return border;
 }
 
-TriMesh Submesh(const TriMesh& mesh, const std::vector<bool>& keep) {
-  std::vector<std::int32_t> renumbered(mesh.points.size(), -1);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const std::int32_t v : mesh.triangles[t]) {
-      renumbered[v] = keep[t] ? 0 : renumbered[v];
+std::vector<std::int32_t> DropUnusedPoints(TriMesh& mesh) {
+  std::vector<std::int32_t> renumbered(mesh.points.size(), -1), left;
+  for (const Triangle& t : mesh.triangles) {
+    for (const std::int32_t v : t) {
+      renumbered[v] = 0;
     }
   }
-  TriMesh result;
   for (std::size_t v = 0; v < mesh.points.size(); ++v) {
     if (renumbered[v] == 0) {
-      renumbered[v] = static_cast<std::int32_t>(result.points.size());
-      result.points.push_back(mesh.points[v]);
+      renumbered[v] = static_cast<std::int32_t>(left.size());
+      mesh.points[left.size()] = mesh.points[v];
+      left.push_back(static_cast<std::int32_t>(v));
     }
   }
+  mesh.points.resize(left.size());
+  for (Triangle& t : mesh.triangles) {
+    t = {renumbered[t[0]], renumbered[t[1]], renumbered[t[2]]};
+  }
+  return left;
+}
+
+TriMesh Submesh(const TriMesh& mesh, const std::vector<bool>& keep) {
+  TriMesh result{mesh.points, {}};
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (keep[t]) {
-      const Triangle& old = mesh.triangles[t];
-      result.triangles.push_back({renumbered[old[0]], renumbered[old[1]], renumbered[old[2]]});
+      result.triangles.push_back(mesh.triangles[t]);
     }
   }
+  DropUnusedPoints(result);
   return result;
 }
 

@@ -57,6 +57,10 @@ EdgeReport CheckEdges(const TriMesh& mesh);
 using MeshEdge = std::array<std::int32_t, 2>;
 std::vector<MeshEdge> BorderEdges(const TriMesh& mesh);
 
+// Leaves out the points that no triangle uses; the others stay in their order. Returns the indices
+// that these had.
+std::vector<std::int32_t> DropUnusedPoints(TriMesh& mesh);
+
 // The triangles for which keep[t] is true, and the points they use, in their old order. keep: one
 // entry per triangle.
 TriMesh Submesh(const TriMesh& mesh, const std::vector<bool>& keep);

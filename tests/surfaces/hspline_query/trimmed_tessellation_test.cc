@@ -113,12 +113,7 @@ TEST_P(TrimLaws, NearEverywhereIsTheWholeSurface) {
       TessellateNear(surface, kChord, PointQuery(Scattered(surface, 5)), 1e4);
   EXPECT_EQ(t.cut_mm2, 0);
   EXPECT_EQ(t.kept.mesh.triangles.size(), whole.mesh.triangles.size());
-  double area = 0;
-  for (const Triangle& triangle : whole.mesh.triangles) {
-    const Vec3& a = whole.mesh.points[triangle[0]];
-    area +=
-        (whole.mesh.points[triangle[1]] - a).cross(whole.mesh.points[triangle[2]] - a).norm() / 2;
-  }
+  const double area = Area(whole.mesh);
   EXPECT_NEAR(t.kept_mm2, area, 1e-9 * area);
 }
 

@@ -69,5 +69,14 @@ TEST(TriMesh, TwoSpheresAreTwoComponentsAndEachCanBeTaken) {
   EXPECT_EQ(taken.triangles, second.triangles);
 }
 
+TEST(TriMesh, UnusedPointsAreDroppedAndTheOthersKeepTheirOrder) {
+  const std::vector<Vec3> points = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 1, 0}, {4, 0, 0}};
+  TriMesh mesh{points, {{4, 1, 3}}};
+  EXPECT_EQ(DropUnusedPoints(mesh), (std::vector<std::int32_t>{1, 3, 4}));
+  EXPECT_EQ(mesh.points, (std::vector<Vec3>{points[1], points[3], points[4]}));
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{2, 0, 1}}));
+  EXPECT_EQ(DropUnusedPoints(mesh), (std::vector<std::int32_t>{0, 1, 2}));
+}
+
 }  // namespace
 }  // namespace semblance
