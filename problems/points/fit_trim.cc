@@ -58,10 +58,15 @@ std::vector<Vec3> PlacesOf(const FitResult& fit, int threads) {
 
 void CheckTrim(const Trim& trim, std::span<const Vec3> positions) {
   const auto* const cloud = std::get_if<CloudTrim>(&trim);
-  if (cloud == nullptr || cloud->distance_mm.automatic || positions.size() < 2) {
+  if (cloud == nullptr || positions.empty()) {
     return;
   }
-  const double apart_mm = NeighbourDistance(PointQuery(positions), positions, 1, 0.5);
+  const PointQuery query(positions);
+  if (cloud->distance_mm.automatic) {
+    AutoDistance(query, positions);
+    return;
+  }
+  const double apart_mm = positions.size() > 1 ? NeighbourDistance(query, positions, 1, 0.5) : 0;
   if (cloud->distance_mm.value < apart_mm) {
     throw InputError(fmt::format(
         "trim.distance_mm: {} is less than what neighbouring points are apart ({:.3g} mm in the "

@@ -42,8 +42,9 @@ void Fields(Visitor& visit, CloudTrim& o) {
 
 using Trim = std::variant<NoTrim, CloudTrim>;
 
-// Throws InputError for a distance that is less than what neighbouring points are apart: the
-// surface would fall into as many pieces. Before the fit.
+// Before the fit, what could only be refused after it. Throws InputError for a distance that is
+// less than what neighbouring points are apart, for the surface would fall into as many pieces; and
+// where `auto` finds that most points coincide, or that they are too few.
 void CheckTrim(const Trim& trim, std::span<const Vec3> positions);
 
 // Where a surface is kept: within a distance of the points' places on it, outliers apart.
@@ -51,8 +52,7 @@ struct TrimmedTo {
   PointQuery places;
   double distance_mm = kNaN;
 };
-// Nothing for a surface that is kept whole. Throws InputError where `auto` finds that most points
-// coincide, or that they are too few.
+// Nothing for a surface that is kept whole. Throws InputError as CheckTrim does for `auto`.
 std::optional<TrimmedTo> TrimOf(const Trim& trim, const FitResult& fit, int threads);
 
 // What was kept and cut.

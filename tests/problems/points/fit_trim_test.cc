@@ -46,17 +46,6 @@ std::string CsvOf(const std::vector<Vec3>& points) {
   return csv;
 }
 
-double AreaOf(const TriMesh& mesh) {
-  double area = 0;
-  for (const Triangle& t : mesh.triangles) {
-    area += (mesh.points[t[1]] - mesh.points[t[0]])
-                .cross(mesh.points[t[2]] - mesh.points[t[0]])
-                .norm() /
-            2;
-  }
-  return area;
-}
-
 class FitTrim : public ::testing::Test {
  protected:
   // A fit of ring.csv into a folder of that name.
@@ -85,10 +74,10 @@ TEST_F(FitTrim, LeavesWhatIsNearThePoints) {
     EXPECT_LT(radius, 40 + distance);
   }
   const double least = std::numbers::pi * (40 * 40 - 15 * 15);
-  EXPECT_GT(AreaOf(ring), least);
-  EXPECT_LT(AreaOf(ring), AreaOf(whole));
-  EXPECT_NEAR(json["kept_mm2"], AreaOf(ring), 1e-4 * least);  // the file's points are floats
-  EXPECT_NEAR(json["kept_mm2"].get<double>() + json["cut_mm2"].get<double>(), AreaOf(whole),
+  EXPECT_GT(Area(ring), least);
+  EXPECT_LT(Area(ring), Area(whole));
+  EXPECT_NEAR(json["kept_mm2"], Area(ring), 1e-4 * least);  // the file's points are floats
+  EXPECT_NEAR(json["kept_mm2"].get<double>() + json["cut_mm2"].get<double>(), Area(whole),
               1e-3 * least);
   EXPECT_EQ(ReadHSpline(folder_ / "ring/surface.hspline.json").Net(0).vertices,
             ReadHSpline(folder_ / "whole/surface.hspline.json").Net(0).vertices);
@@ -140,6 +129,16 @@ TEST(TrimOf, AutoRefusesPointsThatCoincide) {
   EXPECT_THROW(TrimOf(CloudTrim(), fit, 1), InputError);
   fit.uv.resize(3);
   EXPECT_THROW(TrimOf(CloudTrim(), fit, 1), InputError);
+}
+
+TEST(CheckTrim, RefusesBeforeTheFitWhatAutoCannotTell) {
+  std::vector<Vec3> points(50, Vec3(1, 2, 3));
+  EXPECT_THROW(CheckTrim(CloudTrim(), points), InputError);
+  EXPECT_NO_THROW(CheckTrim(NoTrim(), points));
+  points = Ring(8);
+  points.resize(8);
+  EXPECT_THROW(CheckTrim(CloudTrim(), points), InputError);
+  EXPECT_NO_THROW(CheckTrim(CloudTrim(), Ring(100)));
 }
 
 TEST(TrimText, SaysHowMuchIsLeftOut) {
