@@ -17,9 +17,9 @@
 
 namespace semblance {
 
-// The parameters that are given, if there are any. Otherwise a surface that goes round both ways
-// takes a torus's, one that goes round in u the cylinder's, and an open one a plane's. Where every
-// plane folds and there are triangles, the mesh is laid out.
+// The parameters that are given, if there are any. Otherwise those of a torus for a surface that
+// goes round both ways, of a cylinder for one that goes round in u, and of a plane for an open one.
+// Where every plane folds and there are triangles, the mesh is laid out.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
