@@ -117,7 +117,7 @@ void TrimGrid(const TrimmedTo& trim, int threads, FitGrid& grid) {
   constexpr std::size_t kBlock = 256;
   grid.kept.assign(grid.mesh.points.size(), 0);
   ParallelFor(grid.kept.size(), threads, kBlock, [&](std::size_t k) {
-    grid.kept[k] = trim.places.DistanceTo(grid.mesh.points[k]) <= trim.distance_mm;
+    grid.kept[k] = trim.places.DistanceTo(grid.mesh.points[k]) <= trim.distance_mm ? 1 : 0;
   });
   grid.mesh.triangles = TrianglesOf(grid);
 }
@@ -130,7 +130,7 @@ FitGrid Halved(const FitGrid& grid) {
                .kept = {}};
   for (int j = 0; j < half.rows; ++j) {
     for (int i = 0; i < half.columns; ++i) {
-      const std::size_t at = static_cast<std::size_t>(2 * j) * grid.columns + 2 * i;
+      const std::size_t at = 2 * (static_cast<std::size_t>(j) * grid.columns + i);
       half.mesh.points.push_back(grid.mesh.points[at]);
       half.rms_mm.push_back(grid.rms_mm[at]);
       if (!grid.kept.empty()) {

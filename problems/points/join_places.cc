@@ -135,7 +135,7 @@ double Leaving_deg(const OpenedJoin& join, const SurfaceFrame& plane, const Vec3
 
 }  // namespace
 
-EdgeSpans AsFineAsItsEdge(EdgeSpans spans, const OpenedJoin& join, std::string_view name,
+EdgeSpans AsFineAsItsEdge(const EdgeSpans& spans, const OpenedJoin& join, std::string_view name,
                           const NewShape& shape) {
   const int patches = PatchesAlong(shape.level0, join.join.edge), its_patches = join.ItsPatches();
   const EdgeSpans its = join.ItsSpans();

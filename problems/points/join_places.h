@@ -25,7 +25,7 @@ struct NewShape {
 // have the same patches but for a power of two, the given curve is then one that the new edge can
 // take. Throws InputError, naming the join, if that would need levels that the plan does not allow.
 //   name: "joins[0]" and so on.
-EdgeSpans AsFineAsItsEdge(EdgeSpans spans, const OpenedJoin& join, std::string_view name,
+EdgeSpans AsFineAsItsEdge(const EdgeSpans& spans, const OpenedJoin& join, std::string_view name,
                           const NewShape& shape);
 
 // The finer spans of two partitions by halves of the same edge.

@@ -48,8 +48,8 @@ class Triangulation {
     const auto [vertex, is_new] = vertices_.emplace(Key(x, y), static_cast<int>(result_.uv.size()));
     if (is_new) {
       const double unit = 2 << kDeepestCell;
-      result_.uv.emplace_back(vertex->first.second / (shape_.patches_u * unit),
-                              vertex->first.first / (shape_.patches_v * unit));
+      result_.uv.emplace_back(static_cast<double>(vertex->first.second) / (shape_.patches_u * unit),
+                              static_cast<double>(vertex->first.first) / (shape_.patches_v * unit));
     }
     return vertex->second;
   }

@@ -126,8 +126,9 @@ std::set<DomainCell> CellsWithBorder(const HSplineSurface& surface, double chord
 std::vector<char> WithinDistance(std::span<const Vec3> points, const PointQuery& near,
                                  double distance_mm, int threads) {
   std::vector<char> within(points.size());
-  ParallelFor(points.size(), threads, kBlock,
-              [&](std::size_t k) { within[k] = near.DistanceTo(points[k]) <= distance_mm; });
+  ParallelFor(points.size(), threads, kBlock, [&](std::size_t k) {
+    within[k] = near.DistanceTo(points[k]) <= distance_mm ? 1 : 0;
+  });
   return within;
 }
 
@@ -157,7 +158,8 @@ class Crossings {
     constexpr int kHalvings = 16;
     inner_.assign(edges_.size(), 0);
     std::vector<Vec2> uv(edges_.size());
-    for (double step = 0.5; step >= std::ldexp(1.0, -kHalvings); step /= 2) {
+    for (int halving = 1; halving <= kHalvings; ++halving) {
+      const double step = std::ldexp(1.0, -halving);
       for (std::size_t k = 0; k < edges_.size(); ++k) {
         uv[k] = Along(edges_[k], inner_[k] + step);
       }
