@@ -549,7 +549,7 @@ double SpaceSolve::CostOf(const Term& term) {
   if (const auto* const points = std::get_if<PointTerm>(&term); points != nullptr) {
     double sum = 0;
     for (std::size_t k = 0; !IsSeparable(*points) && k < squares_.size(); ++k) {
-      sum += cloud_.points()[k].weight * Rho(*points, squares_[k]);
+      sum += cloud_.points()[k].weight() * Rho(*points, squares_[k]);
     }
     const double mean = IsSeparable(*points) ? rms_mm_ * rms_mm_ : sum / cloud_.weight_sum();
     return cloud_.points().empty() ? 0 : points->weight * mean;
@@ -607,7 +607,7 @@ std::vector<double> SpaceSolve::PointWeights() const {
   std::vector<double> weights(cloud_.points().size(), 0);
   const bool any = std::any_of(terms_.begin(), terms_.end(), IsOfPoints);
   for (std::size_t k = 0; any && k < weights.size(); ++k) {
-    weights[cloud_.Given(k)] = Scale() * cloud_.points()[k].weight * (weighed_ ? factors[k] : 1);
+    weights[cloud_.Given(k)] = Scale() * cloud_.points()[k].weight() * (weighed_ ? factors[k] : 1);
   }
   return weights;
 }

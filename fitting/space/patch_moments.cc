@@ -85,11 +85,11 @@ SEMBLANCE_WIDE_256 void Accumulate(const Batch& batch, const Polynomial& p, Patc
   for (std::size_t k = 0; k < batch.count; ++k) {
     const CloudPoint& point = batch.points[k];
     const double z = point.x * p.scale - p.shift_u, y = point.y * p.scale - p.shift_v;
-    const double w = batch.factors == nullptr ? point.weight : point.weight * batch.factors[k];
-    Vec4 position;
-    __builtin_memcpy(&position, point.position.data(), sizeof position);
-    const Vec4 e = position - (((RowAt(p, 3, z) * y + RowAt(p, 2, z)) * y + RowAt(p, 1, z)) * y +
-                               RowAt(p, 0, z));
+    const double w = batch.factors == nullptr ? point.weight() : point.weight() * batch.factors[k];
+    Vec4 values;
+    __builtin_memcpy(&values, point.values.data(), sizeof values);
+    const Vec4 e = values - (((RowAt(p, 3, z) * y + RowAt(p, 2, z)) * y + RowAt(p, 1, z)) * y +
+                             RowAt(p, 0, z));
     const Vec4 ee = e * e;
     const double square = ee[0] + ee[1] + ee[2];
     sums.squares += w * square;
@@ -132,18 +132,18 @@ SEMBLANCE_WIDE_256 void AccumulateByVertex(const Batch& batch, const PatchId& pa
     const CloudPoint& p = batch.points[k];
     const auto u = CubicWeights(p.x * scale - patch.i, 0),
                v = CubicWeights(p.y * scale - patch.j, 0);
-    Vec4 position;
-    __builtin_memcpy(&position, p.position.data(), sizeof position);
-    const Vec4 e = position - (v[0] * Along(u, vertex) + v[1] * Along(u, vertex + 4) +
-                               v[2] * Along(u, vertex + 8) + v[3] * Along(u, vertex + 12));
+    Vec4 values;
+    __builtin_memcpy(&values, p.values.data(), sizeof values);
+    const Vec4 e = values - (v[0] * Along(u, vertex) + v[1] * Along(u, vertex + 4) +
+                             v[2] * Along(u, vertex + 8) + v[3] * Along(u, vertex + 12));
     const Vec4 ee = e * e;
     const double square = ee[0] + ee[1] + ee[2], factor = FactorOf(batch.factors, k);
-    sums.squares += p.weight * factor * square;
+    sums.squares += p.weight() * factor * square;
     sums.largest = factor >= kOutlier && square > sums.largest ? square : sums.largest;
     if (batch.squares != nullptr) {
       batch.squares[k] = square;
     }
-    const Vec4 pull = e * (p.weight * factor);
+    const Vec4 pull = e * (p.weight() * factor);
     for (int m = 0; m < 16; ++m) {
       residual[m] += pull * (u[m % 4] * v[m / 4]);
     }
@@ -211,7 +211,7 @@ Matrix16 GramOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
   Matrix16 gram = Matrix16::Zero();
   for (std::size_t k = 0; k < points.size(); ++k) {
     const VertexWeights weights = WeightsAt(points[k], patch);
-    gram.noalias() += points[k].weight * FactorOf(factors, k) * weights * weights.transpose();
+    gram.noalias() += points[k].weight() * FactorOf(factors, k) * weights * weights.transpose();
   }
   return gram;
 }

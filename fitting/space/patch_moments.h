@@ -16,10 +16,11 @@ using PatchMatrix = Eigen::Matrix<double, 16, 3>;  // sixteen vertices' x, y, z
 
 // Sums over the points of a patch, in the powers of z = 2 s - 1 and of the same along v.
 struct PatchMoments {
-  alignas(64) double moments[7][8] = {};    // [q][p]: of w z_u^p z_v^q, p and q up to 6
-  alignas(64) double residual[16][4] = {};  // [a + 4 b]: of w z_u^a z_v^b e, e the residual p - S
-  double squares = 0;                       // of w |e|^2
-  double largest = 0;                       // |e|^2, of points whose factor is 0.5 or more
+  alignas(64) double moments[7][8] = {};  // [q][p]: of w z_u^p z_v^q, p and q up to 6
+  // [a + 4 b]: of w z_u^a z_v^b e, e the residual p - S. The fourth lane means nothing.
+  alignas(64) double residual[16][4] = {};
+  double squares = 0;  // of w |e|^2
+  double largest = 0;  // |e|^2, of points whose factor is 0.5 or more
 
   // All but `moments`, which stay as they are when the surface moves.
   void ForgetResidual() {

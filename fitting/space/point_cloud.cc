@@ -117,8 +117,7 @@ CloudPoint MakePoint(const HSplineShape& shape, const auto& p) {
   const PatchPoint at = PatchPointAt(shape, 0, p.uv);
   return {.x = at.patch.i + at.s,
           .y = at.patch.j + at.t,
-          .position = {p.position.x(), p.position.y(), p.position.z(), 0},
-          .weight = p.weight};
+          .values = {p.position.x(), p.position.y(), p.position.z(), p.weight}};
 }
 
 // Indices in the order of their keys, first by the leading bits alone; starts: of each such bucket.
@@ -187,7 +186,7 @@ void PointCloud::Fill(const Points& given) {
     }
     points_.push_back(MakePoint(shape_, given[key.index]));
     given_.push_back(key.index);
-    weight_sum_ += points_.back().weight;
+    weight_sum_ += points_.back().weight();
   }
   starts_.resize(patches + 1, points_.size());
 }

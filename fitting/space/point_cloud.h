@@ -23,8 +23,10 @@ struct Observation {
 struct CloudPoint {
   double x = kNaN;  // u * patches_u of level 0, v * patches_v; in a patch of level L at
   double y = kNaN;  // x * 2^L - i, exactly as PatchPointAt has it
-  std::array<double, 4> position{};  // mm; and a zero
-  double weight = kNaN;
+  // Position in mm, and the weight: what four lanes take at once.
+  std::array<double, 4> values = {kNaN, kNaN, kNaN, kNaN};
+
+  double weight() const { return values[3]; }
 };
 
 // The order of points along the curve of PointCloud, as indices; that in which they are given has
