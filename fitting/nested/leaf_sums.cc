@@ -2,6 +2,7 @@
 #include "fitting/nested/leaf_sums.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
@@ -10,7 +11,7 @@ namespace semblance {
 namespace {
 
 // The products of two of four weights, each pair once; the rest are zeros, to fill registers.
-constexpr int kPairs = 10, kRoom = 16;
+constexpr int kPairs = 10, kRoom = 12;
 constexpr std::array<std::array<int, 4>, 4> kPair = {
     {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}}};
 using Pairs = double[kPairs][kRoom];
@@ -52,34 +53,81 @@ SEMBLANCE_INLINE void PairsOf(const double* weights, double factor, double* pair
   }
 }
 
+// Some points of a leaf, so few that a core keeps all of it at hand.
+template <int channels>
+struct Block {
+  static constexpr int kMost = 32;  // points
+  int count = 0;
+  alignas(64) double pairs_u[kMost][kRoom] = {};
+  alignas(64) double pairs_v[kMost][kPairs];  // times the point's weight
+  alignas(64) double both[kMost][16];
+  alignas(64) double values[kMost][channels + 1];  // the probe last
+};
+
+template <int channels>
+SEMBLANCE_INLINE void Put(const PointsOfLeaf& leaf, std::uint32_t k, Block<channels>& block,
+                          LeafSums& all) {
+  const int n = block.count++;
+  double u[4], v[4];
+  const double w = leaf.points.Weight(k);
+  WeightsAt(leaf.points.X(k) * leaf.scale - leaf.first_u, u);
+  WeightsAt(leaf.points.Y(k) * leaf.scale - leaf.first_v, v);
+  PairsOf(u, 1, block.pairs_u[n]);
+  PairsOf(v, w, block.pairs_v[n]);
+  for (int m = 0; m < 16; ++m) {
+    block.both[n][m] = u[m % 4] * v[m / 4];
+  }
+  for (int c = 0; c < channels; ++c) {
+    block.values[n][c] = w * leaf.points.value[k][c];
+    all.squares += block.values[n][c] * leaf.points.value[k][c];
+  }
+  block.values[n][channels] = std::sqrt(w) * ProbeSign(k);
+  all.weight += w;
+}
+
+// Adds factors[n][r] times the four numbers of across[n] from `first` on to those of row r of the
+// sums. The rows stay in registers while the points pass, and each takes them in their order.
+template <int rows, int room>
+SEMBLANCE_INLINE void AddProducts(const double (*factors)[rows], const double (*across)[room],
+                                  int first, int count, double (*sums)[room]) {
+  Wide sum[rows];
+  for (int r = 0; r < rows; ++r) {
+    std::memcpy(&sum[r], sums[r] + first, sizeof(Wide));
+  }
+  for (int n = 0; n < count; ++n) {
+    Wide some;
+    std::memcpy(&some, across[n] + first, sizeof(Wide));
+    for (int r = 0; r < rows; ++r) {
+      sum[r] += factors[n][r] * some;
+    }
+  }
+  for (int r = 0; r < rows; ++r) {
+    std::memcpy(sums[r] + first, &sum[r], sizeof(Wide));
+  }
+}
+
+template <int channels>
+SEMBLANCE_INLINE void AddBlock(const Block<channels>& block, Pairs& sums, double (*right)[16]) {
+  for (int first = 0; first < kRoom; first += kLaneCount<Wide>) {
+    AddProducts<kPairs, kRoom>(block.pairs_v, block.pairs_u, first, block.count, sums);
+  }
+  for (int first = 0; first < 16; first += kLaneCount<Wide>) {
+    AddProducts<channels + 1, 16>(block.values, block.both, first, block.count, right);
+  }
+}
+
 template <int channels>
 SEMBLANCE_INLINE void AddPoints(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
-  double pairs_u[kRoom] = {}, pairs_v[kPairs], u[4], v[4], both[16];
+  Block<channels> block;
+  alignas(64) double right[channels + 1][16] = {};
   for (std::size_t n = 0; n < leaf.count; ++n) {
-    const std::uint32_t k = leaf.indices[n];
-    const double w = leaf.points.Weight(k);
-    WeightsAt(leaf.points.X(k) * leaf.scale - leaf.first_u, u);
-    WeightsAt(leaf.points.Y(k) * leaf.scale - leaf.first_v, v);
-    PairsOf(u, 1, pairs_u);
-    PairsOf(v, w, pairs_v);
-    for (int r = 0; r < kPairs; ++r) {
-      for (int c = 0; c < kRoom; ++c) {
-        sums[r][c] += pairs_v[r] * pairs_u[c];
-      }
+    Put<channels>(leaf, leaf.indices[n], block, all);
+    if (block.count == Block<channels>::kMost || n + 1 == leaf.count) {
+      AddBlock<channels>(block, sums, right);
+      block.count = 0;
     }
-    for (int m = 0; m < 16; ++m) {
-      both[m] = u[m % 4] * v[m / 4];
-    }
-    for (int c = 0; c <= channels; ++c) {
-      const bool probe = c == channels;
-      const double value = probe ? std::sqrt(w) * ProbeSign(k) : w * leaf.points.value[k][c];
-      all.squares += probe ? 0 : value * leaf.points.value[k][c];
-      for (int m = 0; m < 16; ++m) {
-        all.right[c][m] += value * both[m];
-      }
-    }
-    all.weight += w;
   }
+  std::memcpy(all.right.data(), right, sizeof right);
 }
 
 SEMBLANCE_WIDE void AddPointsOf1(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
