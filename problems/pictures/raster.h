@@ -45,6 +45,27 @@ struct Coverage {
   bool is_front = true;  // the corners run counter-clockwise in the picture
 };
 
+// Twice the area of p, q and the place (x, y), in steps.
+inline std::int64_t CrossOf(const RasterPoint& p, const RasterPoint& q, std::int64_t x,
+                            std::int64_t y) {
+  return (q.x - std::int64_t{p.x}) * (y - p.y) - (q.y - std::int64_t{p.y}) * (x - p.x);
+}
+
+// Where in a triangle with an area a place is, in steps; of a sample's centre, what VisitSamples
+// tells.
+inline Coverage CoverageAt(const RasterPoint& a, const RasterPoint& b, const RasterPoint& c,
+                           std::int64_t x, std::int64_t y) {
+  const std::int64_t area = CrossOf(a, b, c.x, c.y), sign = area > 0 ? 1 : -1;
+  const double scale = 1.0 / static_cast<double>(sign * area);
+  Coverage at{.x = static_cast<int>(x / kSubsamples), .y = static_cast<int>(y / kSubsamples)};
+  at.a = scale * static_cast<double>(sign * CrossOf(b, c, x, y));
+  at.b = scale * static_cast<double>(sign * CrossOf(c, a, x, y));
+  at.c = 1 - at.a - at.b;
+  at.depth = static_cast<float>(at.a * a.depth + at.b * b.depth + at.c * c.depth);
+  at.is_front = sign < 0;  // y runs down
+  return at;
+}
+
 // Columns [x_begin, x_end), rows [y_begin, y_end).
 struct SampleWindow {
   int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
@@ -65,11 +86,7 @@ void VisitSamples(const RasterPoint& a, const RasterPoint& b, const RasterPoint&
   if (x0 > x1 || y0 > y1) {
     return;
   }
-  const auto cross = [](const RasterPoint& p, const RasterPoint& q, std::int64_t x,
-                        std::int64_t y) {
-    return (q.x - std::int64_t{p.x}) * (y - p.y) - (q.y - std::int64_t{p.y}) * (x - p.x);
-  };
-  const std::int64_t area = cross(a, b, c.x, c.y);
+  const std::int64_t area = CrossOf(a, b, c.x, c.y);
   if (area == 0) {
     return;
   }
@@ -80,7 +97,7 @@ void VisitSamples(const RasterPoint& a, const RasterPoint& b, const RasterPoint&
   const std::int64_t step_c = -step_a - step_b;
   for (int y = y0; y <= y1; ++y) {
     const std::int64_t px = x0 * kSubsamples + kHalf, py = y * kSubsamples + kHalf;
-    std::int64_t ea = sign * cross(b, c, px, py), eb = sign * cross(c, a, px, py);
+    std::int64_t ea = sign * CrossOf(b, c, px, py), eb = sign * CrossOf(c, a, px, py);
     std::int64_t ec = sign * area - ea - eb;
     for (int x = x0; x <= x1; ++x, ea += step_a, eb += step_b, ec += step_c) {
       if ((ea | eb | ec) >= 0) {

@@ -18,6 +18,7 @@ namespace semblance {
 namespace {
 
 constexpr int kBandRows = 16;  // pixel rows that are drawn together
+constexpr std::int64_t kHalfSample = kSubsamples / 2;
 
 Rgb LinearOf(const Colour& c) {
   return {static_cast<float>(LinearFromSrgb(c.r)), static_cast<float>(LinearFromSrgb(c.g)),
@@ -235,21 +236,46 @@ class Painter {
     half_way_ = (half_way_.normalized() + to_viewer_).normalized();
   }
 
-  // The mean over the samples of a pixel.
+  // That of all samples of a pixel, nothing sheer before it; -1: there is none.
+  std::int32_t OnlyTriangle(const Layers& seen, int first_row, int column, int row) const {
+    const int s = options_.supersampling, columns = s * options_.width;
+    const std::size_t first = static_cast<std::size_t>(s * row - first_row) * columns + s * column;
+    const std::int32_t triangle = seen.opaque.triangle[first];
+    for (int k = 0; k < s * s; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k / s) * columns + k % s;
+      if (seen.opaque.triangle[i] != triangle || (has_sheer_ && seen.sheer.triangle[i] >= 0)) {
+        return -1;
+      }
+    }
+    return triangle;
+  }
+
+  // The mean over the samples of a pixel; over a triangle alone that of its middle.
   Rgb PixelLight(const Layers& seen, int first_row, int column, int row,
                  const Rgb& background) const {
+    const int s = options_.supersampling;
+    if (const std::int32_t only = OnlyTriangle(seen, first_row, column, row); only >= 0) {
+      return Shade(only, (2 * column + 1) * s * kHalfSample, (2 * row + 1) * s * kHalfSample)
+          .colour;
+    }
+    return MeanOfSamples(seen, first_row, column, row, background);
+  }
+
+  Rgb MeanOfSamples(const Layers& seen, int first_row, int column, int row,
+                    const Rgb& background) const {
     const auto& [opaque, sheer] = seen;
     const int s = options_.supersampling, columns = s * options_.width;
     Rgb sum = Rgb::Zero();
     for (int k = 0; k < s * s; ++k) {
       const int x = s * column + k % s, y = s * row + k / s;
+      const std::int64_t middle_x = (2 * x + 1) * kHalfSample, middle_y = (2 * y + 1) * kHalfSample;
       const std::size_t i = static_cast<std::size_t>(y - first_row) * columns + x;
       Rgb colour = background;
       if (opaque.triangle[i] >= 0) {
-        colour = Shade(opaque.triangle[i], x, y).colour;
+        colour = Shade(opaque.triangle[i], middle_x, middle_y).colour;
       }
       if (has_sheer_ && sheer.triangle[i] >= 0 && sheer.depth[i] < opaque.depth[i]) {
-        const Shaded sheet = Shade(sheer.triangle[i], x, y);
+        const Shaded sheet = Shade(sheer.triangle[i], middle_x, middle_y);
         colour = sheet.alpha * sheet.colour + (1 - sheet.alpha) * colour;
       }
       sum += colour;
@@ -267,11 +293,11 @@ class Painter {
     float alpha = 1;
   };
 
-  Shaded Shade(std::int32_t triangle, int x, int y) const {
+  // x, y: in steps.
+  Shaded Shade(std::int32_t triangle, std::int64_t x, std::int64_t y) const {
     const SceneTriangle& t = flat_.triangles[triangle];
-    Coverage at;
-    VisitSamples(points_[t.corners[0]], points_[t.corners[1]], points_[t.corners[2]],
-                 {x, x + 1, y, y + 1}, [&](const Coverage& sample) { at = sample; });
+    const Coverage at =
+        CoverageAt(points_[t.corners[0]], points_[t.corners[1]], points_[t.corners[2]], x, y);
     const SceneVertex surface = Interpolate(t, at);
     const SceneObject& object = scene_.objects[t.object];
     const Rgb light =

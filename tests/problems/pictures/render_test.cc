@@ -11,6 +11,7 @@
 #include "problems/pictures/lighting.h"
 #include "problems/pictures/mesh_primitives.h"
 #include "problems/pictures/pictures.h"
+#include "problems/pictures/raster.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "surfaces/base/srgb.h"
@@ -160,10 +161,44 @@ TEST(Render, ColourIsInterpolatedBetweenTheCorners) {
   }
 }
 
+// What a pixel sees of one triangle is lit once, in its middle.
+TEST(Render, WithinATriangleMoreSamplesChangeNothing) {
+  SceneObject square = Square(20, 0, kBlack);
+  square.vertex_colours = {{0, 0, 1}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}};
+  RenderOptions one = Plain(), many = Plain();
+  one.supersampling = 1;
+  many.supersampling = 6;
+  const Image coarse = Render({{square}}, FrontCamera(40), one, 1),
+              fine = Render({{square}}, FrontCamera(40), many, 1);
+  for (int y = 1; y < 119; ++y) {
+    for (int x = 1; x < 119; ++x) {
+      ExpectColour(PixelAt(fine, x, y), PixelAt(coarse, x, y), x + y == 119 ? 0.05 : 1.01 / 255);
+    }
+  }
+}
+
 TEST(Render, NearerHidesFartherWhateverTheOrder) {
   const SceneObject near = Square(10, -5, {1, 0, 0}), far = Square(10, 5, {0, 1, 0});
   ExpectColour(Centre(Render({{near, far}}, FrontCamera(40), Plain(), 1)), {1, 0, 0});
   ExpectColour(Centre(Render({{far, near}}, FrontCamera(40), Plain(), 1)), {1, 0, 0});
+}
+
+TEST(Raster, ASamplesPlaceIsTheSameLookedUpAloneAndOnTheWay) {
+  const RasterPoint a{300, 200, 1.5F}, b{4100, 900, 2.5F}, c{1500, 3700, -1};
+  int count = 0;
+  VisitSamples(a, b, c, {0, 32, 0, 32}, [&](const Coverage& sample) {
+    const Coverage alone = CoverageAt(a, b, c, kSubsamples * sample.x + kSubsamples / 2,
+                                      kSubsamples * sample.y + kSubsamples / 2);
+    ++count;
+    EXPECT_EQ(alone.x, sample.x);
+    EXPECT_EQ(alone.y, sample.y);
+    EXPECT_EQ(alone.a, sample.a);
+    EXPECT_EQ(alone.b, sample.b);
+    EXPECT_EQ(alone.c, sample.c);
+    EXPECT_EQ(alone.depth, sample.depth);
+    EXPECT_EQ(alone.is_front, sample.is_front);
+  });
+  EXPECT_GT(count, 50);
 }
 
 TEST(Render, NeighbouringTrianglesLeaveNoHole) {
