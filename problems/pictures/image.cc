@@ -28,8 +28,9 @@ void Append(png_structp png, png_bytep data, png_size_t size) {
 
 void Flush(png_structp) {}
 
-// All filters at level 4: a third of the time of libpng's default, and a tenth more bytes. libpng
-// leaves by longjmp, so nothing here has a destructor.
+// Two filters at level 4: a quarter of the time of libpng's default, and a tenth more bytes; all
+// five would take half as long again and save none. libpng leaves by longjmp, so nothing here has a
+// destructor.
 bool WriteRows(png_structp png, png_infop info, const Image& image) {
   if (setjmp(png_jmpbuf(png)) != 0) {
     return false;
@@ -38,7 +39,7 @@ bool WriteRows(png_structp png, png_infop info, const Image& image) {
                static_cast<png_uint_32>(image.height), 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
-  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_ALL_FILTERS);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB | PNG_FILTER_UP);
   png_set_compression_level(png, 4);
   png_write_info(png, info);
   for (int row = 0; row < image.height; ++row) {
