@@ -198,7 +198,7 @@ std::string FitScene(const FitGrid& grid) {
   for (int k = 0; k <= 32; ++k) {
     colours.push_back(HexText(ColourAt(map, map.high_mm * k / 32)));
   }
-  const Json scene = {
+  Json scene = {
       {"label", "surface"},
       {"facts", Json::array()},
       {"axes", {"+x", "\u2212x", "+y", "\u2212y", "+z", "\u2212z"}},
@@ -221,7 +221,7 @@ std::string FitScene(const FitGrid& grid) {
          {"values", blobs.AddValues(shown.rms_mm)}},
         {{"id", "surface"}, {"label", "Surface, plain"}, {"colour", "#9fb2c4"}, {"mesh", mesh}}}},
       {"blobs", blobs.All()}};
-  return CollectScenes({{"surface", scene.dump()}}, 0).json;
+  return CollectScene("surface", std::move(scene));
 }
 
 }  // namespace semblance

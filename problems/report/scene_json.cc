@@ -255,29 +255,56 @@ std::string SceneJson(const RunResult& result, const RunContext& context) {
   return SceneWriter(result, context).Write();
 }
 
+namespace {
+
+// Each blob once.
+void AddScene(const std::string& label, Json scene, Json& all) {
+  for (auto& [name, blob] : scene["blobs"].items()) {
+    all["blobs"][name] = std::move(blob);
+  }
+  scene.erase("blobs");
+  scene["label"] = label;
+  all["scenes"].push_back(std::move(scene));
+}
+
+Json SceneOf(const SceneText& text) {
+  CheckJsonDepth(text.json);
+  Json scene = Json::parse(text.json, nullptr, false);
+  if (!scene.is_object() || !scene.contains("blobs") || !scene.contains("layers")) {
+    throw IoError(fmt::format("scene '{}': no scene of a run; run it again", text.label));
+  }
+  return scene;
+}
+
+// Of the blobs that `all` has not.
+std::size_t NewBytes(const Json& scene, const Json& all) {
+  std::size_t bytes = 0;
+  for (const auto& [name, blob] : scene["blobs"].items()) {
+    bytes += all["blobs"].contains(name) ? 0 : blob.dump().size();
+  }
+  return bytes;
+}
+
+Json NoScenes() { return {{"scenes", Json::array()}, {"blobs", Json::object()}}; }
+
+}  // namespace
+
+std::string CollectScene(const std::string& label, Json scene) {
+  Json all = NoScenes();
+  AddScene(label, std::move(scene), all);
+  return all.dump();
+}
+
 SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t limit_bytes) {
-  Json all = {{"scenes", Json::array()}, {"blobs", Json::object()}};
+  Json all = NoScenes();
   std::size_t size = 0;
   for (const SceneText& text : scenes) {
-    CheckJsonDepth(text.json);
-    Json scene = Json::parse(text.json, nullptr, false);
-    if (!scene.is_object() || !scene.contains("blobs") || !scene.contains("layers")) {
-      throw IoError(fmt::format("scene '{}': no scene of a run; run it again", text.label));
-    }
-    std::size_t more = 0;
-    for (const auto& [name, blob] : scene["blobs"].items()) {
-      more += all["blobs"].contains(name) ? 0 : blob.dump().size();
-    }
-    if (!all["scenes"].empty() && size + more > limit_bytes) {
+    Json scene = SceneOf(text);
+    size += scenes.size() > 1 ? NewBytes(scene, all) : 0;
+    if (!all["scenes"].empty() && size > limit_bytes) {
       break;
     }
-    size += more;
-    for (const auto& [name, blob] : scene["blobs"].items()) {
-      all["blobs"][name] = blob;
-    }
-    scene.erase("blobs");
-    scene["label"] = text.label;
-    all["scenes"].push_back(std::move(scene));
+    AddScene(text.label, std::move(scene), all);
   }
   return {all.dump(), static_cast<int>(all["scenes"].size())};
 }

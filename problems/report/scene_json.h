@@ -2,6 +2,7 @@
 // What the 3-D view of a report shows, as JSON: layers, and the geometry that they are drawn from.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -29,5 +30,7 @@ struct SceneCollection {
   int count = 0;  // of scenes that were taken
 };
 SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t limit_bytes);
+// The same of a scene alone that is not yet a text.
+std::string CollectScene(const std::string& label, nlohmann::ordered_json scene);
 
 }  // namespace semblance

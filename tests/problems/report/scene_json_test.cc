@@ -105,6 +105,11 @@ TEST(CollectScenes, SharesBlobsAndStopsAtTheLimit) {
   EXPECT_EQ(CollectScenes({{"a", Scene("k", 1000)}}, 0).count, 1);
 }
 
+TEST(CollectScenes, ASceneAloneIsTheSameAsItsText) {
+  EXPECT_EQ(CollectScene("a", Json::parse(Scene("k", 1000))),
+            CollectScenes({{"a", Scene("k", 1000)}}, 0).json);
+}
+
 TEST(CollectScenes, RefusesWhatIsNoScene) {
   EXPECT_THAT(WordsOf<IoError>([] {
                 CollectScenes({{"a", "{}"}}, 1);
