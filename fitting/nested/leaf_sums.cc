@@ -140,24 +140,39 @@ SEMBLANCE_WIDE void AddPointsOf3(const PointsOfLeaf& leaf, Pairs& sums, LeafSums
   AddPoints<3>(leaf, sums, all);
 }
 
-SEMBLANCE_WIDE void Leave(const PointsOfLeaf& leaf, const LeafVertices& vertices, int channels,
-                          NestedResidual* residuals) {
+template <int channels>
+SEMBLANCE_INLINE void Leave(const PointsOfLeaf& leaf, const LeafVertices& vertices,
+                            NestedResidual* residuals) {
+  Wide rows[channels][4];
+  std::memcpy(rows, vertices.data(), sizeof rows);
   double u[4], v[4];
   for (std::size_t n = 0; n < leaf.count; ++n) {
     const std::uint32_t k = leaf.indices[n];
     WeightsAt(leaf.points.X(k) * leaf.scale - leaf.first_u, u);
     WeightsAt(leaf.points.Y(k) * leaf.scale - leaf.first_v, v);
+    const Wide along_u = {u[0], u[1], u[2], u[3]};
     for (int c = 0; c < channels; ++c) {
-      double along[4] = {};
+      Wide sum = {};
       for (int b = 0; b < 4; ++b) {
-        for (int a = 0; a < 4; ++a) {
-          along[a] += v[b] * vertices[c][a + 4 * b];
-        }
+        sum += v[b] * rows[c][b];
       }
-      residuals[n].along[c] = leaf.points.value[k][c] - ((u[0] * along[0] + u[1] * along[1]) +
-                                                         (u[2] * along[2] + u[3] * along[3]));
+      sum *= along_u;
+      residuals[n].along[c] = leaf.points.value[k][c] - ((sum[0] + sum[1]) + (sum[2] + sum[3]));
     }
   }
+}
+
+SEMBLANCE_WIDE void LeaveOf1(const PointsOfLeaf& leaf, const LeafVertices& vertices,
+                             NestedResidual* residuals) {
+  Leave<1>(leaf, vertices, residuals);
+}
+SEMBLANCE_WIDE void LeaveOf2(const PointsOfLeaf& leaf, const LeafVertices& vertices,
+                             NestedResidual* residuals) {
+  Leave<2>(leaf, vertices, residuals);
+}
+SEMBLANCE_WIDE void LeaveOf3(const PointsOfLeaf& leaf, const LeafVertices& vertices,
+                             NestedResidual* residuals) {
+  Leave<3>(leaf, vertices, residuals);
 }
 
 }  // namespace
@@ -181,7 +196,9 @@ LeafSums SumsOver(const NestedPoints& points, const LeafPatch& leaf,
 
 void ResidualsOver(const NestedPoints& points, const LeafPatch& leaf, const LeafVertices& vertices,
                    std::span<const std::uint32_t> indices, NestedResidual* residuals) {
-  Leave(Of(points, leaf, indices), vertices, points.channels, residuals);
+  constexpr void (*kLeave[])(const PointsOfLeaf&, const LeafVertices&, NestedResidual*) = {
+      LeaveOf1, LeaveOf2, LeaveOf3};
+  kLeave[points.channels - 1](Of(points, leaf, indices), vertices, residuals);
 }
 
 }  // namespace semblance
