@@ -79,7 +79,7 @@ class Judge {
     for (const std::filesystem::path& path : file.tables) {
       tables_.push_back(ReadTissueTable(path));
     }
-    for (const std::string& name : sample.names) {
+    for (const std::string& name : Varying(sample).names) {  // else it would be the mean again
       has_person_ = has_person_ || !IsSite(name);
     }
   }

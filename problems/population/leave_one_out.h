@@ -34,6 +34,7 @@ struct Foresight {
 // depths are compared with it. Compared are the sites that all ways foresee, but for those at
 // `known` and their other sides. Tables are taken for sex and build as far as they are known, else
 // male and normal. Subjects without one of the known depths are foreseen by those that they have.
+// `person` and `person_known` are left out where no two subjects are known to differ in anything.
 // Empty with fewer than three subjects.
 std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
                                    const std::vector<CountedSubject>& subjects,

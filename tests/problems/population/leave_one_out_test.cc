@@ -70,6 +70,20 @@ TEST(LeaveOneOut, TheSubjectIsNotInItsOwnMean) {
   EXPECT_NEAR(depth.foreseen_mm, (sample.values.col(at).sum() - depth.depth_mm) / 4, 1e-9);
 }
 
+// The sex and age of one person alone tell nothing of the others: no way of its own, equal to the
+// mean.
+TEST(LeaveOneOut, WhatNoTwoDifferInIsNoWay) {
+  auto people = People(5);
+  for (CountedSubject& person : people) {
+    person.person.bmi.reset();
+  }
+  people[1].person.sex = Sex::kMale;
+  people[1].person.age_years = 39;
+  EXPECT_EQ(LeaveOneOut({}, people, SampleOf(people, 0)).size(), 2u);
+  people[2].person.age_years = 52;
+  EXPECT_EQ(LeaveOneOut({}, people, SampleOf(people, 0)).size(), 4u);
+}
+
 TEST(LeaveOneOut, ScoresAPublishedTableBesideThem) {
   const auto people = People(12);
   PopulationFile file;
