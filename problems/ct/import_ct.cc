@@ -96,16 +96,10 @@ void MoveToHalfMaximum(const CtVolume& volume, const RunContext& context, CtImpo
       result.skull_move_mm, result.skin_move_mm));
 }
 
-}  // namespace
-
-CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
-                  const RunContext& context) {
+// Of a volume as it is.
+CtImport ImportAsItIs(const CtVolume& volume, const CtImportOptions& options,
+                      const RunContext& context) {
   constexpr double kTissueHu = 100;  // above skin_hu: what air inside counts as
-  CheckVolume(volume, "import-ct");
-  if (!(options.skin_hu < options.bone_hu)) {
-    throw InputError(fmt::format("import-ct: skin_hu {} is not below bone_hu {}", options.skin_hu,
-                                 options.bone_hu));
-  }
   context.Report("import ct", "head and outside air");
   const HeadMask mask = FindHeadMask(volume,
                                      {.skin_value = options.skin_hu,
@@ -123,6 +117,33 @@ CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
     MoveToHalfMaximum(volume, context, result);
   }
   return result;
+}
+
+CtImport ImportCoarser(const CtVolume& volume, const CtImportOptions& options,
+                       const RunContext& context) {
+  context.Report("import ct", "coarser voxels");
+  const CtVolume coarser = CoarserVolume(volume, options.coarsen, context.threads);
+  CtImport result = ImportAsItIs(coarser, options, context);
+  const Vec3 &from = volume.spacing_mm, &to = coarser.spacing_mm;
+  result.notes.insert(
+      result.notes.begin(),
+      fmt::format("made coarser: voxels of {:.4g} x {:.4g} x {:.4g} mm instead of {:.4g} x {:.4g} "
+                  "x {:.4g} mm",
+                  to.x(), to.y(), to.z(), from.x(), from.y(), from.z()));
+  return result;
+}
+
+}  // namespace
+
+CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
+                  const RunContext& context) {
+  CheckVolume(volume, "import-ct");
+  if (!(options.skin_hu < options.bone_hu)) {
+    throw InputError(fmt::format("import-ct: skin_hu {} is not below bone_hu {}", options.skin_hu,
+                                 options.bone_hu));
+  }
+  return IsFinerThan(volume, options.coarsen) ? ImportCoarser(volume, options, context)
+                                              : ImportAsItIs(volume, options, context);
 }
 
 }  // namespace semblance

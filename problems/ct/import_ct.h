@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "problems/ct/coarser_volume.h"
 #include "problems/ct/ct_volume.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/base/run_context.h"
@@ -29,6 +30,7 @@ struct CtImportOptions {
   double smallest_bone_cm2 = 3;         // smaller pieces of bone are dropped
   double metal_hu = 3000;               // what has more is metal
   double thinnest_bone_mm = 1.5;        // thinner bone in slices with metal is a streak
+  CoarserVoxels coarsen;                // the volume is made coarser first
 };
 template <class Visitor>
 void Fields(Visitor& visit, CtImportOptions& o) {
@@ -81,6 +83,10 @@ void Fields(Visitor& visit, CtImportOptions& o) {
                   .doc = "bone thinner than this in slices with metal is taken for a streak; more "
                          "takes thin walls too; 0 keeps all"},
         o.thinnest_bone_mm);
+  visit(FieldInfo{.name = "coarsen",
+                  .doc = "makes the volume coarser first, each voxel the mean of what it covers: "
+                         "what a coarser scan of the same head would have shown"},
+        o.coarsen);
 }
 
 struct CtImport {
@@ -92,7 +98,8 @@ struct CtImport {
   std::vector<std::string> notes;  // what people should know, a line each
 };
 
-// Throws InputError if the volume has no tissue, no bone or no outside air at these values;
+// Throws InputError if the volume has no tissue, no bone or no outside air at these values, or is
+// no volume any more once it is made coarser;
 // Cancelled on request.
 CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
                   const RunContext& context);
