@@ -2,7 +2,7 @@
 // Moves an iso-surface of a CT volume to where the edge really is.
 #pragma once
 
-#include "problems/ct/ct_volume.h"
+#include "problems/volumes/ct_volume.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 

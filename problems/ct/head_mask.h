@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "problems/ct/ct_volume.h"
 #include "problems/ct/voxel_mask.h"
+#include "problems/volumes/ct_volume.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/ct/coarser_volume.h"
-#include "problems/ct/ct_volume.h"
+#include "problems/volumes/coarser_volume.h"
+#include "problems/volumes/ct_volume.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"

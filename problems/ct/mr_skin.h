@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/ct/ct_volume.h"
+#include "problems/volumes/ct_volume.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 

@@ -4,8 +4,8 @@
 
 #include <functional>
 
-#include "problems/ct/ct_volume.h"
 #include "problems/ct/head_mask.h"
+#include "problems/volumes/ct_volume.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "problems/ct/ct_volume.h"
 #include "problems/subject/phantom.h"
+#include "problems/volumes/ct_volume.h"
 
 namespace semblance {
 

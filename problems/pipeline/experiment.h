@@ -18,7 +18,6 @@
 #include "problems/bust/bust_source.h"
 #include "problems/config/config_errors.h"
 #include "problems/ct/import_ct.h"
-#include "problems/ct/read_volume.h"
 #include "problems/face_template/template_source.h"
 #include "problems/metrics/face_region.h"
 #include "problems/pipeline/uncertainty_options.h"
@@ -31,6 +30,7 @@
 #include "problems/subject/landmarks.h"
 #include "problems/subject/length_unit.h"
 #include "problems/subject/phantom.h"
+#include "problems/volumes/read_volume.h"
 #include "surfaces/implicit_face.h"
 #include "surfaces/mesh/skull_fill.h"
 

@@ -12,13 +12,13 @@
 #include <thread>
 
 #include "problems/command_line/exit_code.h"
-#include "problems/ct/itk_files.h"
-#include "problems/ct/read_volume.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/output/files.h"
 #include "problems/output/staged_folder.h"
 #include "problems/phantom/phantom_ct.h"
 #include "problems/phantom/phantom_landmarks.h"
+#include "problems/volumes/itk_files.h"
+#include "problems/volumes/read_volume.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

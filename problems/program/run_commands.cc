@@ -18,7 +18,6 @@
 
 #include "problems/command_line/exit_code.h"
 #include "problems/ct/mr_skin.h"
-#include "problems/ct/read_volume.h"
 #include "problems/inputs/input_check.h"
 #include "problems/inputs/input_files.h"
 #include "problems/output/staged_folder.h"
@@ -36,6 +35,7 @@
 #include "problems/study/depth_study.h"
 #include "problems/study/study_plan.h"
 #include "problems/study_report/study_report.h"
+#include "problems/volumes/read_volume.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"

@@ -14,9 +14,9 @@
 #include <utility>
 
 #include "problems/ct/mr_skin.h"
-#include "problems/ct/read_volume.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/volumes/read_volume.h"
 #include "problems/workbench/bench_actions.h"
 #include "problems/workbench/bench_config.h"
 #include "problems/workbench/bench_incoming.h"

@@ -7,11 +7,11 @@
 #include <cctype>
 #include <initializer_list>
 
-#include "problems/ct/read_volume.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/phantom/phantom_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/view/view_mesh.h"
+#include "problems/volumes/read_volume.h"
 #include "problems/workbench/bench_actions.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"

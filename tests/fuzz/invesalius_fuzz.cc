@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "problems/ct/invesalius.h"
+#include "problems/volumes/invesalius.h"
 #include "surfaces/base/error.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "problems/ct/read_volume.h"
+#include "problems/volumes/read_volume.h"
 #include "surfaces/base/error.h"
 
 namespace {

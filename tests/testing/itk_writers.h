@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/ct/voxel_array.h"
+#include "problems/volumes/voxel_array.h"
 
 namespace semblance::testing {
 

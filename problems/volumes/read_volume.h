@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "problems/ct/ct_volume.h"
-#include "problems/ct/itk_files.h"
+#include "problems/volumes/ct_volume.h"
+#include "problems/volumes/itk_files.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/ct/ct_volume.h"
+#include "problems/volumes/ct_volume.h"
 
 namespace semblance {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/coarser_volume.h"
+#include "problems/volumes/coarser_volume.h"
 
 #include <algorithm>
 #include <cmath>

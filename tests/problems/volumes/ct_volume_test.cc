@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/ct_volume.h"
+#include "problems/volumes/ct_volume.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/dicom_series.h"
+#include "problems/volumes/dicom_series.h"
 
 #include <fmt/format.h>
 

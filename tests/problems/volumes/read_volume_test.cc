@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A phantom's head in every kind of file, written by ITK and read back.
-#include "problems/ct/read_volume.h"
+#include "problems/volumes/read_volume.h"
 
 #include <Eigen/Dense>  // before ITK, which else brings a part of an older one
 
@@ -18,9 +18,9 @@
 #include <string>
 
 #include "problems/ct/import_ct.h"
-#include "problems/ct/itk_files.h"
 #include "problems/ct/mr_skin.h"
 #include "problems/phantom/phantom_ct.h"
+#include "problems/volumes/itk_files.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/itk_writers.h"

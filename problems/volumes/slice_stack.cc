@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/slice_stack.h"
+#include "problems/volumes/slice_stack.h"
 
 #include <fmt/format.h>
 

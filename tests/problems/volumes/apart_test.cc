@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/apart.h"
+#include "problems/volumes/apart.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

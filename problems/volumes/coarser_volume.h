@@ -2,7 +2,7 @@
 // A volume as a coarser scan of the same head would have shown it.
 #pragma once
 
-#include "problems/ct/ct_volume.h"
+#include "problems/volumes/ct_volume.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {

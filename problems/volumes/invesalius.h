@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "problems/ct/ct_volume.h"
+#include "problems/volumes/ct_volume.h"
 
 namespace semblance {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/read_volume.h"
+#include "problems/volumes/read_volume.h"
 
 #include <fmt/format.h>
 
@@ -11,11 +11,11 @@
 #include <string_view>
 #include <utility>
 
-#include "problems/ct/dicom_series.h"
-#include "problems/ct/invesalius.h"
-#include "problems/ct/itk_files.h"
-#include "problems/ct/slice_stack.h"
-#include "problems/ct/voxel_array.h"
+#include "problems/volumes/dicom_series.h"
+#include "problems/volumes/invesalius.h"
+#include "problems/volumes/itk_files.h"
+#include "problems/volumes/slice_stack.h"
+#include "problems/volumes/voxel_array.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/itk_files.h"
+#include "problems/volumes/itk_files.h"
 
 // First, else ITK's headers bring a part of an older Eigen of their own.
 #include <Eigen/Dense>

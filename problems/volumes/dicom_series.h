@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/ct/itk_files.h"
+#include "problems/volumes/itk_files.h"
 
 namespace semblance {
 

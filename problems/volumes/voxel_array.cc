@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/voxel_array.h"
+#include "problems/volumes/voxel_array.h"
 
 #include <fmt/format.h>
 

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <type_traits>
 
-#include "problems/ct/apart.h"
-#include "problems/ct/itk_files.h"
+#include "problems/volumes/apart.h"
+#include "problems/volumes/itk_files.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance {

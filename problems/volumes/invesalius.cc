@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/ct/invesalius.h"
+#include "problems/volumes/invesalius.h"
 
 #include <archive.h>
 #include <archive_entry.h>

@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/ct/ct_volume.h"
-#include "problems/ct/voxel_array.h"
+#include "problems/volumes/ct_volume.h"
+#include "problems/volumes/voxel_array.h"
 
 namespace semblance {
 

@@ -2,7 +2,7 @@
 // Built where ITK is not installed.
 #include <fmt/format.h>
 
-#include "problems/ct/itk_files.h"
+#include "problems/volumes/itk_files.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
