@@ -12,6 +12,7 @@
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_file.h"
+#include "problems/subject/sites.h"
 #include "problems/thinning/thinned_network.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -179,8 +180,7 @@ std::vector<std::string> UseSome(const SubjectData& data, const PlaceOptions& op
 }
 
 // The network's plan, closed over the landmarks that the experiment does not use.
-NetworkPlan PlanFor(const Experiment& experiment, const LandmarkFile& landmarks) {
-  NetworkPlan plan = ReadNetworkPlan(experiment.network);
+NetworkPlan PlanFor(const Experiment& experiment, const LandmarkFile& landmarks, NetworkPlan plan) {
   if (std::holds_alternative<KeepAll>(experiment.landmarks.keep)) {
     return plan;
   }
@@ -213,6 +213,8 @@ Case CaseOf(const SubjectData& data, const Experiment& experiment, const MeshQue
                .open_dowels = {},
                .expected_on_bone = {},
                .network = {},
+               .scored_on_bone = {},
+               .scored_network = {},
                .points = {},
                .basis = {},
                .notes = data.notes,
@@ -234,6 +236,7 @@ void GiveDepths(const SubjectData& data, const Experiment& experiment, const Mes
   const std::vector<std::string> on_depths =
       FillDepths(tissue, data.landmarks, subject.dowels_on_bone);
   subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
+  subject.scored_on_bone = subject.dowels_on_bone;
   Append(subject.notes, UsesAllAsGiven(experiment.landmarks)
                             ? on_depths
                             : UseSome(data, experiment.landmarks, tissue, query, subject));
@@ -249,6 +252,20 @@ void LayNetwork(const NetworkPlan& plan, Case& subject) {
   }
   NoteDroppedAreas(subject);
   Append(subject.notes, JoinNetwork(plan, subject.dowels_on_bone, subject.network));
+}
+
+// What is scored rests on all landmarks as they are given, and on the sites that the experiment has
+// in place of a landmark, so that fewer dowels, moved or further ones leave the same bone to
+// compare.
+void LayScoredNetwork(const NetworkPlan& plan, Case& subject) {
+  for (const Dowel& dowel : subject.dowels_on_bone) {
+    auto& scored = subject.scored_on_bone;
+    const bool there = std::ranges::find(scored, dowel.site, &Dowel::site) != scored.end();
+    if (!there && IsStandardSite(dowel.site)) {
+      scored.push_back(dowel);
+    }
+  }
+  subject.scored_network = BuildNetwork(plan, subject.scored_on_bone);
 }
 
 void AppendInputs(const Experiment& experiment, Case& subject) {
@@ -297,7 +314,9 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQ
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
   GiveDepths(data, experiment, query, subject);
   InsertDowels(experiment, data, query, subject);
-  LayNetwork(PlanFor(experiment, data.landmarks), subject);
+  const NetworkPlan plan = ReadNetworkPlan(experiment.network);
+  LayNetwork(PlanFor(experiment, data.landmarks, plan), subject);
+  LayScoredNetwork(plan, subject);
   AppendInputs(experiment, subject);
   return subject;
 }
@@ -308,8 +327,8 @@ ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options)
 
 ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& felt,
                           const FaceRegionOptions& options) {
-  return FindScoredSkin(*subject.skin, felt, *subject.basis.sites, subject.dowels_on_bone,
-                        subject.network, options);
+  return FindScoredSkin(*subject.skin, felt, *subject.basis.sites, subject.scored_on_bone,
+                        subject.scored_network, options);
 }
 
 }  // namespace semblance

@@ -34,6 +34,8 @@ struct Case {
   std::vector<Dowel> open_dowels;       // `depth: auto`: NaN until depth is interpolated
   std::vector<Dowel> expected_on_bone;  // a table's mean depths, where the scheme asks for them
   DowelNetwork network;                 // of those dowels
+  std::vector<Dowel> scored_on_bone;    // at all sites, whichever the experiment uses
+  DowelNetwork scored_network;          // of those: depths are compared in front of it
   std::map<std::string, Vec3> points;   // all landmarks as given, with depth or without, mm
   ScoreBasis basis;                     // the landmarks as given, for what is scored
   std::vector<std::string> notes;       // what a reader of the result should know, a line each

@@ -88,8 +88,9 @@ void MakeVariogram(const DepthStage& stage, const std::vector<double>& areas_mm2
 DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
                               const DepthField& depth, const RunContext& context) {
   DepthComparison comparison;
-  comparison.region = InFrontOfNetwork(stage.shell, stage.dowels_on_shell, stage.subject.network,
-                                       stage.subject.basis.sites->points, experiment.region);
+  comparison.region =
+      InFrontOfNetwork(stage.shell, stage.scored_on_shell, stage.subject.scored_network,
+                       stage.subject.basis.sites->points, experiment.region);
   comparison.directions = DepthDirections(experiment.direction, stage.Input(), context);
   comparison.truth = MeasureDepthTruth(stage.shell, comparison.directions, *stage.subject.skin,
                                        experiment.depth_truth, context);

@@ -28,7 +28,7 @@ struct DepthErrors {
 };
 
 struct DepthComparison {
-  FaceRegion region;             // of the shell's vertices: those in front of the dowel network
+  FaceRegion region;             // of the shell's vertices: those before all sites' network
   std::vector<Vec3> directions;  // of the depths (Experiment::direction)
   DepthTruth truth;
   DepthErrors along_direction, closest;

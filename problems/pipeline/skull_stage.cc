@@ -32,11 +32,13 @@ DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
   subject.notes.insert(subject.notes.end(), projected.notes.begin(), projected.notes.end());
   std::vector<Vec3> normals = VertexNormals(pressed);
   ProjectedDowels expected = ProjectOntoShell(subject.expected_on_bone, pressed, kLeastDepth_mm);
+  ProjectedDowels scored = ProjectOntoShell(subject.scored_on_bone, pressed, kLeastDepth_mm);
   DepthStage stage{std::move(subject),
                    std::move(pressed),
                    std::move(normals),
                    std::move(projected.dowels_on_shell),
                    std::move(expected.dowels_on_shell),
+                   std::move(scored.dowels_on_shell),
                    {}};
   stage.depth = step("interpolate depth", [&] {
     return ApplyOutsideRule(e.outside, stage.Input(),

@@ -20,6 +20,7 @@ struct DepthStage {
   std::vector<Vec3> normals;  // of the shell's vertices
   std::vector<Dowel> dowels_on_shell;    // the same dowels as they stand on the shell
   std::vector<Dowel> expected_on_shell;  // likewise
+  std::vector<Dowel> scored_on_shell;    // likewise
   DepthField depth;                      // of the shell's vertices, after the outside rule
 
   DepthInput Input() const {

@@ -53,6 +53,21 @@ TEST(DepthStudy, TheTruthIsThePhantomsOwnDepth) {
   EXPECT_LT(std::sqrt(squares / count), 0.25);  // the mesh's normals are not the exact ones
 }
 
+// Fewer dowels, moved ones and further ones, also outside the network, are compared over the same
+// bone.
+TEST(DepthStudy, TheBoneThatIsComparedRestsOnAllLandmarks) {
+  const std::vector<bool> all = Measured().truth->region.scored;
+  const std::vector<Vec3> bone = MakePhantom({.random_seed = 1, .rings = 50}).skull.points;
+  const Vec3 crown = *std::ranges::max_element(bone, {}, [](const Vec3& p) { return p.z(); });
+  for (const std::string& change :
+       {std::string("landmarks.keep={type: spread, n: 8}"), std::string("landmarks.noise_mm=2"),
+        std::string("sites={inside: {near: [g, mso_l], depth: 5}}"),
+        fmt::format("sites={{outside: {{near: [{}, {}, {}], depth: 5}}}}", crown.x(), crown.y(),
+                    crown.z())}) {
+    EXPECT_EQ(Measured({change}).truth->region.scored, all) << change;
+  }
+}
+
 TEST(DepthStudy, AMapOfTheTrueDepthHasNoErrorButThoseOfNormals) {
   const ScratchFolder folder;
   const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 50});
