@@ -30,7 +30,7 @@ struct CtImportOptions {
   double smallest_bone_cm2 = 3;         // smaller pieces of bone are dropped
   double metal_hu = 3000;               // what has more is metal
   double thinnest_bone_mm = 1.5;        // thinner bone in slices with metal is a streak
-  CoarserVoxels coarsen;                // the volume is made coarser first
+  CoarserVoxels coarsen = {};           // the volume is made coarser first
 };
 template <class Visitor>
 void Fields(Visitor& visit, CtImportOptions& o) {
