@@ -57,23 +57,71 @@ SEMBLANCE_INLINE N Emit(const DistanceEmitterLanes& b, int first, const Vec3& p,
 
 // Appends to `found` those of some batches, at most eight, that reach p; without a branch that
 // could be guessed wrong. Writes one more than it appends.
+template <class N>
 SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> which,
                                               const ReachLanes& reaches, const Vec3& p,
                                               std::int32_t* found) {
-  Wider squared{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const Wider from = p[axis] - Load<Wider>(reaches.center[axis], 0);
-    squared += from * from;
-  }
-  const auto reach = squared <= Load<Wider>(reaches.squared_mm2, 0);  // -1 or 0, a lane
   std::array<std::int64_t, DistanceEmitterLanes::kLanes> minus;
-  static_assert(sizeof(reach) == sizeof(minus));
-  std::memcpy(minus.data(), &reach, sizeof(minus));
+  for (int first = 0; first < DistanceEmitterLanes::kLanes; first += kLaneCount<N>) {
+    N squared{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const N from = p[axis] - Load<N>(reaches.center[axis], first);
+      squared += from * from;
+    }
+    const auto reach = squared <= Load<N>(reaches.squared_mm2, first);  // -1 or 0, a lane
+    static_assert(sizeof(reach) == kLaneCount<N> * sizeof(minus[0]));
+    std::memcpy(minus.data() + first, &reach, sizeof(reach));
+  }
   for (std::size_t n = 0; n < which.size(); ++n) {
     *found = which[n];
     found -= minus[n];
   }
   return found;
+}
+
+struct Summands {
+  std::span<const DistanceEmitterLanes> batches;
+  std::span<const std::int32_t> which;
+  std::span<const ReachLanes> reaches;
+  const Falloff& falloff;
+};
+
+// Adds what each lane of a batch emits at p to its sum.
+template <class N>
+SEMBLANCE_INLINE void AddBatch(const DistanceEmitterLanes& batch, const Vec3& p,
+                               const Falloff& falloff, DistanceEmitterLanes::Lanes& sums) {
+  constexpr int kUsual = 6;  // the default decay
+  for (int first = 0; first < DistanceEmitterLanes::kLanes; first += kLaneCount<N>) {
+    const N emitted = falloff.whole == kUsual ? Emit<N>(batch, first, p, falloff, kUsual)
+                                              : Emit<N>(batch, first, p, falloff, falloff.whole);
+    Store(Load<N>(sums, first) + emitted, sums, first);
+  }
+}
+
+template <class N>
+SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, std::int64_t& reaching) {
+  constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes, kAtOnce = 32;
+  std::array<std::int32_t, kLanes * kAtOnce + 1> found;
+  DistanceEmitterLanes::Lanes sums{};
+  for (std::size_t begin = 0; begin < all.reaches.size(); begin += kAtOnce) {
+    std::int32_t* end = found.data();
+    for (std::size_t n = begin; n < std::min(begin + kAtOnce, all.reaches.size()); ++n) {
+      const auto rest = all.which.subspan(kLanes * n);
+      end = AppendReaching<N>(rest.first(std::min(kLanes, rest.size())), all.reaches[n], p, end);
+    }
+    for (const std::int32_t* n = found.data(); n != end; ++n) {
+      AddBatch<N>(all.batches[*n], p, all.falloff, sums);
+    }
+    reaching += end - found.data();
+  }
+  return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+}
+
+SEMBLANCE_ONLY_512 double SumByEights(const Summands& all, const Vec3& p, std::int64_t& reaching) {
+  return Sum<Wider>(all, p, reaching);
+}
+SEMBLANCE_WIDE_256 double SumByFours(const Summands& all, const Vec3& p, std::int64_t& reaching) {
+  return Sum<Wide>(all, p, reaching);
 }
 
 ReachBall ReachBallOf(const DistanceEmitterLanes& batch, const Falloff& falloff) {
@@ -166,31 +214,11 @@ std::vector<ReachLanes> Gather(std::span<const ReachBall> reaches,
   return eights;
 }
 
-SEMBLANCE_WIDE double SumByDistance(std::span<const DistanceEmitterLanes> batches,
-                                    std::span<const std::int32_t> which,
-                                    std::span<const ReachLanes> reaches, const Vec3& p,
-                                    const Falloff& falloff, std::int64_t& reaching) {
-  constexpr int kUsual = 6;  // the default decay
-  constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes, kAtOnce = 32;
-  std::array<std::int32_t, kLanes * kAtOnce + 1> found;
-  Wider sum{};
-  for (std::size_t begin = 0; begin < reaches.size(); begin += kAtOnce) {
-    std::int32_t* end = found.data();
-    for (std::size_t n = begin; n < std::min(begin + kAtOnce, reaches.size()); ++n) {
-      const auto rest = which.subspan(kLanes * n);
-      end = AppendReaching(rest.first(std::min(kLanes, rest.size())), reaches[n], p, end);
-    }
-    for (const std::int32_t* n = found.data(); n != end; ++n) {
-      const DistanceEmitterLanes& batch = batches[*n];
-      sum += falloff.whole == kUsual ? Emit<Wider>(batch, 0, p, falloff, kUsual)
-                                     : Emit<Wider>(batch, 0, p, falloff, falloff.whole);
-    }
-    reaching += end - found.data();
-  }
-  DistanceEmitterLanes::Lanes lanes;
-  Store(sum, lanes, 0);
-  return ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])) +
-         ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
+double SumByDistance(std::span<const DistanceEmitterLanes> batches,
+                     std::span<const std::int32_t> which, std::span<const ReachLanes> reaches,
+                     const Vec3& p, const Falloff& falloff, std::int64_t& reaching) {
+  const Summands summands{batches, which, reaches, falloff};
+  return HasAvx512() ? SumByEights(summands, p, reaching) : SumByFours(summands, p, reaching);
 }
 
 double EmitByDistance(const DistanceEmitterLanes& batch, int lane, const Vec3& p,
