@@ -20,22 +20,6 @@ using Triangles = std::vector<QueryKernel::Triangle_3>;
 using Primitive = CGAL::AABB_triangle_primitive<QueryKernel, Triangles::const_iterator>;
 using Traits = CGAL::AABB_traits<QueryKernel, Primitive>;
 
-// No ray meets a triangle without area: CGAL asks for triangles that have one, and the triangles
-// beside it are met. Closest points lie on it as on any other.
-struct RayTraits : Traits {
-  struct Intersection {
-    using Hit = Traits::Intersection_and_primitive_id<QueryKernel::Segment_3>::Type;
-    boost::optional<Hit> operator()(const QueryKernel::Segment_3& ray,
-                                    const Primitive& triangle) const {
-      if (triangle.datum().is_degenerate()) return boost::none;
-      return traits.Traits::intersection_object()(ray, triangle);
-    }
-    const RayTraits& traits;
-  };
-  Intersection intersection_object() const { return {*this}; }
-};
-using AabbTree = CGAL::AABB_tree<RayTraits>;
-
 QueryKernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 Vec3 ToVec(const QueryKernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
 
@@ -60,6 +44,21 @@ Triangles CopyTriangles(const TriMesh& mesh) {
 }  // namespace
 
 struct MeshQuery::Tree {
+  // No ray meets a triangle without area: CGAL asks for triangles that have one, and the triangles
+  // beside it are met. Closest points lie on it as on any other.
+  struct RayTraits : Traits {
+    struct Intersection {
+      using Hit = Traits::Intersection_and_primitive_id<QueryKernel::Segment_3>::Type;
+      boost::optional<Hit> operator()(const QueryKernel::Segment_3& ray,
+                                      const Primitive& triangle) const {
+        if (triangle.datum().is_degenerate()) return boost::none;
+        return traits.Traits::intersection_object()(ray, triangle);
+      }
+      const RayTraits& traits;
+    };
+    Intersection intersection_object() const { return {*this}; }
+  };
+
   explicit Tree(const TriMesh& mesh)
       : triangles(CopyTriangles(mesh)), tree(triangles.cbegin(), triangles.cend()) {
     tree.build();
@@ -77,7 +76,7 @@ struct MeshQuery::Tree {
   }
 
   Triangles triangles;
-  AabbTree tree;
+  CGAL::AABB_tree<RayTraits> tree;
 };
 
 MeshQuery::MeshQuery(const TriMesh& mesh) : tree_(std::make_unique<Tree>(mesh)) {}
@@ -95,7 +94,7 @@ std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direct
   const Vec3 end = origin + max_distance_mm * direction.normalized();
   const QueryKernel::Segment_3 segment(ToCgal(origin), ToCgal(end));
   if (segment.is_degenerate()) return {};
-  std::vector<RayTraits::Intersection::Hit> found;
+  std::vector<Tree::RayTraits::Intersection::Hit> found;
   tree_->tree.all_intersections(segment, std::back_inserter(found));
   std::vector<MeshPoint> hits;
   for (const auto& hit : found) {
