@@ -55,12 +55,15 @@ SEMBLANCE_INLINE N Emit(const DistanceEmitterLanes& b, int first, const Vec3& p,
   return seen.z + Load<N>(b.advance_mm, first) > 0 ? either : nothing;
 }
 
-// Appends to `found` those of some batches, at most eight, that reach p; without a branch that
-// could be guessed wrong. Writes one more than it appends.
+constexpr int kHalf = DistanceEmitterLanes::kLanes / 2;
+// How many of N's registers the lanes of a batch fill.
 template <class N>
-SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> which,
-                                              const ReachLanes& reaches, const Vec3& p,
-                                              std::int32_t* found) {
+constexpr int kParts = DistanceEmitterLanes::kLanes / kLaneCount<N>;
+
+// Which of eight balls reach p: -1, and 0 for those that do not.
+template <class N>
+SEMBLANCE_INLINE std::array<std::int64_t, DistanceEmitterLanes::kLanes> Reaching(
+    const ReachLanes& reaches, const Vec3& p) {
   std::array<std::int64_t, DistanceEmitterLanes::kLanes> minus;
   for (int first = 0; first < DistanceEmitterLanes::kLanes; first += kLaneCount<N>) {
     N squared{};
@@ -68,15 +71,11 @@ SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> whic
       const N from = p[axis] - Load<N>(reaches.center[axis], first);
       squared += from * from;
     }
-    const auto reach = squared <= Load<N>(reaches.squared_mm2, first);  // -1 or 0, a lane
+    const auto reach = squared <= Load<N>(reaches.squared_mm2, first);
     static_assert(sizeof(reach) == kLaneCount<N> * sizeof(minus[0]));
     std::memcpy(minus.data() + first, &reach, sizeof(reach));
   }
-  for (std::size_t n = 0; n < which.size(); ++n) {
-    *found = which[n];
-    found -= minus[n];
-  }
-  return found;
+  return minus;
 }
 
 struct Summands {
@@ -86,35 +85,55 @@ struct Summands {
   const Falloff& falloff;
 };
 
-// Adds what each lane of a batch emits at p to its sum.
+// Appends to `found` the parts of at most four batches that reach p: those of batch b are from
+// kParts b on. Without a branch that could be guessed wrong; writes one more than it appends. Adds
+// to `halves` how many reach p.
 template <class N>
-SEMBLANCE_INLINE void AddBatch(const DistanceEmitterLanes& batch, const Vec3& p,
-                               const Falloff& falloff, DistanceEmitterLanes::Lanes& sums) {
-  constexpr int kUsual = 6;  // the default decay
-  for (int first = 0; first < DistanceEmitterLanes::kLanes; first += kLaneCount<N>) {
-    const N emitted = falloff.whole == kUsual ? Emit<N>(batch, first, p, falloff, kUsual)
-                                              : Emit<N>(batch, first, p, falloff, falloff.whole);
-    Store(Load<N>(sums, first) + emitted, sums, first);
+SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> which,
+                                              const ReachLanes& reaches, const Vec3& p,
+                                              std::int64_t& halves, std::int32_t* found) {
+  const auto minus = Reaching<N>(reaches, p);
+  for (std::size_t n = 0; n < which.size(); ++n) {
+    const std::int64_t lower = minus[2 * n], upper = minus[2 * n + 1];
+    halves -= lower + upper;
+    *found = kParts<N> * which[n];
+    if constexpr (kParts<N> == 1) {
+      found -= lower | upper;
+    } else {
+      found -= lower;
+      *found = kParts<N> * which[n] + 1;
+      found -= upper;
+    }
   }
+  return found;
 }
 
 template <class N>
 SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, std::int64_t& reaching) {
-  constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes, kAtOnce = 32;
-  std::array<std::int32_t, kLanes * kAtOnce + 1> found;
-  DistanceEmitterLanes::Lanes sums{};
+  constexpr int kUsual = 6;            // the default decay
+  constexpr std::size_t kAtOnce = 32;  // eights of balls
+  std::array<std::int32_t, 2 * kHalf * kAtOnce + 1> found;
+  std::array<N, kParts<N>> sums{};
+  std::int64_t halves = 0;
   for (std::size_t begin = 0; begin < all.reaches.size(); begin += kAtOnce) {
     std::int32_t* end = found.data();
     for (std::size_t n = begin; n < std::min(begin + kAtOnce, all.reaches.size()); ++n) {
-      const auto rest = all.which.subspan(kLanes * n);
-      end = AppendReaching<N>(rest.first(std::min(kLanes, rest.size())), all.reaches[n], p, end);
+      const auto rest = all.which.subspan(kHalf * n);
+      const auto four = rest.first(std::min<std::size_t>(kHalf, rest.size()));
+      end = AppendReaching<N>(four, all.reaches[n], p, halves, end);
     }
     for (const std::int32_t* n = found.data(); n != end; ++n) {
-      AddBatch<N>(all.batches[*n], p, all.falloff, sums);
+      const DistanceEmitterLanes& batch = all.batches[*n / kParts<N>];
+      const int part = *n % kParts<N>, first = kHalf * part;
+      sums[part] += all.falloff.whole == kUsual
+                        ? Emit<N>(batch, first, p, all.falloff, kUsual)
+                        : Emit<N>(batch, first, p, all.falloff, all.falloff.whole);
     }
-    reaching += end - found.data();
   }
-  return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
+  reaching += kHalf * halves;
+  DistanceEmitterLanes::Lanes s;
+  std::memcpy(s.data(), sums.data(), sizeof s);
+  return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
 }
 
 SEMBLANCE_ONLY_512 double SumByEights(const Summands& all, const Vec3& p, std::int64_t& reaching) {
@@ -124,25 +143,39 @@ SEMBLANCE_WIDE_256 double SumByFours(const Summands& all, const Vec3& p, std::in
   return Sum<Wide>(all, p, reaching);
 }
 
-ReachBall ReachBallOf(const DistanceEmitterLanes& batch, const Falloff& falloff) {
-  constexpr double kSlack = 1 + 1e-9;
-  const auto at = [](const std::array<DistanceEmitterLanes::Lanes, 3>& lanes, int l) {
+// The corners of a lane's triangle, where it emits from.
+std::array<Vec3, 3> CornersOf(const DistanceEmitterLanes& batch, int l) {
+  const auto at = [l](const std::array<DistanceEmitterLanes::Lanes, 3>& lanes) {
     return Vec3(lanes[0][l], lanes[1][l], lanes[2][l]);
   };
+  const Vec3 a = at(batch.corner), x = at(batch.along), y = at(batch.across);
+  return {a, a + batch.ab.length[l] * x,
+          a + batch.ac.length[l] * (batch.ac.x[l] * x + batch.ac.y[l] * y)};
+}
+
+// Of four lanes, from `first` on.
+ReachBall ReachBallOf(const DistanceEmitterLanes& batch, int first, const Falloff& falloff) {
+  constexpr double kSlack = 1 + 1e-9;
+  int end = first;  // of the lanes that are set
   Box3 box;
-  double furthest_mm = 0;  // from a triangle: where it emits, or is solid
-  for (int l = 0; l < DistanceEmitterLanes::kLanes && batch.gain[l] > 0; ++l) {
-    const Vec3 a = at(batch.corner, l), x = at(batch.along, l), y = at(batch.across, l);
-    box.extend(a).extend(a + batch.ab.length[l] * x);
-    box.extend(a + batch.ac.length[l] * (batch.ac.x[l] * x + batch.ac.y[l] * y));
-    const double emitting_mm = std::pow(batch.gain[l] / falloff.cut, 1 / falloff.power);
-    furthest_mm = std::max({furthest_mm, emitting_mm, batch.advance_mm[l]});
+  for (; end < first + kHalf && batch.gain[end] > 0; ++end) {
+    for (const Vec3& corner : CornersOf(batch, end)) {
+      box.extend(corner);
+    }
   }
   if (box.isEmpty()) {
     return {};
   }
-  const double radius_mm = 0.5 * box.diagonal().norm() + furthest_mm;
-  return {box.center(), kSlack * radius_mm * radius_mm};
+  const Vec3 center = box.center();
+  double radius_mm = 0;
+  for (int l = first; l < end; ++l) {
+    const double emitting_mm = std::pow(batch.gain[l] / falloff.cut, 1 / falloff.power);
+    const double solid_mm = batch.advance_mm[l];
+    for (const Vec3& corner : CornersOf(batch, l)) {
+      radius_mm = std::max(radius_mm, (corner - center).norm() + std::max(emitting_mm, solid_mm));
+    }
+  }
+  return {center, kSlack * radius_mm * radius_mm};
 }
 
 }  // namespace
@@ -193,8 +226,10 @@ std::vector<DistanceEmitterLanes> DistanceKernel::LanesOf(
 std::vector<ReachBall> ReachBallsOf(std::span<const DistanceEmitterLanes> batches,
                                     const Falloff& falloff) {
   std::vector<ReachBall> reaches;
+  reaches.reserve(2 * batches.size());
   for (const DistanceEmitterLanes& batch : batches) {
-    reaches.push_back(ReachBallOf(batch, falloff));
+    reaches.push_back(ReachBallOf(batch, 0, falloff));
+    reaches.push_back(ReachBallOf(batch, kHalf, falloff));
   }
   return reaches;
 }
@@ -202,9 +237,9 @@ std::vector<ReachBall> ReachBallsOf(std::span<const DistanceEmitterLanes> batche
 std::vector<ReachLanes> Gather(std::span<const ReachBall> reaches,
                                std::span<const std::int32_t> which) {
   constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes;
-  std::vector<ReachLanes> eights((which.size() + kLanes - 1) / kLanes);
-  for (std::size_t n = 0; n < which.size(); ++n) {
-    const ReachBall& reach = reaches[which[n]];
+  std::vector<ReachLanes> eights((2 * which.size() + kLanes - 1) / kLanes);
+  for (std::size_t n = 0; n < 2 * which.size(); ++n) {
+    const ReachBall& reach = reaches[2 * which[n / 2] + n % 2];
     ReachLanes& eight = eights[n / kLanes];
     for (int axis = 0; axis < 3; ++axis) {
       eight.center[axis][n % kLanes] = reach.center[axis];

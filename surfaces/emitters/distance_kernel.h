@@ -63,20 +63,24 @@ class DistanceKernel {
   Falloff falloff_;
 };
 
-// A ball around eight triangles beyond which the cut leaves nothing of what they emit.
+// A ball around four triangles, half of the lanes, beyond which the cut leaves nothing of what they
+// emit.
 struct ReachBall {
   Vec3 center = Vec3::Zero();
   double squared_mm2 = -1;  // of its radius; infinite without a cut
 };
+// Two for each eight lanes.
 std::vector<ReachBall> ReachBallsOf(std::span<const DistanceEmitterLanes> lanes,
                                     const Falloff& falloff);
 
 // Eight balls side by side.
 struct alignas(64) ReachLanes {
+  ReachLanes() { squared_mm2.fill(-1); }
+
   std::array<DistanceEmitterLanes::Lanes, 3> center{};
   DistanceEmitterLanes::Lanes squared_mm2{};
 };
-// Some balls, by their numbers.
+// Those of some lanes, by their numbers.
 std::vector<ReachLanes> Gather(std::span<const ReachBall> balls,
                                std::span<const std::int32_t> which);
 
@@ -84,7 +88,7 @@ std::vector<ReachLanes> Gather(std::span<const ReachBall> balls,
 double EmitByDistance(const DistanceEmitterLanes& lanes, int lane, const Vec3& p,
                       const Falloff& falloff);
 // The sum at p of all lanes of some, by their numbers; reaches: theirs, by Gather. Adds to
-// `reaching` how many of them reach p.
+// `reaching` how many emitters were in balls that reach p.
 double SumByDistance(std::span<const DistanceEmitterLanes> lanes,
                      std::span<const std::int32_t> which, std::span<const ReachLanes> reaches,
                      const Vec3& p, const Falloff& falloff, std::int64_t& reaching);

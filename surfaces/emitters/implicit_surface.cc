@@ -151,7 +151,7 @@ struct ImplicitSurface::Impl {
     std::int64_t reaching = 0;
     const double sum =
         SumByDistance(distance_lanes, list.runs, list.reaches, p, k.Fall(), reaching);
-    evaluations += DistanceKernel::kRun * reaching;
+    evaluations += reaching;
     return sum;
   }
 

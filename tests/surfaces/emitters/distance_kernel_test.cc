@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "surfaces/base/random.h"
 #include "surfaces/mesh/point_triangle.h"
 #include "tests/testing/shapes.h"
@@ -71,8 +73,10 @@ TEST_P(DistanceKernelTest, EachLaneIsTheThesisAndTheSumIsTheLanes) {
       return SumByDistance(one, which, Gather(reaches, which), p, GetParam(), reaching);
     };
     EXPECT_EQ(sum_of({0}), sum);
-    EXPECT_GE(reaching, sum > 0 ? 1 : 0);
+    EXPECT_GE(reaching, std::ranges::count_if(emission, [](double e) { return e > 0; }));
+    EXPECT_LE(reaching, DistanceEmitterLanes::kLanes);
     EXPECT_EQ(sum_of({0, 0}), 2 * sum);
+    EXPECT_NEAR(sum_of({0, 0, 0, 0, 0}), 5 * sum, 1e-12 * sum);  // more balls than stand together
     for (int lane = 0; lane < DistanceEmitterLanes::kLanes; ++lane) {
       const double expected = lane < set ? Emission(triangles[lane], p, GetParam()) : 0;
       EXPECT_NEAR(emission[lane], expected, 1e-9 * expected) << n << " " << lane;
