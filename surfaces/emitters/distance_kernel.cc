@@ -58,7 +58,7 @@ SEMBLANCE_INLINE N Emit(const DistanceEmitterLanes& b, int first, const Vec3& p,
 constexpr int kHalf = DistanceEmitterLanes::kLanes / 2;
 // How many of N's registers the lanes of a batch fill.
 template <class N>
-constexpr int kParts = DistanceEmitterLanes::kLanes / kLaneCount<N>;
+constexpr unsigned kParts = DistanceEmitterLanes::kLanes / kLaneCount<N>;
 
 // Which of eight balls reach p: -1, and 0 for those that do not.
 template <class N>
@@ -89,51 +89,56 @@ struct Summands {
 // kParts b on. Without a branch that could be guessed wrong; writes one more than it appends. Adds
 // to `halves` how many reach p.
 template <class N>
-SEMBLANCE_INLINE std::int32_t* AppendReaching(std::span<const std::int32_t> which,
-                                              const ReachLanes& reaches, const Vec3& p,
-                                              std::int64_t& halves, std::int32_t* found) {
+SEMBLANCE_INLINE std::uint32_t* AppendReaching(std::span<const std::int32_t> which,
+                                               const ReachLanes& reaches, const Vec3& p,
+                                               std::int64_t& halves, std::uint32_t* found) {
   const auto minus = Reaching<N>(reaches, p);
   for (std::size_t n = 0; n < which.size(); ++n) {
     const std::int64_t lower = minus[2 * n], upper = minus[2 * n + 1];
     halves -= lower + upper;
-    *found = kParts<N> * which[n];
+    const std::uint32_t first_part = kParts<N> * static_cast<std::uint32_t>(which[n]);
+    *found = first_part;
     if constexpr (kParts<N> == 1) {
       found -= lower | upper;
     } else {
       found -= lower;
-      *found = kParts<N> * which[n] + 1;
+      *found = first_part + 1;
       found -= upper;
     }
   }
   return found;
 }
 
+// whole: the falloff's, known when this is compiled or when it is called.
 template <class N>
-SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, std::int64_t& reaching) {
-  constexpr int kUsual = 6;            // the default decay
+SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, int whole, std::int64_t& reaching) {
   constexpr std::size_t kAtOnce = 32;  // eights of balls
-  std::array<std::int32_t, 2 * kHalf * kAtOnce + 1> found;
+  std::array<std::uint32_t, 2 * kHalf * kAtOnce + 1> found;
   std::array<N, kParts<N>> sums{};
   std::int64_t halves = 0;
   for (std::size_t begin = 0; begin < all.reaches.size(); begin += kAtOnce) {
-    std::int32_t* end = found.data();
+    std::uint32_t* end = found.data();
     for (std::size_t n = begin; n < std::min(begin + kAtOnce, all.reaches.size()); ++n) {
       const auto rest = all.which.subspan(kHalf * n);
       const auto four = rest.first(std::min<std::size_t>(kHalf, rest.size()));
       end = AppendReaching<N>(four, all.reaches[n], p, halves, end);
     }
-    for (const std::int32_t* n = found.data(); n != end; ++n) {
-      const DistanceEmitterLanes& batch = all.batches[*n / kParts<N>];
-      const int part = *n % kParts<N>, first = kHalf * part;
-      sums[part] += all.falloff.whole == kUsual
-                        ? Emit<N>(batch, first, p, all.falloff, kUsual)
-                        : Emit<N>(batch, first, p, all.falloff, all.falloff.whole);
+    for (const std::uint32_t* n = found.data(); n != end; ++n) {
+      const unsigned part = *n % kParts<N>;
+      sums[part] += Emit<N>(all.batches[*n / kParts<N>], kHalf * part, p, all.falloff, whole);
     }
   }
   reaching += kHalf * halves;
   DistanceEmitterLanes::Lanes s;
   std::memcpy(s.data(), sums.data(), sizeof s);
   return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
+}
+
+template <class N>
+SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, std::int64_t& reaching) {
+  constexpr int kUsual = 6;  // the default decay
+  return all.falloff.whole == kUsual ? Sum<N>(all, p, kUsual, reaching)
+                                     : Sum<N>(all, p, all.falloff.whole, reaching);
 }
 
 SEMBLANCE_ONLY_512 double SumByEights(const Summands& all, const Vec3& p, std::int64_t& reaching) {
