@@ -5,6 +5,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <numbers>
 #include <span>
 
@@ -132,6 +134,26 @@ SEMBLANCE_INLINE Wide MeanOfSamples(const Four& seen, std::span<const Sample> sa
   return sum;
 }
 
+// How the mean over four triangles is taken: bits.
+struct Ways {
+  unsigned afar, six, twelve;  // != 0: some lane needs it
+  unsigned near;               // of lanes that are too near for all of them
+};
+
+SEMBLANCE_INLINE Ways WaysOf(const Wide& share, const std::array<double, 3>& most_share) {
+  using Bits = std::int64_t __attribute__((vector_size(32)));
+  constexpr Bits kLaneBits = {8, 16, 32, 64};
+  const Bits in_front = share > 0, beyond_afar = share > All<Wide>(most_share[0]),
+             beyond_six = share > All<Wide>(most_share[1]),
+             beyond_twelve = share > All<Wide>(most_share[2]);
+  const Bits bits = (in_front & ~beyond_afar & 1) | (beyond_afar & ~beyond_six & 2) |
+                    (beyond_six & ~beyond_twelve & 4) | (beyond_twelve & kLaneBits);
+  std::array<std::uint64_t, kLaneCount<Wide>> of_lane;
+  std::memcpy(of_lane.data(), &bits, sizeof bits);
+  const auto all = static_cast<unsigned>((of_lane[0] | of_lane[1]) | (of_lane[2] | of_lane[3]));
+  return {all & 1, all & 2, all & 4, all >> 3};
+}
+
 // Adds what four lanes emit; returns those that are too near, as bits. fixed: the power, or 0 where
 // only the quadrature knows it.
 template <int fixed>
@@ -140,33 +162,23 @@ SEMBLANCE_INLINE unsigned AddFour(const FlatEmitterLanes& batch, int first, cons
   const int power = fixed > 0 ? fixed : quadrature.power;
   const Four seen = See(batch, first, p);
   const Wide share = seen.height > 0 ? seen.share : Wide{};
-  std::array<double, kLaneCount<Wide>>
-      shares;  // g++ 12 miscompiles share[l] where bounds are checked
-  Store(share, shares, 0);
-  unsigned near = 0, ways = 0;  // ways: of taking the mean that some lane needs, as bits
-  for (int l = 0; l < kLaneCount<Wide>; ++l) {
-    const unsigned way = static_cast<unsigned>(shares[l] > quadrature.most_share[0]) +
-                         static_cast<unsigned>(shares[l] > quadrature.most_share[1]) +
-                         static_cast<unsigned>(shares[l] > quadrature.most_share[2]);
-    near |= static_cast<unsigned>(way == 3) << l;
-    ways |= static_cast<unsigned>(shares[l] > 0) << way;
-  }
+  const Ways ways = WaysOf(share, quadrature.most_share);
   Wide mean{};
-  if ((ways & 1) != 0) {
+  if (ways.afar != 0) {
     mean = share <= All<Wide>(quadrature.most_share[0]) ? MeanFromAfar(seen, power) : mean;
   }
-  if ((ways & 2) != 0) {
+  if (ways.six != 0) {
     const Wide six = MeanOfSamples(seen, kSix, power);
     mean = share > All<Wide>(quadrature.most_share[0]) ? six : mean;
   }
-  if ((ways & 4) != 0) {
+  if (ways.twelve != 0) {
     const Wide twelve = MeanOfSamples(seen, kTwelve, power);
     mean = share > All<Wide>(quadrature.most_share[1]) ? twelve : mean;
   }
   const Wide emission = seen.Of(batch.gain) * seen.height * mean;
   const Wide taken = share > All<Wide>(quadrature.most_share[2]) ? Wide{} : emission;
   sum += share > 0 ? taken : Wide{};
-  return near;
+  return ways.near;
 }
 
 EdgeFromFoot SeenFrom(const Vec3& p, const Vec3& u, const Vec3& v, const Vec3& out) {
