@@ -520,6 +520,14 @@ std::vector<std::string> PointFit::Faults() const {
                     "holds it; give the smoothness more weight, or take coarser levels",
                     reach));
   }
+  constexpr double kMostOff = 0.1;
+  if (faults.empty() && off > kMostOff) {
+    faults.push_back(
+        fmt::format("the points lie {:.3g} mm (RMS) from the surface, {:.2g} % of their extent, as "
+                    "points that fill space or lie on several sheets do; give (u,v), other "
+                    "parameters, one sheet alone, or finer levels if it is one",
+                    fit.point_rms_mm, 100 * off));
+  }
   return faults;
 }
 
@@ -532,6 +540,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   StepClock step(context);
   Parametrisation parameters = step("parameters", [&] { return ParametersOf(table, options); });
   CheckJoinParameters(parameters.source, options);
+  const bool given = parameters.source == ParameterSource::kGiven;
   const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
   CheckChord(options.chord_mm, start, {table.positions, parameters.uv}, context);
   const double root_weight = RootOfMeanWeight(table);
@@ -546,6 +555,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   PointFit result = FoundBy(std::move(parameters), std::move(joined), std::move(attributes));
   result.sigma_factor = result.fit.automatic ? result.fit.automatic->noise_mm * root_weight : kNaN;
   result.reach = ReachBeyond(result.fit.surface, box);
+  result.off = given ? kNaN : result.fit.point_rms_mm / box.diagonal().norm();
   AddAttributes(weights, context, step, result);
   if (options.sigma) {
     AddSigma(start, weights, step, result);

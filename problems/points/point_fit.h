@@ -123,10 +123,12 @@ struct PointFit {
   double sigma_factor = kNaN;  // how many times the sigma that were given the points are off;
                                // NaN where none were, or by another plan than `auto`
   double reach = kNaN;         // how far the surface goes beyond the points' box, in its diagonals
+  double off = kNaN;           // the points' RMS distance from it, likewise; NaN for given (u,v)
   std::vector<StepTime> times;
 
   // Why the result cannot be used; empty if it can. A surface that goes three diagonals beyond the
-  // points where nothing holds it is none of theirs.
+  // points where nothing holds it is none of theirs; and points that lie a tenth of the diagonal
+  // from it, over (u,v) that were found for them, are on no one sheet.
   std::vector<std::string> Faults() const;
 };
 

@@ -6,12 +6,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
 #include "problems/points/point_files.h"
 #include "problems/points/residual_files.h"
+#include "surfaces/base/random.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -452,6 +454,24 @@ TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   EXPECT_GT(result.reach, 3);
   ASSERT_EQ(result.Faults().size(), 1u);
   EXPECT_THAT(result.Faults()[0], HasSubstr("times the points' extent beyond them"));
+}
+
+// Inside a ball there is no surface to find; on its upper half there is, however noisy.
+TEST(PointFit, PointsThatFillSpaceCannotBeUsed) {
+  Random random(7);
+  PointTable filled, half;
+  for (int k = 0; k < 3000; ++k) {
+    filled.positions.push_back(50 * std::cbrt(random.Uniform(0, 1)) * random.Direction());
+    const Vec3 on = random.Direction();
+    half.positions.emplace_back(50 * on.x(), 50 * on.y(), 20 * std::abs(on.z()) + random.Normal());
+  }
+  const PointFit result = FitPoints(filled, {}, {});
+  EXPECT_GT(result.off, 0.1);
+  ASSERT_EQ(result.Faults().size(), 1u);
+  EXPECT_THAT(result.Faults()[0], HasSubstr("fill space"));
+  const PointFit noisy = FitPoints(half, {}, {});
+  EXPECT_LT(noisy.off, 0.02);
+  EXPECT_THAT(noisy.Faults(), ::testing::IsEmpty());
 }
 
 TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
