@@ -156,7 +156,7 @@ tidy: setup
 # this project.
 configs: build
 	@$(BUILD)/problems/semblance check configs/*.yaml configs/fit/*.yaml configs/studies/*.yaml
-	@$(BUILD)/problems/semblance check --without-inputs configs/heads/*.yaml configs/demo_phantom/*.yaml
+	@$(BUILD)/problems/semblance check --without-inputs configs/heads/*.yaml configs/demo_phantom/*.yaml configs/population/*.yaml
 
 clean:
 	@rm -rf build build-debug build-sanitize build-quick build-tidy build-fuzz build-threads build-coverage build-clang build-256 build-128

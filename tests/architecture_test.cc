@@ -300,6 +300,14 @@ TEST(Architecture, TheMapNamesFilesThatAreThere) {
   for (std::sregex_iterator it(page.begin(), page.end(), kPath), end; it != end; ++it) {
     EXPECT_TRUE(fs::exists(fs::path(SEMBLANCE_SOURCE_DIR) / (*it)[1].str())) << (*it)[1];
   }
+  static const std::regex kStep(
+      R"(`([\w/]+\.cc)`, `(\w+)`)");  // of the journey: a file and what is in it
+  int steps = 0;
+  for (std::sregex_iterator it(page.begin(), page.end(), kStep), end; it != end; ++it, ++steps) {
+    const std::string code = ReadText(fs::path(SEMBLANCE_SOURCE_DIR) / (*it)[1].str());
+    EXPECT_NE(code.find((*it)[2].str() + "("), std::string::npos) << (*it)[0];
+  }
+  EXPECT_GE(steps, 7);
   for (std::sregex_iterator it(page.begin(), page.end(), kRow), end; it != end; ++it) {
     rooms.insert((*it)[1]);
     EXPECT_TRUE(fs::exists(fs::path(SEMBLANCE_SOURCE_DIR) / (*it)[1].str() / (*it)[3].str()))
