@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "problems/command_line/exit_code.h"
@@ -179,7 +180,35 @@ CheckFindings CheckPopulation(const std::string& file, const Arguments& argument
   return findings;
 }
 
-// The keys at the top tell what a file is for: an experiment, where no other fits better.
+// Whether the file is one of such options, whatever files it names.
+template <class Options>
+bool Reads(const std::string& file, const Arguments& arguments) try {
+  ConfigErrors errors;
+  ReadConfigTree<Options>(
+      LoadConfigTree(file, arguments.overrides, ConfigTreeOf(Options{}), errors), errors);
+  errors.ThrowIfAny();
+  return true;
+} catch (const ConfigError&) {
+  return false;
+}
+
+// Of a file that is a fit's: what is wrong with it as an experiment is a warning.
+CheckFindings CheckEither(const std::string& file, const Arguments& arguments, InputCheck& inputs) {
+  CheckFindings findings;
+  try {
+    findings = CheckExperiment(file, arguments, inputs);
+  } catch (const ConfigError& error) {
+    findings.faults.emplace_back(error.what());
+  }
+  for (const std::string& fault : std::exchange(findings.faults, {})) {
+    findings.warnings.push_back("it is one for `semblance fit`; `semblance run` would say: " +
+                                fault);
+  }
+  return findings;
+}
+
+// The keys at the top tell what a file is for: an experiment, where no other fits better. With
+// keys alone that experiments and fits both have, it may be either.
 CheckFindings CheckConfig(const std::string& file, const Arguments& arguments, InputCheck& inputs) {
   const int of_study = OwnKeys<StudyFile>(file), of_population = OwnKeys<PopulationFile>(file);
   if (of_study > OwnKeys<Experiment>(file) && of_study >= of_population) {
@@ -191,6 +220,9 @@ CheckFindings CheckConfig(const std::string& file, const Arguments& arguments, I
   if (KnownKeys<PointFitOptions>(file) > KnownKeys<Experiment>(file)) {
     ReadChecked<PointFitOptions>(file, arguments, &NamedFiles<PointFitOptions>);
     return {};
+  }
+  if (Reads<PointFitOptions>(file, arguments)) {
+    return CheckEither(file, arguments, inputs);
   }
   return CheckExperiment(file, arguments, inputs);
 }
@@ -333,7 +365,7 @@ int EvaluateCommand(const Arguments& arguments) {
   fmt::print("{}\n", score.dump(2));
   return TellFaults(std::isfinite(score.at("rms_mm").get<double>())
                         ? std::vector<std::string>()
-                        : std::vector<std::string>{"the distance of the faces is no number"});
+                        : std::vector<std::string>{"the distance of the faces is not a number"});
 }
 
 int ReportCommand(const Arguments& arguments) {

@@ -363,6 +363,15 @@ TEST_F(Trust, CheckNamesTheFileOfEachFault) {
   EXPECT_EQ(outcome.out, "fit.yaml: no fault found\n");
 }
 
+// Keys that experiments and fits both have: sound as one is sound, and what the other says is told.
+TEST_F(Trust, CheckTakesAFileForAFitThatIsNoExperiment) {
+  Write("either.yaml", "fit: {plan: {type: adaptive, finest: 4}}\n");
+  const Outcome outcome = Call("check either.yaml");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("either.yaml: warning: it is one for `semblance fit`"));
+  EXPECT_THAT(outcome.out, HasSubstr("level 4 is finer than the surface"));
+}
+
 TEST_F(Trust, ALongMessageIsCut) {
   ExpectRefused("check " + kPhantom + " --set " + std::string(90'000, 'a') + "=1",
                 "bytes left out");
