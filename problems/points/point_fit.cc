@@ -17,7 +17,6 @@
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
 #include "problems/config/config.h"
-#include "problems/metrics/quantile.h"
 #include "problems/points/fit_page.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/join_report.h"
@@ -26,6 +25,7 @@
 #include "problems/report/fit_json.h"
 #include "problems/report/timing_json.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {
@@ -228,7 +228,7 @@ std::string AttributesFault(const std::vector<std::string>& names) {
                          name);
     }
     if (!seen.insert(name).second) {
-      return fmt::format("'{}' stands twice; name it once", name);
+      return fmt::format("'{}' appears twice; name it once", name);
     }
   }
   return "";
@@ -303,6 +303,10 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
     faults.push_back({"attributes", fault});
   }
   AddJoinFaults(options, faults);
+  if (!std::holds_alternative<RestoreFeatures>(options.fit.features)) {
+    faults.push_back({"fit.features",
+                      "a surface through points of a file has no features; leave the option out"});
+  }
   for (std::size_t k = 0; k < options.fit.terms.size(); ++k) {
     const Term& term = options.fit.terms[k];
     if (const std::string_view missing = WhatIsMissing(term);

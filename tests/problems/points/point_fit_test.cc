@@ -496,6 +496,10 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
     EXPECT_THAT(read(fmt::format("fit: {{plan: until, terms: [points, {}]}}\n", term)),
                 HasSubstr("and points of a file have none"));
   }
+  for (const char* rule : {"free", "frozen", "{type: weighted, weight: 3}"}) {
+    EXPECT_THAT(read(fmt::format("fit: {{features: {}}}\n", rule)),
+                HasSubstr("fit.features: a surface through points of a file has no features"));
+  }
   EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, regions: [{u: [0.5, 0.2]}]}}\n"),
