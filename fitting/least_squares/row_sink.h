@@ -15,7 +15,7 @@ class RowSink {
  public:
   virtual ~RowSink() = default;
   // a: rows x vertices, without unit or as its term scales it; b: rows x 3, mm; `vertices` names
-  // the control vertex of each column, one may stand twice.
+  // the control vertex of each column, one may appear twice.
   virtual void Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                    std::span<const int> vertices) = 0;
 };

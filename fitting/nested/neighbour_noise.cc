@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/nested/neighbour_noise.h"
+#include "surfaces/base/quantile.h"
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -79,11 +80,9 @@ double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t>
        n += std::max<std::size_t>(indices.size() / kSamples, 1)) {
     squares.push_back(LeftOver(points, neighbourhood.Of(n, count), terms));
   }
-  const auto middle = squares.begin() + std::ssize(squares) / 2;
-  std::nth_element(squares.begin(), middle, squares.end());
   // The median of a chi-squared variable over its mean (Wilson & Hilferty 1931).
   const double freedom = static_cast<double>(count + 1 - terms) * points.channels;
-  return std::sqrt(*middle / std::pow(1 - 2 / (9 * freedom), 3));
+  return std::sqrt(UpperMedian(squares) / std::pow(1 - 2 / (9 * freedom), 3));
 }
 
 void PairCorrelation::Add(const NestedResidual& a, const NestedResidual& b) {

@@ -17,6 +17,7 @@
 #include "fitting/nested/unresolved_detail.h"
 #include "fitting/nested/weight_search.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -179,7 +180,7 @@ class NestedFitter {
     const NestedWeight chosen = search.Finish();
     least_gain_ = search.least_gain();
     if (std::isnan(chosen.weight)) {
-      Fail("no smoothness has a usable solve; more points than a plane needs are wanted");
+      Fail("no smoothness has a usable solve; give more points than a plane needs");
     }
     weight_ = chosen.weight;
     Judge(chosen, search.steps());
@@ -233,9 +234,7 @@ class NestedFitter {
     if (squares.empty()) {
       return 0;
     }
-    const auto middle = squares.begin() + std::ssize(squares) / 2;
-    std::nth_element(squares.begin(), middle, squares.end());
-    return kSdOfMedian[points_.channels] * std::sqrt(*middle);
+    return kSdOfMedian[points_.channels] * std::sqrt(UpperMedian(squares));
   }
 
   bool Refine() {

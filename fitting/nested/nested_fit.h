@@ -50,7 +50,7 @@ struct NestedFitResult {
 };
 
 // A tenth of the points is held out. In rounds: the thin-plate weight by generalised
-// cross-validation, outliers (outlier_search.h), and finer vertices where residuals hang together
+// cross-validation, outliers (outlier_search.h), and finer vertices where residuals are correlated
 // (unresolved_detail.h), as long as there are such places or points are dense. Of all rounds the
 // one that predicts the points held out best, or within a tenth of a per cent the coarsest, is
 // fitted again to all points. With many points the first rounds look at some of them.

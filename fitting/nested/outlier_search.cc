@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/nested/outlier_search.h"
+#include "surfaces/base/quantile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -76,12 +77,6 @@ class OutlierSearch {
     return changed;
   }
 
-  static double Median(std::vector<double>& values) {
-    const auto middle = values.begin() + std::ssize(values) / 2;
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  }
-
   // All values, if too few have a vote.
   template <class Value>
   double MedianOf(std::ptrdiff_t begin, std::ptrdiff_t end, const Value& value) {
@@ -97,7 +92,7 @@ class OutlierSearch {
         values_.push_back(value(k));
       }
     }
-    return Median(values_);
+    return UpperMedian(values_);
   }
 
   // Whether none can be far: a median is no farther from the mean than the standard deviation.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points that agree with nobody.
+// Outliers: points that disagree with their neighbours.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where residuals hang together, so that finer vertices would follow them.
+// Where residuals are correlated, so that finer vertices would follow them.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +30,8 @@ UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const NestedSp
                                       int finest, std::span<const std::uint32_t> indices,
                                       std::span<const NestedResidual> residuals);
 
-// Overlays each patch of the space over which a finer level sees detail, one level a time. Returns
-// the number of vertices that became active.
+// Overlays each patch of the space over which a finer level sees detail, one level at a time.
+// Returns the number of vertices that became active.
 int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space);
 
 // Overlays each patch of a level that is there and has at least so many points for each of

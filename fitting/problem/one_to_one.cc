@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/problem/one_to_one.h"
+#include "surfaces/base/quantile.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -159,11 +160,10 @@ class Prober {
     for (const Neighbourhood& probe : probes) {
       spacings_mm.push_back(probe.spacing_mm);
     }
-    const auto middle = spacings_mm.begin() + std::ssize(spacings_mm) / 2;
-    std::nth_element(spacings_mm.begin(), middle, spacings_mm.end());
+    const double usual_mm = UpperMedian(spacings_mm);
     int folded = 0, collapsed = 0;
     for (const Neighbourhood& probe : probes) {
-      const bool mixes = IsFolded(probe, std::max(*middle, probe.spacing_mm));
+      const bool mixes = IsFolded(probe, std::max(usual_mm, probe.spacing_mm));
       folded += mixes ? 1 : 0;
       collapsed += !mixes && IsCollapsed(probe) ? 1 : 0;
     }
@@ -214,7 +214,7 @@ class Prober {
     return on_map.determinant() < kLeastArea * kLeastArea * square;
   }
 
-  // Which samples of a neighbourhood hang together in space; numbered from that of the sample.
+  // Which samples of a neighbourhood are connected in space; numbered from that of the sample.
   std::array<int, kWithItself> ClustersOf(const Neighbourhood& probe, double link_mm) const {
     std::array<int, kWithItself> cluster;
     cluster.fill(-1);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/problem/torus.h"
+#include "surfaces/base/quantile.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -33,12 +34,6 @@ std::vector<Vec3> Thinned(std::span<const Vec3> points, std::size_t most) {
     some.push_back(points[k]);
   }
   return some;
-}
-
-double Quantile(std::vector<double>& values, double share) {
-  const auto at = values.begin() + std::lround(share * static_cast<double>(std::ssize(values) - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 // m and a of values m + a cos(angle), angles being even, but for a share of them at either end.

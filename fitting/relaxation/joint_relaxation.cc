@@ -23,7 +23,7 @@
 namespace semblance {
 namespace {
 
-constexpr int kSteps = 5;        // of Levenberg-Marquardt, a round
+constexpr int kSteps = 5;        // of Levenberg-Marquardt, per round
 constexpr double kBeyond = 0.1;  // of a patch: how far past its edge its polynomial is used
 constexpr int kHalvings = 8;     // of single steps, for the barrier
 constexpr int kAllHalvings = 4;  // of all steps, until the cost falls

@@ -11,15 +11,14 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <utility>
 
-#include "fitting/shape_model/farthest_points.h"
 #include "fitting/shape_model/shape_cost.h"
 #include "fitting/shape_model/shape_posterior.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -71,10 +70,11 @@ void CheckTips(const ShapeModel& model, const ShapeTarget& target) {
 // Points of the model that take part
 // ---------------------------------------------------------------------------------------------
 
-std::vector<int> AllPoints(const TriMesh& mesh) {
-  std::vector<int> all(mesh.points.size());
-  std::iota(all.begin(), all.end(), 0);
-  return all;
+// Numbers of at most `count` points that lie far apart, the first one first.
+std::vector<int> SpreadPoints(std::span<const Vec3> points, int count) {
+  const std::vector<std::size_t> some =
+      FarthestFirst(points, 0, static_cast<std::size_t>(count), Coincident::kLeftOut);
+  return {some.begin(), some.end()};
 }
 
 std::vector<Vec3> FeaturePositions(const ShapeTarget& target) {
@@ -129,18 +129,20 @@ std::vector<DrawnPoint> DrawnPoints(const ShapeModel& model, const ShapeTarget& 
                                     const ShapeFitOptions& options) {
   const double farthest = options.surface_range_mm * options.surface_range_mm;
   std::vector<int> candidates;
-  for (const int v : AllPoints(model.mean)) {
+  std::vector<Vec3> places;
+  for (int v = 0; v < static_cast<int>(model.mean.points.size()); ++v) {
     const Vec3& p = model.mean.points[v];
     const bool clear = std::ranges::none_of(target.features, [&](const ShapeFeature& f) {
       return (p - f.position).squaredNorm() <= f.clearance_mm * f.clearance_mm;
     });
     if (clear && NearestTipTo(p, model, target).squared_mm <= farthest) {
       candidates.push_back(v);
+      places.push_back(p);
     }
   }
   std::vector<DrawnPoint> drawn;
-  for (const int v : FarthestPoints(model.mean.points, candidates, options.surface_points)) {
-    drawn.push_back({v, NearestTipTo(model.mean.points[v], model, target).shared_sd_mm});
+  for (const int k : SpreadPoints(places, options.surface_points)) {
+    drawn.push_back({candidates[k], NearestTipTo(places[k], model, target).shared_sd_mm});
   }
   return drawn;
 }
@@ -220,8 +222,7 @@ class ShapeEstimator {
                .mode_sd = options.mode_sd,
                .population_sd = options.population_sd},
         frame_(StartFrame(model, target.start)) {
-    const std::vector<int> centres =
-        FarthestPoints(model.mean.points, AllPoints(model.mean), options.field.centres);
+    const std::vector<int> centres = SpreadPoints(model.mean.points, options.field.centres);
     field_ = SmoothFieldFactor(model.mean.points, centres, FeaturePositions(target), options.field);
     parameters_ = StartParameters(frame_, target.start, model.Modes(), std::ssize(centres));
     start_pose_ = parameters_.pose;
@@ -398,7 +399,7 @@ double Rms(const Eigen::MatrixXd& rows) {
 // Sigma, and what is drawn.
 void ShapeEstimator::TellSpread(const RunContext& context, ShapeEstimate& result) const {
   std::vector<ShapeRow> rows;
-  for (const int v : AllPoints(model_.mean)) {
+  for (int v = 0; v < static_cast<int>(model_.mean.points.size()); ++v) {
     rows.push_back(RowOfVertex(model_, field_, v));
   }
   const ShapePosterior posterior =

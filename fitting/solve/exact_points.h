@@ -32,7 +32,7 @@ class ExactEquations {
  private:
   // What is linear in the unknowns, the same along x, y and z: the place, or a tangent.
   struct Functional {
-    std::vector<int> rows;  // one may stand twice
+    std::vector<int> rows;  // one may appear twice
     std::vector<double> weights;
     Vec3 fixed = Vec3::Zero();  // of what does not take part
   };

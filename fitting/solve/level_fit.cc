@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "fitting/solve/space_solve.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 
@@ -16,14 +17,12 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solve
   return solution;
 }
 
-PatchCoverage CoverageOf(std::vector<int> counts) {
-  PatchCoverage coverage{.patches = static_cast<int>(counts.size()), .empty_patches = 0};
-  coverage.empty_patches = static_cast<int>(std::erase(counts, 0));
-  if (!counts.empty()) {
-    const auto upper = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
-    std::nth_element(counts.begin(), upper, counts.end());
-    const int lower = counts.size() % 2 == 1 ? *upper : *std::max_element(counts.begin(), upper);
-    coverage.median_patch_points = (*upper + lower) / 2.0;
+PatchCoverage CoverageOf(const std::vector<int>& counts) {
+  std::vector<double> filled(counts.begin(), counts.end());
+  const auto empty = static_cast<int>(std::erase(filled, 0));
+  PatchCoverage coverage{.patches = static_cast<int>(counts.size()), .empty_patches = empty};
+  if (!filled.empty()) {
+    coverage.median_patch_points = Quantile(filled, 0.5);
   }
   return coverage;
 }

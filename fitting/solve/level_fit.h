@@ -20,7 +20,7 @@ struct PatchCoverage {
 };
 
 // counts: of the observations, one per patch.
-PatchCoverage CoverageOf(std::vector<int> counts);
+PatchCoverage CoverageOf(const std::vector<int>& counts);
 
 struct TermCosts {
   std::string term;      // its kName

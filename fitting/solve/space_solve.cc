@@ -17,6 +17,7 @@
 #include "fitting/terms/robust_loss.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -320,7 +321,7 @@ void SpaceSolve::NoteCoverage(LevelSummary& summary) {
       counts.push_back(static_cast<int>(node.range.size()));
     }
   }
-  summary.coverage = CoverageOf(std::move(counts));
+  summary.coverage = CoverageOf(counts);
   if (weighed_) {
     space_.Measure({}, threads_, nullptr);
   }
@@ -617,9 +618,7 @@ double SpaceSolve::LeastLossWidth_mm() const {
     return 0;
   }
   std::vector<double> squares = squares_;
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return 3 * std::sqrt(*middle);
+  return 3 * std::sqrt(UpperMedian(squares));
 }
 
 bool SpaceSolve::HasLoss() const {

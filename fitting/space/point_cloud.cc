@@ -143,7 +143,7 @@ int ShiftTo16Bits(std::uint64_t bits) {
 
 }  // namespace
 
-// Twelve bytes a point while it is sorted.
+// Twelve bytes per point while it is sorted.
 std::vector<std::uint32_t> CurveOrder(const HSplineShape& shape, const ScatteredPoints& points) {
   std::vector<std::uint64_t> keys(points.size());
   std::uint64_t all = 0;

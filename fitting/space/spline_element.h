@@ -14,7 +14,7 @@ struct SplineElement {
   PatchId patch;
   int patches_u = 0;  // of its level
   int patches_v = 0;
-  std::vector<int> dofs;  // unknowns: columns of the extraction; one may stand twice
+  std::vector<int> dofs;  // unknowns: columns of the extraction; one may appear twice
   // The patch's vertices are extraction * dofs + fixed. 16 x dofs; 16 x 0 stands for the identity.
   Eigen::Matrix<double, 16, Eigen::Dynamic> extraction{16, 0};
   PatchMatrix fixed = PatchMatrix::Zero();  // mm; of dofs that do not take part

@@ -15,7 +15,7 @@ struct MetricDistortion {
   double area_cm2 = 0;     // of the template where it was looked at
 };
 
-// Over the places (u,v), 2 x 2 Gauss points a patch of the finest level, whose point of the
+// Over the places (u,v), 2 x 2 Gauss points per patch of the finest level, whose point of the
 // template `rest` is `wanted` and has tangents. surface: of the same shape. NaN if there is no such
 // place.
 MetricDistortion DistortionWhere(const HSplineSurface& surface, const HSplineSurface& rest,

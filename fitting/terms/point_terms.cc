@@ -172,7 +172,7 @@ Eigen::MatrixXd Extracted(const Eigen::MatrixXd& a, const SplineElement& element
   return result;
 }
 
-// Three rows a point, 48 columns.
+// Three rows per point, 48 columns.
 void AddPatch(const TangentPointTerm& term, const LevelView& view,
               std::span<const Observation> points, double scale, ControlNet& net,
               ceres::Problem& problem) {

@@ -120,7 +120,7 @@ constexpr auto EnumNames(DistortionOf) {
 // The first fundamental form stays the template's: weight * length_mm^2 * mean over the template's
 // surface of |E|^2; E = (F^T F - 1) / 2 is Green's strain, F the linear map that takes the
 // template's tangent plane to the surface's. of area: mean of (dA / dA of the template - 1)^2.
-// Taken at 2 x 2 Gauss points a patch, of the level's plain B-splines. Bending is free.
+// Taken at 2 x 2 Gauss points per patch, of the level's plain B-splines. Bending is free.
 struct DistortionTerm {
   static constexpr std::string_view kName = "distortion";
   double weight = 0.1;                      // of the mean square

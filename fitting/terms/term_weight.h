@@ -25,7 +25,7 @@ void AutoWeightField(Visitor& visit, AutoOr<double>& weight) {
                   .max = 1e6,
                   .doc = "factor of the mean squared residual; 0 switches the term off; auto: "
                          "chosen by generalised cross-validation, for points that are many and "
-                         "whose errors do not hang together"},
+                         "whose errors are independent"},
         weight);
 }
 

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <numbers>
 
-#include "problems/metrics/quantile.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {

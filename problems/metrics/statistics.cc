@@ -10,8 +10,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "problems/metrics/quantile.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {

@@ -8,6 +8,7 @@
 
 #include "problems/plots/svg_parts.h"
 #include "problems/plots/svg_plot.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -26,10 +27,9 @@ Range RangeOf(std::vector<double> values) {
     return {};
   }
   const double largest = *std::ranges::max_element(values);
-  const auto at = values.begin() + static_cast<long>(0.95 * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  const bool is_cut = *at > 0 && kReach * *at < largest;
-  const double high = is_cut ? kReach * *at : largest;
+  const double most = Quantile(values, 0.95);
+  const bool is_cut = most > 0 && kReach * most < largest;
+  const double high = is_cut ? kReach * most : largest;
   return {.high = high > 0 ? high : 1, .is_cut = is_cut};
 }
 

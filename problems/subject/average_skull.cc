@@ -10,6 +10,7 @@
 #include "fitting/problem/placement.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -84,7 +85,8 @@ Similarity LeastMedian(const Pairs& pairs) {
           continue;
         }
         const Similarity candidate = OfTriple(pairs, {i, j, k});
-        const double median = UpperMedian(Residuals(pairs, candidate));
+        std::vector<double> residuals = Residuals(pairs, candidate);
+        const double median = UpperMedian(residuals);
         if (median < least) {
           least = median;
           best = candidate;
@@ -123,12 +125,6 @@ Similarity Reweighted(const Pairs& pairs, Similarity pose) {
 
 }  // namespace
 
-double UpperMedian(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 Vec3 AverageSite(std::string_view site) {
   const std::string landmark = WithoutSide(site);
   const auto* const found = std::ranges::find(kAverageSkull, landmark, &AverageLandmark::code);
@@ -139,7 +135,7 @@ Vec3 AverageSite(std::string_view site) {
   return {right ? -found->x : found->x, found->y, found->z};
 }
 
-Vec3 SkullFit::Foreseen(std::string_view site) const {
+Vec3 SkullFit::Predicted(std::string_view site) const {
   const Vec3 average = AverageSite(site);
   return skull_from_average * (mirrored ? Mirrored(average) : average);
 }
@@ -150,7 +146,8 @@ SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand) {
   fit.mirrored = hand == Handedness::kMirrored;
   fit.skull_from_average = Reweighted(pairs, LeastMedian(pairs));
   fit.residual_mm = Residuals(pairs, fit.skull_from_average);
-  fit.median_mm = UpperMedian(fit.residual_mm);
+  std::vector<double> sorted = fit.residual_mm;
+  fit.median_mm = UpperMedian(sorted);
   return fit;
 }
 
@@ -163,7 +160,7 @@ SkullSites CompleteSites(std::span<const SitePoint> sites) {
   const SkullFit fit = FitAverageSkull(sites);
   SkullSites complete{fit.skull_from_average, {}};
   for (const std::string& site : StandardSiteCodes()) {
-    complete.points[site] = fit.Foreseen(site);
+    complete.points[site] = fit.Predicted(site);
   }
   for (const SitePoint& s : sites) {
     complete.points[s.site] = s.point;

@@ -30,14 +30,10 @@ struct SkullFit {
   std::vector<double> residual_mm;  // one per site, in mm of an average skull
   double median_mm = kNaN;          // of those
 
-  Vec3 Foreseen(std::string_view site) const;  // where the skull is expected to have it
+  Vec3 Predicted(std::string_view site) const;  // where the skull is expected to have it
 };
 
 enum class Handedness { kAsIs, kMirrored };
-
-// The middle value, of an even number the upper of the two, as least medians take it. Of one value
-// at least.
-double UpperMedian(std::vector<double> values);
 
 // The similarity that the sites agree on, whatever a few of them say: the one with the least median
 // residual that some three of them define (Rousseeuw 1984, all triples), then least squares with
@@ -45,7 +41,7 @@ double UpperMedian(std::vector<double> values);
 // sites, or all lie on a line.
 SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand = Handedness::kAsIs);
 
-// The pose of a skull and its 32 sites: landmarks where there are, else as foreseen.
+// The pose of a skull and its 32 sites: landmarks where there are, else as predicted.
 struct SkullSites {
   Similarity skull_from_average;
   std::map<std::string, Vec3> points;  // one for each of StandardSiteCodes()

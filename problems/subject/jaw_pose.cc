@@ -9,6 +9,7 @@
 
 #include "interp/dowels/site_code.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -54,12 +55,11 @@ std::optional<JawPose> FindJawPose(std::span<const SitePoint> sites) {
   std::vector<double> off_mm;
   off_mm.reserve(lower.size());
   for (const SitePoint& s : lower) {
-    off_mm.push_back((s.point - cranium->Foreseen(s.site)).norm());
+    off_mm.push_back((s.point - cranium->Predicted(s.site)).norm());
   }
-  std::ranges::nth_element(off_mm, off_mm.begin() + std::ssize(off_mm) / 2);
   const Mat3 between =
       cranium->skull_from_average.rotation.transpose() * mandible->skull_from_average.rotation;
-  return JawPose{.opening_deg = TurnAboutX_deg(between), .off_mm = off_mm[off_mm.size() / 2]};
+  return JawPose{.opening_deg = TurnAboutX_deg(between), .off_mm = UpperMedian(off_mm)};
 }
 
 }  // namespace semblance

@@ -15,6 +15,7 @@
 #include "problems/subject/average_skull.h"
 #include "problems/subject/jaw_pose.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -172,10 +173,11 @@ class Search {
     if (!in_air && OfASkullsSize()) {
       return false;
     }
+    std::vector<double> air_mm = air_mm_;
     const std::string where =
         in_air
             ? fmt::format("{} of {} sites are further than {} mm from the skull (median {:.1f} mm)",
-                          far, sites_.size(), options_.max_distance_mm, UpperMedian(air_mm_))
+                          far, sites_.size(), options_.max_distance_mm, UpperMedian(air_mm))
             : fmt::format("the sites lie as on a skull of {:.3f} times the usual size",
                           fit_->skull_from_average.scale);
     if (const std::optional<Change> change = BestChange()) {
@@ -237,20 +239,20 @@ class Search {
            Error(
                "the mandible is open by {0:.0f} degrees, and at most {1} are taken "
                "(max_opening_deg): its sites are {2:.0f} mm (median) from where the upper jaw "
-               "foresees them; give the mandible as a mesh of its own and close it (`subject: "
+               "predicts them; give the mandible as a mesh of its own and close it (`subject: "
                "{{mandible: {{mesh: ..., opening_deg: -{0:.0f}}}}}`)",
                jaw->opening_deg, options_.max_opening_deg, jaw->off_mm);
   }
 
-  // The site that is foreseen where this one lies, if its own landmark is not there.
+  // The site that is predicted where this one lies, if its own landmark is not there.
   std::string TakenFor(const SitePoint& off) const {
     constexpr double kNear_mm = 12;
     for (const std::string& site : StandardSiteCodes()) {
       const auto own = std::ranges::find(sites_, site, &SitePoint::site);
-      const Vec3 foreseen = fit_->Foreseen(site);
-      const bool free = own == sites_.end() || (own->point - foreseen).norm() > 2 * kNear_mm;
-      if (site != off.site && free && (off.point - foreseen).norm() <= kNear_mm) {
-        return fmt::format("; it lies where {} is foreseen, so the names may be exchanged",
+      const Vec3 predicted = fit_->Predicted(site);
+      const bool free = own == sites_.end() || (own->point - predicted).norm() > 2 * kNear_mm;
+      if (site != off.site && free && (off.point - predicted).norm() <= kNear_mm) {
+        return fmt::format("; it lies where {} is predicted, so the names may be exchanged",
                            SiteInWords(site));
       }
     }
@@ -262,7 +264,7 @@ class Search {
       const double off_mm = fit_->residual_mm[k];
       if (off_mm > options_.max_misfit_mm) {
         Error(
-            "site {} is {:.0f} mm from where the other sites foresee it, and at most {} mm are "
+            "site {} is {:.0f} mm from where the other sites predict it, and at most {} mm are "
             "allowed (max_misfit_mm); correct its point or its name{}",
             SiteInWords(sites_[k].site), off_mm, options_.max_misfit_mm, TakenFor(sites_[k]));
       }
@@ -305,12 +307,13 @@ class Search {
       return;
     }
     for (const char* site : {"pg", "go_l", "go_r"}) {
-      if (query_.Closest(fit_->Foreseen(site)).distance_mm <= kNoBone_mm) {
+      if (query_.Closest(fit_->Predicted(site)).distance_mm <= kNoBone_mm) {
         return;
       }
     }
     found_.notes.push_back(fmt::format(
-        "{}: there is no bone where chin and angles of the mandible are foreseen: add the mandible "
+        "{}: there is no bone where chin and angles of the mandible are predicted: add the "
+        "mandible "
         "to the skull's mesh, or list its sites under `absent`; the lower face is the generic "
         "one's",
         who_));

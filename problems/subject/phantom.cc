@@ -8,8 +8,10 @@
 #include <cmath>
 #include <iterator>
 #include <numbers>
+#include <optional>
 #include <string_view>
 
+#include "problems/subject/phantom_relief.h"
 #include "problems/subject/phantom_shape.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
@@ -166,14 +168,19 @@ std::vector<Triangle> RingTriangles(int rings) {
 
 class Head {
  public:
-  explicit Head(std::uint64_t random_seed)
-      : random_(random_seed), shape_(random_), depth_(random_) {
-    const Vec3 nasion = PhantomDirection(Vec3::Zero());
-    centre_ = -shape_.Radius(nasion) * nasion;
+  explicit Head(const PhantomOptions& options)
+      : random_(options.random_seed), shape_(random_), depth_(random_) {
+    if (options.bone == PhantomBone::kLikePeople) {
+      relief_.emplace(random_);
+    }
+    centre_ = -At("n", PhantomDirection(Vec3::Zero())).base;
   }
   PhantomSite At(std::string site, const Vec3& direction) const {
-    return {std::move(site), centre_ + shape_.Radius(direction) * direction,
-            shape_.Normal(direction), depth_.At(direction)};
+    const Vec3 smooth = centre_ + shape_.Radius(direction) * direction,
+               normal = shape_.Normal(direction);
+    const double smooth_mm = depth_.At(direction);
+    const double depth_mm = relief_ ? relief_->Depth(direction, smooth_mm) : smooth_mm;
+    return {std::move(site), smooth + (smooth_mm - depth_mm) * normal, normal, depth_mm};
   }
   const Vec3& Centre() const { return centre_; }
   double Thickness() const { return depth_.Thickness(); }
@@ -182,7 +189,8 @@ class Head {
   Random random_;
   PhantomShape shape_;
   DepthFormula depth_;
-  Vec3 centre_;
+  std::optional<PhantomRelief> relief_;
+  Vec3 centre_ = Vec3::Zero();
 };
 
 std::vector<PhantomSite> AllSites(const Head& head) {
@@ -201,7 +209,7 @@ Phantom MakePhantom(const PhantomOptions& options) {
         fmt::format("phantom: rings is {}, allowed is 8 to 1000; choose a number in that range",
                     options.rings));
   }
-  const Head head(options.random_seed);
+  const Head head(options);
   Phantom phantom;
   phantom.centre = head.Centre();
   phantom.thickness = head.Thickness();

@@ -3,6 +3,7 @@
 // face is recovered where nothing is left to doubt but the method.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -13,10 +14,19 @@
 
 namespace semblance {
 
+enum class PhantomBone {
+  kSmooth,     // as the skin
+  kLikePeople  // hollows and a rough field under the same smooth skin
+};
+constexpr auto EnumNames(PhantomBone) {
+  return std::to_array<std::string_view>({"smooth", "like_people"});
+}
+
 struct PhantomOptions {
   static constexpr std::string_view kName = "phantom";
   std::uint64_t random_seed = 1;  // which head
   int rings = 100;                // of triangles from crown to throat; about 3 rings^2 triangles
+  PhantomBone bone = PhantomBone::kSmooth;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PhantomOptions& o) {
@@ -30,6 +40,11 @@ void Fields(Visitor& visit, PhantomOptions& o) {
           .max = 1000,
           .doc = "bands of triangles from crown to throat; the mesh has about 3 rings^2 triangles"},
       o.rings);
+  visit(FieldInfo{.name = "bone",
+                  .doc =
+                      "smooth: depths vary little along it; like_people: hollows and a rough field "
+                      "under the same smooth skin, so that they vary as people's do"},
+        o.bone);
 }
 
 struct PhantomSite {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -77,9 +78,7 @@ double UsualStep(const std::vector<Level>& levels) {
   for (std::size_t k = 1; k < levels.size(); ++k) {
     steps.push_back(levels[k].height_mm - levels[k - 1].height_mm);
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return UpperMedian(steps);
 }
 
 // Which place of a regular stack each level has.
@@ -166,7 +165,8 @@ SliceStack StackSlices(std::span<const Vec3> positions, const Vec3& normal,
   const std::vector<Level> levels =
       WithoutDoubles(SortedLevels(positions, normal), names, options, where, stack.notes);
   if (levels.size() < 2) {
-    throw InputError(fmt::format("{}: {} slices are no volume; it needs 2", where, levels.size()));
+    throw InputError(
+        fmt::format("{}: {} slices are not a volume; it needs 2", where, levels.size()));
   }
   const std::vector<int> places = Places(levels, where);
   CheckGaps(levels, places, options, where, stack.notes);

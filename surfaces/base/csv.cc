@@ -39,7 +39,7 @@ CsvReader::CsvReader(std::string_view text, std::string_view name, const CsvDial
   std::set<std::string_view> seen;
   for (const std::string& column : columns_) {
     if (!seen.insert(column).second) {
-      Fail(fmt::format("the column '{}' stands twice; leave one out", column));
+      Fail(fmt::format("the column '{}' appears twice; leave one out", column));
     }
   }
 }
@@ -79,7 +79,8 @@ std::optional<double> CsvReader::ToNumber(std::string_view text) const {
   std::string with_point;
   if (dialect_.decimal != '.') {
     with_point = text;
-    std::replace(with_point.begin(), with_point.end(), '.', '?');  // so that 1.000,5 is no number
+    std::replace(with_point.begin(), with_point.end(), '.',
+                 '?');  // so that 1.000,5 is not a number
     std::replace(with_point.begin(), with_point.end(), dialect_.decimal, '.');
     text = with_point;
   }

@@ -7,17 +7,19 @@
 namespace semblance {
 
 std::vector<std::size_t> FarthestFirst(std::span<const Vec3> points, std::size_t first,
-                                       std::size_t count) {
+                                       std::size_t count, Coincident coincident) {
   constexpr double kTaken = -1;
-  std::vector<double> distance(points.size(), std::numeric_limits<double>::infinity());
+  const double least = coincident == Coincident::kTaken ? 0 : std::numeric_limits<double>::min();
+  std::vector<double> squared(points.size(), std::numeric_limits<double>::infinity());
   std::vector<std::size_t> order;
-  for (std::size_t next = first; order.size() < std::min(count, points.size());) {
+  for (std::size_t next = first;
+       order.size() < std::min(count, points.size()) && squared[next] >= least;) {
     order.push_back(next);
-    distance[next] = kTaken;
+    squared[next] = kTaken;
     for (std::size_t k = 0; k < points.size(); ++k) {
-      distance[k] = std::min(distance[k], (points[k] - points[next]).norm());
+      squared[k] = std::min(squared[k], (points[k] - points[next]).squaredNorm());
     }
-    next = static_cast<std::size_t>(std::ranges::max_element(distance) - distance.begin());
+    next = static_cast<std::size_t>(std::ranges::max_element(squared) - squared.begin());
   }
   return order;
 }

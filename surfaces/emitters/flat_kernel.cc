@@ -10,8 +10,8 @@
 #include <numbers>
 #include <span>
 
-#include "surfaces/base/polygon_integral.h"
 #include "surfaces/base/simd.h"
+#include "surfaces/emitters/polygon_integral.h"
 
 namespace semblance {
 namespace {

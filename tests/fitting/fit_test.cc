@@ -181,7 +181,6 @@ TEST(Fit, EveryStepComesNearer) {
   EXPECT_DOUBLE_EQ(result.levels.back().rms_after_mm, result.point_rms_mm);
 }
 
-// Whatever detail finer levels hold, a template that meets its target is left in peace.
 // The terms by default allow both ways; they minimise the same sum.
 TEST(Fit, TheSolverIsTheOneAskedForAndChangesNoSurface) {
   const HSplineSurface start = RandomSurface(Shape(), 2);
@@ -197,6 +196,7 @@ TEST(Fit, TheSolverIsTheOneAskedForAndChangesNoSurface) {
   }
 }
 
+// Whatever detail finer levels hold, a template that meets its target is left in peace.
 TEST(Fit, ATemplateThatFitsStays) {
   const HSplineSurface start = RandomSurface(Shape(), 3, 60);
   const FitTarget target = TargetOn(start, 300);

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "fitting/shape_model/farthest_points.h"
 #include "fitting/shape_model/shape_fit.h"
 #include "fitting/shape_model/shape_posterior.h"
 #include "surfaces/base/error.h"
@@ -100,14 +99,6 @@ TEST(ShapeModel, WhatDisagreesIsRefused) {
   corner.mean.triangles[5][1] = 5000;
   EXPECT_THAT(fault(corner), HasSubstr("5000"));
   EXPECT_THROW(ShapeAt(Dome(), Eigen::VectorXd::Zero(3)), InputError);
-}
-
-TEST(FarthestPoints, EachIsTheFarthestFromThoseBefore) {
-  const std::vector<Vec3> points = {{0, 0, 0}, {1, 0, 0}, {10, 0, 0}, {4, 0, 0}, {10, 0, 0}};
-  const std::vector<int> all = {0, 1, 2, 3, 4};
-  EXPECT_THAT(FarthestPoints(points, all, 3), ElementsAre(0, 2, 3));
-  EXPECT_THAT(FarthestPoints(points, all, 9), ElementsAre(0, 2, 3, 1));  // 4 lies on 2
-  EXPECT_THAT(FarthestPoints(points, std::vector<int>{3, 1}, 1), ElementsAre(3));
 }
 
 TEST(SmoothField, FactorGivesTheCovarianceAtTheCentresAndLessElsewhere) {

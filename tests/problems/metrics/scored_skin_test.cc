@@ -73,7 +73,7 @@ TEST(ScoredSkin, IsTheSameWhateverLandmarksThereAre) {
             0.08 * area);
 }
 
-TEST(ScoredSkin, AZoneIsMaskedAlsoWhereTheSiteIsOnlyForeseen) {
+TEST(ScoredSkin, AZoneIsMaskedAlsoWhereTheSiteIsOnlyPredicted) {
   const FaceRegionOptions masked{.exclude = {{"zy_r", 30}}};
   for (const auto& left_out : {std::vector<std::string>{}, std::vector<std::string>{"zy_r"}}) {
     const ScoredSkin all = Scored(left_out), skin = Scored(left_out, masked);

@@ -234,5 +234,75 @@ TEST(PhantomShape, NormalIsThatOfTheSurfaceByDifferences) {
   }
 }
 
+PhantomOptions LikePeople(std::uint64_t random_seed, int rings) {
+  return {.random_seed = random_seed, .rings = rings, .bone = PhantomBone::kLikePeople};
+}
+
+TEST(PhantomLikePeople, HasTheSmoothOnesFaceAndAnotherBone) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const Phantom smooth = MakePhantom({.random_seed = seed, .rings = 60}),
+                  rough = MakePhantom(LikePeople(seed, 60));
+    ASSERT_EQ(rough.skull.points.size(), smooth.skull.points.size());
+    const Vec3 moved = rough.centre - smooth.centre;  // nasion is the origin of both
+    for (std::size_t v = 0; v < smooth.face.points.size(); ++v) {
+      EXPECT_LT((rough.face.points[v] - moved - smooth.face.points[v]).norm(), 1e-9);
+      EXPECT_NEAR((rough.face.points[v] - rough.skull.points[v]).norm(), rough.depth_mm[v], 1e-9);
+      EXPECT_GT(rough.depth_mm[v], 1);
+      EXPECT_LT(rough.depth_mm[v], 45);
+    }
+    EXPECT_EQ(Bytes(rough), Bytes(MakePhantom(LikePeople(seed, 60))));
+    EXPECT_NE(Bytes(rough), Bytes(MakePhantom(LikePeople(seed + 1, 60))));
+  }
+}
+
+TEST(PhantomLikePeople, TheBoneIsClosedOutwardAndInsideTheSkin) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const Phantom p = MakePhantom(LikePeople(seed, 60));
+    EXPECT_GT(SignedVolume(p.skull), 1e6);
+    EXPECT_GT(SignedVolume(p.face), SignedVolume(p.skull));
+    const MeshQuery skin(p.face);
+    for (std::size_t v = 0; v < p.skull.points.size(); v += 7) {
+      const auto hit = skin.FirstHit(p.centre, p.skull.points[v] - p.centre, 400);
+      ASSERT_TRUE(hit.has_value());
+      EXPECT_GT(hit->distance_mm, (p.skull.points[v] - p.centre).norm()) << v;
+    }
+  }
+}
+
+TEST(PhantomLikePeople, SitesStandOnTheBone) {
+  const Phantom p = MakePhantom(LikePeople(1, 200));
+  const MeshQuery bone(p.skull), skin(p.face);
+  ASSERT_EQ(p.sites.size(), 32u);
+  for (const PhantomSite& site : p.sites) {
+    EXPECT_LT(bone.Closest(site.base).distance_mm, 0.3) << site.site;
+    EXPECT_LT(skin.Closest(site.base + site.depth_mm * site.normal).distance_mm, 0.3) << site.site;
+  }
+}
+
+// Half the mean squared difference of depths some way apart: of people it grows about as the
+// distance does, of a smooth field as its square.
+TEST(PhantomLikePeople, DepthsAreRoughAsOfPeople) {
+  const auto unlike = [](const Phantom& p, double least_mm, double most_mm) {
+    double sum = 0, pairs = 0;
+    for (std::size_t a = 0; a < p.skull.points.size(); a += 3) {
+      for (std::size_t b = a + 1; b < p.skull.points.size(); b += 2) {
+        const double apart_mm = (p.skull.points[a] - p.skull.points[b]).norm();
+        if (apart_mm >= least_mm && apart_mm < most_mm) {
+          sum += std::pow(p.depth_mm[a] - p.depth_mm[b], 2) / 2;
+          pairs += 1;
+        }
+      }
+    }
+    return sum / pairs;
+  };
+  for (const std::uint64_t seed : {1, 4, 5}) {
+    const Phantom rough = MakePhantom(LikePeople(seed, 40)),
+                  smooth = MakePhantom({.random_seed = seed, .rings = 40});
+    EXPECT_LT(unlike(rough, 20, 24) / unlike(rough, 10, 12), 3) << seed;    // 2: as the distance
+    EXPECT_GT(unlike(smooth, 20, 24) / unlike(smooth, 10, 12), 3) << seed;  // 4: as its square
+    EXPECT_GT(unlike(rough, 20, 24), 5 * unlike(smooth, 20, 24)) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace semblance

@@ -78,7 +78,7 @@ TEST(Csv, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_EQ(FaultOf("a,b\n1,2\n3\n"),
             "t.csv:3: 1 entries for 2 columns; give one entry per column");
   EXPECT_EQ(FaultOf("a,b\n\n"), "t.csv:2: the line is empty; leave it out");
-  EXPECT_EQ(FaultOf("a,b,a\n"), "t.csv:1: the column 'a' stands twice; leave one out");
+  EXPECT_EQ(FaultOf("a,b,a\n"), "t.csv:1: the column 'a' appears twice; leave one out");
   EXPECT_THAT(FaultOf("a\n1\n\"2\n3"), HasSubstr("t.csv:3: a quote begins here"));
   EXPECT_THAT(FaultOf("a\n\"2\"3\n"), HasSubstr("t.csv:2: text follows a closing quote"));
   for (const char* bad : {"nan", "inf", "1e999", "x", "0x1", "1 2", "\"1\n2\""}) {
@@ -96,7 +96,7 @@ TEST(Csv, ManyColumnsTakeTheirTurn) {
     names += ",c" + std::to_string(k);
   }
   EXPECT_EQ(CsvReader(names + "\n", "t.csv").Columns().size(), 500'001u);
-  EXPECT_EQ(FaultOf(names + ",c7\n"), "t.csv:1: the column 'c7' stands twice; leave one out");
+  EXPECT_EQ(FaultOf(names + ",c7\n"), "t.csv:1: the column 'c7' appears twice; leave one out");
 }
 
 TEST(Csv, ALineAfterABreakInACellHasItsOwnNumber) {

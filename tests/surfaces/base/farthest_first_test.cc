@@ -13,6 +13,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using ::testing::SizeIs;
 using ::testing::UnorderedElementsAre;
 
 double ToNearest(const std::vector<Vec3>& points, const std::vector<std::size_t>& some,
@@ -44,6 +45,7 @@ TEST(FarthestFirst, NoneTwiceWherePointsCoincide) {
   const std::vector<Vec3> points = {Vec3(1, 0, 0), Vec3(1, 0, 0), Vec3(0, 0, 0), Vec3(1, 0, 0)};
   EXPECT_THAT(FarthestFirst(points, 0, 2), ElementsAre(0, 2));
   EXPECT_THAT(FarthestFirst(points, 0, 9), UnorderedElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(FarthestFirst(points, 0, 9, Coincident::kLeftOut), SizeIs(2));
   EXPECT_THAT(FarthestFirst({}, 0, 3), IsEmpty());
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/metrics/quantile.h"
+#include "surfaces/base/quantile.h"
 
 #include <gtest/gtest.h>
 
@@ -53,6 +53,14 @@ TEST(Quantile, OfNothingIsNaN) {
   EXPECT_EQ(Of({inf, 3, std::nan("")}, 0.5), 3);
   EXPECT_TRUE(
       std::isnan(Quantile(SortedValues(std::vector<double>{1}, std::vector<double>{0}), 0.5)));
+}
+
+TEST(Quantile, TheUpperMedianIsOneOfTheValues) {
+  std::vector<double> odd = {3, 1, 2}, even = {4, 1, 3, 2}, one = {7};
+  EXPECT_EQ(UpperMedian(odd), 2);
+  EXPECT_EQ(UpperMedian(even), 3);
+  EXPECT_EQ(UpperMedian(one), 7);
+  EXPECT_EQ(Quantile(even, 0.5), 2.5);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/base/polygon_integral.h"
+#include "surfaces/emitters/polygon_integral.h"
 
 #include <cmath>
 

@@ -30,4 +30,8 @@ double Quantile(std::span<const WeightedValue> sorted, double share);
 // them in another order.
 double Quantile(std::vector<double>& values, double share);
 
+// The median, or of an even number the upper of the two in the middle: one of the values, so that a
+// bound that is made of it is met by one. values: at least one, none NaN; in another order after.
+double UpperMedian(std::vector<double>& values);
+
 }  // namespace semblance

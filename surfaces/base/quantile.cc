@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/metrics/quantile.h"
+#include "surfaces/base/quantile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -58,6 +58,12 @@ double Quantile(std::vector<double>& values, double share) {
   }
   return (*std::max_element(values.begin(), values.begin() + static_cast<long>(at)) + values[at]) /
          2;
+}
+
+double UpperMedian(std::vector<double>& values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::ranges::nth_element(values, middle);
+  return *middle;
 }
 
 }  // namespace semblance

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/subject/phantom_relief.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace semblance {
+namespace {
+
+struct HollowOnSkull {
+  Vec3 on_skull;  // of an average skull, mm; the left one of a pair
+  Vec3 sigma_mm;  // width along x, y, z
+  double depth_mm;
+};
+
+const HollowOnSkull kHollows[] = {
+    {{0, -4, -44}, {9, 20, 11}, 7},      // nasal opening
+    {{0, -2, -97}, {16, 20, 7}, 1.5},    // between teeth and chin
+    {{33, 10, -13}, {11, 15, 10}, 8.5},  // orbit
+    {{26, 4, -48}, {8, 15, 8}, 3},       // canine fossa
+    {{57, 38, 6}, {16, 16, 15}, 5.5},    // temporal fossa
+    {{44, 36, -62}, {14, 22, 17}, 8.5},  // under the cheek bone, beside the teeth
+    {{52, 60, -58}, {12, 16, 16}, 4},    // masseteric fossa
+    {{26, 22, -116}, {18, 18, 8}, 3},    // under the jaw
+};
+
+// Waves whose sum has about the covariance exp(-r / length) of a rough field (a Cauchy distribution
+// of wave vectors), without those shorter than the mesh can show.
+WaveSum DrawRough(Random& random) {
+  constexpr int kWaves = 400;
+  constexpr double kLength_mm = 20, kShortest_mm = 12, kRadius_mm = 85;  // of the bone
+  WaveSum sum;
+  while (sum.waves.size() < kWaves) {
+    const Vec3 normal(random.Normal(), random.Normal(), random.Normal());
+    const double spread = std::abs(random.Normal());
+    const Vec3 per_mm = normal / (spread * kLength_mm);
+    const double phase = random.Uniform(0, 2 * std::numbers::pi);
+    if (per_mm.norm() * kShortest_mm < 2 * std::numbers::pi) {
+      sum.waves.push_back({kRadius_mm * per_mm, phase, std::sqrt(2.0 / kWaves)});
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+PhantomRelief::PhantomRelief(Random& random) {
+  for (const HollowOnSkull& h : kHollows) {
+    const double reach = (h.on_skull - kPhantomCentre).norm();
+    const double depth = h.depth_mm * random.Uniform(0.7, 1.3);
+    const bool paired = h.on_skull.x() > 0;
+    for (const double side : {1.0, -1.0}) {
+      if (side > 0 || paired) {
+        const Vec3 on_skull(side * h.on_skull.x(), h.on_skull.y(), h.on_skull.z());
+        const double asymmetry = paired ? random.Uniform(0.9, 1.1) : 1;
+        hollows_.push_back({PhantomDirection(on_skull), h.sigma_mm / reach, depth * asymmetry});
+      }
+    }
+  }
+  rough_ = DrawRough(random);
+}
+
+double PhantomRelief::Depth(const Vec3& direction, double smooth_depth_mm) const {
+  constexpr double kRoughness = 0.35, kThick_mm = 12;  // standard deviation of the logarithm
+  double depth = smooth_depth_mm;
+  for (const Hollow& hollow : hollows_) {
+    const Vec3 away = (direction - hollow.direction).cwiseQuotient(hollow.sigma);
+    depth += hollow.depth_mm * std::exp(-away.squaredNorm() / 2);
+  }
+  const double roughness = kRoughness / (1 + depth / kThick_mm);
+  return depth * std::exp(roughness * rough_.Value(direction));
+}
+
+}  // namespace semblance
