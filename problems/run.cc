@@ -201,7 +201,8 @@ std::vector<std::string> RunResult::Faults() const {
   const auto require = [&](const FaceMetrics& metrics, const char* what) {
     const DistanceSummary& s = metrics.truth_to_face;
     if (!std::isfinite(s.mean_abs_mm) || !std::isfinite(s.rms_mm)) {
-      faults.push_back(fmt::format("the distance of the {} from the true skin is no number", what));
+      faults.push_back(
+          fmt::format("the distance of the {} from the true skin is not a number", what));
     }
   };
   if (truth) {

@@ -15,7 +15,7 @@ std::map<std::string, int> IndexBySite(std::span<const Dowel> dowels) {
   std::map<std::string, int> index;
   for (const Dowel& dowel : dowels) {
     if (!index.emplace(dowel.site, static_cast<int>(index.size())).second) {
-      throw InputError(fmt::format("dowels: site '{}' stands twice; keep one", dowel.site));
+      throw InputError(fmt::format("dowels: site '{}' appears twice; keep one", dowel.site));
     }
   }
   return index;

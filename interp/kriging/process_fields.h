@@ -12,7 +12,7 @@ void LengthPriorFields(Visitor& visit, double& median_mm, double& spread) {
                   .unit = "mm",
                   .min = 1,
                   .max = 1e4,
-                  .doc = "median of the length's log-normal prior; some dozen dowels alone hardly "
+                  .doc = "median of the length's log-normal prior; a few dozen dowels alone hardly "
                          "determine a length, and their likelihood drifts to either end"},
         median_mm);
   visit(FieldInfo{.name = "length_prior_spread",

@@ -22,8 +22,8 @@ void Fields(Visitor& visit, DepthMap& o) {
   visit(
       FieldInfo{.name = "file",
                 .doc = "depth per vertex: a PLY whose vertices have the scalar, e.g. depth.ply of "
-                       "a run, or a CSV with the scalar's name in its first line and a line a "
-                       "vertex; above 0, or nan where there is none"},
+                       "a run, or a CSV with the scalar's name in its first line and a line "
+                       "per vertex; above 0, or nan where there is none"},
       o.file);
   visit(FieldInfo{.name = "scalar", .doc = "name of the PLY's vertex property or the CSV's column"},
         o.scalar);

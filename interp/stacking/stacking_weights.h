@@ -7,7 +7,7 @@
 
 namespace semblance {
 
-// errors: one row a point, one column a predictor, finite, at least one of each; importance: of
+// errors: one row per point, one column per predictor, finite, at least one of each; importance: of
 // each point, above 0. The weights >= 0 of sum 1 whose mixed predictor has the least mean squared
 // error, by importance, plus caution times the least mean squared error of one predictor times the
 // squared distance of the weights from equal ones. caution >= 0; large, all count alike.

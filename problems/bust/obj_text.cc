@@ -61,7 +61,8 @@ double NumberOf(const std::string& word, const std::string& name, std::size_t li
   double value = kNaN;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
-    throw InputError(fmt::format("{}: line {}: '{}' is no number", name, line, word.substr(0, 40)));
+    throw InputError(
+        fmt::format("{}: line {}: '{}' is not a number", name, line, word.substr(0, 40)));
   }
   return value;
 }

@@ -13,10 +13,10 @@ namespace semblance {
 std::string ComparisonText(const StudyComparison& comparison);
 
 // One line a pair: study, treatment, reference_study, reference, subjects, mean_difference,
-// mean_low_95, mean_high_95, better, worse, p, p_holm. An empty cell where there is no number.
+// mean_low_95, mean_high_95, better, worse, p, p_holm. An empty cell where there is not a number.
 std::string PairsCsv(const StudyComparison& comparison);
 
-// One line a treatment and subject: study, treatment, subject, metric, value.
+// One line per treatment and subject: study, treatment, subject, metric, value.
 std::string ComparedCsv(const StudyComparison& comparison);
 
 // pairs.csv, values.csv and report.html.

@@ -196,7 +196,7 @@ std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
     fs::path path = fs::weakly_canonical(fs::absolute(folder), ignored);
     path = path.has_filename() ? path : path.parent_path();
     if (std::ranges::find(real, path) != real.end()) {
-      throw InputError(fmt::format("{}: this folder stands twice", folder.string()));
+      throw InputError(fmt::format("{}: this folder appears twice", folder.string()));
     }
     real.push_back(path);
   }

@@ -23,7 +23,7 @@ struct NamedStudy {
 
 // The results in each folder, called by the folder's name; by as much of the path as tells them
 // apart, where two are called alike. Throws IoError as ReadStudyResults, InputError if a folder
-// stands twice.
+// appears twice.
 std::vector<NamedStudy> ReadStudies(const std::vector<std::filesystem::path>& folders);
 
 // A treatment of one study, over the subjects that all studies have.

@@ -26,7 +26,7 @@ JointNormal JointOfTable(const TissueTable& table, Sex sex, Build build,
 //
 // Returns what people should know: what was given and what of it tells nothing, and the dowels that
 // keep the table's depth, as it says nothing of their spread. Throws InputError for a site that is
-// unknown or stands twice, a site in given.measured without a measured depth, a covariate that the
+// unknown or appears twice, a site in given.measured without a measured depth, a covariate that the
 // table has not, a table without any sd; IoError and ConfigError as ReadTissueTable.
 std::vector<std::string> ConditionDepths(const TissueOptions& options,
                                          const LandmarkFile& landmarks, std::span<Dowel> dowels);

@@ -121,11 +121,11 @@ Eigen::RowVectorXd Completed(Eigen::RowVectorXd row, const Moments& now, MatrixX
   const MatrixXd across = now.covariance(missing, known);
   const Eigen::LLT<MatrixXd> factor(now.covariance(known, known));
   const VectorXd off = row(known).transpose() - now.mean(known);
-  const VectorXd foreseen = now.mean(missing) + across * factor.solve(off);
+  const VectorXd predicted = now.mean(missing) + across * factor.solve(off);
   const MatrixXd left =
       now.covariance(missing, missing) - across * factor.solve(across.transpose());
   for (std::size_t a = 0; a < missing.size(); ++a) {
-    row[missing[a]] = foreseen[static_cast<Index>(a)];
+    row[missing[a]] = predicted[static_cast<Index>(a)];
     for (std::size_t b = 0; b < missing.size(); ++b) {
       open(missing[a], missing[b]) += left(static_cast<Index>(a), static_cast<Index>(b));
     }

@@ -42,7 +42,7 @@ struct ConditionalNormal {
 //   sd^2 = covariance (n - 1) / v (1 + 1 / n + (1 - shrinkage) q / (n - 1)),
 // and by Student's quantile at 95 % for v over that of the normal distribution: so the 90 %
 // interval is the exact one for a complete sample without shrinkage (Seber & Lee 2003, 5.3). v is
-// at least 1. Throws InputError if a known name is not among the names, stands twice, or is not
+// at least 1. Throws InputError if a known name is not among the names, appears twice, or is not
 // finite.
 ConditionalNormal Condition(const JointNormal& joint, std::span<const KnownValue> known);
 

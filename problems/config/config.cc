@@ -248,7 +248,7 @@ class TreeBuilder : public YAML::EventHandler {
     } else if (node.text == "<<" && !node.quoted) {
       what = "merge keys (<<) are not read; repeat the entries or use base:";
     } else if (const ConfigLocation* first = FindKey(level.node, node.text)) {
-      what = fmt::format("the key stands twice; first at line {}, column {}", first->line,
+      what = fmt::format("the key appears twice; first at line {}, column {}", first->line,
                          first->column);
     }
     if (!what.empty()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strict configuration: YAML to structs with a `Fields` list (surfaces/fields.h), and back. Also
-// for data files (tissue tables, landmarks, networks), which are YAML read with the same
+// Strict configuration: YAML to structs with a `Fields` list (surfaces/base/fields.h), and back.
+// Also for data files (tissue tables, landmarks, networks), which are YAML read with the same
 // strictness.
 //
 // Every field may be left out and then keeps its default; an empty file is all defaults. Everything

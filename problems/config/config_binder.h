@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Binds structs with a `Fields` list (surfaces/fields.h) to trees: ReadValue, ToTree and
+// Binds structs with a `Fields` list (surfaces/base/fields.h) to trees: ReadValue, ToTree and
 // DescribeType. Only the choice by type is done here; the work is in config_reader.cc and
 // options_reference.cc, so that a variant of many structs stays cheap to compile.
 //

@@ -46,7 +46,7 @@ bool Equal(const std::string& a, const std::string& b) {
 bool InOrder(const Node& node, const std::string& found) {
   const std::optional<double> a = NumberIn(found), b = NumberIn(node.value);
   if (!a || !b) {
-    throw InputError(fmt::format("{} {} {}: '{}' is no number; compare texts with =, != or ~",
+    throw InputError(fmt::format("{} {} {}: '{}' is not a number; compare texts with =, != or ~",
                                  node.name, node.sign, node.value, a ? node.value : found));
   }
   return node.sign == "<"    ? *a < *b

@@ -34,7 +34,7 @@ class ValueFilter {
   ValueFilter(ValueFilter&&) noexcept;
 
   // A comparison of a name that has no value does not hold, but for !=. Throws InputError where <
-  // and the like meet a value that is no number.
+  // and the like meet a value that is not a number.
   bool Holds(const NamedValues& values) const;
 
   struct Node;

@@ -30,7 +30,7 @@ void AppendRuns(const VoxelMask& mask, std::int64_t start, int count, std::vecto
   }
 }
 
-// Sets of runs that hang together; the representative of a set is its first run.
+// Sets of runs that are connected; the representative of a set is its first run.
 class RunSets {
  public:
   explicit RunSets(std::size_t count) : parent_(count) {

@@ -43,7 +43,7 @@ Changes EditsByVertex(const std::vector<VertexEdit>& edits) {
   for (const VertexEdit& edit : edits) {
     const VertexId vertex{edit.level, edit.i, edit.j};
     if (!changes.emplace(vertex, ToVec3(edit.offset)).second) {
-      throw InputError(fmt::format("vertex ({}, {}) of level {} stands twice; keep one", edit.i,
+      throw InputError(fmt::format("vertex ({}, {}) of level {} appears twice; keep one", edit.i,
                                    edit.j, edit.level));
     }
   }

@@ -77,7 +77,7 @@ void CheckValue(Report& report, const RegionReset& reset) {
 // A YAML file. Throws IoError if it cannot be read, ConfigError with a line for each fault.
 EditScript ReadEditScript(const std::filesystem::path& path);
 
-// Throws InputError for a vertex that is not there, that stands twice, or that cannot hold an
+// Throws InputError for a vertex that is not there, that appears twice, or that cannot hold an
 // offset; the surface is then as before. Returns the script that takes the edits back: exactly on
 // levels above 0, but for rounding on level 0.
 EditScript ApplyEdits(const EditScript& script, HSplineSurface& surface);

@@ -107,7 +107,7 @@ void CheckOnce(const SkinLandmarks& landmarks) {
   for (const SkinLandmark& landmark : landmarks.points) {
     if (++count[landmark.code] > 1) {
       throw InputError(
-          fmt::format("landmark '{}' stands twice; keep one of the two", landmark.code));
+          fmt::format("landmark '{}' appears twice; keep one of the two", landmark.code));
     }
   }
 }

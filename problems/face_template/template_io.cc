@@ -164,7 +164,7 @@ std::map<std::string, Vec2> SitesFrom(const std::string& text, const std::filesy
   while (csv.NextRow()) {
     const std::string code(csv.Cell(site));
     if (!sites.emplace(code, Vec2(csv.Number(u), csv.Number(v))).second) {
-      csv.Fail(fmt::format("site '{}' stands twice; keep one", code));
+      csv.Fail(fmt::format("site '{}' appears twice; keep one", code));
     }
   }
   return sites;

@@ -11,7 +11,7 @@ namespace semblance {
 
 // {"tolerance_mm", "met", "folds", "face_to_skin": {rms_mm, p95_mm, max_mm, covered, area_mm2},
 // "skin_to_face": {...}, "levels": [...], "sites": {code: {u, v, from_landmark, drift_mm,
-// error_mm}}, "notes": [...]}; null where there is no number.
+// error_mm}}, "notes": [...]}; null where there is not a number.
 std::string TemplateJson(const TemplateFit& fit, const OuterHead& head,
                          const TemplateFitOptions& options);
 

@@ -35,7 +35,7 @@ void AddNew(const std::string& line, Lines& lines) {
   }
 }
 
-// What an error says, a line a fault.
+// What an error says, a line per fault.
 void AddFault(const std::exception& error, CheckFindings& findings) {
   std::istringstream words(error.what());
   for (std::string line; std::getline(words, line);) {

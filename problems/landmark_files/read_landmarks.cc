@@ -114,7 +114,7 @@ void FindRepeats(const LandmarkFile& file, std::vector<std::string>& faults) {
   std::set<std::string> sites;
   const auto see = [&](const std::string& site) {
     if (!sites.insert(site).second) {
-      faults.push_back(fmt::format("site {} stands twice; keep one", SiteInWords(site)));
+      faults.push_back(fmt::format("site {} appears twice; keep one", SiteInWords(site)));
     }
   };
   std::ranges::for_each(file.landmarks, see, &Landmark::site);

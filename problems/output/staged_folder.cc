@@ -170,7 +170,7 @@ void StagedFolder::Publish(Durability durability) {
   const bool is_in_the_way =
       when_not_empty_ == WhenNotEmpty::kRefuse && Exists(root_) && !HoldsNothing(root_);
   if (is_in_the_way) {
-    KeepAndFail("something has come up there while this was made");
+    KeepAndFail("another program has written there meanwhile");
   }
   if (!(beside_ && TakesName())) {
     MoveFiles();

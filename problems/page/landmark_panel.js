@@ -6,9 +6,9 @@ import {act, choose, keep, landmarkOf, nameOf, onChoice, siteOf, store} from './
 
 const FORMATS = [['.yaml', 'YAML (Semblance)'], ['.mrk.json', '3D Slicer (.mrk.json)'], ['.fcsv', '3D Slicer (.fcsv)'],
                  ['.pp', 'MeshLab (.pp)'], ['.csv', 'table (.csv)'], ['.txt', 'CloudCompare (.txt)']];
-const DOUBTFUL = {from_bone_mm: 2, from_mirror_mm: 8, from_foreseen_mm: 15};
+const DOUBTFUL = {from_bone_mm: 2, from_mirror_mm: 8, from_predicted_mm: 15};
 const MEANINGS = {from_bone_mm: 'from the bone', from_mirror_mm: 'from the mirror image of its partner',
-                  from_foreseen_mm: 'from where the others foresee it'};
+                  from_predicted_mm: 'from where the others predict it'};
 
 const standardSites = () => store.sites.filter((site) => site.standard);
 const isAbsent = (code) => store.state.absent.some((absent) => absent.site === code);
@@ -52,7 +52,7 @@ function remarks(landmark) {
                                       onchange: (event) => change({note: event.target.value})})));
 }
 
-// Made once a site, so that a change of something else does not make it flicker.
+// Made once per site, so that a change of something else does not make it flicker.
 const pictures = new Map();
 const pictureOf = (code) => {
   if (!pictures.has(code)) {
@@ -113,7 +113,7 @@ export function landmarkPanel(bench) {
       ...state.landmarks.map((landmark) => ({
         site: landmark.site, point: landmark.point, hollow: landmark.proposed, chosen: landmark.site === store.site,
         colour: landmark.site === store.site ? '#0b5c8f' : doubts(landmark).length ? '#b3261e' : landmark.proposed ? '#b57d00' : '#1b7f3b'})),
-      ...state.foreseen.filter((foreseen) => foreseen.site === store.site)
+      ...state.predicted.filter((predicted) => predicted.site === store.site)
           .map(({site, point}) => ({site: null, point, hollow: true, colour: '#0b5c8f', text: `${site} may be here`}))]);
   };
 
@@ -123,7 +123,7 @@ export function landmarkPanel(bench) {
     head.replaceChildren(
         element('p', {textContent: `${placed.length} of ${standardSites().length} sites are placed${proposed ? `, ${proposed} of them proposed` : ''}.`}),
         element('div', {className: 'row'},
-            state.foreseen.length ? button(`Suggest the other ${state.foreseen.length}`, () => act('take_foreseen'),
+            state.predicted.length ? button(`Suggest the other ${state.predicted.length}`, () => act('take_predicted'),
                                            {title: 'from those that are placed and an average skull'}) : null,
             button('Propose by shape', () => act('propose'), {title: 'looks for all sites on the bone; takes a minute'}),
             proposed ? button('All are right', () => act('confirm_all')) : null),

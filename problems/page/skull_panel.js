@@ -9,7 +9,7 @@ const UNITS = [['mm', 'millimetre', 1], ['cm', 'centimetre', 10], ['in', 'inch',
 const HEAD_MM = [120, 320];  // the longest side of a skull, whole or in part
 
 // The unit in which the file would measure as a head, where the present one does not.
-const unitForeseen = (size_mm, unit) => {
+const unitPredicted = (size_mm, unit) => {
   const longest = Math.max(...size_mm), fits = (mm) => mm >= HEAD_MM[0] && mm <= HEAD_MM[1];
   const now = UNITS.find(([name]) => name === unit)[2];
   return fits(longest) ? null : UNITS.find(([, , factor]) => fits(longest / now * factor)) || null;
@@ -18,7 +18,7 @@ const unitForeseen = (size_mm, unit) => {
 const nameOf = (path) => path.split('/').pop();
 
 function asRead({subject, values}) {
-  const {axes, units} = values.subject, unit = unitForeseen(subject.size_mm, units);
+  const {axes, units} = values.subject, unit = unitPredicted(subject.size_mm, units);
   return group('As it is read',
       element('p', {className: 'soft', title: subject.skull, textContent: `${nameOf(subject.skull)}: ${subject.triangles.toLocaleString('en')} triangles`}),
       element('ul', {className: 'sizes'}, ...subject.size_mm.map((mm, k) => element('li', {},

@@ -34,7 +34,7 @@ std::string HexText(const Colour& colour);
 struct Image {
   int width = 0;                  // pixels
   int height = 0;                 // pixels
-  std::vector<std::uint8_t> rgb;  // sRGB, 3 bytes a pixel, row by row from the top left
+  std::vector<std::uint8_t> rgb;  // sRGB, 3 bytes per pixel, row by row from the top left
 };
 
 // A picture of one colour; width, height >= 1, else InputError.

@@ -20,10 +20,11 @@ struct DepthErrors {
   std::map<std::string, DistanceSummary> regions;  // by part of the face
   std::vector<double> error_mm;         // one per vertex of the shell; NaN where not scored
   std::map<TruthStatus, int> vertices;  // of the scored region, by what the truth says
-  std::vector<double> coverage;         // of the area with a stated sd_mm (interp/calibration.h)
-  double coverage_90 = kNaN;            // its share at 90 %
-  DepthScores scores;                   // by area, over all that is scored
-  DepthScores scheme_scores;            // where the scheme itself gave the depth
+  std::vector<double>
+      coverage;               // of the area with a stated sd_mm (interp/evaluation/calibration.h)
+  double coverage_90 = kNaN;  // its share at 90 %
+  DepthScores scores;         // by area, over all that is scored
+  DepthScores scheme_scores;  // where the scheme itself gave the depth
   std::map<std::string, DepthScores> region_scores;  // over all, by part of the face
 };
 

@@ -144,10 +144,10 @@ bool IsLandmark(const std::string& name, const ExtraSite& site, const LandmarkFi
     return false;
   }
   if (!site.near.IsNull()) {
-    throw InputError(
-        fmt::format("sites.{}: {} stands twice, as it is among the landmarks; leave `near` out, or "
-                    "give the site a name of its own",
-                    name, SiteInWords(name)));
+    throw InputError(fmt::format(
+        "sites.{}: {} appears twice, as it is among the landmarks; leave `near` out, or "
+        "give the site a name of its own",
+        name, SiteInWords(name)));
   }
   return true;
 }
@@ -185,7 +185,7 @@ TissueOptions WithSiteDepths(const Experiment& experiment, const LandmarkFile& l
     }
     if (!tissue.set_mm.emplace(name, site.depth->value).second) {
       throw InputError(fmt::format(
-          "sites.{}.depth: the depth stands twice, here and in tissue.set_mm; leave one out",
+          "sites.{}.depth: the depth appears twice, here and in tissue.set_mm; leave one out",
           name));
     }
   }

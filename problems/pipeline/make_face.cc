@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "problems/conditional/condition_depths.h"
-#include "problems/metrics/quantile.h"
 #include "problems/pipeline/dowel_target.h"
 #include "problems/pipeline/stage_key.h"
 #include "problems/prior/hspline_prior.h"
 #include "problems/prior/prior_target.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh/mesh_query.h"

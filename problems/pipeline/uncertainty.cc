@@ -10,9 +10,9 @@
 #include "interp/evaluation/calibration.h"
 #include "interp/kriging/kriging_process.h"
 #include "problems/conditional/condition_depths.h"
-#include "problems/metrics/quantile.h"
 #include "problems/prior/depth_spread.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {

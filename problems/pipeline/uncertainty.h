@@ -17,7 +17,7 @@
 namespace semblance {
 
 // Shares, 0..1, of the scored true skin whose distance from the face lies within the central
-// interval of a normal distribution of the stated sigma (interp/calibration.h).
+// interval of a normal distribution of the stated sigma (interp/evaluation/calibration.h).
 struct SigmaCoverage {
   std::vector<double> curve;                   // at 5 %, 10 %, .. 95 %
   double at_90 = kNaN;                         // 0.9 where sigma is true

@@ -8,8 +8,8 @@
 #include <iterator>
 #include <set>
 
-#include "problems/metrics/quantile.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/hspline/patch_tree.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 

@@ -13,7 +13,7 @@
 
 namespace semblance {
 
-// Of the points' distances, outliers too (problems/metrics/quantile.h).
+// Of the points' distances, outliers too (surfaces/base/quantile.h).
 struct DistanceQuantiles {
   double median_mm = kNaN, p95_mm = kNaN, max_mm = kNaN;
 };

@@ -32,7 +32,7 @@ std::string Verdict(const AutoReport& r) {
   if (r.limited_by_density) {
     return "detail goes down to the points' spacing: denser points would show more";
   }
-  return LeavesDetail(r) ? "residuals still hang together: part of what counts as noise is detail"
+  return LeavesDetail(r) ? "residuals are still correlated: part of what counts as noise is detail"
                          : "residuals look like noise: these points show no more detail";
 }
 
@@ -59,7 +59,7 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
 }
 
 std::string AutoText(const AutoReport& r) {
-  std::string text = fmt::format("noise {:.3g} mm a coordinate", r.noise_mm);
+  std::string text = fmt::format("noise {:.3g} mm per coordinate", r.noise_mm);
   if (std::isfinite(r.neighbour_noise_mm)) {  // few points have no neighbours to compare
     text += fmt::format(" (between neighbours {:.3g})", r.neighbour_noise_mm);
   }

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "problems/metrics/quantile.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
 namespace semblance {

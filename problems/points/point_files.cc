@@ -308,7 +308,7 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
   return PointFile{.points = points->Take(), .sha256 = sha.Hex()};
 }
 
-// Beyond, the square of a distance is no number any more.
+// Beyond, the square of a distance is not a number any more.
 void CheckReach(const PointTable& points, const std::string& name) {
   constexpr double kFarthest = 1e100;
   for (std::size_t k = 0; k < points.positions.size(); ++k) {

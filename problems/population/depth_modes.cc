@@ -66,12 +66,12 @@ Components FillAndFind(const MatrixXd& depths, const VectorXd& start, Index coun
     const Eigen::RowVectorXd mean = full.colwise().mean();
     found = ComponentsOf(full.rowwise() - mean, count);
     double moved = 0;
-    const MatrixXd foreseen = (found.scores * found.modes.transpose()).rowwise() + mean;
+    const MatrixXd predicted = (found.scores * found.modes.transpose()).rowwise() + mean;
     for (Index row = 0; row < full.rows(); ++row) {
       for (Index column = 0; column < full.cols(); ++column) {
         if (!std::isfinite(depths(row, column))) {
-          moved = std::max(moved, std::abs(foreseen(row, column) - full(row, column)));
-          full(row, column) = foreseen(row, column);
+          moved = std::max(moved, std::abs(predicted(row, column) - full(row, column)));
+          full(row, column) = predicted(row, column);
         }
       }
     }

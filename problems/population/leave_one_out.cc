@@ -107,7 +107,7 @@ class Judge {
     return ways;
   }
 
-  // Whether all ways foresee the site and the subject has it.
+  // Whether all ways predict the site and the subject has it.
   bool Counts(Index subject, Index column,
               const std::vector<std::pair<std::string, Forecasts>>& ways) const {
     const std::string& site = sample_.names[column];
@@ -126,8 +126,8 @@ class Judge {
 
 void Score(int subjects, Foresight& way) {
   std::vector<double> errors, sds, sums(subjects, 0), counts(subjects, 0);
-  for (const ForeseenDepth& depth : way.depths) {
-    errors.push_back(depth.foreseen_mm - depth.depth_mm);
+  for (const PredictedDepth& depth : way.depths) {
+    errors.push_back(depth.predicted_mm - depth.depth_mm);
     sds.push_back(depth.sd_mm);
     sums[depth.subject] += std::abs(errors.back());
     counts[depth.subject] += 1;

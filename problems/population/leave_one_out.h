@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How well a population's table, and what it says given something of a person, foresees a person
+// How well a population's table, and what it says given something of a person, predicts a person
 // who is not in it.
 #pragma once
 
@@ -13,27 +13,27 @@
 
 namespace semblance {
 
-struct ForeseenDepth {
+struct PredictedDepth {
   int subject = -1;  // row of the sample
   std::string site;
-  double depth_mm = kNaN, foreseen_mm = kNaN, sd_mm = kNaN;
+  double depth_mm = kNaN, predicted_mm = kNaN, sd_mm = kNaN;
 };
 
-// One way of foreseeing.
+// One way of predicting.
 struct Foresight {
   std::string name;  // mean; person: given sex, build, age and body mass index as far as they are
                      // known; known: given the depths at PopulationFile::known; person_known: given
                      // both; else the id of a published table
-  std::vector<ForeseenDepth> depths;
+  std::vector<PredictedDepth> depths;
   DepthScores scores;             // over all of them, an sd of 0 or none not counted
   std::vector<double> mae_mm;     // one per subject; NaN without a depth
   SampleSummary against_mean_mm;  // per subject: its mae less that of `mean`
 };
 
 // Each subject in turn: the distribution is found again from the others alone, and the subject's
-// depths are compared with it. Compared are the sites that all ways foresee, but for those at
+// depths are compared with it. Compared are the sites that all ways predict, but for those at
 // `known` and their other sides. Tables are taken for sex and build as far as they are known, else
-// male and normal. Subjects without one of the known depths are foreseen by those that they have.
+// male and normal. Subjects without one of the known depths are predicted by those that they have.
 // `person` and `person_known` are left out where no two subjects are known to differ in anything.
 // Empty with fewer than three subjects.
 std::vector<Foresight> LeaveOneOut(const PopulationFile& file,

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/metrics/quantile.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {

@@ -71,7 +71,7 @@ void CheckNames(const std::vector<PopulationEntry>& entries) {
   for (const PopulationEntry& entry : entries) {
     if (entry.subject.name.empty() || !names.insert(entry.subject.name).second) {
       throw InputError(fmt::format(
-          "subjects: the name '{}' is empty or stands twice; each subject needs one of its own",
+          "subjects: the name '{}' is empty or appears twice; each subject needs one of its own",
           entry.subject.name));
     }
   }

@@ -257,7 +257,7 @@ struct PopulationPlan {
 //   any;
 // beside them subjects.csv with the columns name, sex, build, age_years and bmi, as far as they are
 // known, and population.yaml with options, if they are there. Throws IoError or ConfigError for
-// what cannot be read; InputError for a name that stands twice or is not plain, and where there is
+// what cannot be read; InputError for a name that appears twice or is not plain, and where there is
 // no subject.
 PopulationPlan ReadPopulation(const std::filesystem::path& path);
 

@@ -68,11 +68,11 @@ std::string OutliersCsv(const PopulationResult& result) {
 }
 
 std::string LeaveOneOutCsv(const PopulationResult& result) {
-  CsvWriter csv({"way", "subject", "site", "depth_mm", "foreseen_mm", "sd_mm"});
+  CsvWriter csv({"way", "subject", "site", "depth_mm", "predicted_mm", "sd_mm"});
   for (const Foresight& way : result.foresights) {
-    for (const ForeseenDepth& depth : way.depths) {
+    for (const PredictedDepth& depth : way.depths) {
       csv.Row(way.name, NameOf(result, depth.subject), depth.site, depth.depth_mm,
-              depth.foreseen_mm, depth.sd_mm);
+              depth.predicted_mm, depth.sd_mm);
     }
   }
   return csv.Text();

@@ -57,7 +57,7 @@ std::vector<ReportTile> Tiles(const PopulationResult& result) {
 
 ReportTable ForesightTable(const PopulationResult& result) {
   ReportTable table{
-      .caption = "Each subject foreseen by the others, mm",
+      .caption = "Each subject predicted by the others, mm",
       .header = {"way", "depths", "MAE", "RMSE", "bias", "CRPS", "interval score", "within 50 %",
                  "90 %", "95 %", "sd stated", "MAE less the mean's, 95 %"},
       .rows = {}};
@@ -95,8 +95,8 @@ std::vector<BoxRow> CoverageRows(const PopulationResult& result) {
   std::vector<BoxRow> rows;
   for (const Foresight& way : result.foresights) {
     std::vector<double> errors, sds;
-    for (const ForeseenDepth& depth : way.depths) {
-      errors.push_back(depth.foreseen_mm - depth.depth_mm);
+    for (const PredictedDepth& depth : way.depths) {
+      errors.push_back(depth.predicted_mm - depth.depth_mm);
       sds.push_back(depth.sd_mm);
     }
     if (way.scores.stated > 0) {
@@ -107,10 +107,10 @@ std::vector<BoxRow> CoverageRows(const PopulationResult& result) {
 }
 
 ReportSection ForesightSection(const PopulationResult& result) {
-  ReportSection section{.heading = "How well a person is foreseen"};
+  ReportSection section{.heading = "How well a person is predicted"};
   section.paragraphs = {fmt::format(
       "Each subject is left out, the table is found from the others, and the subject's depths are "
-      "compared with it, at the sites that every way foresees. The few measured depths are those "
+      "compared with it, at the sites that every way predicts. The few measured depths are those "
       "at "
       "{}, which with their other sides are in no score.",
       fmt::join(result.file.known, ", "))};

@@ -43,7 +43,7 @@ void Fields(Visitor& visit, MandibleOptions& o) {
         o.bite_mm);
   visit(FieldInfo{.name = "condyle_left",
                   .unit = "mm",
-                  .doc = "middle of the left condyle, LPS; else foreseen from the landmarks"},
+                  .doc = "middle of the left condyle, LPS; else predicted from the landmarks"},
         o.condyle_left);
   visit(FieldInfo{.name = "condyle_right", .unit = "mm", .doc = "of the right one; both or none"},
         o.condyle_right);

@@ -66,7 +66,7 @@ std::map<std::string, ModelPoint> ReadSites(const ModesPrior& source, const TriM
                       code, at.distance_mm, source.mean.string(), kFarthestSiteMm));
     }
     if (!sites.emplace(code, ModelPoint{at.triangle, at.weights}).second) {
-      table.Fail(fmt::format("site '{}' stands twice", code));
+      table.Fail(fmt::format("site '{}' appears twice", code));
     }
   }
   return sites;

@@ -88,7 +88,7 @@ const std::vector<std::string>& RulePointCodes();
 // An unknown name under `points`, as "points.NAME".
 std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules);
 
-// A rule at work. One that predicts two coordinates stands twice.
+// A rule at work. One that predicts two coordinates appears twice.
 struct AppliedRule {
   std::string rule;        // as in FeatureRules
   std::string point;       // of the face: eye_l, ch_r, prn, sn

@@ -187,7 +187,7 @@ int MergeCommand(const StudyArguments& a) {
     fmt::print(stderr, "semblance: {}\n", ForTerminal(line));
   }
   if (!fs::exists(root / "plan.json")) {
-    throw IoError(fmt::format("{}: no folder of a study; it has no plan.json", root.string()));
+    throw IoError(fmt::format("{}: not a folder of a study; it has no plan.json", root.string()));
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   return PrintStudyState(WriteStudyTables(folder), root);

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "problems/metrics/quantile.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {

@@ -9,12 +9,12 @@
 #include <numbers>
 #include <optional>
 
-#include "problems/metrics/quantile.h"
 #include "problems/propose/site_rules.h"
 #include "problems/propose/skull_warp.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_check.h"
 
 namespace semblance {
@@ -23,7 +23,7 @@ namespace {
 // What the references and their mirror images say of one site.
 struct Opinions {
   std::vector<Vec3> points;
-  std::vector<double> patch_misfits_mm;
+  std::vector<double> piece_misfits_mm;
   int references = 0;
   double site_error_mm = kNaN;  // least of them
 };
@@ -70,7 +70,7 @@ class Proposer {
     ChoosePose();
     context_.Report("warp");
     CarryAll();
-    const Mat3 turned = FitOf(ForeseenSites()).skull_from_average.rotation;
+    const Mat3 turned = FitOf(PredictedSites()).skull_from_average.rotation;
     for (const Site& site : StandardSites()) {
       if (const auto found = opinions_.find(site.code); found != opinions_.end()) {
         Settle(site.code, found->second, turned);
@@ -110,7 +110,7 @@ class Proposer {
       for (const WarpedSite& s : carried[k]) {
         Opinions& opinions = opinions_[s.site];
         opinions.points.push_back(s.point);
-        opinions.patch_misfits_mm.push_back(s.patch_misfit_mm);
+        opinions.piece_misfits_mm.push_back(s.piece_misfit_mm);
         opinions.references += k % 2 == 0;
         opinions.site_error_mm =
             std::fmin(opinions.site_error_mm, references_[k / 2].site_error_mm);
@@ -123,7 +123,7 @@ class Proposer {
     return CarrySites(head, shell_, pose, WarpOnto(head, shell_, pose));
   }
 
-  std::vector<SitePoint> ForeseenSites() const {
+  std::vector<SitePoint> PredictedSites() const {
     std::vector<SitePoint> sites;
     for (const auto& [site, opinions] : opinions_) {
       sites.push_back({site, Median(opinions.points)});
@@ -144,21 +144,21 @@ class Proposer {
 
   void Settle(const std::string& site, const Opinions& opinions, const Mat3& turned) {
     constexpr double kNoBone_mm = 8;
-    const Vec3 foreseen = Median(opinions.points);
-    const SnappedSite snapped = SnapToBone(site, foreseen, shell_, turned);
+    const Vec3 predicted = Median(opinions.points);
+    const SnappedSite snapped = SnapToBone(site, predicted, shell_, turned);
     if (snapped.from_bone_mm > kNoBone_mm) {
       proposal_.absent.push_back(
-          {site, fmt::format("no bone within {} mm of where it is foreseen: the nearest is {:.0f} "
+          {site, fmt::format("no bone within {} mm of where it is predicted: the nearest is {:.0f} "
                              "mm away",
                              kNoBone_mm, snapped.from_bone_mm)});
       return;
     }
     ProposedSite found{.site = site,
                        .point = bone_.Closest(snapped.point).position,
-                       .foreseen = foreseen,
+                       .predicted = predicted,
                        .references = opinions.references,
-                       .agreement_mm = Spread_mm(opinions.points, foreseen),
-                       .patch_misfit_mm = Median(opinions.patch_misfits_mm),
+                       .agreement_mm = Spread_mm(opinions.points, predicted),
+                       .piece_misfit_mm = Median(opinions.piece_misfits_mm),
                        .from_bone_mm = snapped.from_bone_mm,
                        .sharpness_mm = snapped.sharpness_mm};
     Judge(opinions, found);
@@ -169,7 +169,7 @@ class Proposer {
     constexpr double kNoMatch_mm = 5;  // in place of a misfit where too little bone is there
     const auto square = [](double x) { return x * x; };
     const double misfit_mm =
-        std::isfinite(site.patch_misfit_mm) ? site.patch_misfit_mm : kNoMatch_mm;
+        std::isfinite(site.piece_misfit_mm) ? site.piece_misfit_mm : kNoMatch_mm;
     site.expected_error_mm =
         std::sqrt(square(opinions.site_error_mm) / opinions.references +
                   square(site.agreement_mm) / static_cast<double>(opinions.points.size()) +
@@ -252,9 +252,9 @@ std::string NoteOf(const ProposedSite& site) {
       site.references == 1 ? "1 reference and its mirror image"
                            : fmt::format("{} references", site.references),
       site.agreement_mm,
-      std::isfinite(site.patch_misfit_mm) ? fmt::format("{:.1f} mm", site.patch_misfit_mm)
+      std::isfinite(site.piece_misfit_mm) ? fmt::format("{:.1f} mm", site.piece_misfit_mm)
                                           : "no measure (too little is there)",
-      RuleOf(site.site).what, (site.point - site.foreseen).norm(), site.sharpness_mm);
+      RuleOf(site.site).what, (site.point - site.predicted).norm(), site.sharpness_mm);
 }
 
 }  // namespace

@@ -15,12 +15,12 @@ namespace semblance {
 
 struct ProposedSite {
   std::string site;
-  Vec3 point = Vec3::Constant(kNaN);     // on the skull, mm
-  Vec3 foreseen = Vec3::Constant(kNaN);  // by the median of the references, before the rule
-  int references = 0;                    // heads that have the site; mirror images are not counted
-  double agreement_mm = kNaN;            // rms of the references' sites from their median
-  double patch_misfit_mm = kNaN;  // of the bone around it after the warp, median of references
-  double from_bone_mm = kNaN;     // of the foreseen point
+  Vec3 point = Vec3::Constant(kNaN);      // on the skull, mm
+  Vec3 predicted = Vec3::Constant(kNaN);  // by the median of the references, before the rule
+  int references = 0;                     // heads that have the site; mirror images are not counted
+  double agreement_mm = kNaN;             // rms of the references' sites from their median
+  double piece_misfit_mm = kNaN;  // of the bone around it after the warp, median of references
+  double from_bone_mm = kNaN;     // of the predicted point
   double sharpness_mm = kNaN;     // of the rule's extremum (site_rules.h)
   // Root mean square; the root of the sum of the squares of the references' own error and of their
   // disagreement, as those of a mean, of misfit, distance and half the sharpness.
@@ -31,7 +31,7 @@ struct ProposedSite {
 
 struct Proposal {
   std::vector<ProposedSite> sites;     // in the order of StandardSites()
-  std::vector<AbsentLandmark> absent;  // no bone within 8 mm of where it is foreseen
+  std::vector<AbsentLandmark> absent;  // no bone within 8 mm of where it is predicted
   SkullPose pose;                      // of the first reference whose shape says how it lies
   Similarity skull_from_average;       // by the proposed sites
   std::string axes = "LPS";            // of the skull's file, as the pose says: LPS or RAS

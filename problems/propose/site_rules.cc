@@ -47,32 +47,32 @@ constexpr double kHalfMidline_mm = 1.5;
 // What a rule asks for on one skull.
 struct Search {
   const SkullShell& skull;
-  Vec3 foreseen, normal;  // of the shell
-  Vec3 along, left;       // unit
+  Vec3 predicted, normal;  // of the shell
+  Vec3 along, left;        // unit
   double reach_mm;
   bool midline;
 
   double Score(const Vec3& p) const {
-    const Vec3 d = p - foreseen;
+    const Vec3 d = p - predicted;
     return along.dot(d) - d.squaredNorm() / (2 * reach_mm);
   }
   bool Counts(std::size_t v) const {
     constexpr double kAlike = 0.3;
-    const Vec3 d = skull.mesh.points[v] - foreseen;
+    const Vec3 d = skull.mesh.points[v] - predicted;
     return d.norm() <= 1.5 * reach_mm && skull.normals[v].dot(normal) > kAlike &&
            (!midline || std::abs(left.dot(d)) <= kHalfMidline_mm);
   }
 };
 
-Search SearchFor(const SiteRule& rule, std::string_view site, const ShellPoint& foreseen,
+Search SearchFor(const SiteRule& rule, std::string_view site, const ShellPoint& predicted,
                  const SkullShell& skull, const Mat3& skull_from_average) {
   Vec3 along = rule.direction;
   if (site.ends_with("_r")) {
     along.x() = -along.x();
   }
   return {.skull = skull,
-          .foreseen = foreseen.position,
-          .normal = foreseen.normal,
+          .predicted = predicted.position,
+          .normal = predicted.normal,
           .along = (skull_from_average * along).normalized(),
           .left = skull_from_average.col(0),
           .reach_mm = rule.reach_mm,
@@ -118,10 +118,10 @@ const SiteRule& RuleOf(std::string_view site) {
   return *found;
 }
 
-SnappedSite SnapToBone(std::string_view site, const Vec3& foreseen, const SkullShell& skull,
+SnappedSite SnapToBone(std::string_view site, const Vec3& predicted, const SkullShell& skull,
                        const Mat3& skull_from_average) {
   const SiteRule& rule = RuleOf(site);
-  const MeshPoint closest = skull.query.Closest(foreseen);
+  const MeshPoint closest = skull.query.Closest(predicted);
   SnappedSite snapped{.point = closest.position,
                       .from_bone_mm = closest.distance_mm,
                       .moved_mm = closest.distance_mm,
@@ -132,7 +132,7 @@ SnappedSite SnapToBone(std::string_view site, const Vec3& foreseen, const SkullS
       const Vec3 inside = skull.mesh.points[*best] - rule.inset_mm * search.along;
       snapped.point = skull.query.Closest(inside).position;
       snapped.sharpness_mm = Sharpness_mm(search, *best);
-      snapped.moved_mm = (snapped.point - foreseen).norm();
+      snapped.moved_mm = (snapped.point - predicted).norm();
     }
   }
   return snapped;

@@ -10,11 +10,11 @@
 
 namespace semblance {
 
-// Of the bone near the foreseen point the one that lies furthest in a direction, less the square of
-// its distance from the foreseen point over twice the reach: a plane tilted by an angle a moves the
-// site by reach * tan(a), a ridge catches it. Only bone within 1.5 reaches that faces within 72
+// Of the bone near the predicted point the one that lies furthest in a direction, less the square
+// of its distance from the predicted point over twice the reach: a plane tilted by an angle a moves
+// the site by reach * tan(a), a ridge catches it. Only bone within 1.5 reaches that faces within 72
 // degrees of the bone there counts, so that it is on the same side of a thin wall. In the midline
-// only bone within 1.5 mm of the sagittal plane through the foreseen point counts.
+// only bone within 1.5 mm of the sagittal plane through the predicted point counts.
 struct SiteRule {
   std::string_view landmark;      // Site::landmark
   Vec3 direction = Vec3::Zero();  // in an average skull's frame (LPS, Frankfurt), on the left;
@@ -29,14 +29,14 @@ const SiteRule& RuleOf(std::string_view site);
 
 struct SnappedSite {
   Vec3 point = Vec3::Constant(kNaN);  // on the shell
-  double from_bone_mm = kNaN;         // of the foreseen point
-  double moved_mm = kNaN;             // from the foreseen point
+  double from_bone_mm = kNaN;         // of the predicted point
+  double moved_mm = kNaN;             // from the predicted point
   double sharpness_mm = kNaN;  // rms spread of the bone that lies as far to 0.25 mm; 0 without a
                                // direction
 };
 
 // skull_from_average: rotation of an average skull's frame to the skull's.
-SnappedSite SnapToBone(std::string_view site, const Vec3& foreseen, const SkullShell& skull,
+SnappedSite SnapToBone(std::string_view site, const Vec3& predicted, const SkullShell& skull,
                        const Mat3& skull_from_average);
 
 }  // namespace semblance

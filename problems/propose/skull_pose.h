@@ -20,7 +20,7 @@ struct ShellMatch {
 };
 
 // One damped Gauss-Newton step towards least squared distances along the normals: the motion, of
-// the moved reference, that lessens them. With scale_too false the scale stays 1.
+// the moved reference, that makes them least. With scale_too false the scale stays 1.
 Similarity StepTowards(const std::vector<ShellMatch>& matches, bool scale_too);
 
 // The `share` of the matches with the least distances, of those that face alike.

@@ -18,7 +18,7 @@
 namespace semblance {
 namespace {
 
-// A part of a mesh that hangs together.
+// A connected part of a mesh.
 struct Body {
   double area_mm2 = 0;
   Box3 box;

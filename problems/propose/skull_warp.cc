@@ -122,11 +122,11 @@ class Warper {
   ThinPlate plate_;
 };
 
-std::vector<ShellMatch> MatchPatch(const std::vector<ShellPoint>& patch, const SkullShell& skull,
+std::vector<ShellMatch> MatchPiece(const std::vector<ShellPoint>& piece, const SkullShell& skull,
                                    const Similarity& motion) {
   constexpr double kReach_mm = 6;
   std::vector<ShellMatch> matches;
-  for (const ShellPoint& p : patch) {
+  for (const ShellPoint& p : piece) {
     const Vec3 from = motion * p.position;
     const ShellPoint q = skull.Closest(from);
     const double distance_mm = (q.position - from).norm();
@@ -141,19 +141,19 @@ std::vector<ShellMatch> MatchPatch(const std::vector<ShellPoint>& patch, const S
   return matches;
 }
 
-struct PatchFit {
+struct PieceFit {
   Similarity motion;
   double misfit_mm = kNaN;
 };
 
-PatchFit LayPatch(const std::vector<ShellPoint>& patch, const SkullShell& skull) {
+PieceFit LayPiece(const std::vector<ShellPoint>& piece, const SkullShell& skull) {
   constexpr int kRounds = 12;
-  constexpr double kKeptOfPatch = 0.8;
-  const std::size_t fewest = std::max<std::size_t>(12, patch.size() / 3);
-  PatchFit fit;
+  constexpr double kKeptOfPiece = 0.8;
+  const std::size_t fewest = std::max<std::size_t>(12, piece.size() / 3);
+  PieceFit fit;
   for (int round = 0; round <= kRounds; ++round) {
     const std::vector<ShellMatch> kept =
-        KeepClosest(MatchPatch(patch, skull, fit.motion), kKeptOfPatch);
+        KeepClosest(MatchPiece(piece, skull, fit.motion), kKeptOfPiece);
     if (kept.size() < fewest) {
       return {};
     }
@@ -168,16 +168,16 @@ PatchFit LayPatch(const std::vector<ShellPoint>& patch, const SkullShell& skull)
   return fit;
 }
 
-std::vector<ShellPoint> PatchAround(const Vec3& site, const std::vector<ShellPoint>& points,
+std::vector<ShellPoint> PieceAround(const Vec3& site, const std::vector<ShellPoint>& points,
                                     const ThinPlate& plate, const Mat3& rotation) {
   constexpr double kRadius_mm = 18;
-  std::vector<ShellPoint> patch;
+  std::vector<ShellPoint> piece;
   for (const ShellPoint& p : points) {
     if ((p.position - site).norm() <= kRadius_mm) {
-      patch.push_back({plate(p.position), rotation * p.normal});
+      piece.push_back({plate(p.position), rotation * p.normal});
     }
   }
-  return patch;
+  return piece;
 }
 
 }  // namespace
@@ -200,8 +200,8 @@ std::vector<WarpedSite> CarrySites(const ReferenceHead& reference, const SkullSh
   std::vector<WarpedSite> sites;
   for (const SitePoint& s : reference.sites) {
     const Vec3 carried = plate(s.point);
-    const PatchFit fit =
-        LayPatch(PatchAround(s.point, points, plate, skull_from_reference.rotation), skull);
+    const PieceFit fit =
+        LayPiece(PieceAround(s.point, points, plate, skull_from_reference.rotation), skull);
     const Vec3 laid = fit.motion * carried;
     const bool near = (laid - carried).norm() <= kFarthest_mm;
     sites.push_back({s.site, near ? laid : carried, fit.misfit_mm});

@@ -25,7 +25,7 @@ ThinPlate WarpOnto(const ReferenceHead& reference, const SkullShell& skull,
 struct WarpedSite {
   std::string site;
   Vec3 point = Vec3::Constant(kNaN);
-  double patch_misfit_mm = kNaN;  // mean distance of the bone around it after the fit; NaN where
+  double piece_misfit_mm = kNaN;  // mean distance of the bone around it after the fit; NaN where
                                   // too little of it has a match
 };
 

@@ -85,7 +85,7 @@ py::object TableOf(const fs::path& csv) {
 // What `semblance study` has written into the folder, as it stands.
 py::object TableIn(const fs::path& folder) {
   if (!fs::exists(folder / "plan.json")) {
-    throw IoError(fmt::format("{}: no folder of a study; it has no plan.json", folder.string()));
+    throw IoError(fmt::format("{}: not a folder of a study; it has no plan.json", folder.string()));
   }
   if (!fs::exists(folder / "trials.csv")) {
     throw IoError(fmt::format(

@@ -200,10 +200,11 @@ std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const 
   std::set<std::string> names;
   for (const Alternative& alternative : experiment.alternatives) {
     if (!IsName(alternative.name) || !names.insert(alternative.name).second) {
-      throw InputError(fmt::format(
-          "alternatives: '{}' is no name, or stands twice; letters, digits, '_', '-' and '+' make "
-          "one",
-          alternative.name));
+      throw InputError(
+          fmt::format("alternatives: '{}' is not a name, or appears twice; letters, digits, '_', "
+                      "'-' and '+' make "
+                      "one",
+                      alternative.name));
     }
     result.push_back({alternative.name, Read(text, alternative, folder)});
     result.back().experiment.title += " (" + alternative.name + ")";

@@ -18,7 +18,7 @@ struct NamedExperiment {
 };
 
 // Throws ConfigError or InputError, with the alternative's name, for what `check` refuses: a name
-// that stands twice or is no name of a folder, a setting that is none. folder: of the
+// that appears twice or is no name of a folder, a setting that is none. folder: of the
 // configuration; relative paths in what alternatives set start there.
 std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment,
                                             const std::filesystem::path& folder);

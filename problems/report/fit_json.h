@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fit reports, as JSON; null where there is no number.
+// What a fit reports, as JSON; null where there is not a number.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -195,7 +195,7 @@ std::vector<std::array<std::uint8_t, 3>> Bytes(const std::vector<Colour>& colour
   return bytes;
 }
 
-// A mesh with one value a vertex: as colours for people's eyes, as `quality` for MeshLab, as
+// A mesh with one value per vertex: as colours for people's eyes, as `quality` for MeshLab, as
 // `scalar_...` for CloudCompare and Blender.
 std::string MappedPly(const TriMesh& mesh, const std::string& scalar,
                       const std::vector<double>& values, const ColourMap& map,

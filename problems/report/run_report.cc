@@ -367,7 +367,7 @@ ReportSection RulesSection(const Json& rules) {
   ReportSection section{
       .heading = "Rules for what bone does not carry",
       .paragraphs = {"Each is one observation among the depth markers. What is left goes from "
-                     "the face to what the rule foresaw."},
+                     "the face to what the rule predicted."},
       .folded = true};
   ReportTable table{
       "The rules at work", {"rule", "point", "coordinate", "left (mm)", "SD (mm)", "source"}, {}};

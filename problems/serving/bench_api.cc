@@ -274,7 +274,7 @@ void ConfirmAll(Bench& bench, const Json&) {
 void ClearLandmarks(Bench& bench, const Json&) {
   bench.Do("removed all landmarks", [](BenchState s) { return TakeLandmarks(std::move(s), {}); });
 }
-void Foreseen(Bench& bench, const Json&) { bench.TakeForeseen(); }
+void Predicted(Bench& bench, const Json&) { bench.TakePredicted(); }
 void Set(Bench& bench, const Json& json) {
   const std::string path = TextOf(json, "path");
   if (path == "subject.axes" || path == "subject.units") {
@@ -354,7 +354,7 @@ constexpr std::array<std::pair<std::string_view, Action>, 23> kActions = {
      {"confirm", &Confirm},
      {"confirm_all", &ConfirmAll},
      {"clear_landmarks", &ClearLandmarks},
-     {"take_foreseen", &Foreseen},
+     {"take_predicted", &Predicted},
      {"set", &Set},
      {"unset", &Unset},
      {"open", &OpenFile},

@@ -30,7 +30,7 @@ Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
   json["depth_along_normal_mm"] = l.depth_along_normal_mm ? Json(*l.depth_along_normal_mm) : Json();
   if (const auto at = checks.sites.find(l.site); at != checks.sites.end()) {
     json["from_bone_mm"] = Number(at->second.from_bone_mm);
-    json["from_foreseen_mm"] = Number(at->second.from_foreseen_mm);
+    json["from_predicted_mm"] = Number(at->second.from_predicted_mm);
     json["from_mirror_mm"] = Number(at->second.from_mirror_mm);
   }
   return json;
@@ -77,9 +77,9 @@ Json JobJson(const JobStatus& job) {
           {"words", job.words}};
 }
 
-Json ForeseenJson(const LandmarkChecks& checks) {
+Json PredictedJson(const LandmarkChecks& checks) {
   Json json = Json::array();
-  for (const auto& [site, point] : checks.foreseen) {
+  for (const auto& [site, point] : checks.predicted) {
     json.push_back({{"site", site}, {"point", Numbers(point)}});
   }
   return json;
@@ -127,7 +127,7 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
                {"subject", SubjectJson(shot)},
                {"landmarks", Json::array()},
                {"absent", Json::array()},
-               {"foreseen", ForeseenJson(shot.checks)},
+               {"predicted", PredictedJson(shot.checks)},
                {"errors", shot.checks.errors},
                {"notes", shot.checks.notes},
                {"settings", Json::array()},

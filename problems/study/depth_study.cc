@@ -160,7 +160,7 @@ std::vector<std::string> DepthResult::Faults() const {
     faults.emplace_back("no vertex of the skull has a depth");
   }
   if (truth && !std::isfinite(truth->tips.rms_mm)) {
-    faults.emplace_back("the distance of the depth's end from the true skin is no number");
+    faults.emplace_back("the distance of the depth's end from the true skin is not a number");
   }
   return faults;
 }

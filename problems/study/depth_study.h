@@ -38,7 +38,7 @@ DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context
                          StageCache* cache = nullptr);
 
 // Metrics and counts: title, subject, usable, depth{}, depth_truth{}, cross_validation{}, notes[];
-// null, or NaN that is written as null, where there is no number.
+// null, or NaN that is written as null, where there is not a number.
 nlohmann::ordered_json DepthResultJson(const Experiment& experiment, const DepthResult& result);
 
 // One line per left-out dowel: kind, site, landmark, region, depth_mm, predicted_mm, error_mm,

@@ -100,7 +100,7 @@ class SubjectReader {
       Fail(path, "the subject has no name; give it one");
     } else if (std::any_of(begin, begin + static_cast<std::ptrdiff_t>(n),
                            [&](const StudySubject& other) { return other.name == name; })) {
-      Fail(path, fmt::format("the name '{}' stands twice; give each subject its own", name));
+      Fail(path, fmt::format("the name '{}' appears twice; give each subject its own", name));
     }
   }
 

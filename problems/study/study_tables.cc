@@ -198,7 +198,7 @@ std::vector<std::string> AreaNotes(const StudyResults& results) {
     return {};
   }
   return {fmt::format(
-      "the treatments were not measured on the same area ({}, cm²): of {}. Their figures can not "
+      "the treatments were not measured on the same area ({}, cm²): of {}. Their figures cannot "
       "be compared as they stand; let them differ in nothing that decides what is measured "
       "(region, network)",
       metric, fmt::join(unlike, ", "))};

@@ -20,8 +20,8 @@ struct TrialRow {
   std::map<std::string, double> metrics;  // by dotted path in result.json; finite ones only
   std::vector<double> quantiles_mm = {};  // of the face's error (FaceMetrics); empty: none
   std::vector<double> step_rms_mm = {};   // before the first step of the fit, after each
-  // Of stated standard deviations (interp/calibration.h): against the true depth, against dowels
-  // that were left out.
+  // Of stated standard deviations (interp/evaluation/calibration.h): against the true depth,
+  // against dowels that were left out.
   std::vector<double> depth_coverage = {}, left_out_coverage = {};
   // Of its timing.json: work that another trial did for it is not in it. NaN: not told. It is in no
   // table that is the same in every run.

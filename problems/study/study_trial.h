@@ -36,7 +36,7 @@ class TrialFaults {
  public:
   void Add(const std::string& line);
   void Add(const ConfigErrors& errors);
-  // Throws ConfigError with a line a fault.
+  // Throws ConfigError with a line per fault.
   void ThrowIfAny() const;
 
  private:

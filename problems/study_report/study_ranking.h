@@ -23,8 +23,8 @@ double MeanSeconds(const StudyResults& results, const Treatment& treatment);
 // rounds". Empty where the study names its treatments itself, or has one alone.
 std::string WordsOfNames(const StudyResults& results);
 
-// A line a treatment for a terminal: rank, mean, subjects, seconds and label; the first twenty, and
-// how many more there are. Empty where no trial has a value.
+// A line per treatment for a terminal: rank, mean, subjects, seconds and label; the first twenty,
+// and how many more there are. Empty where no trial has a value.
 std::string RankingText(const StudyResults& results);
 
 }  // namespace semblance

@@ -56,7 +56,7 @@ std::map<int, double> AreasInside(const TriMesh& mesh, int first, const Sphere& 
   return areas;
 }
 
-// Triangles hang together at shared points, also at those outside the ball: the points of a coarse
+// Triangles are connected at shared points, also at those outside the ball: the points of a coarse
 // mesh all are.
 std::map<int, std::vector<int>> TrianglesByPoint(const TriMesh& mesh,
                                                  const std::map<int, double>& areas) {

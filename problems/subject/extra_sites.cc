@@ -112,7 +112,7 @@ Vec3 PointNear(const std::string& site, const ConfigNode& near, std::span<const 
                       site, SiteInWords(landmark)));
     }
     average = average ? average : FitAverageSkull(standard);
-    sum += average->Foreseen(landmark);
+    sum += average->Predicted(landmark);
   }
   return sum / static_cast<double>(place.landmarks.size());
 }

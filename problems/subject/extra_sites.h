@@ -62,7 +62,7 @@ SitePlace ReadPlace(const ConfigNode& near);
 template <class Report>
 void CheckValue(Report& report, const ExtraSite& site) {
   if (site.uv && !site.near.IsNull()) {
-    report("near", "where the site is stands twice, as `uv` and as `near`; give one of them");
+    report("near", "where the site is appears twice, as `uv` and as `near`; give one of them");
   }
   if (!site.near.IsNull()) {
     if (const std::string fault = ReadPlace(site.near).fault; !fault.empty()) {
@@ -78,7 +78,7 @@ std::vector<OptionFault> FaultsOfSites(const ExtraSites& sites);
 bool IsHeld(const ExtraSites& sites, const std::string& site);
 
 // Where a site stands, before it is laid onto bone: the point, or the middle of the landmarks,
-// where they are given or else foreseen. Throws InputError, naming `site`, if a landmark of `near`
+// where they are given or else predicted. Throws InputError, naming `site`, if a landmark of `near`
 // is neither given nor standard.
 Vec3 PointNear(const std::string& site, const ConfigNode& near, std::span<const SitePoint> given);
 

@@ -20,7 +20,7 @@ std::array<Vec3, 2> AverageCondyles();
 
 struct JawPose {
   double opening_deg = kNaN;  // against the average skull's closed jaw; below 0: closed further
-  double off_mm = kNaN;  // of the mandible's sites from where the cranium foresees them, median
+  double off_mm = kNaN;  // of the mandible's sites from where the cranium predicts them, median
 };
 
 // Two fits of the average skull (FitAverageSkull), one to the sites of the cranium and one to those

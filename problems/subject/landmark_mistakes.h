@@ -27,7 +27,7 @@ struct LandmarkMistakes {
 //   size            0.7 to 1.4 times the average skull is a skull
 //   pose            turned by more than 60 degrees from LPS: whether it is RAS
 //   mandible open   by more than max_opening_deg (jaw_pose.h)
-//   far off         a site further than max_misfit_mm from where the others foresee it
+//   far off         a site further than max_misfit_mm from where the others predict it
 //   mandible        all its sites in the air; a note where none is given, none is called absent and
 //                   no bone is near
 //   in the air      a site further than max_distance_mm from the bone

@@ -155,7 +155,7 @@ void CheckValue(Report& report, const LandmarkFile& file) {
   std::set<std::string> sites;
   for (const Landmark& landmark : file.landmarks) {
     if (!sites.insert(landmark.site).second) {
-      report("landmarks", fmt::format("site '{}' stands twice; keep one", landmark.site));
+      report("landmarks", fmt::format("site '{}' appears twice; keep one", landmark.site));
     }
   }
   for (const AbsentLandmark& absent : file.absent) {

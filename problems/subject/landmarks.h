@@ -53,7 +53,7 @@ struct LandmarkFile {
 struct PlaceOptions {
   double max_distance_mm = 3;   // of a landmark from the skull; more is an error
   double normal_radius_mm = 3;  // of the mean normal where a landmark has none
-  double max_misfit_mm = 25;    // of a landmark from where the others foresee it; more is an error
+  double max_misfit_mm = 25;    // of a landmark from where the others predict it; more is an error
   double max_opening_deg = 15;  // of the mandible; more is an error
   LandmarksKept keep = KeepAll{};  // which of them are used
   double noise_mm = 0;             // by which each is moved at random, as an unsure hand would
@@ -129,7 +129,7 @@ void Fields(Visitor& visit, PlaceOptions& o) {
                   .min = 5,
                   .max = 1000,
                   .doc = "a landmark further than this from where the others and an average skull "
-                         "foresee it is an error; in mm of the average skull"},
+                         "predict it is an error; in mm of the average skull"},
         o.max_misfit_mm);
   visit(FieldInfo{.name = "max_opening_deg",
                   .unit = "deg",
@@ -169,13 +169,13 @@ UsedLandmarks LandmarksInUse(const LandmarkFile& file, const MeshQuery& skull,
 // The one way to read such a file, as the checks are made here; points and normals come in mm and
 // LPS whatever the file is in. Throws IoError if the file cannot
 // be read; ConfigError, with a line for each fault, if it has no
-// landmark, a site is neither standard nor further (sites.h) or stands twice (also once as absent),
-// a point lacks, or a normal is not of length 1 within 1 %.
+// landmark, a site is neither standard nor further (sites.h) or appears twice (also once as
+// absent), a point lacks, or a normal is not of length 1 within 1 %.
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
 
 // One dowel per landmark, in the file's order, its depth still NaN. The base is the skull's point
 // nearest to the landmark; the direction the landmark's normal, else the area-weighted normal of
-// the skull within the radius: of the bone that hangs together with the base there and faces within
+// the skull within the radius: of the bone that is connected with the base there and faces within
 // 80 degrees of it, so that the inner side of a thin wall has no say. Throws InputError if a
 // landmark is too far from the skull, or the skull has no area there.
 // query: of the skull.

@@ -26,7 +26,7 @@ NetworkPlan ReadNetworkPlan(const std::filesystem::path& path) {
           path.string(), area[0], area[1], area[2]));
     }
     if (!known.insert(sorted).second) {
-      throw InputError(fmt::format("{}: area [{}, {}, {}] stands twice; keep one", path.string(),
+      throw InputError(fmt::format("{}: area [{}, {}, {}] appears twice; keep one", path.string(),
                                    area[0], area[1], area[2]));
     }
   }

@@ -21,7 +21,7 @@ void Fields(Visitor& visit, NetworkPlan& plan) {
 
 // Any sites may stand in it, also ones that are not standard. Throws IoError if the file cannot be
 // read, ConfigError if it is not such a file, InputError if it has no area, an area names a site
-// twice, or an area stands twice.
+// twice, or an area appears twice.
 NetworkPlan ReadNetworkPlan(const std::filesystem::path& path);
 
 }  // namespace semblance

@@ -148,7 +148,7 @@ void CheckValue(Report& report, const TissueCorrelations& o) {
   std::set<std::string> seen;
   for (const std::string& name : o.names) {
     if (!seen.insert(name).second) {
-      report("names", fmt::format("'{}' stands twice; keep one", name));
+      report("names", fmt::format("'{}' appears twice; keep one", name));
     }
     if (!IsCovariateOf(o, name) && !ComplaintAboutLandmark(name).empty()) {
       report("names", fmt::format("{}; or is it a covariate that `covariates` lacks?",
@@ -210,7 +210,7 @@ void CheckValue(Report& report, const TissueTable& table) {
   std::set<std::string> sites;
   for (const TissueRow& row : table.rows) {
     if (!sites.insert(row.site).second) {
-      report("rows", fmt::format("site '{}' stands twice; keep one", row.site));
+      report("rows", fmt::format("site '{}' appears twice; keep one", row.site));
     }
     if (StrataOf(row) != StrataOf(table.rows.front())) {
       report("rows", fmt::format("site '{}' has other strata than the first row; a table is either "

@@ -186,7 +186,7 @@ std::string StratumName(Sex sex, Build build);
 
 // The one way to read a table, as the checks are made here. Throws IoError if the file cannot be
 // read; ConfigError if it is not such a table: units other than mm, strata that are neither the six
-// nor "adult", a site that stands twice or with a side, a mean in a missing cell or none in
+// nor "adult", a site that appears twice or with a side, a mean in a missing cell or none in
 // another, correlations that no depths can have (not positive definite) or of a site without sd.
 TissueTable ReadTissueTable(const std::filesystem::path& path);
 

@@ -14,9 +14,9 @@ namespace semblance {
 // Each site of `gone` moves into a neighbour, and the areas between the two vanish (an edge
 // collapse; Hoppe 1996): fewer and larger areas. Without a site inside, the network covers what it
 // covered; without one of its border, the border runs straight between that site's neighbours.
-// Of the neighbours that keep it sound (no area turns over, none stands twice, no edge gets a third
-// area, the border stays a border) that one which leaves the best-shaped areas. A site without such
-// a neighbour stays in the plan, and its areas fall away where the network is built.
+// Of the neighbours that keep it sound (no area turns over, none appears twice, no edge gets a
+// third area, the border stays a border) that one which leaves the best-shaped areas. A site
+// without such a neighbour stays in the plan, and its areas fall away where the network is built.
 //
 // points: of the sites, in any unit. Areas of sites that are not among them are left as they are.
 NetworkPlan WithoutSites(NetworkPlan plan, const std::set<std::string>& gone,

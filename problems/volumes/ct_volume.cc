@@ -15,7 +15,7 @@ void CheckVolumeClaim(const VolumeClaim& claim, const std::string& where) {
   const auto& [x, y, z] = claim.counts;
   const std::string voxels = fmt::format("{:.10g} x {:.10g} x {:.10g} voxels", x, y, z);
   if (!(std::min({x, y, z}) >= 1)) {
-    throw InputError(fmt::format("{}: {} are no volume", where, voxels));
+    throw InputError(fmt::format("{}: {} are not a volume", where, voxels));
   }
   const double count = x * y * z;
   if (!(count * sizeof(std::int16_t) <= kLargestVolume_bytes)) {
@@ -31,7 +31,7 @@ void CheckVolumeClaim(const VolumeClaim& claim, const std::string& where) {
 
 void CheckVolume(const CtVolume& volume, const std::string& where) {
   if (std::min({volume.columns, volume.rows, volume.slices}) < 2) {
-    throw InputError(fmt::format("{}: {} x {} x {} voxels are no volume; it needs 2 each way",
+    throw InputError(fmt::format("{}: {} x {} x {} voxels are not a volume; it needs 2 each way",
                                  where, volume.columns, volume.rows, volume.slices));
   }
   const Vec3& s = volume.spacing_mm;

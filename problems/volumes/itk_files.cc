@@ -215,7 +215,8 @@ Value NiftiValue(const std::string& head, std::size_t at, bool swapped) {
 }
 
 // How the voxels lie, in a NIfTI-1 file that is not packed: steps, quaternion with its place, rows
-// of a matrix. ITK takes the matrix apart without end if it holds what is no number, or a huge one.
+// of a matrix. ITK takes the matrix apart without end if it holds what is not a number, or a huge
+// one.
 void CheckNiftiPlaces(const std::filesystem::path& file) {
   constexpr std::size_t kHeader = 348;
   constexpr double kFarthest_mm = 1e9;

@@ -239,15 +239,15 @@ void Bench::PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& 
   Take(Done(history_, "placed " + site, PlaceLandmark(Now(history_), site, point)));
 }
 
-void Bench::TakeForeseen() {
+void Bench::TakePredicted() {
   const Lock lock(mutex_);
-  if (checks_.foreseen.empty()) {
+  if (checks_.predicted.empty()) {
     throw InputError(
-        "landmarks: none is foreseen; place three or more that do not lie on a line, on a head in "
+        "landmarks: none is predicted; place three or more that do not lie on a line, on a head in "
         "mm and LPS");
   }
   Take(Done(history_, "suggested the other landmarks",
-            TakeProposals(Now(history_), ForeseenLandmarks(checks_))));
+            TakeProposals(Now(history_), PredictedLandmarks(checks_))));
 }
 
 const RunFace& Bench::FreshFace() const {

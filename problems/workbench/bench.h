@@ -77,7 +77,7 @@ class Bench {
   // point to `near`.
   void PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& direction,
                   const Vec3& near);
-  void TakeForeseen();
+  void TakePredicted();
 
   // Pulls the face of the last run at the point of it that is nearest to `at`.
   void PullAt(const Vec3& at, Pull pull);

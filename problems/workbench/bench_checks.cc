@@ -62,19 +62,19 @@ void MeasureMirrors(std::span<const SitePoint> sites, const MidPlane& plane,
   }
 }
 
-void Foresee(const SkullFit& fit, std::span<const SitePoint> sites, const MeshQuery& bone,
+void Predict(const SkullFit& fit, std::span<const SitePoint> sites, const MeshQuery& bone,
              LandmarkChecks& checks) {
   constexpr double kFarthest_mm = 15;
   for (std::size_t k = 0; k < sites.size(); ++k) {
-    checks.sites[sites[k].site].from_foreseen_mm = fit.residual_mm[k];
+    checks.sites[sites[k].site].from_predicted_mm = fit.residual_mm[k];
   }
   for (const std::string& site : StandardSiteCodes()) {
     if (checks.sites.contains(site)) {
       continue;
     }
-    const MeshPoint at = bone.Closest(fit.Foreseen(site));
+    const MeshPoint at = bone.Closest(fit.Predicted(site));
     if (at.distance_mm <= kFarthest_mm) {
-      checks.foreseen[site] = at.position;
+      checks.predicted[site] = at.position;
     }
   }
 }
@@ -89,7 +89,7 @@ LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, co
   }
   const std::vector<SitePoint> sites = StandardOnes(file);
   if (const auto fit = FitOf(sites)) {
-    Foresee(*fit, sites, bone, checks);
+    Predict(*fit, sites, bone, checks);
   }
   if (const auto plane = PlaneOf(sites)) {
     MeasureMirrors(sites, *plane, checks);
@@ -102,15 +102,15 @@ LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, co
   return checks;
 }
 
-LandmarkFile ForeseenLandmarks(const LandmarkChecks& checks) {
+LandmarkFile PredictedLandmarks(const LandmarkChecks& checks) {
   LandmarkFile file;
   file.proposed = true;
-  for (const auto& [site, point] : checks.foreseen) {
+  for (const auto& [site, point] : checks.predicted) {
     Landmark landmark;
     landmark.site = site;
     landmark.point = {point.x(), point.y(), point.z()};
     landmark.certainty = Certainty::kLow;
-    landmark.note = "foreseen from the other landmarks and an average skull";
+    landmark.note = "predicted from the other landmarks and an average skull";
     file.landmarks.push_back(std::move(landmark));
   }
   return file;

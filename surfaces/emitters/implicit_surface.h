@@ -12,7 +12,7 @@
 
 namespace semblance {
 
-struct NeighbourList;  // neighbour_list_cache.h
+struct NeighbourList;  // emitter_search.h
 
 struct ImplicitOptions {
   Emitter emitter = FlatEmitter{};  // what a triangle emits

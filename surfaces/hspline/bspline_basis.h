@@ -25,7 +25,7 @@ constexpr std::array<double, 4> CubicWeights(double t, int order) {
 }
 
 // The vertices of the coarser level, along one direction, that make one vertex of the finer level:
-// knot insertion at every midpoint. Index may stand twice, then with weight 0.
+// knot insertion at every midpoint. Index may appear twice, then with weight 0.
 struct RefinementRow {
   std::array<int, 3> index;
   std::array<double, 3> weight;  // sum 1

@@ -24,7 +24,7 @@ struct ControlNet {
 };
 
 // S(u,v) = sum_k weight[k] * net.vertices[index[k]], exactly the bicubic B-spline of the level at
-// (u,v). Along a closed direction with few vertices an index may stand twice.
+// (u,v). Along a closed direction with few vertices an index may appear twice.
 struct Stencil {
   std::array<int, 16> index{};
   std::array<double, 16> weight{};  // sum 1 for a point, 0 for a derivative

@@ -35,7 +35,7 @@ PatchTree::PatchTree(const HSplineSurface& surface) : shape_(surface.shape()) {
   MakeGrid();
 }
 
-// Memory of the shortcut: at most eight entries a leaf, so that it too grows with the detail.
+// Memory of the shortcut: at most eight entries per leaf, so that it too grows with the detail.
 void PatchTree::MakeGrid() {
   const std::size_t most = 8 * leaves_.size();
   const auto count = [&](int level) {

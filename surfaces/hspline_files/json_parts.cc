@@ -37,7 +37,7 @@ Json ParseWithoutRepeats(std::string_view text) {
   return Json::parse(text, [&seen](int depth, Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::key && depth == 1 &&
         !seen.insert(parsed.get<std::string>()).second) {
-      throw IoError(fmt::format("entry '{}' stands twice", parsed.get<std::string>()));
+      throw IoError(fmt::format("entry '{}' appears twice", parsed.get<std::string>()));
     }
     return true;  // keep it
   });

@@ -32,7 +32,7 @@ void Fields(Visitor& visit, NarrowBand& o) {
       FieldInfo{
           .name = "components",
           .doc = "outermost: of the surface only the component through its outermost points, or, "
-                 "where cells are too coarse for these to hang together, also what shares cells "
+                 "where cells are too coarse to connect these, also what shares cells "
                  "with it; "
                  "all: no component of it in the grid is missed, at many times the cost, so "
                  "that sheets and fragments that are dropped are counted"},

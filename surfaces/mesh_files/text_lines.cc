@@ -102,7 +102,7 @@ T TextLines::NextNumber() {
   if (error == std::errc::result_out_of_range && end == word.data() + word.size()) {
     return OutOfRange<T>(word);
   }
-  Fail(fmt::format("'{}' is no number; numbers are like -12.5 or 1e-3", Shown(word)));
+  Fail(fmt::format("'{}' is not a number; numbers are like -12.5 or 1e-3", Shown(word)));
 }
 
 float TextLines::NextFloat() { return NextNumber<float>(); }

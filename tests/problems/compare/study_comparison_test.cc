@@ -219,7 +219,7 @@ TEST(StudyComparison, FoldersAreCalledByAsMuchOfTheirPathAsTellsThemApart) {
   EXPECT_THAT(WordsOf<InputError>([&] {
                 names({folder / "one/out", folder / "one/../one/out"});
               }),
-              HasSubstr("stands twice"));
+              HasSubstr("appears twice"));
 }
 
 TEST(ComparisonFiles, TheTablesHoldEveryPairAndValue) {

@@ -81,7 +81,7 @@ TEST(ValueFilter, SaysWhereAConditionIsNone) {
     EXPECT_THAT(Refusal(deep + "subject = a"), HasSubstr("more than 64 parts"));
   }
   EXPECT_THAT(WordsOf<InputError>([] { Holds("interp < 3", kTrial); }),
-              HasSubstr("'kriging' is no number"));
+              HasSubstr("'kriging' is not a number"));
 }
 
 }  // namespace

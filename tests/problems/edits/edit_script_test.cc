@@ -100,7 +100,7 @@ TEST(EditScript, FaultsAreNamedAndNothingChanges) {
     return "accepted";
   };
   const std::string good = "  - {level: 1, i: 5, j: 6, offset: [9, 9, 9]}\n";
-  EXPECT_THAT(complaint(good + good), HasSubstr("stands twice"));
+  EXPECT_THAT(complaint(good + good), HasSubstr("appears twice"));
   EXPECT_THAT(complaint(good + "  - {level: 0, i: 99, j: 6, offset: [0, 0, 0]}\n"),
               HasSubstr("i is 0..6, j is 0..7"));
   EXPECT_THAT(complaint(good + "  - {level: 0, i: 1, j: 6}\n"), HasSubstr("give an offset"));
@@ -116,7 +116,7 @@ TEST(EditScript, AVertexThatStandsTwiceIsSaidWhenTheFileIsRead) {
   const std::string edit = "  - {level: 1, i: 5, j: 6, offset: [9, 9, 9]}\n";
   WriteFileAtomically(folder / "twice.yaml", "edits:\n" + edit + edit);
   EXPECT_THAT(WordsOf<InputError>([&] { ReadEditScript(folder / "twice.yaml"); }),
-              HasSubstr("twice.yaml: vertex (5, 6) of level 1 stands twice"));
+              HasSubstr("twice.yaml: vertex (5, 6) of level 1 appears twice"));
 }
 
 }  // namespace

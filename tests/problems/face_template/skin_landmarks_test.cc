@@ -97,7 +97,7 @@ TEST_F(SkinLandmarkFiles, WhatIsWrongIsSaidWithItsPlace) {
               AllOf(HasSubstr("a.csv:2"), HasSubstr("'nose'"), HasSubstr("prn")));
   EXPECT_THAT(
       FaultOf({File("a.csv", "site,x,y,z\ng,1,2,3\n"), File("b.csv", "site,x,y,z\ng,1,2,3\n")}),
-      HasSubstr("'g' stands twice"));
+      HasSubstr("'g' appears twice"));
   EXPECT_THAT(FaultOf({File("a.csv", "i_multipie,x,y,z\n69,1,2,3\n")}), HasSubstr("1 to 68"));
   EXPECT_THAT(FaultOf({File("a.csv", "site,x,y\ng,1,2\n")}), HasSubstr("'z'"));
   EXPECT_THAT(FaultOf({File("a.csv", "site,x,y,z\n")}), HasSubstr("no landmark"));

@@ -111,7 +111,7 @@ TEST_F(TemplateIo, AFaceNeedsNoFeatures) {
 
 TEST_F(TemplateIo, NamesASiteThatIsMissingOrTwiceOrOutsideTheDomain) {
   EXPECT_THAT(MessageAfterSites("zy_l,", "zy_x,"), HasSubstr("site 'zy_l' is missing"));
-  EXPECT_THAT(MessageAfterSites("zy_l,", "zy_r,"), HasSubstr("site 'zy_r' stands twice"));
+  EXPECT_THAT(MessageAfterSites("zy_l,", "zy_r,"), HasSubstr("site 'zy_r' appears twice"));
   EXPECT_THAT(MessageAfterSites("\ng,0.5,", "\ng,1.5,"),
               AllOf(HasSubstr("site 'g'"), HasSubstr("(1.5, "), HasSubstr("[0, 1]")));
   EXPECT_THAT(MessageAfterSites("\ng,0.5,", "\ng,here,"), HasSubstr("here"));

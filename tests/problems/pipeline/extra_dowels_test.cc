@@ -115,13 +115,13 @@ TEST(ExtraDowels, WhatCannotBePlacedIsToldInOneLine) {
     return WordsOf<InputError>([&] { CaseOf(Phantom30(sites, std::move(overrides))); });
   };
   EXPECT_THAT(words("n: {near: [0, 0, 0], depth: 3}"),
-              HasSubstr("sites.n: n (Nasion) stands twice, as it is among the landmarks"));
+              HasSubstr("sites.n: n (Nasion) appears twice, as it is among the landmarks"));
   EXPECT_THAT(words("mine: {near: n, depth: 3}"), HasSubstr("stands where n (Nasion) stands"));
   EXPECT_THAT(words("mine: {near: [n, rhi]}"), HasSubstr("sites.mine: no depth is given"));
   EXPECT_THAT(words("mine: {near: [0, -300, 0], depth: 3}"), HasSubstr("mm from the skull"));
   EXPECT_THAT(words("mn: {depth: 3}"), HasSubstr("sites.mn: mn (Mid-nasal) is not among the"));
   EXPECT_THAT(words("n: {depth: auto}"), HasSubstr("sites.n.depth: auto is for a site that is"));
-  EXPECT_THAT(words("n: {depth: 5}", {"tissue.set_mm={n: 6}"}), HasSubstr("stands twice, here"));
+  EXPECT_THAT(words("n: {depth: 5}", {"tissue.set_mm={n: 6}"}), HasSubstr("appears twice, here"));
 }
 
 TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {

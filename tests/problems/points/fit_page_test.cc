@@ -6,8 +6,8 @@
 
 #include <cmath>
 
-#include "problems/metrics/quantile.h"
 #include "problems/points/fit_maps.h"
+#include "surfaces/base/quantile.h"
 #include "tests/testing/scattered_data.h"
 
 namespace semblance {

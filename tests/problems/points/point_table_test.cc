@@ -83,7 +83,7 @@ TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(message(""), HasSubstr("p.csv:1: '' is no column"));
   EXPECT_THAT(message("1,2,3\n"), HasSubstr("p.csv:1: '1' is no column"));
   EXPECT_THAT(message("x,y\n1,2\n"), HasSubstr("no column 'z'"));
-  EXPECT_THAT(message("x,y,z,x\n"), HasSubstr("'x' stands twice"));
+  EXPECT_THAT(message("x,y,z,x\n"), HasSubstr("'x' appears twice"));
   EXPECT_THAT(message("x,y,z,u\n"), HasSubstr("'u' stands alone"));
   EXPECT_THAT(message("x,y,z\n"), HasSubstr("no point"));
   EXPECT_THAT(message("x,y,z\n1,2\n"), HasSubstr("p.csv:2: 2 entries for 3 columns"));

@@ -64,10 +64,10 @@ TEST(LeaveOneOut, TheSubjectIsNotInItsOwnMean) {
   const JointSample sample = SampleOf(people, 0);
   const auto ways = LeaveOneOut({}, people, sample);
   ASSERT_EQ(ways.size(), 2u);
-  const ForeseenDepth& depth = ways[0].depths.front();
+  const PredictedDepth& depth = ways[0].depths.front();
   const auto at = std::ranges::find(sample.names, depth.site) - sample.names.begin();
   EXPECT_EQ(depth.site, "sg");
-  EXPECT_NEAR(depth.foreseen_mm, (sample.values.col(at).sum() - depth.depth_mm) / 4, 1e-9);
+  EXPECT_NEAR(depth.predicted_mm, (sample.values.col(at).sum() - depth.depth_mm) / 4, 1e-9);
 }
 
 // The sex and age of one person alone tell nothing of the others: no way of its own, equal to the

@@ -61,7 +61,7 @@ TEST(FeatureRules, ARuleIsOnWhenItsPointsAreThere) {
   EXPECT_TRUE(MarksOfRules(off, AverageLandmarks(), {}, Ict()).marks.empty());
 }
 
-TEST(FeatureRules, ForeseeWhatTheirFormulasSay) {
+TEST(FeatureRules, PredictWhatTheirFormulasSay) {
   const RuleMarks all = MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict());
   const auto mark = [&](std::size_t k) { return all.marks.at(k).position; };
   const double upper = AverageSite("mso_l").z(), lower = AverageSite("mio_l").z();

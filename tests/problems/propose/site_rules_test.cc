@@ -37,14 +37,14 @@ TEST(SiteRules, WithoutADirectionTheClosestBoneCounts) {
 // circle towards the direction, at an angle that follows from R and the reach.
 TEST(SiteRules, TheSiteGoesTowardsItsDirection) {
   const double start = 0.15;  // radians below and before the lowest point
-  const Vec3 foreseen = OnBall({0, -std::sin(start), -std::cos(start)});
-  const SnappedSite found = SnapToBone("me", foreseen, Ball(), Mat3::Identity());
+  const Vec3 predicted = OnBall({0, -std::sin(start), -std::cos(start)});
+  const SnappedSite found = SnapToBone("me", predicted, Ball(), Mat3::Identity());
   const double reach_mm = RuleOf("me").reach_mm;
   // cos(a) + (R / reach) cos(a - start) is greatest
   const double share = kRadius_mm / reach_mm;
   const double angle = std::atan2(share * std::sin(start), 1 + share * std::cos(start));
   EXPECT_LT((found.point - OnBall({0, -std::sin(angle), -std::cos(angle)})).norm(), 1.2);
-  EXPECT_LT(found.point.z(), foreseen.z());
+  EXPECT_LT(found.point.z(), predicted.z());
   EXPECT_GT(found.sharpness_mm, 0);
 }
 
@@ -59,17 +59,17 @@ TEST(SiteRules, SidesAreMirrorImages) {
 
 TEST(SiteRules, DirectionsTurnWithTheSkull) {
   const Mat3 turn = Eigen::AngleAxisd(1.2, Vec3(1, 1, 0).normalized()).toRotationMatrix();
-  const Vec3 foreseen = OnBall({0.1, -1, 0.1});
+  const Vec3 predicted = OnBall({0.1, -1, 0.1});
   const SkullShell ball = Ball();
-  const Vec3 upright = SnapToBone("pg", foreseen, ball, Mat3::Identity()).point;
-  const Vec3 turned = SnapToBone("pg", turn * foreseen, ball, turn).point;
+  const Vec3 upright = SnapToBone("pg", predicted, ball, Mat3::Identity()).point;
+  const Vec3 turned = SnapToBone("pg", turn * predicted, ball, turn).point;
   EXPECT_LT((turn * upright - turned).norm(), 1.5);  // the vertices are others
 }
 
 TEST(SiteRules, InTheMidlineASiteStaysThere) {
-  const Vec3 foreseen = OnBall({0.3, -1, 0});
-  const Vec3 found = SnapToBone("g", foreseen, Ball(), Mat3::Identity()).point;
-  EXPECT_NEAR(found.x(), foreseen.x(), 1.6);
+  const Vec3 predicted = OnBall({0.3, -1, 0});
+  const Vec3 found = SnapToBone("g", predicted, Ball(), Mat3::Identity()).point;
+  EXPECT_NEAR(found.x(), predicted.x(), 1.6);
 }
 
 }  // namespace

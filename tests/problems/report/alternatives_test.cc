@@ -61,7 +61,7 @@ TEST(Alternatives, AreCheckedBeforeAnythingRuns) {
               ThrowsMessage<ConfigError>(HasSubstr("tissue.build")));
   EXPECT_THAT([&] { of("[{name: ../a}]"); }, ThrowsMessage<InputError>(HasSubstr("'../a'")));
   EXPECT_THAT([&] { of("[{name: a}, {name: a}]"); },
-              ThrowsMessage<InputError>(HasSubstr("stands twice")));
+              ThrowsMessage<InputError>(HasSubstr("appears twice")));
 }
 
 TEST(Alternatives, StandBelowTheRunAndSayWhatIsLeftOut) {

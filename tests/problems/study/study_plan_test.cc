@@ -116,7 +116,8 @@ TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
   EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("grid.interp: expected a list"));
   EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("go side by side"));
   EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"), HasSubstr("must be the lower"));
-  EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"), HasSubstr("the name 'a' stands twice"));
+  EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"),
+              HasSubstr("the name 'a' appears twice"));
   EXPECT_THAT(Faults("grid: {rounds: [2, 2]}\n"), HasSubstr("are the same experiment"));
   EXPECT_THAT(Faults("grid: {no.such: [2]}\n"), HasSubstr("no"));
   EXPECT_THAT(WordsOf<ConfigError>([&] { ReadStudy(Write("grid: {rounds: [1]}\n")); }),
@@ -172,7 +173,8 @@ TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
   EXPECT_THAT(Faults("sample: {method: lhs}\n"),
               AllOf(HasSubstr("sample.n: the number of samples is missing"),
                     HasSubstr("sample.ranges: there is no range")));
-  EXPECT_THAT(Faults("set: {rounds: 2}\n"), HasSubstr("study.yaml:4:1: set: the key stands twice"));
+  EXPECT_THAT(Faults("set: {rounds: 2}\n"),
+              HasSubstr("study.yaml:4:1: set: the key appears twice"));
 }
 
 TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreToldTogetherAndOnce) {

@@ -59,7 +59,7 @@ TEST(AverageSkull, APoseIsFoundThoughAThirdOfTheSitesAreWrong) {
   }
   const SkullFit fit = FitAverageSkull(sites);
   for (std::size_t k = 0; k < sites.size(); ++k) {
-    EXPECT_LT((fit.Foreseen(sites[k].site) - clean.Foreseen(sites[k].site)).norm(), 2);
+    EXPECT_LT((fit.Predicted(sites[k].site) - clean.Predicted(sites[k].site)).norm(), 2);
     EXPECT_EQ(fit.residual_mm[k] > 20, k % 3 == 0) << sites[k].site;
   }
 }
@@ -70,7 +70,7 @@ TEST(AverageSkull, AMirrorImageFitsTheMirroredSkullAlone) {
   EXPECT_LT(mirrored.median_mm, 4);
   EXPECT_GT(as_is.median_mm, 3 * mirrored.median_mm);
   for (const SitePoint& s : Posed(true)) {
-    EXPECT_LT((mirrored.Foreseen(s.site) - s.point).norm(), 10) << s.site;
+    EXPECT_LT((mirrored.Predicted(s.site) - s.point).norm(), 10) << s.site;
   }
 }
 
@@ -92,7 +92,7 @@ TEST(AverageSkull, RealHeadsAndPhantomsFitIt) {
   }
 }
 
-TEST(AverageSkull, MissingSitesAreForeseen) {
+TEST(AverageSkull, MissingSitesArePredicted) {
   for (const char* name : {"cthead", "vhm"}) {
     const std::vector<SitePoint> all = Read(name);
     for (const SitePoint& left_out : all) {

@@ -51,7 +51,7 @@ TEST(ExtraSites, AreReadAndWrittenBack) {
 
 TEST(ExtraSites, WhatIsWrongIsToldInOneLine) {
   EXPECT_THAT(Words("a: {near: [1, 2, 3], uv: [0.5, 0.5], depth: 3}"),
-              HasSubstr("sites.a.near: where the site is stands twice"));
+              HasSubstr("sites.a.near: where the site is appears twice"));
   EXPECT_THAT(Words("n: {uv: [0.5, 1.2]}"), HasSubstr("sites.n.uv[1]: "));
   EXPECT_THAT(Words("a: {near: g, depth: -1}"), HasSubstr("sites.a.depth: "));
   EXPECT_THAT(Words("a: {near: gg, depth: 1}"), HasSubstr("sites.a.near: unknown site 'gg'"));
@@ -87,7 +87,7 @@ TEST(PointNear, IsThePointTheLandmarkOrTheMiddleOfSeveral) {
   EXPECT_EQ(at("[1, 2, 3]"), Vec3(1, 2, 3));
   EXPECT_EQ(at("g"), AverageSite("g") + Vec3(5, 6, 7));
   EXPECT_LT((at("[n, rhi]") - Vec3(5, 0.5, 0)).norm(), 1e-9);
-  EXPECT_LT((at("go_l") - AverageSite("go_l") - Vec3(5, 6, 7)).norm(), 1e-6);  // foreseen
+  EXPECT_LT((at("go_l") - AverageSite("go_l") - Vec3(5, 6, 7)).norm(), 1e-6);  // predicted
   EXPECT_THAT(WordsOf<InputError>([&] { at("mn"); }),
               HasSubstr("sites.a.near: mn (Mid-nasal) is not among the landmarks"));
 }

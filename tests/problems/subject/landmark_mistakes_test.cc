@@ -165,7 +165,7 @@ const Mistake kMistakes[] = {
      1},
     {"a pair exchanged",
      [](Subject& s) { std::swap(At(s, "fe_l").site, At(s, "zy_l").site); },
-     {"mm from where the other sites foresee it", "max_misfit_mm", "the names may be exchanged"},
+     {"mm from where the other sites predict it", "max_misfit_mm", "the names may be exchanged"},
      2},
     {"the same point twice",
      [](Subject& s) { At(s, "g").point = At(s, "n").point; },

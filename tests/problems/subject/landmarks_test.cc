@@ -92,7 +92,7 @@ TEST(LandmarkFile, RefusesUnknownSites) {
 
 TEST(LandmarkFile, RefusesRepeatedSites) {
   EXPECT_THAT(Complaints("landmarks: [{site: g, point: [1, 2, 3]}, {site: g, point: [1, 2, 4]}]\n"),
-              HasSubstr("landmarks: site 'g' stands twice; keep one"));
+              HasSubstr("landmarks: site 'g' appears twice; keep one"));
   EXPECT_THAT(Complaints("landmarks: [{site: g, point: [1, 2, 3]}]\nabsent: [{site: g}]\n"),
               HasSubstr("absent: site 'g' already stands in this file; keep one"));
 }

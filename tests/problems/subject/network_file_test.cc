@@ -130,7 +130,7 @@ TEST(NetworkFile, RefusesWhatIsNotANetwork) {
   EXPECT_THAT(words("areas: [[g, sg, g]]\n"),
               HasSubstr("area [g, sg, g] names a site twice; an area needs three different sites"));
   EXPECT_THAT(words("areas: [[g, sg, pg], [pg, g, sg]]\n"),
-              HasSubstr("area [pg, g, sg] stands twice"));
+              HasSubstr("area [pg, g, sg] appears twice"));
   EXPECT_THROW(ReadNetworkPlan(ScratchFile("areas: [[g, sg]]\n")), ConfigError);
   EXPECT_THROW(ReadNetworkPlan(ScratchFile("area: [[g, sg, pg]]\n")), ConfigError);
   EXPECT_THROW(ReadNetworkPlan("/no/such/network.yaml"), IoError);

@@ -224,7 +224,7 @@ TEST(TissueTable, RefusesWhatIsNotATable) {
   EXPECT_THAT(words(OneRow("{adult: {mean: 3}}") + "units: cm\n"),
               HasSubstr("units: must be mm, not 'cm'"));
   EXPECT_THAT(words(OneRow("{adult: {mean: 3}}") + "  - {site: g, values: {adult: {mean: 3}}}\n"),
-              HasSubstr("site 'g' stands twice"));
+              HasSubstr("site 'g' appears twice"));
   EXPECT_THAT(words("id: x\nrows: [{site: go_l, values: {adult: {mean: 3}}}]\n"),
               HasSubstr("a pair stands once"));
   EXPECT_THAT(words(""), HasSubstr("rows"));

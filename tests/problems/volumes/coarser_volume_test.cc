@@ -86,7 +86,7 @@ TEST(CoarserVolume, OnlyFinerAxesChangeAndThreadsChangeNothing) {
 TEST(CoarserVolume, WhatIsNoVolumeAnyMoreIsToldSo) {
   const CtVolume fine = VolumeOf([](const Vec3&) { return 0.0; });
   EXPECT_THAT(WordsOf<InputError>([&] { CoarserVolume(fine, {.pixel_mm = 8}, 1); }),
-              HasSubstr("1 x 1 x 14 voxels are no volume"));
+              HasSubstr("1 x 1 x 14 voxels are not a volume"));
 }
 
 // An edge stays where the mean of a voxel is midway: the balls keep their size within a part of

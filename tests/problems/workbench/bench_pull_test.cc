@@ -16,8 +16,8 @@ using testing::RandomSurface;
 const HSplineShape kShape{.patches_u = 6, .patches_v = 5, .max_level = 3};
 constexpr int kPerPatch = 2;
 
-// How far the face lies at most from where the moves of 1 mm foresaw it, in mm.
-double FarthestFromForeseen(const HSplineSurface& face, int level, const Vec3& by) {
+// How far the face lies at most from where the moves of 1 mm predicted it, in mm.
+double FarthestFromPredicted(const HSplineSurface& face, int level, const Vec3& by) {
   Pull pull{.level = level, .uv = {0.37, 0.61}};
   const auto moves = PullMoves(face, pull, kPerPatch);
   pull.by_mm = by;
@@ -27,25 +27,25 @@ double FarthestFromForeseen(const HSplineSurface& face, int level, const Vec3& b
   const std::vector<Vec3> after = Tessellate(pulled, kPerPatch).mesh.points;
   double farthest = 0;
   for (std::size_t v = 0; v < before.size(); ++v) {
-    Vec3 foreseen = before[v];
+    Vec3 predicted = before[v];
     for (int axis = 0; axis < 3; ++axis) {
-      foreseen += by[axis] * moves[axis][v];
+      predicted += by[axis] * moves[axis][v];
     }
-    farthest = std::max(farthest, (after[v] - foreseen).norm());
+    farthest = std::max(farthest, (after[v] - predicted).norm());
   }
   return farthest;
 }
 
 TEST(PullMoves, AreExactWhereNoFinerDetailTurns) {
   const HSplineSurface face = RandomSurface(kShape, 3);
-  EXPECT_LT(FarthestFromForeseen(face, kShape.max_level, {10, -20, 5}), 1e-6);
+  EXPECT_LT(FarthestFromPredicted(face, kShape.max_level, {10, -20, 5}), 1e-6);
 }
 
 TEST(PullMoves, ErrWithThePullWhereDetailTurnsAndFadeWithIt) {
   const HSplineSurface face = RandomSurface(kShape, 3);
   const Vec3 by(2, -4, 1);
-  const double whole = FarthestFromForeseen(face, 1, by);
-  const double tenth = FarthestFromForeseen(face, 1, 0.1 * by);
+  const double whole = FarthestFromPredicted(face, 1, by);
+  const double tenth = FarthestFromPredicted(face, 1, 0.1 * by);
   EXPECT_GT(whole, 1e-3);
   EXPECT_LT(tenth, 0.2 * whole);
   EXPECT_LT(whole, 0.5 * by.norm());

@@ -265,9 +265,9 @@ TEST_F(WorkbenchBench, WhatAPullIsShownToDoIsWhatItDoes) {
   const std::vector<Vec3> after = shown();
   double farthest = 0;
   for (std::size_t v = 0; v < before.size(); ++v) {
-    const Vec3 foreseen = moves[0][v] - 2 * moves[1][v] + 0.5 * moves[2][v];
-    EXPECT_LT((after[v] - before[v] - foreseen).norm(), 0.05);
-    farthest = std::max(farthest, foreseen.norm());
+    const Vec3 predicted = moves[0][v] - 2 * moves[1][v] + 0.5 * moves[2][v];
+    EXPECT_LT((after[v] - before[v] - predicted).norm(), 0.05);
+    farthest = std::max(farthest, predicted.norm());
   }
   EXPECT_GT(farthest, 1.5);
 }

@@ -68,7 +68,7 @@ TEST(HSplineJson, RefusesEveryOtherText) {
       {Replaced(good, "\"level0\":[[", "\"level0\":[[\"1\",0,0],["), "\"1\" is not a number"},
       {Replaced(good, "\"level0\":[[", "\"level0\":[[null,0,0],["), "null is not a number"},
       {Replaced(good, "\"level0\":[[", "\"level0\":[[0,0,0],["), "does not fit level 0"},
-      {Replaced(good, "\"version\":1", "\"version\":1,\"version\":1"), "'version' stands twice"},
+      {Replaced(good, "\"version\":1", "\"version\":1,\"version\":1"), "'version' appears twice"},
       {Replaced(good, "\"offsets\":[[", "\"offsets\":[[1,2,2,0,0,0],[1,2,2,0,0,0],["),
        "has two offsets"},
       {Replaced(good, "\"offsets\":[", "\"offsets\":[3,"), "3 is not a list of 6 numbers"},
