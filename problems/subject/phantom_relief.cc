@@ -14,14 +14,14 @@ struct HollowOnSkull {
 };
 
 const HollowOnSkull kHollows[] = {
-    {{0, -4, -44}, {9, 20, 11}, 7},      // nasal opening
-    {{0, -2, -97}, {16, 20, 7}, 1.5},    // between teeth and chin
-    {{33, 10, -13}, {11, 15, 10}, 8.5},  // orbit
-    {{26, 4, -48}, {8, 15, 8}, 3},       // canine fossa
-    {{57, 38, 6}, {16, 16, 15}, 5.5},    // temporal fossa
-    {{44, 36, -62}, {14, 22, 17}, 8.5},  // under the cheek bone, beside the teeth
-    {{52, 60, -58}, {12, 16, 16}, 4},    // masseteric fossa
-    {{26, 22, -116}, {18, 18, 8}, 3},    // under the jaw
+    {{0, -4, -44}, {9, 20, 11}, 4},      // nasal opening
+    {{0, -2, -97}, {16, 20, 7}, 1},      // between teeth and chin
+    {{33, 10, -13}, {11, 15, 10}, 5},    // orbit
+    {{26, 4, -48}, {8, 15, 8}, 2},       // canine fossa
+    {{57, 38, 6}, {16, 16, 15}, 3},      // temporal fossa
+    {{44, 36, -62}, {14, 22, 17}, 5},    // under the cheek bone, beside the teeth
+    {{52, 60, -58}, {12, 16, 16}, 2.5},  // masseteric fossa
+    {{26, 22, -116}, {18, 18, 8}, 2},    // under the jaw
 };
 
 // Waves whose sum has about the covariance exp(-r / length) of a rough field (a Cauchy distribution
@@ -61,7 +61,7 @@ PhantomRelief::PhantomRelief(Random& random) {
 }
 
 double PhantomRelief::Depth(const Vec3& direction, double smooth_depth_mm) const {
-  constexpr double kRoughness = 0.35, kThick_mm = 12;  // standard deviation of the logarithm
+  constexpr double kRoughness = 0.45, kThick_mm = 12;  // standard deviation of the logarithm
   double depth = smooth_depth_mm;
   for (const Hollow& hollow : hollows_) {
     const Vec3 away = (direction - hollow.direction).cwiseQuotient(hollow.sigma);
