@@ -78,8 +78,8 @@ TEST(CtVolume, AClaimIsJudgedBeforeMemoryIsTaken) {
   EXPECT_THAT(words({.counts = {1e9, 1e9, 1e9}}),
               HasSubstr("1000000000 x 1000000000 x 1000000000 voxels"));
   EXPECT_THAT(words({.counts = {1e300, 1e300, 1e300}}), HasSubstr("at most 8 GB"));
-  EXPECT_THAT(words({.counts = {kNaN, 2, 2}}), HasSubstr("no volume"));
-  EXPECT_THAT(words({.counts = {0, 512, 512}}), HasSubstr("no volume"));
+  EXPECT_THAT(words({.counts = {kNaN, 2, 2}}), HasSubstr("not a volume"));
+  EXPECT_THAT(words({.counts = {0, 512, 512}}), HasSubstr("not a volume"));
   EXPECT_THAT(words({.counts = {512, 512, 100}, .file_bytes = 1000}), HasSubstr("cannot hold"));
 }
 
