@@ -26,7 +26,7 @@ struct PhantomOptions {
   static constexpr std::string_view kName = "phantom";
   std::uint64_t random_seed = 1;  // which head
   int rings = 100;                // of triangles from crown to throat; about 3 rings^2 triangles
-  PhantomBone bone = PhantomBone::kSmooth;
+  PhantomBone bone = PhantomBone::kSmooth;  // like_people: under the same skin
 };
 template <class Visitor>
 void Fields(Visitor& visit, PhantomOptions& o) {
@@ -50,14 +50,15 @@ void Fields(Visitor& visit, PhantomOptions& o) {
 struct PhantomSite {
   std::string site;                    // landmark code with side, e.g. "g", "go_l", "go_r"
   Vec3 base = Vec3::Constant(kNaN);    // on the exact skull, mm
-  Vec3 normal = Vec3::Constant(kNaN);  // of the exact skull there, unit, outward
+  Vec3 normal = Vec3::Constant(kNaN);  // of the exact smooth bone there, unit, outward
   double depth_mm = kNaN;              // of the tissue along the normal, > 0
 };
 
 struct Phantom {
   TriMesh skull;                       // closed, outward; LPS, nasion at the origin
-  std::vector<double> depth_mm;        // tissue along the exact normal, one per skull vertex, > 0
-  TriMesh face;                        // skull vertex + depth * exact normal; the skull's triangles
+  std::vector<double> depth_mm;        // tissue along the smooth bone's exact normal, one per
+                                       // skull vertex, > 0
+  TriMesh face;                        // skull vertex + depth * that normal; the skull's triangles
   std::vector<PhantomSite> sites;      // all 32: midline from the forehead down, then pairs
   Vec3 centre = Vec3::Constant(kNaN);  // every ray from here meets the skull once
   double thickness = kNaN;             // by which all its depths exceed those of an average adult

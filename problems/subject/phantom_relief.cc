@@ -7,13 +7,7 @@
 namespace semblance {
 namespace {
 
-struct HollowOnSkull {
-  Vec3 on_skull;  // of an average skull, mm; the left one of a pair
-  Vec3 sigma_mm;  // width along x, y, z
-  double depth_mm;
-};
-
-const HollowOnSkull kHollows[] = {
+const BumpOnSkull kHollows[] = {
     {{0, -4, -44}, {9, 20, 11}, 4},      // nasal opening
     {{0, -2, -97}, {16, 20, 7}, 1},      // between teeth and chin
     {{33, 10, -13}, {11, 15, 10}, 5},    // orbit
@@ -44,28 +38,15 @@ WaveSum DrawRough(Random& random) {
 
 }  // namespace
 
-PhantomRelief::PhantomRelief(Random& random) {
-  for (const HollowOnSkull& h : kHollows) {
-    const double reach = (h.on_skull - kPhantomCentre).norm();
-    const double depth = h.depth_mm * random.Uniform(0.7, 1.3);
-    const bool paired = h.on_skull.x() > 0;
-    for (const double side : {1.0, -1.0}) {
-      if (side > 0 || paired) {
-        const Vec3 on_skull(side * h.on_skull.x(), h.on_skull.y(), h.on_skull.z());
-        const double asymmetry = paired ? random.Uniform(0.9, 1.1) : 1;
-        hollows_.push_back({PhantomDirection(on_skull), h.sigma_mm / reach, depth * asymmetry});
-      }
-    }
-  }
-  rough_ = DrawRough(random);
-}
+PhantomRelief::PhantomRelief(Random& random)
+    : hollows_(DrawBumps(kHollows, {.height = 0.3, .side = 0.1}, random)),
+      rough_(DrawRough(random)) {}
 
 double PhantomRelief::Depth(const Vec3& direction, double smooth_depth_mm) const {
   constexpr double kRoughness = 0.45, kThick_mm = 12;  // standard deviation of the logarithm
   double depth = smooth_depth_mm;
-  for (const Hollow& hollow : hollows_) {
-    const Vec3 away = (direction - hollow.direction).cwiseQuotient(hollow.sigma);
-    depth += hollow.depth_mm * std::exp(-away.squaredNorm() / 2);
+  for (const PhantomBump& hollow : hollows_) {
+    depth += hollow.Value(direction);
   }
   const double roughness = kRoughness / (1 + depth / kThick_mm);
   return depth * std::exp(roughness * rough_.Value(direction));

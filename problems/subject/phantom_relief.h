@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The relief of a phantom's bone under a skin that stays smooth: hollows that tissue fills, and a
-// rough field, so that depths vary along the bone as people's do.
+// rough field, so that depths vary along the bone as people's do. How deep and how rough: by the
+// variograms of true depths of three heads (docs/interpolation.md).
 #pragma once
 
 #include <vector>
@@ -15,17 +16,12 @@ class PhantomRelief {
  public:
   explicit PhantomRelief(Random& random);  // draws depths of hollows and the rough field
 
-  // The tissue along the smooth bone's normal once the bone has its relief, > 0 for what the smooth
-  // bone has, > 0; direction unit, from the rays' centre.
+  // Tissue along the smooth bone's normal once the bone has its relief, mm, > 0. direction: unit,
+  // from the rays' centre; smooth_depth_mm > 0: the tissue over the smooth bone there.
   double Depth(const Vec3& direction, double smooth_depth_mm) const;
 
  private:
-  struct Hollow {  // depth * exp(-|(d - direction) / sigma|^2 / 2)
-    Vec3 direction, sigma;
-    double depth_mm;
-  };
-
-  std::vector<Hollow> hollows_;
+  std::vector<PhantomBump> hollows_;
   WaveSum rough_;
 };
 

@@ -7,12 +7,6 @@
 namespace semblance {
 namespace {
 
-struct Feature {
-  Vec3 on_skull;  // on an average skull, mm; the left one of a pair
-  Vec3 sigma_mm;  // width along x, y, z
-  double height_mm;
-};
-
 struct Body {
   Vec3 middle;   // on an average skull, mm
   Vec3 half_mm;  // half axes
@@ -21,7 +15,7 @@ struct Body {
 
 // Nothing here is narrower than lets the surface be moved out by 20 mm without folding: a dent of
 // height h and width s curves by h / s^2, the foot of a bump by 0.45 h / s^2, both below 1 / 20 mm.
-const Feature kFeatures[] = {
+const BumpOnSkull kFeatures[] = {
     {{0, 0, 9}, {16, 30, 11}, 3},        // glabella
     {{0, -4, -19}, {14, 30, 13}, 6},     // nasal bones
     {{0, -4, -46}, {15, 30, 14}, -2.5},  // nasal opening
@@ -85,6 +79,33 @@ WaveSum DrawWaves(Random& random) {
   return sum;
 }
 
+double PhantomBump::Value(const Vec3& at) const {
+  const Vec3 away = (at - direction).cwiseQuotient(sigma);
+  return height_mm * std::exp(-away.squaredNorm() / 2);
+}
+
+Vec3 PhantomBump::Gradient(const Vec3& at) const {
+  return -Value(at) * (at - direction).cwiseQuotient(sigma).cwiseQuotient(sigma);
+}
+
+std::vector<PhantomBump> DrawBumps(std::span<const BumpOnSkull> bumps, const BumpSpread& spread,
+                                   Random& random) {
+  std::vector<PhantomBump> drawn;
+  for (const BumpOnSkull& bump : bumps) {
+    const double reach = (bump.on_skull - kPhantomCentre).norm();
+    const double height = bump.height_mm * random.Uniform(1 - spread.height, 1 + spread.height);
+    const bool paired = bump.on_skull.x() > 0;
+    for (const double side : {1.0, -1.0}) {
+      if (side > 0 || paired) {
+        const Vec3 on_skull(side * bump.on_skull.x(), bump.on_skull.y(), bump.on_skull.z());
+        const double asymmetry = paired ? random.Uniform(1 - spread.side, 1 + spread.side) : 1;
+        drawn.push_back({PhantomDirection(on_skull), bump.sigma_mm / reach, height * asymmetry});
+      }
+    }
+  }
+  return drawn;
+}
+
 PhantomShape::PhantomShape(Random& random) {
   for (const Body& body : kBodies) {
     const Mat3 turn = Eigen::AngleAxisd(body.tilt, Vec3::UnitX()).toRotationMatrix();
@@ -92,18 +113,7 @@ PhantomShape::PhantomShape(Random& random) {
     bodies_.push_back({body.middle - kPhantomCentre,
                        turn * half.cwiseAbs2().cwiseInverse().asDiagonal() * turn.transpose()});
   }
-  for (const Feature& f : kFeatures) {
-    const double reach = (f.on_skull - kPhantomCentre).norm();
-    const double height = f.height_mm * random.Uniform(0.8, 1.2);
-    const bool paired = f.on_skull.x() > 0;
-    for (const double side : {1.0, -1.0}) {
-      if (side > 0 || paired) {
-        const Vec3 on_skull(side * f.on_skull.x(), f.on_skull.y(), f.on_skull.z());
-        const double asymmetry = paired ? random.Uniform(0.95, 1.05) : 1;
-        bumps_.push_back({PhantomDirection(on_skull), f.sigma_mm / reach, height * asymmetry});
-      }
-    }
-  }
+  bumps_ = DrawBumps(kFeatures, {.height = 0.2, .side = 0.05}, random);
   waves_ = DrawWaves(random);
 }
 
@@ -133,11 +143,9 @@ PhantomShape::Radial PhantomShape::Bodies(const Vec3& direction) const {
 PhantomShape::Radial PhantomShape::At(const Vec3& direction) const {
   constexpr double kWaveMm = 1;
   Radial r = Bodies(direction);
-  for (const Bump& bump : bumps_) {
-    const Vec3 away = (direction - bump.direction).cwiseQuotient(bump.sigma);
-    const double height = bump.height_mm * std::exp(-away.squaredNorm() / 2);
-    r.radius_mm += height;
-    r.gradient -= height * away.cwiseQuotient(bump.sigma);
+  for (const PhantomBump& bump : bumps_) {
+    r.radius_mm += bump.Value(direction);
+    r.gradient += bump.Gradient(direction);
   }
   r.radius_mm += kWaveMm * waves_.Value(direction);
   r.gradient += kWaveMm * waves_.Gradient(direction);

@@ -2,6 +2,7 @@
 // The bone of a phantom by formula: a radius for every direction, no one's data.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
@@ -27,6 +28,30 @@ struct WaveSum {  // a smooth function of direction; as drawn, rms about 0.7, ne
 };
 WaveSum DrawWaves(Random& random);
 
+// A bump or a hollow of an average skull.
+struct BumpOnSkull {
+  Vec3 on_skull;  // mm; the left one of a pair
+  Vec3 sigma_mm;  // width along x, y, z
+  double height_mm;
+};
+
+// The same as one phantom has it, seen from the rays' centre.
+struct PhantomBump {
+  Vec3 direction, sigma;
+  double height_mm;
+
+  double Value(const Vec3& at) const;   // height * exp(-|(at - direction) / sigma|^2 / 2), mm
+  Vec3 Gradient(const Vec3& at) const;  // by the direction
+};
+
+// By what share heights differ between phantoms, and the sides of a pair from one another.
+struct BumpSpread {
+  double height, side;
+};
+// Both of each pair, which is what does not lie in the mid-plane.
+std::vector<PhantomBump> DrawBumps(std::span<const BumpOnSkull> bumps, const BumpSpread& spread,
+                                   Random& random);
+
 // A closed smooth surface that every ray from the centre meets once.
 class PhantomShape {
  public:
@@ -40,10 +65,6 @@ class PhantomShape {
     Vec3 offset;   // of its middle from the rays' centre, mm
     Mat3 quadric;  // x . quadric x = 1 on the surface, x from its middle
   };
-  struct Bump {  // height * exp(-|(d - direction) / sigma|^2 / 2)
-    Vec3 direction, sigma;
-    double height_mm;
-  };
   struct Radial {
     double radius_mm;
     Vec3 gradient;  // by the direction, along the unit sphere
@@ -53,7 +74,7 @@ class PhantomShape {
   Radial At(const Vec3& direction) const;
 
   std::vector<Ellipsoid> bodies_;
-  std::vector<Bump> bumps_;
+  std::vector<PhantomBump> bumps_;
   WaveSum waves_;
 };
 
