@@ -50,8 +50,8 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
   NuggetShareField(visit, o.nugget_share);
   visit(FieldInfo{.name = "fit_nugget",
                   .doc = "let the likelihood find one more uncertainty that all dowels have (what "
-                         "varies between neighbouring places): it smooths where depths do not hang "
-                         "together"},
+                         "varies between neighbouring places): it smooths where depths are not "
+                         "correlated"},
         o.fit_nugget);
   visit(
       FieldInfo{.name = "edge_mm",

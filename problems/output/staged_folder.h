@@ -34,8 +34,8 @@ class StagedFolder {
   // To write into, until Publish().
   OutputFolder& Files() { return *files_; }
 
-  // Moves all to Root(). Throws IoError if something has come up there meanwhile, or cannot be
-  // moved; the files then stay in a folder that the message names.
+  // Moves all to Root(). Throws IoError if another program has written there meanwhile, or cannot
+  // be moved; the files then stay in a folder that the message names.
   void Publish(Durability durability = Durability::kSynced);
 
  private:

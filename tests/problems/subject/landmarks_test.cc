@@ -196,7 +196,7 @@ TEST(AveragedNormal, TheInnerSideOfAThinWallHasNoSay) {
 }
 
 TEST(AveragedNormal, TheBackOfAThinWallHasNoSayNearItsRim) {
-  TriMesh disc = SphereMesh({0, 0, 0}, 50, 200);  // front and back hang together over the rim
+  TriMesh disc = SphereMesh({0, 0, 0}, 50, 200);  // front and back are connected over the rim
   for (Vec3& p : disc.points) {
     p.z() *= 0.01;
   }
