@@ -102,7 +102,14 @@ class FaultFinder {
       }
     }
   }
-  void Plan(const AutoPlan&) {}  // the surface takes the levels that it needs
+  // The surface takes the levels that it needs. What moves (u,v) does so before the fit.
+  void Plan(const AutoPlan& plan) {
+    if (plan.relaxation_rounds > 0) {
+      Add("plan.relaxation_rounds",
+          "(u,v) are moved by `semblance fit` alone; write relaxation_rounds: 0, or take another "
+          "plan with relaxation: footpoint");
+    }
+  }
 
   // What the auto plan chooses by itself is not to be asked for. Ceres takes other terms too, in
   // the space that the plan has found.
@@ -124,8 +131,8 @@ class FaultFinder {
     NeedPoints("the auto plan has no term 'points' with a weight; add one", "terms");
     if (!std::holds_alternative<NoRelaxation>(options_.relaxation)) {
       Add("relaxation",
-          "the auto plan leaves the points' (u,v) where they are; write relaxation: "
-          "none, or take plan: adaptive");
+          "the auto plan moves no (u,v) between its solves; write relaxation: none and, to move "
+          "them before the fit, plan: {type: auto, relaxation_rounds: 3}, or take plan: adaptive");
     }
   }
 

@@ -211,6 +211,7 @@ struct AutoPlan {
   static constexpr std::string_view kName = "auto";
   int finest = 7;                             // level, however dense the points are
   OutlierRule outliers = OutlierRule::kDrop;  // keep: every point is believed
+  int relaxation_rounds = 0;                  // of moves of (u,v) before the fit, at most
 };
 template <class Visitor>
 void Fields(Visitor& visit, AutoPlan& o) {
@@ -224,6 +225,14 @@ void Fields(Visitor& visit, AutoPlan& o) {
                 .doc = "drop: points that agree with none of their neighbours have no weight, and "
                        "are listed; keep: every point is believed"},
       o.outliers);
+  visit(FieldInfo{.name = "relaxation_rounds",
+                  .min = 0,
+                  .max = 20,
+                  .doc = "in how many rounds at most, before the fit, each point's (u,v) move to "
+                         "the foot of its perpendicular on a coarse surface, for (u,v) that are "
+                         "only about right; 0: they stay as they are. For `semblance fit`, without "
+                         "joins and exact points"},
+        o.relaxation_rounds);
 }
 
 // How every plan goes to the minimum of its terms.

@@ -48,6 +48,9 @@ std::vector<std::string> Notes(const PointFit& result, const Figures& figures) {
   if (figures.tolerance) {
     notes.push_back(ToleranceText(*figures.tolerance));
   }
+  if (result.moves) {
+    notes.push_back(MovesText(*result.moves));
+  }
   for (std::string& line : JoinLines(result.joins)) {
     notes.push_back(std::move(line));
   }

@@ -74,4 +74,28 @@ std::string AutoText(const AutoReport& r) {
   return text + Verdict(r) + "\n";
 }
 
+nlohmann::ordered_json MovesJson(const FootMoves& moves) {
+  return {{"rounds", moves.rounds},
+          {"rms_move_mm", moves.rms_move_mm},
+          {"max_move_mm", moves.max_move_mm},
+          {"coarse_rms_before_mm", moves.rms_before_mm},
+          {"coarse_rms_after_mm", moves.rms_after_mm},
+          {"folds_prevented", moves.folds_prevented}};
+}
+
+std::string MovesText(const FootMoves& moves) {
+  if (moves.rounds == 0) {
+    return "(u,v) stay as they are: moving them brings the points no nearer to a coarse surface";
+  }
+  std::string text = fmt::format(
+      "(u,v) moved in {}: RMS {:.4g} mm, at most {:.4g} mm; the points' RMS distance from a coarse "
+      "surface fell from {:.4g} to {:.4g} mm",
+      moves.rounds == 1 ? "1 round" : fmt::format("{} rounds", moves.rounds), moves.rms_move_mm,
+      moves.max_move_mm, moves.rms_before_mm, moves.rms_after_mm);
+  if (moves.folds_prevented > 0) {
+    text += fmt::format("; {} of the triangles were kept from turning over", moves.folds_prevented);
+  }
+  return text;
+}
+
 }  // namespace semblance

@@ -155,6 +155,9 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
   }
+  if (result.moves) {
+    json["moves"] = MovesJson(*result.moves);
+  }
   if (!result.joins.empty()) {
     json["joins"] = JoinsJson(result.joins);
   }
@@ -260,6 +263,20 @@ std::string JoinParametersFault(ParameterSource source) {
                    NameOf(source));
 }
 
+// Of (u,v), before the fit.
+int RoundsOfMoves(const FitOptions& fit) {
+  const auto* const plan = std::get_if<AutoPlan>(&fit.plan);
+  return plan == nullptr ? 0 : plan->relaxation_rounds;
+}
+
+// What is left to do once (u,v) have been moved.
+FitOptions AfterMoves(FitOptions fit) {
+  if (auto* const plan = std::get_if<AutoPlan>(&fit.plan)) {
+    plan->relaxation_rounds = 0;
+  }
+  return fit;
+}
+
 void AddJoinFaults(const PointFitOptions& options, std::vector<OptionFault>& faults) {
   if (options.joins.empty()) {
     return;
@@ -269,6 +286,11 @@ void AddJoinFaults(const PointFitOptions& options, std::vector<OptionFault>& fau
   }
   if (std::string fault = JoinPlanFault(options.fit); !fault.empty()) {
     faults.push_back({"joins", std::move(fault)});
+  }
+  if (RoundsOfMoves(options.fit) > 0) {
+    faults.push_back({"fit.plan.relaxation_rounds",
+                      "joins need the (u,v) beside the edge as they are; write "
+                      "relaxation_rounds: 0, or leave joins out"});
   }
   for (OptionFault& fault : JoinFaults(options.joins, options.closure)) {
     faults.push_back(std::move(fault));
@@ -317,7 +339,7 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
                                     TermName(term), missing)});
     }
   }
-  for (const FitFault& fault : FaultsOf(options.fit, ShapeOf(options).max_level)) {
+  for (const FitFault& fault : FaultsOf(AfterMoves(options.fit), ShapeOf(options).max_level)) {
     faults.push_back({"fit." + fault.path, fault.what});
   }
   return faults;
@@ -338,6 +360,9 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   std::vector<std::string> notes;
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
+  }
+  if (result.moves) {
+    notes.push_back(MovesText(*result.moves));
   }
   for (std::string& line : JoinLines(result.joins)) {
     notes.push_back(std::move(line));
@@ -420,6 +445,20 @@ Parametrisation ParametersOf(PointTable& table, const PointFitOptions& options) 
   table.triangles = std::vector<Triangle>();
   CheckClosure(parameters.source, options.closure);
   return parameters;
+}
+
+// Before the fit.
+FootMoves MoveUv(const PointTable& table, std::span<const Triangle> triangles,
+                 const PointFitOptions& options, const RunContext& context, std::vector<Vec2>& uv) {
+  if (!table.exact.empty()) {
+    throw InputError(
+        "fit.plan.relaxation_rounds: exact points need their (u,v), and those around them, as they "
+        "are; write relaxation_rounds: 0, or leave the column exact out");
+  }
+  MovedUv moved = MoveToFeet(ShapeOf(options), {table.positions, uv, table.weights}, triangles,
+                             std::get<AutoPlan>(options.fit.plan), context);
+  uv = std::move(moved.uv);
+  return moved.moves;
 }
 
 std::vector<ExactPoint> ExactOf(const PointTable& table, std::span<const Vec2> uv) {
@@ -542,9 +581,16 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   std::vector<PointAttribute> attributes = AttributesAsked(table, options);
   const std::vector<OpenedJoin> joins = OpenJoins(options.joins, options.closure);
   StepClock step(context);
+  const std::vector<Triangle> triangles =
+      RoundsOfMoves(options.fit) > 0 ? table.triangles : std::vector<Triangle>();
   Parametrisation parameters = step("parameters", [&] { return ParametersOf(table, options); });
   CheckJoinParameters(parameters.source, options);
   const bool given = parameters.source == ParameterSource::kGiven;
+  std::optional<FootMoves> moves;
+  if (RoundsOfMoves(options.fit) > 0) {
+    moves = step("relaxation",
+                 [&] { return MoveUv(table, triangles, options, context, parameters.uv); });
+  }
   const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
   CheckChord(options.chord_mm, start, {table.positions, parameters.uv}, context);
   const double root_weight = RootOfMeanWeight(table);
@@ -554,9 +600,11 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
                      std::move(table.weights)};
   JoinedFit joined = step("fit", [&] {
-    return FitOwned(start, std::move(points), std::move(exact), joins, options.fit, context);
+    return FitOwned(start, std::move(points), std::move(exact), joins, AfterMoves(options.fit),
+                    context);
   });
   PointFit result = FoundBy(std::move(parameters), std::move(joined), std::move(attributes));
+  result.moves = moves;
   result.sigma_factor = result.fit.automatic ? result.fit.automatic->noise_mm * root_weight : kNaN;
   result.reach = ReachBeyond(result.fit.surface, box);
   result.off = given ? kNaN : result.fit.point_rms_mm / box.diagonal().norm();

@@ -12,6 +12,7 @@
 #include "fitting/fit.h"
 #include "fitting/plan/fit_faults.h"
 #include "fitting/problem/parametrise.h"
+#include "fitting/relaxation/foot_moves.h"
 #include "fitting/solve/attribute_fit.h"
 #include "fitting/solve/surface_sigma.h"
 #include "problems/config/config_errors.h"
@@ -110,9 +111,10 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
-  std::string parameters;  // given, plane, cylinder, torus or mesh
-  std::string how;         // which of them, in words; empty of given ones
-  MapFaults map_faults;    // of what was chosen
+  std::string parameters;               // given, plane, cylinder, torus or mesh
+  std::string how;                      // which of them, in words; empty of given ones
+  MapFaults map_faults;                 // of what was chosen
+  std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
   FitResult fit;
   std::vector<JoinReport> joins;                  // one per join
   std::vector<PointAttribute> attributes;         // as given
@@ -139,8 +141,8 @@ std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const
 // closure that does not suit the parameters (a cylinder goes round in u, a torus both ways, a plane
 // and a mesh do not), for joins of points without (u,v) of their own, for attributes that the table
 // has not, for a trim below what the points are apart, and for a chord so fine that a coarse fit of
-// some of the points has already shown surface.ply to be too large. Reads the surfaces that are
-// joined, and throws as OpenJoins does.
+// some of the points has already shown surface.ply to be too large, and for moves of (u,v) beside
+// exact points. Reads the surfaces that are joined, and throws as OpenJoins does.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),

@@ -106,6 +106,58 @@ TEST_F(PointFitCommand, TheTableOfTheReadmeIsFittedWithoutAConfiguration) {
   EXPECT_NEAR(json["automatic"]["outlier_count"], 20, 2);
 }
 
+// (u,v) that are off by a hundredth blur the head; moved first, they do not.
+TEST_F(PointFitCommand, UvMoveBeforeTheFitWhereThatIsAskedFor) {
+  FitTarget target = Scattered(HeadPoint, 8000, 1e-4, 1);
+  Random random(2);
+  for (FitPoint& p : target.points) {
+    const double u = p.uv.x() + 0.01 * random.Normal(), v = p.uv.y() + 0.01 * random.Normal();
+    p.uv = {u - std::floor(u), std::clamp(v, 0.0, 1.0)};
+  }
+  Write("head.csv", Csv(target, /*with_uv=*/true));
+  const auto fit = [&](const std::string& name, const std::string& more) {
+    const auto outcome = Call(
+        fmt::format("fit head.csv --set closure=periodic_u --out {} --quiet --set report=false {}",
+                    name, more));
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.out;
+  };
+  const auto result = [&](const std::string& name) {
+    return nlohmann::json::parse(ReadFileBytes(folder_ / name / "result.json"));
+  };
+  const std::string rounds = "--set 'fit.plan={type: auto, relaxation_rounds: 3}'";
+  EXPECT_THAT(fit("as_given", ""), ::testing::Not(HasSubstr("moved")));
+  EXPECT_THAT(fit("moved", rounds), HasSubstr("(u,v) moved in "));
+  EXPECT_FALSE(result("as_given").contains("moves"));
+  const auto moves = result("moved")["moves"];
+  EXPECT_GE(moves["rounds"], 1);
+  EXPECT_GT(moves["rms_move_mm"], 0.01);
+  EXPECT_LE(moves["coarse_rms_after_mm"], moves["coarse_rms_before_mm"]);
+  EXPECT_LT(10 * result("moved")["median_mm"].get<double>(), result("as_given")["median_mm"]);
+  fit("again", rounds + " --threads 2");
+  for (const char* file : {"surface.hspline.json", "residuals.csv", "result.json"}) {
+    EXPECT_EQ(ReadFileBytes(folder_ / "again" / file), ReadFileBytes(folder_ / "moved" / file));
+  }
+}
+
+TEST_F(PointFitCommand, GivenUvStayUnlessAskedFor) {
+  const FitTarget target = Scattered(FrankePoint, 500, 1e-3, 1);
+  const PointTable table = ParsePointTable(Csv(target, /*with_uv=*/true), "test");
+  const PointFit result = FitPoints(table, {}, {});
+  EXPECT_FALSE(result.moves);
+  EXPECT_EQ(result.fit.uv, table.uv);
+}
+
+TEST_F(PointFitCommand, MovesBesideExactPointsAreRefused) {
+  PointTable table = ParsePointTable(Csv(Scattered(FrankePoint, 500, 1e-3, 1), true), "test");
+  table.exact = {0};
+  table.exact_normals = {Vec3::Zero()};
+  PointFitOptions options;
+  options.fit.plan = AutoPlan{.relaxation_rounds = 2};
+  EXPECT_THAT(testing::WordsOf<InputError>([&] { FitPoints(table, options, {}); }),
+              HasSubstr("fit.plan.relaxation_rounds: exact points"));
+}
+
 TEST_F(PointFitCommand, PointsOfEachKindOfFileAreTheSame) {
   const FitTarget target = Scattered(FrankePoint, 300, 0, 1);
   std::string xyz, obj, ply = "ply\nformat ascii 1.0\nelement vertex 300\n";
@@ -501,6 +553,11 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
                 HasSubstr("fit.features: a surface through points of a file has no features"));
   }
   EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
+  EXPECT_THAT(read("fit: {plan: {type: auto, relaxation_rounds: 2}}\n"
+                   "joins: [{surface: a.json, edge: u0, its_edge: u1}]\n"),
+              HasSubstr("fit.plan.relaxation_rounds: joins need"));
+  EXPECT_THAT(read("fit: {plan: {type: adaptive, relaxation_rounds: 2}}\n"),
+              HasSubstr("fit.plan.relaxation_rounds"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, regions: [{u: [0.5, 0.2]}]}}\n"),
               HasSubstr("fit.plan.regions[0]"));
