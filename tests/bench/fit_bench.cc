@@ -10,8 +10,8 @@
 #include "tests/bench/fit_parts.h"
 
 // One BLAS thread for every case; OpenBLAS looks at the variable only when it is loaded.
-// fit_bench [head] [command] [untuned] [peers] [heldout] [coverage] [relax] [linear]: parts; none:
-// all of them.
+// fit_bench [head] [command] [untuned] [peers] [feet] [heldout] [coverage] [relax] [linear]: parts;
+// none: all of them.
 int main(int argc, char** argv) {
   if (std::getenv("OPENBLAS_NUM_THREADS") == nullptr) {
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
@@ -32,6 +32,9 @@ int main(int argc, char** argv) {
   }
   if (wanted("peers")) {
     semblance::bench::RunPeers();
+  }
+  if (wanted("feet")) {
+    semblance::bench::RunFeet();
   }
   if (wanted("heldout")) {
     semblance::bench::RunHeldOut();

@@ -20,6 +20,9 @@ void RunUntuned();
 // The head at 1e5 points against FITPACK and ITK, where their Debian packages are there.
 void RunPeers();
 
+// (u,v) that are off, or found, moved to the points' feet before the fit that is told nothing.
+void RunFeet();
+
 // Points held out of a terrain and of a deep-drawn part with gaps, with `weight: auto`, against MBA
 // and FITPACK at their best.
 void RunHeldOut();
