@@ -16,6 +16,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
@@ -173,32 +174,71 @@ class Head {
     if (options.bone == PhantomBone::kLikePeople) {
       relief_.emplace(random_);
     }
-    centre_ = -At("n", PhantomDirection(Vec3::Zero())).base;
-  }
-  PhantomSite At(std::string site, const Vec3& direction) const {
-    const Vec3 smooth = centre_ + shape_.Radius(direction) * direction,
-               normal = shape_.Normal(direction);
-    const double smooth_mm = depth_.At(direction);
-    const double depth_mm = relief_ ? relief_->Depth(direction, smooth_mm) : smooth_mm;
-    return {std::move(site), smooth + (smooth_mm - depth_mm) * normal, normal, depth_mm};
+    const Vec3 nasion = PhantomDirection(Vec3::Zero());
+    centre_ = -(relief_ ? RoughRadius(nasion) : shape_.Radius(nasion)) * nasion;
   }
   const Vec3& Centre() const { return centre_; }
-  double Thickness() const { return depth_.Thickness(); }
+  double Thickness() const { return depth_.Thickness() * (relief_ ? relief_->Weight() : 1); }
+  bool IsSmooth() const { return !relief_; }
+
+  // On the smooth bone, from which the skin is laid along the normals.
+  PhantomSite Smooth(std::string site, const Vec3& direction) const {
+    return {std::move(site), centre_ + shape_.Radius(direction) * direction,
+            shape_.Normal(direction), depth_.At(direction)};
+  }
+  Vec3 RoughBone(const Vec3& direction) const {
+    return centre_ + RoughRadius(direction) * direction;
+  }
+  // With the normal of the plane through points 3 mm away on four sides: who places a landmark
+  // looks at the bone around it.
+  PhantomSite Rough(std::string site, const Vec3& direction) const {
+    const double step = 3 / RoughRadius(direction);
+    const auto bone = [&](const Vec3& aside) {
+      return RoughBone((direction + aside).normalized());
+    };
+    const Vec3 along = step * direction.unitOrthogonal(), across = direction.cross(along);
+    const Vec3 normal =
+        (bone(along) - bone(-along)).cross(bone(across) - bone(-across)).normalized();
+    return {std::move(site), RoughBone(direction), normal, kNaN};
+  }
 
  private:
+  double RoughRadius(const Vec3& direction) const {
+    const double smooth_mm = depth_.At(direction);
+    return shape_.Radius(direction) + smooth_mm - relief_->Thickness(direction, smooth_mm);
+  }
+
   Random random_;
   PhantomShape shape_;
   DepthFormula depth_;
   std::optional<PhantomRelief> relief_;
-  Vec3 centre_ = Vec3::Zero();
+  Vec3 centre_;
 };
 
 std::vector<PhantomSite> AllSites(const Head& head) {
   std::vector<PhantomSite> sites;
   for (const Site& site : StandardSites()) {
-    sites.push_back(head.At(site.code, DirectionOf(site)));
+    const Vec3 direction = DirectionOf(site);
+    sites.push_back(head.IsSmooth() ? head.Smooth(site.code, direction)
+                                    : head.Rough(site.code, direction));
   }
   return sites;
+}
+
+// The depths of rough bone are how far its normals go to the skin.
+void MeasureDepths(Phantom& phantom) {
+  const MeshQuery skin(phantom.face);
+  const auto depth_mm = [&](const Vec3& base, const Vec3& normal) {
+    constexpr double kReach_mm = 400;  // more than a head: a ray from inside leaves the skin
+    return skin.FirstHit(base, normal, kReach_mm)->distance_mm;
+  };
+  const std::vector<Vec3> normals = VertexNormals(phantom.skull);
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    phantom.depth_mm[v] = depth_mm(phantom.skull.points[v], normals[v]);
+  }
+  for (PhantomSite& site : phantom.sites) {
+    site.depth_mm = depth_mm(site.base, site.normal);
+  }
 }
 
 }  // namespace
@@ -216,12 +256,15 @@ Phantom MakePhantom(const PhantomOptions& options) {
   phantom.skull.triangles = RingTriangles(options.rings);
   phantom.face.triangles = phantom.skull.triangles;
   for (const Vec3& direction : RingDirections(options.rings)) {
-    const PhantomSite p = head.At({}, direction);
-    phantom.skull.points.push_back(p.base);
+    const PhantomSite p = head.Smooth({}, direction);
+    phantom.skull.points.push_back(head.IsSmooth() ? p.base : head.RoughBone(direction));
     phantom.depth_mm.push_back(p.depth_mm);
     phantom.face.points.push_back(p.base + p.depth_mm * p.normal);
   }
   phantom.sites = AllSites(head);
+  if (!head.IsSmooth()) {
+    MeasureDepths(phantom);
+  }
   return phantom;
 }
 

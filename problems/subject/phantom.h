@@ -16,7 +16,7 @@ namespace semblance {
 
 enum class PhantomBone {
   kSmooth,     // as the skin
-  kLikePeople  // hollows and a rough field under the same smooth skin
+  kLikePeople  // hollows, ridges and roughness under the smooth one's skin
 };
 constexpr auto EnumNames(PhantomBone) {
   return std::to_array<std::string_view>({"smooth", "like_people"});
@@ -40,25 +40,27 @@ void Fields(Visitor& visit, PhantomOptions& o) {
           .max = 1000,
           .doc = "bands of triangles from crown to throat; the mesh has about 3 rings^2 triangles"},
       o.rings);
-  visit(FieldInfo{.name = "bone",
-                  .doc =
-                      "smooth: depths vary little along it; like_people: hollows and a rough field "
-                      "under the same smooth skin, so that they vary as people's do"},
-        o.bone);
+  visit(
+      FieldInfo{
+          .name = "bone",
+          .doc =
+              "smooth: depths vary little along it; like_people: hollows, ridges and a rough field "
+              "under the same smooth skin, so that they vary as people's do"},
+      o.bone);
 }
 
 struct PhantomSite {
   std::string site;                    // landmark code with side, e.g. "g", "go_l", "go_r"
   Vec3 base = Vec3::Constant(kNaN);    // on the exact skull, mm
-  Vec3 normal = Vec3::Constant(kNaN);  // of the exact smooth bone there, unit, outward
+  Vec3 normal = Vec3::Constant(kNaN);  // of it, unit, outward; like_people: of 3 mm around
   double depth_mm = kNaN;              // of the tissue along the normal, > 0
 };
 
 struct Phantom {
   TriMesh skull;                       // closed, outward; LPS, nasion at the origin
-  std::vector<double> depth_mm;        // tissue along the smooth bone's exact normal, one per
-                                       // skull vertex, > 0
-  TriMesh face;                        // skull vertex + depth * that normal; the skull's triangles
+  std::vector<double> depth_mm;        // of the tissue along the bone's normal (smooth: the exact
+                                       // one; like_people: the mesh's), one per skull vertex, > 0
+  TriMesh face;                        // what lies over the smooth bone; the skull's triangles
   std::vector<PhantomSite> sites;      // all 32: midline from the forehead down, then pairs
   Vec3 centre = Vec3::Constant(kNaN);  // every ray from here meets the skull once
   double thickness = kNaN;             // by which all its depths exceed those of an average adult

@@ -79,13 +79,17 @@ WaveSum DrawWaves(Random& random) {
   return sum;
 }
 
+double PhantomBump::Away(const Vec3& at) const {
+  return (at - direction).cwiseQuotient(sigma).squaredNorm() / 2;
+}
+
 double PhantomBump::Value(const Vec3& at) const {
-  const Vec3 away = (at - direction).cwiseQuotient(sigma);
-  return height_mm * std::exp(-away.squaredNorm() / 2);
+  return height_mm * std::exp(-std::pow(Away(at), steepness));
 }
 
 Vec3 PhantomBump::Gradient(const Vec3& at) const {
-  return -Value(at) * (at - direction).cwiseQuotient(sigma).cwiseQuotient(sigma);
+  const double slope = steepness * std::pow(Away(at), steepness - 1);
+  return -slope * Value(at) * (at - direction).cwiseQuotient(sigma).cwiseQuotient(sigma);
 }
 
 std::vector<PhantomBump> DrawBumps(std::span<const BumpOnSkull> bumps, const BumpSpread& spread,
@@ -99,7 +103,8 @@ std::vector<PhantomBump> DrawBumps(std::span<const BumpOnSkull> bumps, const Bum
       if (side > 0 || paired) {
         const Vec3 on_skull(side * bump.on_skull.x(), bump.on_skull.y(), bump.on_skull.z());
         const double asymmetry = paired ? random.Uniform(1 - spread.side, 1 + spread.side) : 1;
-        drawn.push_back({PhantomDirection(on_skull), bump.sigma_mm / reach, height * asymmetry});
+        drawn.push_back({PhantomDirection(on_skull), bump.sigma_mm / reach, height * asymmetry,
+                         bump.steepness});
       }
     }
   }

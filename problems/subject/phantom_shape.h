@@ -33,15 +33,19 @@ struct BumpOnSkull {
   Vec3 on_skull;  // mm; the left one of a pair
   Vec3 sigma_mm;  // width along x, y, z
   double height_mm;
+  double steepness = 1;  // 1: a bell; 2: a floor with a rim
 };
 
 // The same as one phantom has it, seen from the rays' centre.
 struct PhantomBump {
   Vec3 direction, sigma;
-  double height_mm;
+  double height_mm, steepness;
 
-  double Value(const Vec3& at) const;   // height * exp(-|(at - direction) / sigma|^2 / 2), mm
+  double Value(const Vec3& at) const;   // height exp(-q^steepness), mm; q as below
   Vec3 Gradient(const Vec3& at) const;  // by the direction
+
+ private:
+  double Away(const Vec3& at) const;  // q = |(at - direction) / sigma|^2 / 2
 };
 
 // By what share heights differ between phantoms, and the sides of a pair from one another.

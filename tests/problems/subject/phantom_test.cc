@@ -10,6 +10,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "interp/evaluation/variogram.h"
+#include "problems/subject/averaged_normal.h"
 #include "problems/subject/phantom_shape.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
@@ -238,70 +240,100 @@ PhantomOptions LikePeople(std::uint64_t random_seed, int rings) {
   return {.random_seed = random_seed, .rings = rings, .bone = PhantomBone::kLikePeople};
 }
 
-TEST(PhantomLikePeople, HasTheSmoothOnesFaceAndAnotherBone) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
-    const Phantom smooth = MakePhantom({.random_seed = seed, .rings = 60}),
-                  rough = MakePhantom(LikePeople(seed, 60));
-    ASSERT_EQ(rough.skull.points.size(), smooth.skull.points.size());
-    const Vec3 moved = rough.centre - smooth.centre;  // nasion is the origin of both
-    for (std::size_t v = 0; v < smooth.face.points.size(); ++v) {
-      EXPECT_LT((rough.face.points[v] - moved - smooth.face.points[v]).norm(), 1e-9);
-      EXPECT_NEAR((rough.face.points[v] - rough.skull.points[v]).norm(), rough.depth_mm[v], 1e-9);
-      EXPECT_GT(rough.depth_mm[v], 1);
-      EXPECT_LT(rough.depth_mm[v], 45);
-    }
-    EXPECT_EQ(Bytes(rough), Bytes(MakePhantom(LikePeople(seed, 60))));
-    EXPECT_NE(Bytes(rough), Bytes(MakePhantom(LikePeople(seed + 1, 60))));
+class PhantomLikePeople : public ::testing::TestWithParam<int> {
+ protected:
+  const Phantom phantom_ = MakePhantom(LikePeople(static_cast<std::uint64_t>(GetParam()), 60));
+};
+INSTANTIATE_TEST_SUITE_P(Seeds, PhantomLikePeople, ::testing::Range(1, 6));
+
+TEST_P(PhantomLikePeople, HasTheSmoothOnesFace) {
+  const Phantom smooth =
+      MakePhantom({.random_seed = static_cast<std::uint64_t>(GetParam()), .rings = 60});
+  const Vec3 moved = phantom_.centre - smooth.centre;  // nasion is the origin of both
+  ASSERT_EQ(phantom_.face.points.size(), smooth.face.points.size());
+  EXPECT_EQ(phantom_.face.triangles, smooth.face.triangles);
+  for (std::size_t v = 0; v < smooth.face.points.size(); ++v) {
+    ASSERT_LT((phantom_.face.points[v] - moved - smooth.face.points[v]).norm(), 1e-9);
+  }
+  EXPECT_LT(phantom_.sites[2].base.norm(), 1e-9) << "nasion";
+}
+
+TEST_P(PhantomLikePeople, TheBoneIsClosedAndOutward) {
+  const EdgeReport edges = CheckEdges(phantom_.skull);
+  EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
+  EXPECT_EQ(ConnectedComponents(phantom_.skull).count, 1);
+  EXPECT_GT(SignedVolume(phantom_.skull), 1.5e6);
+  for (const Triangle& t : phantom_.skull.triangles) {
+    const Vec3 ray = TriangleCentroid(phantom_.skull, t) - phantom_.centre;
+    ASSERT_GT(ray.dot(TriangleAreaVector(phantom_.skull, t)), 0) << "folded";
   }
 }
 
-TEST(PhantomLikePeople, TheBoneIsClosedOutwardAndInsideTheSkin) {
-  for (const std::uint64_t seed : {1, 2, 3, 4}) {
-    const Phantom p = MakePhantom(LikePeople(seed, 60));
-    EXPECT_GT(SignedVolume(p.skull), 1e6);
-    EXPECT_GT(SignedVolume(p.face), SignedVolume(p.skull));
-    const MeshQuery skin(p.face);
-    for (std::size_t v = 0; v < p.skull.points.size(); v += 7) {
-      const auto hit = skin.FirstHit(p.centre, p.skull.points[v] - p.centre, 400);
-      ASSERT_TRUE(hit.has_value());
-      EXPECT_GT(hit->distance_mm, (p.skull.points[v] - p.centre).norm()) << v;
-    }
+TEST_P(PhantomLikePeople, TheSkinLiesOutsideOfTheBone) {
+  const MeshQuery skin(phantom_.face);
+  for (const Vec3& bone : phantom_.skull.points) {
+    const Vec3 outward = (bone - phantom_.centre).normalized();
+    const auto hit = skin.FirstHit(bone, outward, 400);
+    ASSERT_TRUE(hit.has_value());
+    ASSERT_GT(hit->distance_mm, 1.5);
+    ASSERT_LT(hit->distance_mm, 60);
+    ASSERT_GT(skin.Closest(bone).distance_mm, 1);
   }
 }
 
-TEST(PhantomLikePeople, SitesStandOnTheBone) {
-  const Phantom p = MakePhantom(LikePeople(1, 200));
-  const MeshQuery bone(p.skull), skin(p.face);
-  ASSERT_EQ(p.sites.size(), 32u);
-  for (const PhantomSite& site : p.sites) {
-    EXPECT_LT(bone.Closest(site.base).distance_mm, 0.3) << site.site;
-    EXPECT_LT(skin.Closest(site.base + site.depth_mm * site.normal).distance_mm, 0.3) << site.site;
-  }
-}
-
-// Half the mean squared difference of depths some way apart: of people it grows about as the
-// distance does, of a smooth field as its square.
-TEST(PhantomLikePeople, DepthsAreRoughAsOfPeople) {
-  const auto unlike = [](const Phantom& p, double least_mm, double most_mm) {
-    double sum = 0, pairs = 0;
-    for (std::size_t a = 0; a < p.skull.points.size(); a += 3) {
-      for (std::size_t b = a + 1; b < p.skull.points.size(); b += 2) {
-        const double apart_mm = (p.skull.points[a] - p.skull.points[b]).norm();
-        if (apart_mm >= least_mm && apart_mm < most_mm) {
-          sum += std::pow(p.depth_mm[a] - p.depth_mm[b], 2) / 2;
-          pairs += 1;
-        }
-      }
-    }
-    return sum / pairs;
+TEST_P(PhantomLikePeople, DepthsAreWhatLiesAlongTheNormals) {
+  const MeshQuery skin(phantom_.face);
+  const std::vector<Vec3> normals = VertexNormals(phantom_.skull);
+  const auto along = [&](const Vec3& base, const Vec3& normal) {
+    return skin.FirstHit(base, normal, 400)->distance_mm;
   };
-  for (const std::uint64_t seed : {1, 4, 5}) {
-    const Phantom rough = MakePhantom(LikePeople(seed, 40)),
-                  smooth = MakePhantom({.random_seed = seed, .rings = 40});
-    EXPECT_LT(unlike(rough, 20, 24) / unlike(rough, 10, 12), 3) << seed;    // 2: as the distance
-    EXPECT_GT(unlike(smooth, 20, 24) / unlike(smooth, 10, 12), 3) << seed;  // 4: as its square
-    EXPECT_GT(unlike(rough, 20, 24), 5 * unlike(smooth, 20, 24)) << seed;
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    ASSERT_EQ(phantom_.depth_mm[v], along(phantom_.skull.points[v], normals[v]));
   }
+  for (const PhantomSite& s : phantom_.sites) {
+    EXPECT_EQ(s.depth_mm, along(s.base, s.normal)) << s.site;
+  }
+}
+
+TEST_P(PhantomLikePeople, SitesStandOnTheBoneAndFaceAsItDoesAround) {
+  const Phantom fine = MakePhantom(LikePeople(static_cast<std::uint64_t>(GetParam()), 200));
+  const MeshQuery bone(fine.skull);
+  ASSERT_EQ(fine.sites.size(), 32u);
+  for (const PhantomSite& s : fine.sites) {
+    const MeshPoint on_bone = bone.Closest(s.base);
+    EXPECT_LT(on_bone.distance_mm, 0.3) << s.site;
+    const Vec3 mean =
+        AveragedNormal(fine.skull, on_bone.triangle, {.center = s.base, .radius_mm = 3});
+    EXPECT_GT(s.normal.dot(mean), std::cos(0.35)) << s.site;
+    EXPECT_NEAR(s.normal.norm(), 1, 1e-12);
+  }
+}
+
+// Half the mean squared difference of the face's depths some way apart: of people it grows about as
+// the distance does, of a smooth field as its square.
+TEST_P(PhantomLikePeople, DepthsAreAsRoughAsThoseOfPeople) {
+  const Phantom smooth =
+      MakePhantom({.random_seed = static_cast<std::uint64_t>(GetParam()), .rings = 60});
+  const auto unlike_mm2 = [](const Phantom& p, std::size_t bin) {
+    std::vector<double> depth_mm = p.depth_mm;
+    for (std::size_t v = 0; v < depth_mm.size(); ++v) {
+      const Vec3& bone = p.skull.points[v];
+      const bool of_face = bone.y() < 65 && bone.z() > -110 && bone.z() < 10;
+      depth_mm[v] = of_face && depth_mm[v] < 40 ? depth_mm[v] : kNaN;  // beyond, a ray that grazes
+    }
+    return EmpiricalVariogram(p.skull.points, depth_mm, {}, 5, 60).at(bin).semivariance_mm2;
+  };
+  EXPECT_LT(unlike_mm2(phantom_, 4), 4 * unlike_mm2(phantom_, 1));  // 23 mm apart, and 8
+  EXPECT_GT(unlike_mm2(smooth, 4), 5 * unlike_mm2(smooth, 1));
+  EXPECT_GT(unlike_mm2(phantom_, 4), 5 * unlike_mm2(smooth, 4));
+  EXPECT_GT(unlike_mm2(phantom_, 1), 1.5);
+  EXPECT_LT(unlike_mm2(phantom_, 1), 25);
+}
+
+TEST(PhantomLikePeopleOfASeed, IsTheSameToTheByteAndNoOtherSeeds) {
+  const std::vector<std::uint8_t> bytes = Bytes(MakePhantom(LikePeople(7, 20)));
+  EXPECT_EQ(bytes, Bytes(MakePhantom(LikePeople(7, 20))));
+  EXPECT_NE(bytes, Bytes(MakePhantom(LikePeople(8, 20))));
 }
 
 }  // namespace
