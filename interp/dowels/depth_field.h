@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,12 +24,22 @@ struct SchemeShare {
   double weight = kNaN;  // 0..1
 };
 
+// The Gaussian process that a scheme takes depths for: what its likelihood found, or the options
+// fixed.
+struct DepthProcess {
+  double length_mm = kNaN;  // over which depths resemble each other
+  double signal_mm = kNaN;  // standard deviation
+  double nugget_mm = kNaN;  // that all dowels have beside their own; 0 where none is sought
+  double mean_mm = kNaN;    // by generalised least squares: that of the mean over the dowels
+};
+
 // All vectors but the last have one entry per vertex.
 struct DepthField {
   std::vector<double> depth_mm;  // NaN where there is none: such a vertex does not emit
   std::vector<DepthStatus> status;
-  std::vector<double> sd_mm;             // NaN where the scheme knows none
-  std::vector<SchemeShare> shares = {};  // of sum 1; empty where one scheme alone was asked for
+  std::vector<double> sd_mm;                 // NaN where the scheme knows none
+  std::vector<SchemeShare> shares = {};      // of sum 1; empty where one scheme alone was asked for
+  std::optional<DepthProcess> process = {};  // where the scheme is one
 };
 
 }  // namespace semblance

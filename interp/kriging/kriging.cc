@@ -93,16 +93,20 @@ KrigingHyper HyperFor(const Kriging& options, const KrigingScene& scene, const R
                   run);
 }
 
+DepthProcess ProcessOf(const KrigingHyper& hyper, const KrigingScene& scene,
+                       const KrigingProcess& process) {
+  return {hyper.length_mm, hyper.signal_mm, 0,
+          (scene.data.regressors * process.coefficients()).mean()};
+}
+
 }  // namespace
 
-KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run) {
+DepthProcess FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run) {
   CheckDepthInput(input);
   const MeanRegressors mean(options.mean, Kriging::kName, input, run);
   const KrigingScene scene = SceneOf(options, input, DepthSamples(input.dowels), mean, run);
   const KrigingHyper hyper = HyperFor(options, scene, run);
-  const KrigingProcess process(options.covariance, scene.data, hyper);
-  return {hyper.length_mm, hyper.signal_mm,
-          (scene.data.regressors * process.coefficients()).mean()};
+  return ProcessOf(hyper, scene, KrigingProcess(options.covariance, scene.data, hyper));
 }
 
 DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
@@ -133,19 +137,23 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
   const MeanRegressors mean(options.mean, Kriging::kName, input, run);
   const KrigingScene scene = SceneOf(options, input, samples, mean, run);
   const Eigen::MatrixXd regressors = mean.AtVertices(run);
-  KrigingProcess process(options.covariance, scene.data, HyperFor(options, scene, run));
+  const KrigingHyper hyper = HyperFor(options, scene, run);
+  KrigingProcess process(options.covariance, scene.data, hyper);
   if (options.state_sd) {
     process.PrepareSd();
   }
-  return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
-    const Eigen::VectorXd distance_mm = scene.DistancesTo(input.skull.points[i], i);
-    if (!std::isfinite(distance_mm.minCoeff())) {
-      return DepthValue{};  // no dowel is reached along the bone
-    }
-    const DepthValue value =
-        process.ValueAt(distance_mm, regressors.col(static_cast<Eigen::Index>(i)));
-    return DepthValue{limits(value.mm), value.sd_mm};
-  });
+  DepthField field =
+      AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
+        const Eigen::VectorXd distance_mm = scene.DistancesTo(input.skull.points[i], i);
+        if (!std::isfinite(distance_mm.minCoeff())) {
+          return DepthValue{};  // no dowel is reached along the bone
+        }
+        const DepthValue value =
+            process.ValueAt(distance_mm, regressors.col(static_cast<Eigen::Index>(i)));
+        return DepthValue{limits(value.mm), value.sd_mm};
+      });
+  field.process = ProcessOf(hyper, scene, process);
+  return field;
 }
 
 }  // namespace semblance

@@ -61,16 +61,9 @@ void Fields(Visitor& visit, Kriging& o) {
   MaxAngleField(visit, o.max_angle_deg);
 }
 
-// What the likelihood found, or the options fixed.
-struct KrigingModel {
-  double length_mm = kNaN;
-  double signal_mm = kNaN;
-  double mean_mm = kNaN;  // the process's mean, by generalised least squares: that of the dowels
-};
-
 // The maximum of the restricted likelihood times the prior (kriging_likelihood.h). Of more than 200
 // dowels it uses 200 that lie far apart. Throws as InterpolateDepth.
-KrigingModel FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
+DepthProcess FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
 
 // Of the depths at some points, given the dowels, the model and the uncertain mean.
 struct DepthPosterior {

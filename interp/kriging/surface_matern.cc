@@ -165,18 +165,6 @@ class SurfaceProcess {
 
 }  // namespace
 
-SurfaceMaternModel FitSurfaceMatern(const SurfaceMatern& options, const DepthInput& input,
-                                    const RunContext& run) {
-  CheckDepthInput(input);
-  CheckSurface(SurfaceMatern::kName, input.skull);
-  const MeanRegressors mean(options.mean, SurfaceMatern::kName, input, run);
-  const SurfaceScene scene = SceneOf(options, input, DepthSamples(input.dowels), mean, run);
-  const SurfaceMaternHyper hyper = HyperFor(options, scene, run);
-  const SurfaceProcess process(options, scene, hyper, run);
-  return {hyper.length_mm, hyper.signal_mm, hyper.nugget_mm,
-          (scene.data.regressors * process.coefficients()).mean()};
-}
-
 DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& input,
                             const RunContext& run) {
   CheckDepthInput(input);
@@ -187,12 +175,17 @@ DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& inpu
   const MeanRegressors mean(options.mean, SurfaceMatern::kName, input, run);
   const SurfaceScene scene = SceneOf(options, input, samples, mean, run);
   const Eigen::MatrixXd regressors = mean.AtVertices(run);
-  const SurfaceProcess process(options, scene, HyperFor(options, scene, run), run);
-  return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
-    const CornerWeights at = scene.surface.Locate(input.skull.points[i], static_cast<int>(i));
-    const DepthValue value = process.ValueAt(at, regressors.col(static_cast<Eigen::Index>(i)));
-    return DepthValue{limits(value.mm), value.sd_mm};
-  });
+  const SurfaceMaternHyper hyper = HyperFor(options, scene, run);
+  const SurfaceProcess process(options, scene, hyper, run);
+  DepthField field =
+      AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
+        const CornerWeights at = scene.surface.Locate(input.skull.points[i], static_cast<int>(i));
+        const DepthValue value = process.ValueAt(at, regressors.col(static_cast<Eigen::Index>(i)));
+        return DepthValue{limits(value.mm), value.sd_mm};
+      });
+  field.process = {hyper.length_mm, hyper.signal_mm, hyper.nugget_mm,
+                   (scene.data.regressors * process.coefficients()).mean()};
+  return field;
 }
 
 }  // namespace semblance

@@ -67,27 +67,16 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
   MaxAngleField(visit, o.max_angle_deg);
 }
 
-// What the likelihood found, or the options fixed.
-struct SurfaceMaternModel {
-  double length_mm = kNaN;
-  double signal_mm = kNaN;
-  double nugget_mm = kNaN;  // that of fit_nugget; 0 without
-  double mean_mm = kNaN;    // of the mean over the dowels
-};
-
-// The maximum of the restricted likelihood times the length's prior, within a factor of 12 of the
-// prior's median (surface_matern_likelihood.h). Of more than 60 dowels it uses 60 that lie far
-// apart. Throws as InterpolateDepth.
-SurfaceMaternModel FitSurfaceMatern(const SurfaceMatern& options, const DepthInput& input,
-                                    const RunContext& run);
-
 // The Gaussian field of on_surface/matern_field.h, divided by its own standard deviation and times
 // the signal: as uncertain at a rim, on a crest and on a small loose piece as elsewhere, for the
 // equation alone would have the variance grow there; so kernels are positive definite on any
 // surface, which those of geodesic distances are not. Far from all dowels, and on pieces of the
 // skull without one, the depth is the mean there. sd_mm is that of the process at the vertex, given
 // the dowels, the model and the uncertain mean; it does not hold the nugget of a further
-// measurement there, nor the uncertainty of length and signal. kNotFacing as AssignWhereFacing.
+// measurement there, nor the uncertainty of length and signal. These two, where they are not given,
+// are the maximum of the restricted likelihood times the length's prior, within a factor of 12 of
+// the prior's median (surface_matern_likelihood.h); of more than 60 dowels it uses 60 that lie far
+// apart. kNotFacing as AssignWhereFacing.
 // Throws InputError as CheckDepthInput and MeanRegressors, or if the skull has no triangle.
 DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& input,
                             const RunContext& run);

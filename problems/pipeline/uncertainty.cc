@@ -138,7 +138,7 @@ Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& inpu
                             const RunContext& context) {
   const auto* const own = std::get_if<Kriging>(&experiment.interp);
   Kriging kriging = own == nullptr ? Kriging{.nugget_share = 0} : *own;
-  const KrigingModel model = FitKriging(kriging, input, context);
+  const DepthProcess model = FitKriging(kriging, input, context);
   kriging.length_mm = result.depth_length_mm = model.length_mm;
   kriging.signal_mm = result.depth_signal_mm = model.signal_mm;
   std::vector<Vec3> bases;

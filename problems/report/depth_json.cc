@@ -114,6 +114,12 @@ Json DepthToJson(const DepthField& depth, const Case& subject) {
                {"max_mm", nullptr},
                {"dowels", subject.dowels_on_bone.size()},
                {"areas", subject.network.areas.size()}};
+  if (depth.process) {
+    json["process"] = {{"length_mm", depth.process->length_mm},
+                       {"signal_mm", depth.process->signal_mm},
+                       {"nugget_mm", depth.process->nugget_mm},
+                       {"mean_mm", depth.process->mean_mm}};
+  }
   for (const SchemeShare& share : depth.shares) {
     json["shares"][share.scheme] = share.weight;
   }

@@ -14,7 +14,7 @@ namespace semblance {
 nlohmann::ordered_json ScoresToJson(const DepthScores& scores);
 
 // Counts of vertices by status, range and mean of the assigned depths, dowels and areas; shares{}
-// of an average of schemes.
+// of an average of schemes, process{} of kriging.
 nlohmann::ordered_json DepthToJson(const DepthField& depth, const Case& subject);
 
 // along_direction{...}, closest{...}: each a distance summary with regions{}, coverage_90, the

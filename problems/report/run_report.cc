@@ -212,12 +212,16 @@ ReportTable CountsTable(const std::string& caption, const Json& values) {
   return table;
 }
 
-// With the weights of an average of schemes.
+// With the weights of an average of schemes, and what kriging found.
 ReportTable DepthTable(const Json& depth) {
   ReportTable table = CountsTable("Tissue depth over the bone", depth);
   const Json shares = depth.value("shares", Json::object());
   for (const auto& [scheme, weight] : shares.items()) {
     table.rows.push_back({fmt::format("weight of {}", scheme), Number(weight, 3)});
+  }
+  const Json process = depth.value("process", Json::object());
+  for (const auto& [name, value] : process.items()) {
+    table.rows.push_back({"process: " + WordsOfKey(name), Number(value, 3)});
   }
   return table;
 }

@@ -92,6 +92,16 @@ std::string SharesText(const DepthField& depth) {
   return text.empty() ? "" : text + "\n";
 }
 
+// What the scheme took the depths for.
+std::string ProcessText(const DepthField& depth) {
+  return depth.process
+             ? fmt::format(
+                   "process: mean {:.1f} mm, sd {:.1f} mm, length {:.0f} mm, nugget {:.2f} mm\n",
+                   depth.process->mean_mm, depth.process->signal_mm, depth.process->length_mm,
+                   depth.process->nugget_mm)
+             : "";
+}
+
 std::string ScoresLine(const std::string& what, const DepthScores& s) {
   return s.stated == 0
              ? ""
@@ -223,7 +233,7 @@ std::string LeftOutCsv(const DepthResult& result) {
 }
 
 std::string DepthText(const DepthResult& result) {
-  std::string text = SharesText(result.depth);
+  std::string text = SharesText(result.depth) + ProcessText(result.depth);
   if (result.truth) {
     text += TruthText(*result.truth) + VariogramText(*result.truth);
   }

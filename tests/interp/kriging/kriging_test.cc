@@ -21,7 +21,7 @@ DepthField FieldAt(const Kriging& options, const DowelScene& scene, std::vector<
   return InterpolateDepth(options, at.Input(), RunContext{});
 }
 
-KrigingModel ModelOf(const Kriging& options, DowelScene scene) {
+DepthProcess ModelOf(const Kriging& options, DowelScene scene) {
   scene.network.areas.clear();
   return FitKriging(options, scene.Input(), RunContext{});
 }
@@ -153,7 +153,7 @@ TEST_P(EveryCovariance, FitIsNoWorseThanAnyPointOfADenseGrid) {
   const Kriging free{.covariance = static_cast<Covariance>(GetParam())};
   DowelScene scene = ScatteredScene(25);
   scene.network.areas.clear();
-  const KrigingModel best = ModelOf(free, scene);
+  const DepthProcess best = ModelOf(free, scene);
   const KrigingData data = DataOf(scene);
   const auto cost = [&](double length_mm, double signal_mm) {
     const double away = std::log(length_mm / free.length_prior_mm) / free.length_prior_spread;
@@ -171,7 +171,7 @@ TEST(KrigingFit, FindsTheLengthAndTheSignalOfManyDowels) {
   const Kriging free{.covariance = Covariance::kMatern12, .length_prior_spread = 10};
   std::vector<double> lengths;
   for (const double length : {25.0, 100.0}) {
-    const KrigingModel model = ModelOf(free, RoughScene(180, 5, length, 3));
+    const DepthProcess model = ModelOf(free, RoughScene(180, 5, length, 3));
     EXPECT_NEAR(model.signal_mm, 2, 0.7);
     EXPECT_NEAR(model.mean_mm, 20, 2);
     lengths.push_back(model.length_mm);
@@ -191,22 +191,33 @@ TEST(KrigingFit, APriorHoldsTheLengthThatFewDowelsDoNotTell) {
 
 TEST(KrigingFit, KeepsWhatTheOptionsFix) {
   const DowelScene scene = ScatteredScene(30);
-  const KrigingModel both = ModelOf({.length_mm = 33, .signal_mm = 1.5}, scene);
+  const DepthProcess both = ModelOf({.length_mm = 33, .signal_mm = 1.5}, scene);
   EXPECT_EQ(both.length_mm, 33);
   EXPECT_EQ(both.signal_mm, 1.5);
   EXPECT_NEAR(ModelOf({.length_mm = 33}, scene).length_mm, 33, 1e-12);
   EXPECT_NEAR(ModelOf({.signal_mm = 1.5}, scene).signal_mm, 1.5, 1e-12);
 }
 
+TEST(KrigingFit, ComesWithTheField) {
+  const DowelScene scene = ScatteredScene(20);
+  const DepthProcess found = FitKriging(Kriging{}, scene.Input(), RunContext{});
+  const DepthField field = InterpolateDepth(Kriging{}, scene.Input(), RunContext{});
+  ASSERT_TRUE(field.process.has_value());
+  EXPECT_EQ(field.process->length_mm, found.length_mm);
+  EXPECT_EQ(field.process->signal_mm, found.signal_mm);
+  EXPECT_EQ(field.process->nugget_mm, 0);
+  EXPECT_EQ(field.process->mean_mm, found.mean_mm);
+}
+
 TEST(KrigingFit, ScalesWithTheDepths) {
   const DowelScene scene = RoughScene(60, 5, 50, 11);
   const Kriging free{.covariance = Covariance::kMatern12};
-  const KrigingModel best = ModelOf(free, scene);
+  const DepthProcess best = ModelOf(free, scene);
   DowelScene scaled = scene;
   for (Dowel& dowel : scaled.dowels) {
     dowel.depth_mm *= 3;
   }
-  const KrigingModel three = ModelOf(free, scaled);
+  const DepthProcess three = ModelOf(free, scaled);
   EXPECT_NEAR(three.length_mm / best.length_mm, 1, 0.01);
   EXPECT_NEAR(three.signal_mm / best.signal_mm, 3, 0.03);
   EXPECT_NEAR(three.mean_mm / best.mean_mm, 3, 0.03);

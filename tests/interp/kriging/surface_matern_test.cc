@@ -212,8 +212,7 @@ TEST(SurfaceMatern, OnAPieceWithoutADowelIsTheMeanWithTheFullSd) {
   const SurfaceMatern options{
       .length_mm = 40, .signal_mm = 1.5, .clamp = false, .max_angle_deg = 180};
   const DepthField field = InterpolateDepth(options, scene.Input(), RunContext{});
-  const double mean_mm = FitSurfaceMatern(options, scene.Input(), RunContext{}).mean_mm;
-  EXPECT_NEAR(field.depth_mm.back(), mean_mm, 1e-9);
+  EXPECT_NEAR(field.depth_mm.back(), field.process->mean_mm, 1e-9);
   EXPECT_GT(field.sd_mm.back(), 1.5);
   EXPECT_LT(field.sd_mm.back(), 2);
 }
@@ -247,8 +246,8 @@ TEST(SurfaceMatern, AFittedNuggetSmoothsNoiseAndNotASlope) {
     noisy.dowels[k].depth_mm = smooth.dowels[k].depth_mm + (k % 2 == 0 ? 1.5 : -1.5);
   }
   const SurfaceMatern options{.fit_nugget = true};
-  EXPECT_GT(FitSurfaceMatern(options, noisy.Input(), {}).nugget_mm, 1);
-  EXPECT_LT(FitSurfaceMatern(options, smooth.Input(), {}).nugget_mm, 0.2);
+  EXPECT_GT(InterpolateDepth(options, noisy.Input(), {}).process->nugget_mm, 1);
+  EXPECT_LT(InterpolateDepth(options, smooth.Input(), {}).process->nugget_mm, 0.2);
 }
 
 TEST(SurfaceMatern, NeedsASurface) {
