@@ -88,7 +88,6 @@ class HSplineSurface {
   // stored vertices anew, from the coarsest level that it changes.
   void SetOffsets(const std::map<VertexId, std::optional<Vec3>>& offsets);
   void SetOffset(const VertexId& vertex, const Vec3& offset) { SetOffsets({{vertex, offset}}); }
-  void RemoveOffset(const VertexId& vertex) { SetOffsets({{vertex, std::nullopt}}); }
 
   std::size_t Bytes() const;  // of memory held; a node of the offsets counts 96
 

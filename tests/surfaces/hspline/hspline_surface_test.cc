@@ -343,8 +343,7 @@ TEST(HSpline, OneOffsetIsSetReadAndRemoved) {
   EXPECT_EQ(surface.Offset({1, 4, 5}), Vec3(1, 2, 3));
   EXPECT_EQ(surface.Offsets(2), (std::map<VertexId, Vec3>{{{2, 4, 5}, Vec3(4, 5, 6)}}));
   EXPECT_EQ(surface.Offset({2, 5, 5}), std::nullopt);
-  surface.RemoveOffset({1, 4, 5});
-  surface.RemoveOffset({2, 4, 5});
+  surface.SetOffsets({{{1, 4, 5}, std::nullopt}, {{2, 4, 5}, std::nullopt}});
   EXPECT_TRUE(surface.Offsets().empty());
   EXPECT_EQ(surface.Net(2).vertices, untouched.vertices);
 }
