@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <thread>
@@ -99,6 +100,12 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
   command.add_option("--out", a.out, "folder for ct/, landmarks.yaml and true_skin.ply")
       ->required();
   command.add_option("--seed", a.phantom.random_seed, "which head")->capture_default_str();
+  const std::map<std::string, PhantomBone> bones = {{"smooth", PhantomBone::kSmooth},
+                                                    {"like_people", PhantomBone::kLikePeople}};
+  command
+      .add_option("--bone", a.phantom.bone,
+                  "smooth; like_people: with hollows and ridges, and rough [smooth]")
+      ->transform(CLI::CheckedTransformer(bones));
   command.add_option("--pixel-mm", a.ct.pixel_mm, "between columns and rows")
       ->check(CLI::Range(0.3, 5.0))
       ->capture_default_str();

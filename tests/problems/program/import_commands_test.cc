@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string>
 
+#include "surfaces/base/atomic_file.h"
 #include "tests/testing/program_call.h"
 
 namespace semblance {
@@ -70,6 +71,18 @@ TEST_F(ImportCommands, AHeadThatCannotBeMadeLeavesNoFolder) {
                 ::testing::AnyOf(HasSubstr("not a plain name"), HasSubstr("no site 'nose'")));
     EXPECT_FALSE(fs::exists(folder_ / "one")) << wrong;
   }
+}
+
+TEST_F(ImportCommands, AHeadMayHaveTheBoneOfPeople) {
+  const auto bytes = [&](const char* path) { return ReadFileBytes(folder_ / path); };
+  ASSERT_EQ(
+      CallProgram(folder_, "phantom --out rough --bone like_people --pixel-mm 2.5 --slice-mm 3")
+          .code,
+      0);
+  EXPECT_NE(bytes("rough/landmarks.yaml"), bytes("head/landmarks.yaml"));
+  EXPECT_EQ(CallProgram(folder_, "import-ct rough/ct --quiet --out out").code, 0);
+  EXPECT_EQ(CallProgram(folder_, "phantom --out one --bone rough").code, 2);
+  EXPECT_FALSE(fs::exists(folder_ / "one"));
 }
 
 TEST_F(ImportCommands, ASubjectMayBeAFolderOfDicom) {
