@@ -61,18 +61,30 @@ std::shared_ptr<const OuterSkin> OuterSkinOf(const Experiment& experiment, const
       [&] { return FindOuterSkin(skin, probe_mm); });
 }
 
-std::optional<TruthComparison> Measure(const Experiment& experiment, const SkullStage& skull,
-                                       const TriMesh& face,
-                                       const std::optional<FaceUncertainty>& uncertainty,
-                                       std::span<const Sphere> masks, StageCache& cache,
-                                       const RunContext& context) {
-  const Case& subject = skull.depth_stage->subject;
+// What of the true skin the face will be measured against; none where it is not known. Before
+// anything long is done: a region without any skin ends the run.
+std::optional<ScoredSkin> SkinToScore(const Experiment& experiment, const Case& subject,
+                                      StageCache& cache) {
   if (!subject.skin) {
     return std::nullopt;
   }
+  const auto felt = OuterSkinOf(experiment, *subject.skin, cache);
+  ScoredSkin scored = FindScoredSkin(subject, *felt, experiment.region);
+  CheckScored(scored.region);
+  return scored;
+}
+
+std::optional<TruthComparison> Measure(const Experiment& experiment, const SkullStage& skull,
+                                       std::optional<ScoredSkin> scored, const TriMesh& face,
+                                       const std::optional<FaceUncertainty>& uncertainty,
+                                       std::span<const Sphere> masks, const RunContext& context) {
+  if (!scored) {
+    return std::nullopt;
+  }
+  const Case& subject = skull.depth_stage->subject;
   const TriMesh& skin = *subject.skin;
   TruthComparison truth;
-  truth.skin = FindScoredSkin(subject, *OuterSkinOf(experiment, skin, cache), experiment.region);
+  truth.skin = *std::move(scored);
   truth.face = CompareFaces(skin, truth.skin.region, face, context);
   truth.details = MeasureDetails(skin, truth.skin, subject.basis, face, context);
   truth.implicit = CompareFaces(skin, truth.skin.region, skull.implicit.mesh, context);
@@ -220,6 +232,8 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const auto skull = MakeSkullStage(experiment, shared, step, context);
   const DepthStage& bone = *skull->depth_stage;
   Case subject = bone.subject;
+  auto scored =
+      step("find the skin to score", [&] { return SkinToScore(experiment, subject, shared); });
   const FacesAtHand faces = GivenFaces(experiment, shared, step, subject, context);
   const LoadedPrior* const prior = faces.prior.get();
   const TriMesh seedable = SeedableFace(experiment, skull->cuts, skull->implicit.dense, subject);
@@ -235,7 +249,8 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
     return UncertaintyOf(experiment, bone, prior, made, face, subject, context);
   });
   auto truth = step("measure", [&] {
-    return Measure(experiment, *skull, face.mesh, uncertainty, SigmaMasks(made), shared, context);
+    return Measure(experiment, *skull, std::move(scored), face.mesh, uncertainty, SigmaMasks(made),
+                   context);
   });
   auto bust = BustOf(bust_model.get(), experiment.bust, made, seedable, step, subject, context);
   auto features = MeasureFeatures(made.placed.face, made.fitted.fit.surface);

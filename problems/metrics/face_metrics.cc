@@ -169,15 +169,15 @@ std::vector<Sample> EvenlyWeighted(std::vector<Sample> a, const std::vector<Samp
   return a;
 }
 
-void RequireScored(const FaceRegion& region) {
+}  // namespace
+
+void CheckScored(const FaceRegion& region) {
   if (std::find(region.scored.begin(), region.scored.end(), true) == region.scored.end()) {
     throw InputError(
         "face metrics: no vertex of the true skin is scored; check that skull and skin share a "
         "frame, and what of the skin `region` asks for (extent, reach_mm, exclude)");
   }
 }
-
-}  // namespace
 
 TriMesh OuterSurface(const TriMesh& truth, const FaceRegion& region) {
   if (region.outer.empty()) {
@@ -229,7 +229,7 @@ FaceRegion WholeSurface(const TriMesh& truth) {
 
 FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                          const RunContext& context) {
-  RequireScored(region);
+  CheckScored(region);
   const TriMesh outer = OuterSurface(truth, region);
   const MeshQuery face_query(face), outer_query(outer);
   const std::vector<double> truth_areas = VertexAreas(truth);

@@ -65,8 +65,11 @@ struct FaceMetrics {
   std::vector<double> signed_mm;     // one per vertex of the true skin, NaN where not scored
 };
 
+// Throws InputError if no vertex is scored.
+void CheckScored(const FaceRegion& region);
+
 // Area-weighted, closest-point distances (not along a normal); no alignment is done.
-// region: of the vertices of `truth`. Throws InputError if nothing is scored.
+// region: of the vertices of `truth`. Throws as CheckScored.
 FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                          const RunContext& context);
 

@@ -10,6 +10,7 @@
 
 #include "fitting/plan/fit_check.h"
 #include "problems/bust/bust_model.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -95,6 +96,14 @@ void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& fault
   }
 }
 
+void CheckRegion(const FaceRegionOptions& region, std::vector<OptionFault>& faults) {
+  for (std::size_t k = 0; k < region.exclude.size(); ++k) {
+    if (std::string complaint = ComplaintAboutSite(region.exclude[k].site); !complaint.empty()) {
+      faults.push_back({fmt::format("region.exclude[{}].site", k), std::move(complaint)});
+    }
+  }
+}
+
 // A prior that is asked but names no files.
 void CheckPriorFiles(const PriorSource& source, std::vector<OptionFault>& faults) {
   const auto need = [&](const char* field, const std::filesystem::path& file, const char* remedy) {
@@ -175,6 +184,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back({"sites." + fault.path, fault.what});
   }
   CheckExpected(experiment, faults);
+  CheckRegion(experiment.region, faults);
   CheckWayToFace(experiment, faults);
   CheckAutoPlan(experiment, faults);
   CheckBust(experiment, faults);

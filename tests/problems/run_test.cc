@@ -405,6 +405,17 @@ TEST(Run, ASkullWithoutLandmarksIsOneClearError) {
             "shows the form)");
 }
 
+TEST(Run, ARegionWithoutSkinIsToldBeforeTheFit) {
+  std::vector<std::string> steps;
+  RunContext context;
+  context.on_event = [&steps](const Event& event) { steps.push_back(event.step); };
+  const Experiment all_excluded = SmallPhantom({"region.exclude=[{site: n, radius_mm: 200}]"});
+  EXPECT_THAT(WordsOf<InputError>([&] { semblance::Run(all_excluded, context); }),
+              HasSubstr("no vertex of the true skin is scored"));
+  EXPECT_THAT(steps, ::testing::Contains("polygonize"));
+  EXPECT_THAT(steps, ::testing::Not(::testing::Contains("fit")));
+}
+
 TEST(Run, CanBeStopped) {
   std::stop_source source;
   source.request_stop();

@@ -94,6 +94,11 @@ TEST(Experiment, WhatAPlanCannotIsToldWhenTheFileIsRead) {
       "a.yaml"));
 }
 
+TEST(Experiment, AnExcludedZoneIsAroundAStandardSite) {
+  EXPECT_THAT(Faults("region: {exclude: [{site: g}, {site: sn}]}\n"),
+              HasSubstr("region.exclude[1].site: unknown site 'sn'; did you mean 'sg'?"));
+}
+
 TEST(Experiment, ThePlanThatKnowsNoFeaturesIsNotForATemplateThatHasSome) {
   const std::string fit =
       "fit: {plan: auto, terms: [points, {type: smoothness, weight: auto}], relaxation: none}\n";
