@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "fitting/fit.h"
 #include "fitting/terms/term_cost.h"
@@ -26,29 +28,81 @@ double ExtentOf(std::span<const FitPoint> points) {
   return box.diagonal().norm();
 }
 
-// A twisted patch is what nobody wants: points near an edge say which way it runs.
-void CheckDirection(const OpenedJoin& opened, std::size_t index, std::span<const FitPoint> points) {
-  constexpr double kNear = 0.05, kPlainly = 4;
-  constexpr int kEnough = 8;
-  const PatchJoin& join = opened.join;
-  const int along = RunsAlongV(join.edge) ? 1 : 0, across = 1 - along;
-  double as_given = 0, turned = 0;
-  int count = 0;
+// One way to lay a new edge along an edge of the given surface.
+struct EdgeWay {
+  SurfaceEdge its_edge;
+  bool reversed;
+  double mean_mm;  // from the points beside the new edge to where it would be
+};
+
+// A point near the new edge, t along it.
+struct Beside {
+  Vec3 position;
+  double t;
+};
+
+std::vector<Beside> PointsBeside(SurfaceEdge edge, std::span<const FitPoint> points) {
+  constexpr double kNear = 0.05;
+  const int along = RunsAlongV(edge) ? 1 : 0, across = 1 - along;
+  std::vector<Beside> beside;
   for (const FitPoint& p : points) {
     const double t = p.uv[along];
-    if (std::abs(p.uv[across] - OnEdge(join.edge, t)[across]) <= kNear) {
-      as_given += (p.position - opened.surface.Point(opened.ItsPlace(t))).norm();
-      turned += (p.position - opened.surface.Point(opened.ItsPlace(1 - t))).norm();
-      ++count;
+    if (std::abs(p.uv[across] - OnEdge(edge, t)[across]) <= kNear) {
+      beside.push_back({p.position, t});
     }
   }
-  if (count >= kEnough && as_given > kPlainly * turned) {
-    throw InputError(fmt::format(
-        "joins[{}].reversed: the points beside {} are {:.3g} times nearer to {} of {} if it runs "
-        "the other way; write reversed: {}",
-        index, NameOf(join.edge), as_given / turned, NameOf(join.its_edge),
-        join.surface.filename().string(), !join.reversed));
+  return beside;
+}
+
+// Of all borders that the new edge could follow; none where too few points lie beside it.
+std::vector<EdgeWay> WaysOf(const OpenedJoin& opened, std::span<const FitPoint> points) {
+  constexpr std::size_t kEnough = 8;
+  const std::vector<Beside> beside = PointsBeside(opened.join.edge, points);
+  const HSplineShape& its = opened.surface.shape();
+  std::vector<EdgeWay> ways;
+  for (const SurfaceEdge e :
+       {SurfaceEdge::kU0, SurfaceEdge::kU1, SurfaceEdge::kV0, SurfaceEdge::kV1}) {
+    if (beside.size() < kEnough || !HasEdge(its, e) ||
+        IsClosedAlong(its, e) != IsClosedAlong(its, opened.join.its_edge)) {
+      continue;
+    }
+    for (const bool reversed : {false, true}) {
+      double sum_mm = 0;
+      for (const Beside& p : beside) {
+        const Vec2 place = OnEdge(e, reversed ? 1 - p.t : p.t);
+        sum_mm += (p.position - opened.surface.Point(place)).norm();
+      }
+      ways.push_back({e, reversed, sum_mm / static_cast<double>(beside.size())});
+    }
   }
+  return ways;
+}
+
+// A twisted patch, or one that is drawn right across the given surface, is what nobody wants:
+// points near an edge say which edge it follows, and which way it runs.
+void CheckPlace(const OpenedJoin& opened, std::size_t index, std::span<const FitPoint> points) {
+  constexpr double kPlainly = 4;
+  const PatchJoin& join = opened.join;
+  const std::vector<EdgeWay> ways = WaysOf(opened, points);
+  const auto given = std::ranges::find_if(ways, [&](const EdgeWay& w) {
+    return w.its_edge == join.its_edge && w.reversed == join.reversed;
+  });
+  const auto best = std::ranges::min_element(ways, {}, &EdgeWay::mean_mm);
+  if (given == ways.end() || given->mean_mm <= kPlainly * best->mean_mm) {
+    return;
+  }
+  const std::string beside = fmt::format("the points beside {} are {:.3g} times nearer to",
+                                         NameOf(join.edge), given->mean_mm / best->mean_mm);
+  const std::string file = join.surface.filename().string();
+  if (best->its_edge == join.its_edge) {
+    throw InputError(
+        fmt::format("joins[{}].reversed: {} {} of {} if it runs the other way; write reversed: {}",
+                    index, beside, NameOf(join.its_edge), file, best->reversed));
+  }
+  throw InputError(fmt::format(
+      "joins[{}].its_edge: {} {} of {} than to its {}; write its_edge: {}, reversed: {}", index,
+      beside, NameOf(best->its_edge), file, NameOf(join.its_edge), NameOf(best->its_edge),
+      best->reversed));
 }
 
 class JoinFitter {
@@ -83,7 +137,7 @@ class JoinFitter {
   void Check() const {
     CheckCorners(joins_, extent_mm_);
     for (std::size_t k = 0; k < joins_.size(); ++k) {
-      CheckDirection(joins_[k], k, target_.points);
+      CheckPlace(joins_[k], k, target_.points);
     }
   }
 

@@ -26,8 +26,8 @@ std::string JoinPlanFault(const FitOptions& options);
 // A fit without the joins shows how fine the new edges become. Then they are held (join_places.h),
 // and again at more places, over finer vertices, where the result does not hold between them: at
 // most six times. Throws as Fit and ExactPointsOf do, and InputError for corners at which two
-// joins contradict each other, points beside an edge that lie plainly nearer to the given one run
-// the other way, and more than kMostExactPoints places.
+// joins contradict each other, points beside an edge that lie plainly nearer to another one of the
+// given surface, or to the given one run the other way, and more than kMostExactPoints places.
 //   start: of level 0 alone, or of the plan's levels. target: at least one point.
 JoinedFit FitJoined(const HSplineSurface& start, FitTarget target,
                     std::span<const OpenedJoin> joins, const FitOptions& options,

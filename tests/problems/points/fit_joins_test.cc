@@ -19,6 +19,7 @@
 namespace semblance {
 namespace {
 
+using ::testing::AllOf;
 using testing::ErrorAgainst;
 using testing::FreeFit;
 using ::testing::HasSubstr;
@@ -243,6 +244,11 @@ TEST(FitJoins, ContradictionsAreRefused) {
   PatchJoin turned = kRight;
   turned.reversed = true;
   EXPECT_THAT(refusal({Opened(given, turned)}, {}), HasSubstr("write reversed: false"));
+  PatchJoin far = kRight;
+  far.its_edge = SurfaceEdge::kU0;
+  EXPECT_THAT(refusal({Opened(given, far)}, {}),
+              AllOf(HasSubstr("joins[0].its_edge: the points beside u0 are"),
+                    HasSubstr("than to its u0; write its_edge: u1, reversed: false")));
   EXPECT_THAT(
       refusal({Opened(GivenSurface({.patches_v = 64, .plan = AdaptivePlan{.finest = 0}}), kRight)},
               {}),
