@@ -96,6 +96,13 @@ void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& fault
   }
 }
 
+void CheckPhantom(const Subject& subject, std::vector<OptionFault>& faults) {
+  const auto* const phantom = std::get_if<PhantomOptions>(&subject);
+  if (std::string fault = phantom == nullptr ? "" : RingsFault(*phantom); !fault.empty()) {
+    faults.push_back({"subject.rings", std::move(fault)});
+  }
+}
+
 void CheckRegion(const FaceRegionOptions& region, std::vector<OptionFault>& faults) {
   for (std::size_t k = 0; k < region.exclude.size(); ++k) {
     if (std::string complaint = ComplaintAboutSite(region.exclude[k].site); !complaint.empty()) {
@@ -184,6 +191,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back({"sites." + fault.path, fault.what});
   }
   CheckExpected(experiment, faults);
+  CheckPhantom(experiment.subject, faults);
   CheckRegion(experiment.region, faults);
   CheckWayToFace(experiment, faults);
   CheckAutoPlan(experiment, faults);

@@ -230,7 +230,11 @@ void MeasureDepths(Phantom& phantom) {
   const MeshQuery skin(phantom.face);
   const auto depth_mm = [&](const Vec3& base, const Vec3& normal) {
     constexpr double kReach_mm = 400;  // more than a head: a ray from inside leaves the skin
-    return skin.FirstHit(base, normal, kReach_mm)->distance_mm;
+    const std::optional<MeshPoint> hit = skin.FirstHit(base, normal, kReach_mm);
+    if (!hit) {
+      throw InputError("phantom: the bone stands out of the skin; give it more rings");
+    }
+    return hit->distance_mm;
   };
   const std::vector<Vec3> normals = VertexNormals(phantom.skull);
   for (std::size_t v = 0; v < normals.size(); ++v) {
@@ -243,11 +247,19 @@ void MeasureDepths(Phantom& phantom) {
 
 }  // namespace
 
+std::string RingsFault(const PhantomOptions& options) {
+  const bool rough = options.bone == PhantomBone::kLikePeople;
+  const int least = rough ? 30 : 8;
+  return options.rings >= least && options.rings <= 1000
+             ? ""
+             : fmt::format("{} is too {}, allowed is {} to 1000{}; choose a number in that range",
+                           options.rings, options.rings < least ? "few" : "many", least,
+                           rough ? " with bone: like_people" : "");
+}
+
 Phantom MakePhantom(const PhantomOptions& options) {
-  if (options.rings < 8 || options.rings > 1000) {
-    throw InputError(
-        fmt::format("phantom: rings is {}, allowed is 8 to 1000; choose a number in that range",
-                    options.rings));
+  if (const std::string fault = RingsFault(options); !fault.empty()) {
+    throw InputError("phantom: rings: " + fault);
   }
   const Head head(options);
   Phantom phantom;

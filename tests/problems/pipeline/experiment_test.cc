@@ -94,6 +94,13 @@ TEST(Experiment, WhatAPlanCannotIsToldWhenTheFileIsRead) {
       "a.yaml"));
 }
 
+TEST(Experiment, ARoughPhantomNeedsRingsEnough) {
+  EXPECT_THAT(
+      Faults("subject: {type: phantom, bone: like_people, rings: 29}\n"),
+      HasSubstr("subject.rings: 29 is too few, allowed is 30 to 1000 with bone: like_people"));
+  EXPECT_NO_THROW(ReadConfigText<Experiment>("subject: {type: phantom, rings: 29}\n", "a.yaml"));
+}
+
 TEST(Experiment, AnExcludedZoneIsAroundAStandardSite) {
   EXPECT_THAT(Faults("region: {exclude: [{site: g}, {site: sn}]}\n"),
               HasSubstr("region.exclude[1].site: unknown site 'sn'; did you mean 'sg'?"));

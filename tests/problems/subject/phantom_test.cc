@@ -331,9 +331,9 @@ TEST_P(PhantomLikePeople, DepthsAreAsRoughAsThoseOfPeople) {
 }
 
 TEST(PhantomLikePeopleOfASeed, IsTheSameToTheByteAndNoOtherSeeds) {
-  const std::vector<std::uint8_t> bytes = Bytes(MakePhantom(LikePeople(7, 20)));
-  EXPECT_EQ(bytes, Bytes(MakePhantom(LikePeople(7, 20))));
-  EXPECT_NE(bytes, Bytes(MakePhantom(LikePeople(8, 20))));
+  const std::vector<std::uint8_t> bytes = Bytes(MakePhantom(LikePeople(7, 30)));
+  EXPECT_EQ(bytes, Bytes(MakePhantom(LikePeople(7, 30))));
+  EXPECT_NE(bytes, Bytes(MakePhantom(LikePeople(8, 30))));
 }
 
 }  // namespace
