@@ -74,12 +74,14 @@ class FootMover {
     OnCoarse last = first;
     for (moves_.rounds = 0; moves_.rounds < plan_.relaxation_rounds && !IsSettled(last);) {
       context_.ThrowIfStopped();
-      OnCoarse next = Fit(Moved(last));
+      int folds_prevented = 0;
+      OnCoarse next = Fit(Moved(last, folds_prevented));
       if (!IsNearer(next, last) || !IsNearer(next, first)) {
         break;
       }
       last = std::move(next);
       ++moves_.rounds;
+      moves_.folds_prevented += folds_prevented;
     }
     Tell(first, last);
     return {std::move(last.uv), moves_};
@@ -119,12 +121,12 @@ class FootMover {
   }
 
   // An outlier has no foot on this surface.
-  std::vector<Vec2> Moved(const OnCoarse& on) {
+  std::vector<Vec2> Moved(const OnCoarse& on, int& folds_prevented) const {
     std::vector<Vec2> uv = on.feet;
     for (std::size_t k = 0; k < uv.size(); ++k) {
       uv[k] = on.outlier[k] != 0 ? on.uv[k] : uv[k];
     }
-    moves_.folds_prevented += KeepFromFolding(shape_, triangles_, on.uv, uv);
+    folds_prevented = KeepFromFolding(shape_, triangles_, on.uv, uv);
     return uv;
   }
 

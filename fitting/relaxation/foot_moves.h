@@ -22,7 +22,7 @@ struct FootMoves {
   double rms_after_mm = kNaN;   // from that over the last: at most as much
   double rms_move_mm = kNaN;    // on the last surface, from the first (u,v) to the last
   double max_move_mm = kNaN;
-  int folds_prevented = 0;  // triangles that moves would have turned over
+  int folds_prevented = 0;  // triangles that these moves would have turned over
 };
 
 struct MovedUv {
