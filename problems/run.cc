@@ -61,8 +61,8 @@ std::shared_ptr<const OuterSkin> OuterSkinOf(const Experiment& experiment, const
       [&] { return FindOuterSkin(skin, probe_mm); });
 }
 
-// What of the true skin the face will be measured against; none where it is not known. Before
-// anything long is done: a region without any skin ends the run.
+// What of the true skin the face will be measured against; none where it is not known. Found before
+// the fit, so that a region without any skin does not cost one.
 std::optional<ScoredSkin> SkinToScore(const Experiment& experiment, const Case& subject,
                                       StageCache& cache) {
   if (!subject.skin) {

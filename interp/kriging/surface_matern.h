@@ -76,8 +76,8 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
 // measurement there, nor the uncertainty of length and signal. These two, where they are not given,
 // are the maximum of the restricted likelihood times the length's prior, within a factor of 12 of
 // the prior's median (surface_matern_likelihood.h); of more than 60 dowels it uses 60 that lie far
-// apart. kNotFacing as AssignWhereFacing.
-// Throws InputError as CheckDepthInput and MeanRegressors, or if the skull has no triangle.
+// apart. kNotFacing as AssignWhereFacing. Throws InputError as CheckDepthInput and MeanRegressors,
+// or if the skull has no triangle.
 DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& input,
                             const RunContext& run);
 
