@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What an automatic fit assumed, in words and as JSON.
+// What a fit of points tells: in words, as JSON, and as the files of its folder.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "fitting/nested/nested_fit.h"
 #include "fitting/relaxation/foot_moves.h"
+#include "problems/output/files.h"
+#include "problems/points/point_fit.h"
+#include "surfaces/base/run_context.h"
 
 namespace semblance {
 
@@ -18,5 +22,13 @@ std::string AutoText(const AutoReport& report);
 // How (u,v) were moved before the fit.
 nlohmann::ordered_json MovesJson(const FootMoves& moves);
 std::string MovesText(const FootMoves& moves);
+
+// Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
+// surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (three attributes each),
+// report.html and timing.json; the same bytes for the same input, timing.json apart. Returns
+// lines that a user should be told.
+std::vector<std::string> WritePointFit(const PointFitOptions& options, const PointSource& source,
+                                       const PointFit& result, OutputFolder& folder,
+                                       const RunContext& context);
 
 }  // namespace semblance

@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
 
@@ -16,22 +15,12 @@
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
-#include "problems/config/config.h"
-#include "problems/points/fit_page.h"
-#include "problems/points/fit_report.h"
 #include "problems/points/join_report.h"
-#include "problems/points/residual_files.h"
 #include "problems/points/surface_ply.h"
-#include "problems/report/fit_json.h"
-#include "problems/report/timing_json.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/quantile.h"
-#include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 HSplineShape ShapeOf(const PointFitOptions& options) {
   return {.patches_u = options.patches_u,
@@ -77,137 +66,6 @@ std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
              ? std::optional(ParameterSource::kMesh)
              : std::nullopt;
 }
-
-Json VerticesJson(const HSplineSurface& surface) {
-  const int coarsest = surface.Columns(0) * surface.Rows(0);
-  Json json = {{"total", coarsest + surface.Offsets().size()},
-               {"by_level", Json::array({coarsest})}};
-  for (int level = 1; level <= surface.shape().max_level; ++level) {
-    json["by_level"].push_back(surface.Offsets(level).size());
-  }
-  return json;
-}
-
-// Of (u,v) that were not given.
-Json MapJson(const PointFit& result) {
-  return {{"how", result.how},
-          {"folded_share", result.map_faults.folded},
-          {"collapsed_share", result.map_faults.collapsed}};
-}
-
-Json AttributesJson(const PointFit& result) {
-  Json json = Json::array();
-  for (std::size_t k = 0; k < result.attributes.size(); ++k) {
-    const AttributeColumn& column = result.attribute_fit.columns[k];
-    json.push_back({{"name", result.attributes[k].name},
-                    {"rms", column.rms},
-                    {"weight", column.weight},
-                    {"degrees_of_freedom", column.degrees_of_freedom}});
-  }
-  return json;
-}
-
-Json SigmaJson(const PointFit& result) {
-  std::vector<double> at_points = result.sigma_mm;
-  return {{"median_mm", Quantile(at_points, 0.5)},
-          {"degrees_of_freedom", result.sigma->degrees_of_freedom()}};
-}
-
-Json ToleranceJson(const ToleranceReport& tolerance) {
-  Json json = {{"tolerance_mm", tolerance.tolerance_mm},
-               {"met", tolerance.Met()},
-               {"points_beyond", tolerance.beyond},
-               {"cells", tolerance.cells},
-               {"cells_on_finest_level", tolerance.at_finest}};
-  if (tolerance.regions > 0) {
-    json["regions"] = tolerance.regions;
-  }
-  return json;
-}
-
-Json TrimJson(const TrimReport& trim) {
-  return {
-      {"distance_mm", trim.distance_mm}, {"kept_mm2", trim.kept_mm2}, {"cut_mm2", trim.cut_mm2}};
-}
-
-// What every fit has.
-Json FiguresJson(const PointFitOptions& options, const PointSource& source,
-                 const PointFit& result) {
-  const DistanceQuantiles distance = QuantilesOf(result.fit);
-  return {{"title", options.title},
-          {"version", SEMBLANCE_VERSION},
-          {"points_file", source.name},
-          {"points_sha256", source.sha256},
-          {"points", result.fit.residual_mm.size()},
-          {"parameters", result.parameters},
-          {"rms_mm", result.fit.point_rms_mm},
-          {"median_mm", distance.median_mm},
-          {"p95_mm", distance.p95_mm},
-          {"max_mm", distance.max_mm},
-          {"control_vertices", VerticesJson(result.fit.surface)},
-          {"usable", result.Faults().empty()},
-          {"faults", result.Faults()}};
-}
-
-Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, const PointFit& result,
-                  const std::optional<TrimReport>& trim) {
-  Json json = FiguresJson(options, source, result);
-  if (!result.how.empty()) {
-    json["map"] = MapJson(result);
-  }
-  if (result.moves) {
-    json["moves"] = MovesJson(*result.moves);
-  }
-  if (!result.joins.empty()) {
-    json["joins"] = JoinsJson(result.joins);
-  }
-  if (!result.attributes.empty()) {
-    json["attributes"] = AttributesJson(result);
-  }
-  if (std::isfinite(result.sigma_factor)) {
-    json["sigma_factor"] = result.sigma_factor;
-  }
-  if (result.sigma) {
-    json["sigma"] = SigmaJson(result);
-  }
-  if (result.fit.automatic) {
-    json["automatic"] = AutoJson(*result.fit.automatic);
-  }
-  if (const auto tolerance = ToleranceOf(options, result)) {
-    json["tolerance"] = ToleranceJson(*tolerance);
-  }
-  if (trim) {
-    json["trim"] = TrimJson(*trim);
-  }
-  json.update(StepsToJson(result.fit));
-  return json;
-}
-
-void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& folder) {
-  constexpr std::size_t kMostAsText = 100'000;
-  const ResidualColumns columns{result.fit, result.attributes, result.attribute_at,
-                                result.sigma_mm};
-  if (kind == ResidualFile::kAuto) {
-    kind = result.fit.residual_mm.size() <= kMostAsText ? ResidualFile::kCsv : ResidualFile::kPly;
-  }
-  if (kind == ResidualFile::kCsv) {
-    folder.Write("residuals.csv", ResidualsCsv(columns));
-  } else if (kind == ResidualFile::kPly) {
-    folder.Write("residuals.ply", ResidualsPly(columns));
-  }
-}
-
-// Three columns a file.
-void WriteAttributes(const PointFit& result, OutputFolder& folder) {
-  for (std::size_t k = 0; k < result.attribute_fit.surfaces.size(); ++k) {
-    folder.Write(fmt::format("attributes_{}.hspline.json", k + 1),
-                 HSplineToJson(result.attribute_fit.surfaces[k]));
-  }
-}
-
-}  // namespace
-
-namespace {
 
 // What points of a file have not; empty for a term that they have all for.
 std::string_view WhatIsMissing(const Term& term) {
@@ -353,35 +211,6 @@ std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const
 }
 
 namespace {
-
-// What a user should know beside the figures.
-std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit& result,
-                                 double chord_mm) {
-  std::vector<std::string> notes;
-  if (!result.how.empty()) {
-    notes.push_back(fmt::format("(u,v) by {}", result.how));
-  }
-  if (result.moves) {
-    notes.push_back(MovesText(*result.moves));
-  }
-  for (std::string& line : JoinLines(result.joins)) {
-    notes.push_back(std::move(line));
-  }
-  for (std::size_t k = 0; k < result.attributes.size(); ++k) {
-    notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,
-                                result.attribute_fit.columns[k].rms));
-  }
-  if (std::isfinite(result.sigma_factor)) {
-    notes.push_back(fmt::format("the points are off by {:.3g} times the sigma that was given",
-                                result.sigma_factor));
-  }
-  if (!options.chord_mm.automatic && chord_mm > options.chord_mm.value) {
-    notes.push_back(fmt::format(
-        "surface.ply is within {:.3g} mm of the surface, for {} mm would need too many triangles",
-        chord_mm, options.chord_mm.value));
-  }
-  return notes;
-}
 
 // In the order of the options; taken out of the table.
 std::vector<PointAttribute> AttributesAsked(PointTable& table, const PointFitOptions& options) {
@@ -614,35 +443,6 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   }
   result.times = step.Take();
   return result;
-}
-
-std::vector<std::string> WritePointFit(const PointFitOptions& options, const PointSource& source,
-                                       const PointFit& result, OutputFolder& folder,
-                                       const RunContext& context) {
-  context.Report("write");
-  // First what can still be refused.
-  const double chord_mm = ChordFor(result.fit.surface, options.chord_mm);
-  const std::optional<TrimmedTo> trim =
-      result.Faults().empty() ? TrimOf(options.trim, result.fit, context.threads) : std::nullopt;
-  const SurfaceMesh mesh = SurfacePly(result, chord_mm, trim ? &*trim : nullptr, context.threads);
-  folder.Write("resolved.yaml", WriteConfig(options));
-  folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
-  folder.Write("surface.ply", mesh.ply);
-  WriteResiduals(options.residuals, result, folder);
-  WriteAttributes(result, folder);
-  if (options.report && result.Faults().empty()) {
-    folder.Write("report.html", FitPageHtml(options, source, result,
-                                            {trim ? &*trim : nullptr, mesh.trim}, context.threads));
-  }
-  folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("result.json", ResultJsonOf(options, source, result, mesh.trim)
-                                      .dump(2, ' ', false, Json::error_handler_t::replace) +
-                                  "\n");
-  std::vector<std::string> notes = NotesOf(options, result, chord_mm);
-  if (mesh.trim) {
-    notes.push_back(TrimText(*mesh.trim));
-  }
-  return notes;
 }
 
 }  // namespace semblance

@@ -16,7 +16,6 @@
 #include "fitting/solve/attribute_fit.h"
 #include "fitting/solve/surface_sigma.h"
 #include "problems/config/config_errors.h"
-#include "problems/output/files.h"
 #include "problems/pipeline/step_clock.h"
 #include "problems/points/fit_joins.h"
 #include "problems/points/fit_maps.h"
@@ -145,15 +144,9 @@ std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const
 // exact points. Reads the surfaces that are joined, and throws as OpenJoins does.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
-// Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
-// surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (three attributes each),
-// report.html and timing.json; the same bytes for the same input, timing.json apart. source: what
-// the points came from. Returns lines that a user should be told.
+// What the points came from.
 struct PointSource {
   std::string name, sha256;
 };
-std::vector<std::string> WritePointFit(const PointFitOptions& options, const PointSource& source,
-                                       const PointFit& result, OutputFolder& folder,
-                                       const RunContext& context);
 
 }  // namespace semblance
