@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The packages in a Debian 12 that has nothing else: apt installs them, the demo is run, and its figures are those of README.md; Python imports the
-# module; manual page and completions are there. As root. ROOT is made by debootstrap where it is not there.
+# module; manual page and completions are there; programs that use the libraries are built and linked. As root. ROOT is made by debootstrap where it is not there.
 #
 # usage: clean_debian.sh PACKAGES ROOT
 set -euo pipefail
@@ -38,4 +38,11 @@ END
 inside 'python3 -c "import semblance; print(semblance.__doc__.splitlines()[0])"'
 inside 'cd /usr/share && test -s man/man1/semblance.1* && test -s bash-completion/completions/semblance && test -s zsh/vendor-completions/_semblance &&
   test -s fish/vendor_completions.d/semblance.fish'
+# Someone else's program, with nothing but what libsemblance-dev asks for and a compiler: of one floor, and of all.
+inside 'apt-get install -y -qq --no-install-recommends cmake make g++'
+rm -rf "$root/root/consumer" && cp -r "$source/tests/consumer" "$root/root/consumer"
+inside 'cmake -S consumer -B consumer/fitting > /dev/null && make -s -C consumer/fitting && printf "0 0 0\n1 0 0\n0 1 0\n1 1 0\n" > plane.txt &&
+  sed -i "s/COMPONENTS fitting/COMPONENTS problems/; s/semblance::fitting/semblance::problems/" consumer/CMakeLists.txt &&
+  printf "#include <semblance/problems/run.h>\nint main() { return semblance::Run({}, {}).Faults().empty(); }\n" > consumer/main.cc &&
+  cmake -S consumer -B consumer/problems > /dev/null && make -s -C consumer/problems'
 echo "the packages install in a clean Debian 12, and the demo gives the figures of README.md"
