@@ -7,7 +7,6 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <string>
 #include <thread>
 #include <utility>
@@ -19,6 +18,7 @@
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/landmark_files/site_page.h"
 #include "problems/landmark_files/site_picture.h"
+#include "problems/program/work_options.h"
 #include "problems/propose/proposal_table.h"
 #include "problems/propose/propose_landmarks.h"
 #include "surfaces/base/atomic_file.h"
@@ -90,11 +90,9 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
   LandmarkArguments& a = *Bind(convert, line, &Convert);
   convert.add_option("IN", a.in, ".yaml, .mrk.json, .fcsv, .pp, .csv, .txt or .asc")->required();
   convert.add_option("OUT", a.out, "file of one of these kinds")->required();
-  const std::map<std::string, Axes> words = {{"LPS", Axes::kLps}, {"RAS", Axes::kRas}};
-  convert
-      .add_option("--axes", a.reading.axes,
-                  "LPS or RAS: of a file that does not say (.pp, .csv, .txt, .asc) [LPS]")
-      ->transform(CLI::CheckedTransformer(words));
+  AddChoice(convert, "--axes",
+            "LPS or RAS: of a file that does not say (.pp, .csv, .txt, .asc) [LPS]",
+            a.reading.axes);
   convert.add_flag("--leave-out-unknown", a.reading.leave_out_unknown,
                    "leave out points whose name is no site, and say which");
   convert.add_flag("--force", a.force, "replace a file of the same name");

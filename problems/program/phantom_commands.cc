@@ -7,7 +7,6 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 #include <thread>
@@ -18,6 +17,7 @@
 #include "problems/output/staged_folder.h"
 #include "problems/phantom/phantom_ct.h"
 #include "problems/phantom/phantom_landmarks.h"
+#include "problems/program/work_options.h"
 #include "problems/volumes/itk_files.h"
 #include "problems/volumes/read_volume.h"
 #include "surfaces/base/error.h"
@@ -99,13 +99,10 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
   a.ct.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   command.add_option("--out", a.out, "folder for ct/, landmarks.yaml and true_skin.ply")
       ->required();
-  command.add_option("--seed", a.phantom.random_seed, "which head")->capture_default_str();
-  const std::map<std::string, PhantomBone> bones = {{"smooth", PhantomBone::kSmooth},
-                                                    {"like_people", PhantomBone::kLikePeople}};
-  command
-      .add_option("--bone", a.phantom.bone,
-                  "smooth; like_people: with hollows and ridges, and rough [smooth]")
-      ->transform(CLI::CheckedTransformer(bones));
+  command.add_option("--random-seed,--seed", a.phantom.random_seed, "which head")
+      ->capture_default_str();
+  AddChoice(command, "--bone", "smooth; like_people: with hollows and ridges, and rough",
+            a.phantom.bone);
   command.add_option("--pixel-mm", a.ct.pixel_mm, "between columns and rows")
       ->check(CLI::Range(0.3, 5.0))
       ->capture_default_str();

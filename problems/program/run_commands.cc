@@ -52,7 +52,6 @@ struct Arguments : WorkOptions {
   std::string config, landmarks;
   std::vector<std::string> exclude;
   CtImportOptions ct;
-  std::string ct_edges = "threshold";
   ReadVolumeOptions reading;
   MrSkinOptions mr;
   std::string modality = "auto";
@@ -323,9 +322,7 @@ void Import(const Arguments& arguments, const VolumeReading& reading, bool mr, O
     PrintNotes(import.notes);
     return;
   }
-  CtImportOptions options = arguments.ct;
-  options.edges = arguments.ct_edges == "threshold" ? CtEdges::kThreshold : CtEdges::kHalfMaximum;
-  WriteImport(ImportCt(reading.volume, options, context), folder);
+  WriteImport(ImportCt(reading.volume, arguments.ct, context), folder);
 } catch (const InputError& error) {
   throw InputError(fmt::format("{}: {}", arguments.files.at(0), error.what()));
 }
@@ -442,9 +439,7 @@ void DeclareImportCt(CLI::App& command, CommandLine& line) {
       ->check(Finite())
       ->check(CLI::Range(-900.0, 0.0))
       ->capture_default_str();
-  command.add_option("--edges", a.ct_edges, "threshold, or half_maximum, which thins tissue less")
-      ->check(CLI::IsMember({"threshold", "half_maximum"}))
-      ->capture_default_str();
+  AddChoice(command, "--edges", "threshold, or half_maximum, which thins tissue less", a.ct.edges);
   AddOutput(command, a);
   AddWork(command, line, a);
 }

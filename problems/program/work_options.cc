@@ -31,6 +31,16 @@ void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options) {
   command.add_flag("--quiet", options.quiet, "no progress");
 }
 
+CLI::Option* AddWords(CLI::App& command, const std::string& name, const std::string& description,
+                      const std::vector<std::string>& words,
+                      const std::function<void(std::size_t)>& take) {
+  const auto take_word = [words, take](const std::string& word) {
+    take(static_cast<std::size_t>(std::ranges::find(words, word) - words.begin()));
+  };
+  return command.add_option_function<std::string>(name, take_word, description)
+      ->check(CLI::IsMember(words));
+}
+
 RunContext ContextOf(const WorkOptions& options) {
   RunContext context;
   context.threads = options.threads;

@@ -5,6 +5,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -30,6 +33,28 @@ void AddSet(CLI::App& command, WorkOptions& options);
 void AddOutput(CLI::App& command, WorkOptions& options);
 // --threads and --quiet
 void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options);
+
+// An option that takes one of some words; take(n) for the n-th of them.
+CLI::Option* AddWords(CLI::App& command, const std::string& name, const std::string& description,
+                      const std::vector<std::string>& words,
+                      const std::function<void(std::size_t)>& take);
+
+// One that takes a value of an enum, by its words in configurations (fields.h).
+template <class E>
+void AddChoice(CLI::App& command, const std::string& name, const std::string& description,
+               E& value) {
+  const auto words = EnumNames(E{});
+  AddWords(command, name, description, {words.begin(), words.end()}, [&value](std::size_t n) {
+    value = static_cast<E>(n);
+  })->default_str(std::string(words[static_cast<std::size_t>(value)]));
+}
+template <class E>
+void AddChoice(CLI::App& command, const std::string& name, const std::string& description,
+               std::optional<E>& value) {
+  const auto words = EnumNames(E{});
+  AddWords(command, name, description, {words.begin(), words.end()},
+           [&value](std::size_t n) { value = static_cast<E>(n); });
+}
 
 RunContext ContextOf(const WorkOptions& options);
 StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out);
