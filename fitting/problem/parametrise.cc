@@ -121,7 +121,7 @@ MapFaults FaultsOf(const Scan& points, const Candidate& candidate) {
           .mirrored = by_triangles.mirrored};
 }
 
-std::string Percent(double share) { return fmt::format("{:.2g} %", 100 * share); }
+std::string Percent(double share) { return fmt::format("{:.3g} %", 100 * share); }
 
 std::string FaultsText(const std::vector<Candidate>& tried) {
   std::string text;

@@ -202,7 +202,7 @@ std::string ToleranceText(const ToleranceReport& r) {
         r.tolerance_mm, own, r.points, r.largest_mm);
   }
   std::string text = fmt::format(
-      "THE TOLERANCE WAS MISSED: {} of {} points ({:.2g} %) are farther off than {:.4g} mm{}, "
+      "THE TOLERANCE WAS MISSED: {} of {} points ({:.3g} %) are farther off than {:.4g} mm{}, "
       "the farthest {:.4g} mm; they lie in {} {}",
       r.beyond, r.points, 100.0 * r.beyond / r.points, r.tolerance_mm, own, r.largest_mm, r.cells,
       r.cells == 1 ? "cell" : "cells");

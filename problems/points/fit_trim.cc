@@ -90,7 +90,7 @@ std::optional<TrimmedTo> TrimOf(const Trim& trim, const FitResult& fit, int thre
 std::string TrimText(const TrimReport& r) {
   const double share = r.cut_mm2 / (r.kept_mm2 + r.cut_mm2);
   return fmt::format("trimmed to within {:.3g} mm of a point: {} of the surface is left out",
-                     r.distance_mm, share > 0 ? fmt::format("{:.2g} %", 100 * share) : "nothing");
+                     r.distance_mm, share > 0 ? fmt::format("{:.3g} %", 100 * share) : "nothing");
 }
 
 }  // namespace semblance

@@ -83,6 +83,13 @@ std::string AttributesFault(const std::vector<std::string>& names) {
       "nx", "ny", "nz", "s", "t", "point",  "sigma_mm", "exact"};
   std::set<std::string> seen;
   for (const std::string& name : names) {
+    const std::string residual = name + "_residual";
+    if (std::find(names.begin(), names.end(), residual) != names.end()) {
+      return fmt::format(
+          "'{}' is what the residuals of '{}' are called in the residuals' file; "
+          "give the column another name",
+          residual, name);
+    }
     if (kTaken.contains(name) || name.empty() ||
         name.find_first_of(" \t,\"\n") != std::string::npos) {
       return fmt::format("'{}' has a meaning of its own, or blanks in it; name another column",
@@ -395,7 +402,7 @@ std::vector<std::string> PointFit::Faults() const {
   constexpr double kMostOff = 0.1;
   if (faults.empty() && off > kMostOff) {
     faults.push_back(
-        fmt::format("the points lie {:.3g} mm (RMS) from the surface, {:.2g} % of their extent, as "
+        fmt::format("the points lie {:.3g} mm (RMS) from the surface, {:.3g} % of their extent, as "
                     "points that fill space or lie on several sheets do; give (u,v), other "
                     "parameters, one sheet alone, or finer levels if it is one",
                     fit.point_rms_mm, 100 * off));
@@ -405,7 +412,6 @@ std::vector<std::string> PointFit::Faults() const {
 
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
-  CheckChord(options.chord_mm, table.positions);
   CheckTrim(options.trim, table.positions);
   std::vector<PointAttribute> attributes = AttributesAsked(table, options);
   const std::vector<OpenedJoin> joins = OpenJoins(options.joins, options.closure);

@@ -33,11 +33,19 @@ double DiagonalOf(std::span<const Vec3> positions) {
 
 constexpr double kChords = 5000;  // of an extent, where the chord is `auto`
 
-[[noreturn]] void RefuseChord(double chord_mm, double least_mm) {
-  throw InputError(
-      fmt::format("chord_mm: {} is too fine for these points: surface.ply would have too many "
-                  "triangles; give at least {:.2g}, or auto",
-                  chord_mm, least_mm));
+// To two digits.
+double RoundedUp(double value) {
+  const double digit = std::pow(10, std::floor(std::log10(value)) - 1);
+  return digit * std::ceil(value / digit);
+}
+
+void RefuseBelow(double least_mm, double chord_mm) {
+  if (chord_mm < least_mm) {
+    throw InputError(
+        fmt::format("chord_mm: {} is too fine for these points: surface.ply would have too many "
+                    "triangles; give at least {:.2g}, or auto",
+                    chord_mm, RoundedUp(least_mm)));
+  }
 }
 
 // `chord_mm`, or as much more as keeps the cells, of two triangles each, within a number.
@@ -98,26 +106,20 @@ MeshAttributes AttributesOf(const PointFit& result, std::span<const Vec2> uv, in
 
 }  // namespace
 
-void CheckChord(const AutoOr<double>& chord_mm, std::span<const Vec3> positions) {
-  constexpr double kFinest = 1e-7;
-  const double least = kFinest * DiagonalOf(positions);
-  if (!chord_mm.automatic && chord_mm.value < least) {
-    RefuseChord(chord_mm.value, least);
-  }
-}
-
 void CheckChord(const AutoOr<double>& chord_mm, const HSplineSurface& start,
                 const ScatteredPoints& points, const RunContext& context) {
   constexpr std::size_t kFewest = 16;  // for the auto plan
-  if (chord_mm.automatic || points.size() < kFewest ||
-      chord_mm.value > DiagonalOf(points.positions) / kChords) {
+  constexpr double kFinest = 1e-7;     // of the extent, whatever the surface
+  const double extent_mm = DiagonalOf(points.positions);
+  if (chord_mm.automatic || chord_mm.value > extent_mm / kChords) {
     return;
   }
-  const HSplineSurface rough = RoughSurface(start, points, context);
-  if (const double least_mm = AffordableChord(rough, chord_mm, kMostCells / 4);
-      least_mm > chord_mm.value) {
-    RefuseChord(chord_mm.value, least_mm);
+  double least_mm = std::max(chord_mm.value, kFinest * extent_mm);
+  if (points.size() >= kFewest) {
+    const HSplineSurface rough = RoughSurface(start, points, context);
+    least_mm = AffordableChord(rough, least_mm, kMostCells / 4);
   }
+  RefuseBelow(least_mm, chord_mm.value);
 }
 
 double ChordFor(const HSplineSurface& surface, const AutoOr<double>& chord_mm) {

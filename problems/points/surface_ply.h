@@ -10,11 +10,9 @@
 
 namespace semblance {
 
-// Throws InputError for a chord so fine against the points' extent that no surface could be written
-// with it.
-void CheckChord(const AutoOr<double>& chord_mm, std::span<const Vec3> positions);
-// The same for one finer than `auto` would have it where a rough surface, fitted to some of the
-// points, already needs too many triangles. Before the fit: what could only be refused after it.
+// Throws InputError for a chord so fine that surface.ply would have too many triangles; says which
+// chord would do. Looks only at one finer than `auto` would have it: on a rough surface, fitted to
+// some of the points. Before the fit: what could only be refused after it.
 void CheckChord(const AutoOr<double>& chord_mm, const HSplineSurface& start,
                 const ScatteredPoints& points, const RunContext& context);
 
