@@ -4,12 +4,15 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
 #include <stop_token>
 #include <string>
+#include <system_error>
 #include <utility>
 
 namespace semblance {
@@ -34,6 +37,20 @@ inline CLI::Validator Finite() {
             return CLI::detail::lexical_cast(text, number) && !std::isfinite(number)
                        ? "'" + text + "' is not a finite number"
                        : "";
+          },
+          ""};
+}
+
+// For options that take a whole number from 0 on: CLI11 would read -1 as the largest one, and 010
+// as eight.
+inline CLI::Validator WholeNumber() {
+  return {[](std::string& text) -> std::string {
+            std::uint64_t number = 0;
+            const auto [end, error] =
+                std::from_chars(text.data(), text.data() + text.size(), number);
+            const bool whole = error == std::errc() && end == text.data() + text.size() &&
+                               (number == 0 || text[0] != '0');
+            return whole ? "" : "'" + text + "' is not a whole number from 0 to 2^64 - 1";
           },
           ""};
 }

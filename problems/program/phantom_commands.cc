@@ -100,18 +100,24 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
   command.add_option("--out", a.out, "folder for ct/, landmarks.yaml and true_skin.ply")
       ->required();
   command.add_option("--random-seed,--seed", a.phantom.random_seed, "which head")
+      ->check(WholeNumber())
       ->capture_default_str();
   AddChoice(command, "--bone", "smooth; like_people: with hollows and ridges, and rough",
             a.phantom.bone);
   command.add_option("--pixel-mm", a.ct.pixel_mm, "between columns and rows")
+      ->check(Finite())
       ->check(CLI::Range(0.3, 5.0))
       ->capture_default_str();
   command.add_option("--slice-mm", a.ct.slice_mm, "between slices")
+      ->check(Finite())
       ->check(CLI::Range(0.3, 10.0))
       ->capture_default_str();
-  command.add_option("--lost", a.ct.defect.site,
-                     "the skull lacks its bone around this site; sites there are in no file");
+  CLI::Option* const lost =
+      command.add_option("--lost", a.ct.defect.site,
+                         "the skull lacks its bone around this site; sites there are in no file");
   command.add_option("--lost-radius-mm", a.ct.defect.radius_mm, "how far around it")
+      ->needs(lost)
+      ->check(Finite())
       ->check(CLI::Range(1.0, 60.0))
       ->capture_default_str();
   command.add_option("--volume", a.volume,

@@ -27,6 +27,7 @@ void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options) {
   options.stop = line.stop;
   command
       .add_option("--threads", options.threads, "threads to use; the result does not depend on it")
+      ->check(WholeNumber())
       ->check(CLI::Range(1, 1024));
   command.add_flag("--quiet", options.quiet, "no progress");
 }
