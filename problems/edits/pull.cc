@@ -90,24 +90,26 @@ std::optional<std::array<double, 3>> ToArray(const std::optional<Vec3>& v) {
   return v ? std::optional(std::array{v->x(), v->y(), v->z()}) : std::nullopt;
 }
 
-void AddMoves(const ControlNet& before, const ControlNet& after, EditScript& script) {
+// What vertices of level 0 are moved by in all, of those that moved now.
+std::map<VertexId, std::optional<Vec3>> MovesInAll(const ControlNet& before,
+                                                   const ControlNet& after,
+                                                   const EditScript& script) {
+  std::map<VertexId, std::optional<Vec3>> moves;
   for (int j = 0; j < before.rows; ++j) {
     for (int i = 0; i < before.columns; ++i) {
-      const Vec3 move = after.At(i, j) - before.At(i, j);
-      if (move == Vec3::Zero()) {
-        continue;
-      }
-      const auto said = std::ranges::find_if(script.edits, [i, j](const VertexEdit& edit) {
-        return edit.level == 0 && edit.i == i && edit.j == j;
-      });
-      if (said == script.edits.end()) {
-        script.edits.push_back({0, i, j, ToArray(move)});
-      } else {
-        const auto& had = *said->offset;
-        said->offset = ToArray(Vec3(Vec3(had[0], had[1], had[2]) + move));
+      if (const Vec3 move = after.At(i, j) - before.At(i, j); move != Vec3::Zero()) {
+        moves[{0, i, j}] = move;
       }
     }
   }
+  for (const VertexEdit& edit : script.edits) {
+    const auto found = moves.find({edit.level, edit.i, edit.j});
+    if (found != moves.end() && edit.offset) {
+      const auto& had = *edit.offset;
+      found->second = Vec3(Vec3(had[0], had[1], had[2]) + *found->second);
+    }
+  }
+  return moves;
 }
 
 }  // namespace
@@ -147,9 +149,7 @@ EditScript Pulled(const Pull& pull, const HSplineSurface& face, const EditScript
     MoveBy(shares, pull.by_mm / moved, after);
   }
   if (pull.level == 0) {
-    EditScript next = script;
-    AddMoves(before, after, next);
-    return next;
+    return WithOffsets(script, MovesInAll(before, after, script));
   }
   HSplineSurface pulled = face;
   pulled.SetNet(pull.level, after);

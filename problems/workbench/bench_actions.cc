@@ -118,6 +118,10 @@ BenchState RemarkLandmark(BenchState state, const std::string& site,
   if (depth && !(*depth >= 0.01 && *depth <= 100)) {
     throw InputError(fmt::format("landmarks: a depth of {} mm; give 0.01 to 100", *depth));
   }
+  if (remarks.note.size() > kLongestNote) {
+    throw InputError(fmt::format("landmarks: a note of {} bytes; at most {} are kept",
+                                 remarks.note.size(), kLongestNote));
+  }
   BenchLandmark& landmark = Placed(state, site);
   landmark.certainty = remarks.certainty;
   landmark.note = remarks.note;

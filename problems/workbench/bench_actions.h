@@ -3,6 +3,7 @@
 // else. Throws InputError for what cannot be meant; the old state is a value and stays.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -25,9 +26,10 @@ BenchState RenameLandmark(BenchState state, const std::string& site, const std::
 BenchState CallAbsent(BenchState state, const std::string& site, const std::string& reason);
 
 // What the observer knows beside the place. depth: measured along the normal; none: not measured.
+inline constexpr std::size_t kLongestNote = 4000;
 struct LandmarkRemarks {
   Certainty certainty = Certainty::kMedium;
-  std::string note = {};
+  std::string note = {};  // at most kLongestNote bytes
   std::optional<double> depth_along_normal_mm = {};
 };
 BenchState RemarkLandmark(BenchState state, const std::string& site,

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "problems/config/config_limits.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/workbench/bench_assets.h"
@@ -107,7 +108,14 @@ BenchHistory BenchFolder::Read() const {
 
 void BenchFolder::Write(const BenchHistory& history, const Experiment& experiment) const {
   const BenchState& state = Now(history);
-  WriteFileAtomically(root_ / kHistory, HistoryText(history));
+  const std::string text = HistoryText(history);
+  if (text.size() > kLargestConfig_bytes) {
+    throw InputError(
+        fmt::format("{}: the work and its last {} steps would take {} MB, more than could be read "
+                    "again; shorten the notes",
+                    kHistory, history.steps.size(), text.size() / 1'000'000));
+  }
+  WriteFileAtomically(root_ / kHistory, text);
   WriteOrRemove(root_ / "landmarks.yaml", LandmarksText(state));
   WriteOrRemove(root_ / "edits.yaml", EditsText(state));
   WriteOrRemove(root_ / "config.yaml", ShortConfig(experiment, root_));

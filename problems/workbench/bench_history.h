@@ -20,25 +20,6 @@ struct BenchHistory {
   int now = 0;                   // the step that counts; those after it can be done again
 };
 
-template <class Visitor>
-void Fields(Visitor& visit, BenchStep& o) {
-  visit(FieldInfo{.name = "what", .doc = "what led here"}, o.what);
-  visit(FieldInfo{.name = "state", .doc = "after it"}, o.state);
-}
-
-template <class Visitor>
-void Fields(Visitor& visit, BenchHistory& o) {
-  visit(FieldInfo{.name = "now", .min = 0, .max = 100000, .doc = "the step that counts"}, o.now);
-  visit(FieldInfo{.name = "steps", .min = 1, .doc = "oldest first"}, o.steps);
-}
-
-template <class Report>
-void CheckValue(Report& report, const BenchHistory& history) {
-  if (history.now >= static_cast<int>(history.steps.size())) {
-    report("now", "is beyond the last step");
-  }
-}
-
 inline constexpr int kMostSteps = 100;  // older ones are forgotten
 
 inline const BenchState& Now(const BenchHistory& history) {
@@ -55,7 +36,8 @@ bool CanRedo(const BenchHistory& history);
 BenchHistory Undone(BenchHistory history);  // as it is where there is nothing to undo
 BenchHistory Redone(BenchHistory history);
 
-// As YAML, and back. Throws ConfigError for a text that is none.
+// As YAML, and back: of each step but the first, the edits are what differs from the step before.
+// Throws ConfigError for a text that is none.
 std::string HistoryText(const BenchHistory& history);
 BenchHistory HistoryFromText(std::string_view text, const std::string& name);
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "problems/config/config.h"
 #include "problems/workbench/bench_history.h"
 #include "surfaces/base/error.h"
 
@@ -126,6 +127,47 @@ TEST(BenchHistory, OldStepsAreForgotten) {
   }
   EXPECT_THAT(history.steps, SizeIs(kMostSteps));
   EXPECT_EQ(Now(history).landmarks[0].point[0], 3 * kMostSteps - 1);
+}
+
+// Each step once held all edits: a hundred pulls took more than a configuration may have.
+TEST(BenchHistory, AHundredPullsAreShortAndComeBack) {
+  BenchHistory history = BeginHistory(WithGlabella());
+  EditScript edits;
+  std::size_t in_all = 0;
+  for (int k = 0; k < kMostSteps + 20; ++k) {
+    if (k % 10 == 9) {
+      VertexEdit changed = edits.edits[1];
+      changed.offset = std::array{0.5, 0.25, double(k)};
+      edits.edits.erase(edits.edits.begin(), edits.edits.begin() + 2);
+      edits.edits.push_back(changed);
+    }
+    for (int i = 0; i < 20; ++i) {
+      edits.edits.push_back({2, k, i, std::array{0.1 * k, 1.0 / (1 + i), 0.3}});
+    }
+    in_all += edits.edits.size();
+    history = Done(history, "pulled", TakeEdits(Now(history), edits));
+  }
+  const std::string text = HistoryText(history);
+  EXPECT_LT(text.size(), 5 * in_all) << "bytes; written whole an edit takes some sixty";
+  const BenchHistory again = HistoryFromText(text, "history");
+  EXPECT_EQ(HistoryText(again), text);
+  for (std::size_t k = 0; k < history.steps.size(); k += 11) {
+    EXPECT_EQ(WriteConfig(again.steps[k].state), WriteConfig(history.steps[k].state)) << k;
+  }
+}
+
+// As the first workbenches wrote it.
+TEST(BenchHistory, StepsThatHoldAllTheirEditsAreRead) {
+  const BenchHistory history = HistoryFromText(
+      "now: 1\nsteps:\n  - {what: began}\n"
+      "  - {what: pulled, state: {edits: {edits: [{level: 1, i: 2, j: 3, offset: [1, 2, 3]}]}}}\n",
+      "history");
+  EXPECT_THAT(Now(history).edits.edits, SizeIs(1));
+}
+
+TEST(BenchActions, ALongNoteIsRefused) {
+  EXPECT_THROW(RemarkLandmark(WithGlabella(), "g", {.note = std::string(kLongestNote + 1, 'x')}),
+               InputError);
 }
 
 TEST(BenchHistory, ItsTextGivesItBack) {
