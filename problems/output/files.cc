@@ -101,4 +101,10 @@ void OutputFolder::Write(std::string_view name, std::string_view bytes, Durabili
   written_.emplace_back(name);
 }
 
+std::string PlainName(const std::filesystem::path& path) {
+  const std::filesystem::path plain = std::filesystem::absolute(path / "").lexically_normal();
+  const std::string name = plain.parent_path().filename().string();
+  return name.substr(0, name.find('.', 1));
+}
+
 }  // namespace semblance

@@ -45,4 +45,7 @@ class OutputFolder {
   std::filesystem::path root_;
 };
 
+// Of a file or folder without its endings: `head` of head.nii.gz, head.ply and head/.
+std::string PlainName(const std::filesystem::path& path);
+
 }  // namespace semblance

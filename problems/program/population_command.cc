@@ -79,8 +79,7 @@ int PopulationCommand(const PopulationArguments& a) {
   if (a.list) {
     return PrintPlan(plan);
   }
-  const std::string name =
-      fs::absolute(fs::path(a.path) / "").lexically_normal().parent_path().stem().string();
+  const std::string name = PlainName(a.path);
   const fs::path root = a.out.empty() ? fs::path("out") / name : fs::path(a.out);
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   GatherSubjects(plan, root, {a.from.begin(), a.from.end()});

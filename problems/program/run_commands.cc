@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/program/run_commands.h"
+#include "problems/output/files.h"
 
 #include <fmt/format.h>
 
@@ -279,13 +280,6 @@ int OptionsCommand(const Arguments& arguments) {
   return kDone;
 }
 
-// The name of a folder or file without its endings.
-std::string VolumeName(const std::filesystem::path& path) {
-  const std::filesystem::path plain = std::filesystem::absolute(path / "").lexically_normal();
-  const std::string name = plain.parent_path().filename().string();
-  return name.substr(0, name.find('.', 1));
-}
-
 void PrintNotes(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) {
     fmt::print("note: {}\n", note);
@@ -336,7 +330,7 @@ int ImportCtCommand(const Arguments& arguments) {
     throw InputError("--skin-value is for an MR; the skin of a CT is at --skin-hu");
   }
   PrintNotes(reading.notes);
-  StagedFolder folder = FolderOf(arguments, "out/" + VolumeName(path));
+  StagedFolder folder = FolderOf(arguments, "out/" + PlainName(path));
   Import(arguments, reading, mr, folder.Files(), context);
   folder.Publish();
   const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();
@@ -429,6 +423,7 @@ void DeclareImportCt(CLI::App& command, CommandLine& line) {
   command
       .add_option("--skin-value", a.mr.skin_value,
                   "of an MR: grey value of the skin's surface; 0 finds it by Otsu's method")
+      ->check(Finite())
       ->check(CLI::Range(0.0, 32767.0))
       ->capture_default_str();
   command.add_option("--bone-hu", a.ct.bone_hu, "Hounsfield value of the skull's surface")

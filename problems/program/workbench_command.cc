@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/program/workbench_command.h"
+#include "problems/output/files.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -46,7 +47,7 @@ BenchOptions BenchOptionsOf(const WorkbenchArguments& a) {
     return options;
   }
   options.source = a.source;
-  const std::string name = a.source.empty() ? "workbench" : fs::path(a.source).stem().string();
+  const std::string name = a.source.empty() ? "workbench" : PlainName(a.source);
   options.folder = a.out.empty() ? "out/" + name + "_workbench" : a.out;
   if (!a.source.empty() && !fs::exists(a.source)) {
     throw IoError(fmt::format("{}: no such file or folder", a.source));

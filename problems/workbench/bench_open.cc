@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/workbench/bench_open.h"
+#include "problems/output/files.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -321,14 +322,9 @@ const FileSubject& FilesOf(const OpenBase& base) {
   return std::get<FileSubject>(base.experiment.subject);
 }
 
-std::string StemOf(const fs::path& path) {
-  const std::string stem = path.stem().string();
-  return stem.ends_with(".nii") ? stem.substr(0, stem.size() - 4) : stem;
-}
-
 // Slices that were sent by themselves have no name together.
 std::string NameOfVolume(const fs::path& path, const fs::path& root) {
-  return BatchOf(root, path) == path ? "volume" : StemOf(path);
+  return BatchOf(root, path) == path ? "volume" : PlainName(path);
 }
 
 Opened OpenSkinOf(const OpenRequest& request, const fs::path& path, const OpenBase& base,
@@ -352,7 +348,7 @@ Opened OpenMesh(const OpenRequest& request, const fs::path& path, const OpenBase
     FileSubject files;
     files.skull = file;
     return {.what = {},
-            .state = WithHead(base.state, files, StemOf(path), base.folder.Root()),
+            .state = WithHead(base.state, files, PlainName(path), base.folder.Root()),
             .notes = {}};
   }
   return {.what = {},
@@ -389,7 +385,7 @@ Opened OpenConfig(const OpenRequest& request, const fs::path& path, const OpenBa
     experiment.edits.clear();
     opened.state.settings.clear();
   } else {
-    BenchBeginning beginning = BeginFromConfig(file, added.NewPath(StemOf(path)), context);
+    BenchBeginning beginning = BeginFromConfig(file, added.NewPath(PlainName(path)), context);
     experiment = std::move(beginning.experiment);
     opened.state = std::move(beginning.state);
     opened.notes = std::move(beginning.notes);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/workbench/bench_subject.h"
+#include "problems/output/files.h"
 
 #include <fmt/format.h>
 
@@ -163,7 +164,7 @@ BenchBeginning BeginFromConfig(const fs::path& config, const fs::path& meshes,
   experiment.subject =
       SubjectAsFiles(experiment.subject, meshes, beginning.state, context, beginning.notes);
   if (beginning.state.subject.empty()) {
-    beginning.state.subject = config.stem().string();
+    beginning.state.subject = PlainName(config);
   }
   return beginning;
 }
@@ -195,7 +196,7 @@ BenchBeginning BeginBench(const fs::path& source, const fs::path& folder,
   BenchBeginning beginning{.experiment = UsualExperiment(folder), .state = {}, .notes = {}};
   beginning.experiment.subject =
       SubjectAsFiles(SubjectIn(source), meshes, beginning.state, context, beginning.notes);
-  beginning.state.subject = source.empty() ? "subject" : source.stem().string();
+  beginning.state.subject = source.empty() ? "subject" : PlainName(source);
   return beginning;
 }
 
