@@ -59,17 +59,6 @@ std::vector<ReferenceHead> ReadReferences(const BenchOptions& options) {
   return heads;
 }
 
-// In the frame of the mesh that was looked at.
-LandmarkFile InMeshFrame(LandmarkFile file) {
-  for (Landmark& l : file.landmarks) {
-    if (file.axes == "RAS") {
-      l.point = {-l.point[0], -l.point[1], l.point[2]};
-    }
-  }
-  file.axes = "LPS";
-  return file;
-}
-
 // All that a face depends on, edits apart.
 std::string KeyOfRun(Experiment experiment, const BenchState& state, const fs::path& folder) {
   experiment.edits.clear();
@@ -450,25 +439,42 @@ void Bench::MakeVariant(BenchVariant variant, int revision, const RunContext& co
   variants_.insert_or_assign(variant, made);
 }
 
-void Bench::StartVariants(const std::vector<BenchVariant>& variants) {
+// In place of what runs. That is waited for without the lock, which its last step may need; and
+// nobody else starts anything meanwhile.
+void Bench::StartJob(const std::string& name, const std::function<Work()>& prepare) {
+  const Lock starting(starting_);
   job_.Stop();
   const Lock lock(mutex_);
+  job_.Start(name, options_.threads, prepare());
+}
+
+void Bench::CheckSkull() const {
   if (!subject_->bone) {
     throw InputError("there is no skull yet; open one first");
   }
-  job_.Start("variants", options_.threads,
-             [this, variants, revision = revision_](const RunContext& context) {
-               for (std::size_t k = 0; k < variants.size(); ++k) {
-                 RunContext inner = context;
-                 inner.on_event = [&, k](Event event) {
-                   event.step = fmt::format("{} ({} of {}), {}", NameOf(variants[k]), k + 1,
-                                            variants.size(), event.step);
-                   context.on_event(event);
-                 };
-                 MakeVariant(variants[k], revision, inner);
-               }
-               return std::string("done");
-             });
+}
+
+std::string Bench::MakeVariants(const std::vector<BenchVariant>& variants, int revision,
+                                const RunContext& context) {
+  for (std::size_t k = 0; k < variants.size(); ++k) {
+    RunContext inner = context;
+    inner.on_event = [&, k](Event event) {
+      event.step =
+          fmt::format("{} ({} of {}), {}", NameOf(variants[k]), k + 1, variants.size(), event.step);
+      context.on_event(event);
+    };
+    MakeVariant(variants[k], revision, inner);
+  }
+  return "done";
+}
+
+void Bench::StartVariants(const std::vector<BenchVariant>& variants) {
+  StartJob("variants", [&] {
+    CheckSkull();
+    return [this, variants, revision = revision_](const RunContext& context) {
+      return MakeVariants(variants, revision, context);
+    };
+  });
 }
 
 RunFace Bench::FinishRun(const Experiment& experiment, const RunContext& context, int revision) {
@@ -500,22 +506,23 @@ void Bench::CancelJob() {
 }
 
 void Bench::StartRun() {
-  job_.Stop();  // before the lock, which its last step may wait for
-  const Lock lock(mutex_);
-  const Experiment experiment = folder_.ExperimentAsSaved();
-  const int revision = revision_;
-  job_.Start("run", options_.threads, [this, experiment, revision](const RunContext& context) {
-    FinishRun(experiment, context, revision);
-    return std::string("done");
+  StartJob("run", [&] {
+    return [this, experiment = folder_.ExperimentAsSaved(),
+            revision = revision_](const RunContext& context) {
+      FinishRun(experiment, context, revision);
+      return std::string("done");
+    };
   });
 }
 
 std::string Bench::Propose(const RunContext& context) {
   std::shared_ptr<const BenchSubject> subject;
+  std::string name;
   int revision = 0;
   {
     const Lock lock(mutex_);
     subject = subject_;
+    name = Now(history_).subject;
     revision = revision_;
   }
   std::vector<ReferenceHead> made_up;
@@ -525,7 +532,8 @@ std::string Bench::Propose(const RunContext& context) {
   }
   const Proposal proposal = ProposeLandmarks(subject->skull.mesh, "the skull",
                                              references_.empty() ? made_up : references_, context);
-  const LandmarkFile file = InMeshFrame(ProposalFile(proposal, Now(history_).subject));
+  LandmarkFile file = ProposalFile(proposal, name);
+  file.axes = "LPS";  // the points are where they were seen, on the mesh as it stands here
   const Lock lock(mutex_);
   if (revision != revision_) {
     throw Cancelled();
@@ -566,20 +574,16 @@ std::string Bench::Open(const OpenRequest& request, const RunContext& context) {
 }
 
 void Bench::StartOpening(const OpenRequest& request) {
-  job_.Stop();
-  const Lock lock(mutex_);
-  job_.Start("open", options_.threads,
-             [this, request](const RunContext& context) { return Open(request, context); });
+  StartJob("open", [&] {
+    return [this, request](const RunContext& context) { return Open(request, context); };
+  });
 }
 
 void Bench::StartProposal() {
-  job_.Stop();
-  const Lock lock(mutex_);
-  if (!subject_->bone) {
-    throw InputError("there is no skull yet; open one first");
-  }
-  job_.Start("propose", options_.threads,
-             [this](const RunContext& context) { return Propose(context); });
+  StartJob("propose", [&] {
+    CheckSkull();
+    return [this](const RunContext& context) { return Propose(context); };
+  });
 }
 
 }  // namespace semblance

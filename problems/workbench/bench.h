@@ -112,6 +112,10 @@ class Bench {
   void CancelJob();
 
  private:
+  using Work = std::function<std::string(const RunContext&)>;
+
+  void StartJob(const std::string& name, const std::function<Work()>& prepare);
+  void CheckSkull() const;
   void Take(BenchHistory history, bool keeps_run = false);
   void LoadSubjectOf(const Experiment& experiment, const RunContext& context);
   void FindFormerRun();
@@ -122,6 +126,8 @@ class Bench {
   bool HasVariant(BenchVariant variant) const;
   std::optional<BenchFace> FaceAsIs(BenchVariant variant) const;
   void MakeVariant(BenchVariant variant, int revision, const RunContext& context);
+  std::string MakeVariants(const std::vector<BenchVariant>& variants, int revision,
+                           const RunContext& context);
   std::string Propose(const RunContext& context);
   std::string Open(const OpenRequest& request, const RunContext& context);
   BenchFace CoarseOf(const BenchSubject& subject, const Experiment& experiment,
@@ -130,7 +136,8 @@ class Bench {
   HSplineSurface Edited(const RunFace& face) const;
   RunContext Context() const;
 
-  mutable std::mutex mutex_;
+  std::mutex starting_;       // held by who starts a job, before mutex_
+  mutable std::mutex mutex_;  // of all below
   BenchOptions options_;
   std::vector<ReferenceHead> references_;  // of the options
   BenchFolder folder_;

@@ -20,6 +20,7 @@
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -180,6 +181,46 @@ TEST_F(WorkbenchBench, AChangeDuringARunIsNotMixedIntoIt) {
   EXPECT_EQ(bench.Look().job.state, JobState::kStopped);
   EXPECT_FALSE(bench.Look().has_face);
   EXPECT_FALSE(fs::exists(bench.Folder() / "run/manifest.json"));
+}
+
+// As two pages do that ask at the same moment.
+TEST_F(WorkbenchBench, ManyMayStartAJobAtOnce) {
+  Bench bench(Options());
+  for (int round = 0; round < 2; ++round) {
+    std::vector<std::jthread> pages;
+    for (int k = 0; k < 3; ++k) {
+      pages.emplace_back([&bench] { bench.StartRun(); });
+      pages.emplace_back([&bench] { bench.StartVariants({BenchVariant::kThinner}); });
+    }
+  }
+  RunToTheEnd(bench);
+  EXPECT_TRUE(bench.Look().has_face);
+}
+
+TEST_F(WorkbenchBench, ProposalsLieOnABoneThatIsInRasToo) {
+  const Phantom phantom = MakePhantom({.random_seed = 3, .rings = 40});
+  TriMesh skull = phantom.skull;
+  for (Vec3& p : skull.points) {
+    p = Vec3(-p.x(), -p.y(), p.z());
+  }
+  WriteFileAtomically(folder_ / "ras.ply", EncodeMesh(skull, ".ply"));
+  BenchOptions options;
+  options.source = folder_ / "ras.ply";
+  options.folder = folder_ / "bench";
+  Bench bench(options);
+  bench.StartProposal();
+  AwaitEnd(bench);
+  const auto farthest = [&bench] {
+    double most_mm = 0;
+    for (const auto& [site, check] : bench.Look().checks.sites) {
+      most_mm = std::max(most_mm, check.from_bone_mm);
+    }
+    return most_mm;
+  };
+  EXPECT_THAT(bench.Look().job.words, HasSubstr("set its axes to RAS"));
+  EXPECT_LT(farthest(), 3);
+  bench.CorrectFrame("subject.axes", "\"RAS\"");
+  EXPECT_LT(farthest(), 3);
 }
 
 TEST_F(WorkbenchBench, ACoarseFaceFollowsADepth) {
