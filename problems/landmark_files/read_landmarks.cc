@@ -123,6 +123,13 @@ void FindRepeats(const LandmarkFile& file, std::vector<std::string>& faults) {
 
 std::string_view WordOf(Axes axes) { return EnumNames(axes)[static_cast<std::size_t>(axes)]; }
 
+// Where the axes of a file of that kind can be set right.
+std::string_view RemedyForAxes(const Format& format) {
+  return format.parse != nullptr
+             ? "leave the axes out"
+             : "leave the axes out, or correct `axes` in the file (LPS where it has none)";
+}
+
 void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, LandmarkFile& file,
                 Notes& notes) {
   if (file.axes.empty() && !options.axes) {
@@ -131,8 +138,8 @@ void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, Landm
   }
   const std::string said(options.axes ? WordOf(*options.axes) : "");
   if (!file.axes.empty() && !said.empty() && file.axes != said) {
-    throw InputError(fmt::format("{}: the file says {}, and {} was asked for; leave the axes out",
-                                 path.string(), file.axes, said));
+    throw InputError(fmt::format("{}: the file says {}, and {} was asked for; {}", path.string(),
+                                 file.axes, said, RemedyForAxes(FormatOf(path))));
   }
   if (file.axes.empty()) {
     file.axes = said.empty() ? "LPS" : said;
@@ -143,14 +150,7 @@ void TurnToLps(const fs::path& path, LandmarkFile& file, Notes& notes) {
   if (file.axes == "LPS") {
     return;
   }
-  const auto turn = [](std::array<double, 3>& v) { v = {-v[0], -v[1], v[2]}; };
-  for (Landmark& landmark : file.landmarks) {
-    turn(landmark.point);
-    if (landmark.normal) {
-      turn(*landmark.normal);
-    }
-  }
-  file.axes = "LPS";
+  file = InLpsMm(std::move(file));
   notes.push_back(
       fmt::format("{}: turned from RAS to LPS (x and y negated)", path.filename().string()));
 }
@@ -198,9 +198,10 @@ LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& 
   if (format.parse != nullptr) {
     return ReadForeign(path, format, options);
   }
-  LandmarkReading reading{.file = ReadLandmarkFile(path), .notes = {}};
-  CheckReach(path, reading.file);
+  LandmarkReading reading{.file = ReadLandmarkFileAsWritten(path), .notes = {}};
   ChooseAxes(path, options, reading.file, reading.notes);
+  reading.file = InLpsMm(std::move(reading.file));
+  CheckReach(path, reading.file);
   if (reading.file.proposed) {
     reading.notes.push_back(fmt::format(
         "{}: these landmarks are a proposal that no person has confirmed; look at each on the "

@@ -166,7 +166,14 @@ void CheckValue(Report& report, const LandmarkFile& file) {
 }
 
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path) {
-  auto file = ReadConfig<LandmarkFile>(path);
+  return InLpsMm(ReadLandmarkFileAsWritten(path));
+}
+
+LandmarkFile ReadLandmarkFileAsWritten(const std::filesystem::path& path) {
+  return ReadConfig<LandmarkFile>(path);
+}
+
+LandmarkFile InLpsMm(LandmarkFile file) {
   const Axes axes = *Named<Axes>(file.axes);
   const LengthUnit unit = *Named<LengthUnit>(file.units);
   for (Landmark& landmark : file.landmarks) {

@@ -173,6 +173,12 @@ UsedLandmarks LandmarksInUse(const LandmarkFile& file, const MeshQuery& skull,
 // absent), a point lacks, or a normal is not of length 1 within 1 %.
 LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
 
+// The same in the units and axes that the file says.
+LandmarkFile ReadLandmarkFileAsWritten(const std::filesystem::path& path);
+
+// With points and normals in mm and LPS. Units and axes must be words of their enums.
+LandmarkFile InLpsMm(LandmarkFile file);
+
 // One dowel per landmark, in the file's order, its depth still NaN. The base is the skull's point
 // nearest to the landmark; the direction the landmark's normal, else the area-weighted normal of
 // the skull within the radius: of the bone that is connected with the base there and faces within

@@ -123,6 +123,19 @@ TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {
               HasSubstr("the file says LPS, and RAS was asked for"));
 }
 
+TEST_F(LandmarkReadingTest, AxesThatAreAskedForMustBeThoseThatYamlSays) {
+  const std::string ras = "axes: RAS\nlandmarks: [{site: g, point: [1, 2, 3]}]\n";
+  EXPECT_EQ(Read("a.yaml", ras, {.axes = Axes::kRas}).file.landmarks.at(0).point,
+            (std::array{-1.0, -2.0, 3.0}));
+  EXPECT_THAT(Fault("a.yaml", ras, {.axes = Axes::kLps}),
+              HasSubstr("the file says RAS, and LPS was asked for"));
+  const std::string silent = "landmarks: [{site: g, point: [1, 2, 3]}]\n";
+  EXPECT_EQ(Read("a.yaml", silent, {.axes = Axes::kLps}).file.landmarks.at(0).point,
+            (std::array{1.0, 2.0, 3.0}));
+  EXPECT_THAT(Fault("a.yaml", silent, {.axes = Axes::kRas}),
+              HasSubstr("correct `axes` in the file (LPS where it has none)"));
+}
+
 TEST_F(LandmarkReadingTest, WhatIsNoMarkupFileIsNamed) {
   for (const char* text : {"", "{\"markups\": [", "{}", "[]", "{\"markups\": [3]}",
                            "{\"markups\": [{\"coordinateSystem\": \"LPS\"}]}"}) {
