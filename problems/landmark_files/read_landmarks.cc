@@ -212,7 +212,12 @@ LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& 
 }
 
 std::string EncodeLandmarks(const LandmarkFile& file, const fs::path& path) {
-  return FormatOf(path).encode(file);
+  const Format& format = FormatOf(path);
+  return format.encode(format.parse == nullptr ? file : InLpsMm(file));
+}
+
+std::string AxesIn(const LandmarkFile& file, const fs::path& path) {
+  return FormatOf(path).parse == nullptr ? file.axes : "LPS";
 }
 
 std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) {
@@ -236,6 +241,10 @@ std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) 
   }
   if (format.parse != nullptr && file.proposed) {
     lost.emplace_back("that they are a proposal");
+  }
+  if (AxesIn(file, path) != file.axes) {
+    lost.push_back(fmt::format(
+        "the axes {}; points and normals are turned to LPS (x and y negated)", file.axes));
   }
   return lost;
 }

@@ -30,8 +30,12 @@ struct LandmarkReading {
 LandmarkReading ReadLandmarks(const std::filesystem::path& path,
                               const ReadLandmarksOptions& options = {});
 
-// The bytes of a file of that kind. Throws InputError for an extension that is none of those above.
+// The bytes of a file of that kind; all but YAML are in mm and LPS, whatever `file` is in. Throws
+// InputError for an extension that is none of those above.
 std::string EncodeLandmarks(const LandmarkFile& file, const std::filesystem::path& path);
+
+// The axes of those bytes: "LPS" or "RAS".
+std::string AxesIn(const LandmarkFile& file, const std::filesystem::path& path);
 
 // What `file` holds that a file of that kind has no place for, a line each; empty if all goes in.
 std::vector<std::string> LostIn(const LandmarkFile& file, const std::filesystem::path& path);

@@ -123,13 +123,8 @@ std::vector<ReferenceHead> ReferencesOf(const ProposeArguments& a) {
   return heads;
 }
 
-void TellDifferences(const ProposeArguments& a, LandmarkFile file) {
-  if (file.axes == "RAS") {
-    for (Landmark& l : file.landmarks) {
-      l.point = {-l.point[0], -l.point[1], l.point[2]};
-    }
-  }
-  fmt::print("{}", TextOf(CompareProposal(file, ReadLandmarks(a.compare).file)));
+void TellDifferences(const ProposeArguments& a, const LandmarkFile& file) {
+  fmt::print("{}", TextOf(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
 }
 
 void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
@@ -141,9 +136,9 @@ void WriteProposal(const ProposeArguments& a, const std::string& out, const Land
   CheckFree(out, a.force);
   WriteFileAtomically(out, bytes);
   fmt::print(
-      "{}: {} sites proposed, {} absent. Look at each on the skull and correct it; then set "
-      "`proposed: false`\n",
-      out, file.landmarks.size(), file.absent.size());
+      "{}: {} sites proposed, {} absent, mm, {}. Look at each on the skull and correct it; then "
+      "set `proposed: false`\n",
+      out, file.landmarks.size(), file.absent.size(), AxesIn(file, out));
 }
 
 int Propose(const ProposeArguments& a) {

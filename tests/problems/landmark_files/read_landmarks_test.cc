@@ -90,6 +90,28 @@ INSTANTIATE_TEST_SUITE_P(, EveryKind,
                            return name;
                          });
 
+// Only YAML can say RAS; all others say LPS, or nothing, which is taken as LPS.
+TEST_P(EveryKind, HoldsTheSamePointsWhateverTheAxes) {
+  const LandmarkFile lps = SampleFile();
+  LandmarkFile ras = lps;
+  ras.axes = "RAS";
+  for (Landmark& l : ras.landmarks) {
+    l.point = {-l.point[0], -l.point[1], l.point[2]};
+    l.normal = {-(*l.normal)[0], -(*l.normal)[1], (*l.normal)[2]};
+  }
+  const std::string name = fmt::format("sample{}", GetParam());
+  const LandmarkReading back = Read(name, EncodeLandmarks(ras, name));
+  for (std::size_t k = 0; k < lps.landmarks.size(); ++k) {
+    EXPECT_EQ(back.file.landmarks.at(k).point, lps.landmarks[k].point);
+    if (back.file.landmarks[k].normal) {
+      EXPECT_EQ(back.file.landmarks[k].normal, lps.landmarks[k].normal);
+    }
+  }
+  const bool says_ras = AxesIn(ras, name) == "RAS";
+  EXPECT_EQ(says_ras, name.ends_with(".yaml") || name.ends_with(".yml"));
+  EXPECT_EQ(says_ras, LostIn(ras, name) == LostIn(lps, name));
+}
+
 TEST_F(LandmarkReadingTest, SaysWhatAFileHasNoPlaceFor) {
   LandmarkFile file = SampleFile();
   EXPECT_THAT(LostIn(file, "a.csv"), IsEmpty());
@@ -99,6 +121,8 @@ TEST_F(LandmarkReadingTest, SaysWhatAFileHasNoPlaceFor) {
   file.absent.push_back({"g", "gone"});
   EXPECT_THAT(LostIn(file, "a.csv"), ElementsAre(HasSubstr("1 sites")));
   EXPECT_THAT(LostIn(file, "a.yaml"), IsEmpty());
+  file.axes = "RAS";
+  EXPECT_THAT(LostIn(file, "a.pp"), ::testing::Contains(HasSubstr("turned to LPS")));
 }
 
 TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {

@@ -61,5 +61,26 @@ TEST_F(LandmarkCommands, AProposalSaysThatItIsOneAndReplacesNothingUnasked) {
   EXPECT_THAT(again.err, HasSubstr("it exists"));
 }
 
+TEST_F(LandmarkCommands, AProposalOnARasSkullIsTurnedWhereTheFileCannotSayRas) {
+  TriMesh skull = MakePhantom({.random_seed = 4, .rings = 40}).skull;
+  for (Vec3& p : skull.points) {
+    p = ToLps(p, Axes::kRas);
+  }
+  WriteFileAtomically(folder_ / "ras.ply", EncodeMesh(skull, ".ply"));
+  const testing::Outcome yaml =
+      testing::CallProgram(folder_, "landmarks propose ras.ply --quiet --out ras.yaml");
+  EXPECT_THAT(yaml.out, HasSubstr("mm, RAS"));
+  const testing::Outcome slicer =
+      testing::CallProgram(folder_, "landmarks propose ras.ply --quiet --out ras.mrk.json");
+  EXPECT_THAT(slicer.out, HasSubstr("mm, LPS"));
+  EXPECT_THAT(slicer.err, HasSubstr("turned to LPS"));
+  const LandmarkFile a = ReadLandmarks(folder_ / "ras.yaml").file;
+  const LandmarkFile b = ReadLandmarks(folder_ / "ras.mrk.json").file;
+  ASSERT_EQ(a.landmarks.size(), b.landmarks.size());
+  for (std::size_t k = 0; k < a.landmarks.size(); ++k) {
+    EXPECT_EQ(a.landmarks[k].point, b.landmarks[k].point) << a.landmarks[k].site;
+  }
+}
+
 }  // namespace
 }  // namespace semblance
