@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -48,14 +48,41 @@ void RequireMillimetres(const Json& markup) {
   }
 }
 
+bool IsPosition(const Json& row) {
+  return row.is_array() && row.size() == 3 &&
+         std::ranges::all_of(row, [](const Json& x) { return x.is_number(); }) &&
+         json_parts::VecFromJson(row, 0).allFinite();
+}
+
 std::array<double, 3> PositionOf(const Json& point) {
-  const Json& row = json_parts::ListFromJson(point, "position");
-  json_parts::RequireSize(row, 3);
-  const Vec3 p = json_parts::VecFromJson(row, 0);
-  if (!p.allFinite()) {
-    throw IoError("a position is not finite");
+  const auto row = point.find("position");
+  if (row == point.end() || !IsPosition(*row)) {
+    throw IoError(fmt::format(
+        "'position' is {}; it must be [x, y, z], finite numbers; place the point in Slicer, or "
+        "mark it as missing there",
+        row == point.end() ? "not there" : row->dump()));
   }
+  const Vec3 p = json_parts::VecFromJson(*row, 0);
   return {p.x(), p.y(), p.z()};
+}
+
+// Why a point has no place, by Slicer's four words; "" where it has one.
+std::string ReasonOfAbsence(const Json& point) {
+  const std::string status = TextOf(point, "positionStatus", "defined");
+  if (status == "defined") {
+    return "";
+  }
+  if (status == "undefined") {
+    return "not placed";
+  }
+  if (status == "missing") {
+    return "marked as missing in Slicer";
+  }
+  if (status == "preview") {
+    return "not placed, only previewed in Slicer";
+  }
+  throw IoError(fmt::format(
+      "'positionStatus' is '{}'; it must be defined, undefined, missing or preview", status));
 }
 
 void AddPoint(const Json& point, LandmarkFile& file) {
@@ -64,13 +91,32 @@ void AddPoint(const Json& point, LandmarkFile& file) {
   }
   Landmark landmark;
   landmark.site = TextOf(point, "label", "");
-  if (TextOf(point, "positionStatus", "defined") == "undefined") {
-    file.absent.push_back({landmark.site, "not placed"});
+  if (const std::string reason = ReasonOfAbsence(point); !reason.empty()) {
+    file.absent.push_back({landmark.site, reason});
     return;
   }
   landmark.point = PositionOf(point);
   landmark.note = TextOf(point, "description", "");
   file.landmarks.push_back(landmark);
+}
+
+// "point 3 'nasion'", from 1.
+std::string NameOf(const Json& point, std::size_t number) {
+  const bool has_label = point.is_object() && point.contains("label") && point["label"].is_string();
+  return has_label ? fmt::format("point {} '{}'", number, point["label"].get<std::string>())
+                   : fmt::format("point {}", number);
+}
+
+void AddPoints(const Json& markup, LandmarkFile& file) {
+  std::size_t number = 0;
+  for (const Json& point : json_parts::ListFromJson(markup, "controlPoints")) {
+    ++number;
+    try {
+      AddPoint(point, file);
+    } catch (const IoError& error) {
+      throw IoError(fmt::format("{}: {}", NameOf(point, number), error.what()));
+    }
+  }
 }
 
 LandmarkFile FromJson(const Json& json) {
@@ -82,9 +128,7 @@ LandmarkFile FromJson(const Json& json) {
     }
     file.axes = axes;
     RequireMillimetres(markup);
-    for (const Json& point : json_parts::ListFromJson(markup, "controlPoints")) {
-      AddPoint(point, file);
-    }
+    AddPoints(markup, file);
   }
   return file;
 }

@@ -147,6 +147,37 @@ TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {
               HasSubstr("the file says LPS, and RAS was asked for"));
 }
 
+// Of Slicer's words for a point only "defined" means that it is placed; it writes "" as the
+// position of a point that has none, and leaves a missing one the position that it had.
+TEST_F(LandmarkReadingTest, SlicersPointsThatAreNotPlacedAreAbsent) {
+  const auto markups = [](const std::string& point) {
+    return fmt::format(
+        R"({{"markups": [{{"coordinateSystem": "LPS", "controlPoints": [
+            {{"label": "n", "position": [1, 2, 3]}}, {{"label": "g", {}}}]}}]}})",
+        point);
+  };
+  for (const char* status : {"undefined", "missing", "preview"}) {
+    for (const char* position : {R"("")", "[4, 5, 6]", "[]"}) {
+      const LandmarkFile file =
+          Read("a.mrk.json",
+               markups(fmt::format(R"("position": {}, "positionStatus": "{}")", position, status)))
+              .file;
+      ASSERT_EQ(file.landmarks.size(), 1U) << status << position;
+      EXPECT_EQ(file.absent.at(0).site, "g");
+      EXPECT_NE(file.absent[0].reason, "");
+    }
+  }
+  for (const char* point :
+       {R"("position": "")", R"("position": [1, 2])", R"("position": [1, 2, null])",
+        R"("position": [1, 2, "3"])", R"("id": "2")"}) {
+    EXPECT_THAT(Fault("a.mrk.json", markups(point)),
+                ::testing::AllOf(HasSubstr("a.mrk.json: point 2 'g': 'position' is "),
+                                 HasSubstr("must be [x, y, z]")));
+  }
+  EXPECT_THAT(Fault("a.mrk.json", markups(R"("positionStatus": "gone")")),
+              HasSubstr("point 2 'g': 'positionStatus' is 'gone'; it must be defined, undefined"));
+}
+
 TEST_F(LandmarkReadingTest, AxesThatAreAskedForMustBeThoseThatYamlSays) {
   const std::string ras = "axes: RAS\nlandmarks: [{site: g, point: [1, 2, 3]}]\n";
   EXPECT_EQ(Read("a.yaml", ras, {.axes = Axes::kRas}).file.landmarks.at(0).point,
