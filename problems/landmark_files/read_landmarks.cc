@@ -185,6 +185,7 @@ LandmarkReading ReadForeign(const fs::path& path, const Format& format,
     faults.emplace_back("there is no landmark; place at least one");
   }
   Complain(path, faults);
+  CheckLandmarks(file.landmarks, path.string());
   CheckReach(path, file);
   ChooseAxes(path, options, file, reading.notes);
   TurnToLps(path, file, reading.notes);

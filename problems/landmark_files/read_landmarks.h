@@ -26,7 +26,8 @@ struct LandmarkReading {
 // (MeshLab), .txt and .asc (CloudCompare), .csv. Sites may go by any name that SiteCalled knows.
 // RAS is turned to LPS, and a note says so. Throws IoError if the file cannot be read or is not of
 // its format; InputError with a line per fault if a name is no site (and may not be left out), a
-// site appears twice, there is no landmark, or options.axes contradicts the file.
+// site appears twice, there is no landmark, a coordinate is beyond all reach, or options.axes
+// contradicts the file; ConfigError as ReadLandmarkFile does, for whatever kind of file.
 LandmarkReading ReadLandmarks(const std::filesystem::path& path,
                               const ReadLandmarksOptions& options = {});
 

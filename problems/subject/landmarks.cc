@@ -112,6 +112,17 @@ void Keep(const LandmarkFile& all, const LandmarksKept& kept, UsedLandmarks& use
   }
 }
 
+// Where messages say that all of a tree stands.
+void Locate(const ConfigLocation& location, ConfigNode& tree) {
+  tree.location = location;
+  for (ConfigNode::Entry& entry : tree.entries) {
+    Locate(location, entry.value);
+  }
+  for (ConfigNode& item : tree.items) {
+    Locate(location, item);
+  }
+}
+
 }  // namespace
 
 template <class Report>
@@ -171,6 +182,19 @@ LandmarkFile ReadLandmarkFile(const std::filesystem::path& path) {
 
 LandmarkFile ReadLandmarkFileAsWritten(const std::filesystem::path& path) {
   return ReadConfig<LandmarkFile>(path);
+}
+
+void CheckLandmarks(std::span<const Landmark> landmarks, const std::string& file) {
+  ConfigErrors errors;
+  for (const Landmark& landmark : landmarks) {
+    const ConfigSource source{.name = fmt::format("{}: site {}", file, SiteInWords(landmark.site)),
+                              .folder = {},
+                              .has_lines = false};
+    ConfigNode tree = ConfigTreeOf(landmark);
+    Locate({std::make_shared<const ConfigSource>(source)}, tree);
+    ReadConfigTree<Landmark>(tree, errors);
+  }
+  errors.ThrowIfAny();
 }
 
 LandmarkFile InLpsMm(LandmarkFile file) {

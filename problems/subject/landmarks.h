@@ -5,6 +5,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -175,6 +176,11 @@ LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
 
 // The same in the units and axes that the file says.
 LandmarkFile ReadLandmarkFileAsWritten(const std::filesystem::path& path);
+
+// Checks what other kinds of files say of landmarks as ReadLandmarkFile checks YAML: the ranges of
+// depths, the length of normals. file: its name, for messages. Throws ConfigError with a line for
+// each fault, which names the site.
+void CheckLandmarks(std::span<const Landmark> landmarks, const std::string& file);
 
 // With points and normals in mm and LPS. Units and axes must be words of their enums.
 LandmarkFile InLpsMm(LandmarkFile file);

@@ -261,6 +261,18 @@ TEST_F(LandmarkReadingTest, TablesWithCommasOrSemicolons) {
   EXPECT_THAT(Fault("a.csv", "site;x;y;z\ng;1.000,5;2;0\n"), HasSubstr("'1.000,5' is not"));
 }
 
+TEST_F(LandmarkReadingTest, ChecksTheValuesOfATableAsThoseOfYaml) {
+  const std::string head =
+      "site,x,y,z,normal_x,normal_y,normal_z,depth_along_normal_mm,depth_closest_mm\n";
+  EXPECT_THAT(Fault("a.csv", head + "nasion,1,2,3,,,,-5,\ng,1,2,3,,,,4,1000\n"),
+              ::testing::AllOf(HasSubstr("a.csv: site n (Nasion): depth_along_normal_mm: -5 is out "
+                                         "of range; allowed is 0.01 to 100 mm\n"),
+                               HasSubstr("a.csv: site g (Glabella): depth_closest_mm: 1000 is")));
+  EXPECT_THAT(Fault("a.csv", head + "n,1,2,3,3,0,0,,\n"),
+              HasSubstr("a.csv: site n (Nasion): normal: has the length 3; it must be 1"));
+  EXPECT_EQ(Fault("a.csv", head + "n,1,2,3,0,0,1,5,\n"), "no fault");
+}
+
 TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
   const std::string table = "site,x,y,z\nF-1,0,0,0\ngonion,0,0,0\ng,0,0,0\nglabella,1,1,1\n";
   EXPECT_THAT(Fault("a.csv", table),
