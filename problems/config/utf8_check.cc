@@ -95,4 +95,17 @@ bool RequireReadableBytes(std::string_view text, const std::shared_ptr<const Con
   return is_readable;
 }
 
+std::optional<int> LineThatIsNotUtf8(std::string_view text) {
+  int line = 1;
+  for (std::size_t k = 0; k < text.size();) {
+    const std::size_t length = SequenceLength(text, k);
+    if (length == 0) {
+      return line;
+    }
+    line += text[k] == '\n' ? 1 : 0;
+    k += length;
+  }
+  return std::nullopt;
+}
+
 }  // namespace semblance

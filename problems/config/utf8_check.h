@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is wrong with the bytes of a configuration, before any of it is parsed.
+// What is wrong with the bytes of a configuration, or of another text, before any of it is parsed.
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "problems/config/config_errors.h"
@@ -14,5 +15,8 @@ namespace semblance {
 // there were none.
 bool RequireReadableBytes(std::string_view text, const std::shared_ptr<const ConfigSource>& source,
                           ConfigErrors& errors);
+
+// The line, from 1, of the first byte that is not UTF-8; nothing if there is none.
+std::optional<int> LineThatIsNotUtf8(std::string_view text);
 
 }  // namespace semblance

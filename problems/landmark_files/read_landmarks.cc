@@ -11,6 +11,7 @@
 #include <set>
 
 #include "problems/config/config.h"
+#include "problems/config/utf8_check.h"
 #include "problems/landmark_files/fcsv.h"
 #include "problems/landmark_files/landmark_table.h"
 #include "problems/landmark_files/markups_json.h"
@@ -43,6 +44,7 @@ struct Format {
   std::string (*encode)(const LandmarkFile& file);
   bool holds_measurements;  // normals, depths and certainties
   bool holds_notes;
+  bool says_encoding = false;  // XML, whose parser turns any to UTF-8
 };
 
 std::string CloudComparePoints(const LandmarkFile& file) {
@@ -63,7 +65,7 @@ constexpr std::array kFormats = {
     Format{".yml", nullptr, &WriteConfig<LandmarkFile>, true, true},
     Format{".mrk.json", &Plain<&ParseMarkupsJson>, &MarkupsJson, false, true},
     Format{".fcsv", &Plain<&ParseFcsv>, &Fcsv, false, true},
-    Format{".pp", &Plain<&ParseMeshLabPoints>, &MeshLabPoints, false, false},
+    Format{".pp", &Plain<&ParseMeshLabPoints>, &MeshLabPoints, false, false, true},
     Format{".csv", &ParseTable, &LandmarkTable, true, true},
     Format{".txt", &Plain<&ParsePointList>, &CloudComparePoints, false, false},
     Format{".asc", &Plain<&ParsePointList>, &CloudComparePoints, false, false},
@@ -170,11 +172,22 @@ void CheckReach(const fs::path& path, const LandmarkFile& file) {
   Complain(path, faults);
 }
 
+// Bytes that are UTF-8, as all other kinds of files that a note may go to must be.
+std::string ReadText(const fs::path& path, const Format& format) {
+  std::string text = ReadFileBytes(path);
+  const std::optional<int> line = format.says_encoding ? std::nullopt : LineThatIsNotUtf8(text);
+  if (line) {
+    throw IoError(fmt::format("{}:{}: a byte that is not UTF-8; save the file as UTF-8",
+                              path.string(), *line));
+  }
+  return text;
+}
+
 LandmarkReading ReadForeign(const fs::path& path, const Format& format,
                             const ReadLandmarksOptions& options) {
   LandmarkReading reading;
   LandmarkFile& file = reading.file;
-  file = format.parse(ReadFileBytes(path), path.string(), reading.notes);
+  file = format.parse(ReadText(path, format), path.string(), reading.notes);
   file.subject = path.filename().string();
   file.subject.resize(file.subject.size() - format.extension.size());
   std::vector<std::string> faults;

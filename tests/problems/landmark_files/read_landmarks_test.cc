@@ -273,6 +273,21 @@ TEST_F(LandmarkReadingTest, ChecksTheValuesOfATableAsThoseOfYaml) {
   EXPECT_EQ(Fault("a.csv", head + "n,1,2,3,0,0,1,5,\n"), "no fault");
 }
 
+TEST_F(LandmarkReadingTest, RefusesBytesThatAreNotUtf8AndNamesTheirLine) {
+  EXPECT_THAT(Fault("lat.csv", "site,x,y,z,note\nn,1.5,2,3,caf\xe9\n"),
+              HasSubstr("lat.csv:2: a byte that is not UTF-8; save the file as UTF-8"));
+  EXPECT_THAT(Fault("lat.txt", "n,1.5,2,3\n\ngonion\xff,1,2,3\n"), HasSubstr("lat.txt:3: a byte"));
+  EXPECT_THAT(Fault("lat.fcsv", "# CoordinateSystem = LPS\n1,1,2,3,0,0,0,1,1,1,0,n,\xe9,\n"),
+              HasSubstr("lat.fcsv:2: a byte"));
+  EXPECT_EQ(Read("utf8.csv", "site,x,y,z,note\nn,1.5,2,3,caf\xc3\xa9\n").file.landmarks.at(0).note,
+            "caf\xc3\xa9");
+  // XML says its own encoding; this is Latin-1, as the first line says.
+  EXPECT_EQ(Fault("lat.pp",
+                  "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<PickedPoints><!-- caf\xe9 -->"
+                  "<point x=\"1\" y=\"2\" z=\"3\" name=\"n\"/></PickedPoints>"),
+            "no fault");
+}
+
 TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
   const std::string table = "site,x,y,z\nF-1,0,0,0\ngonion,0,0,0\ng,0,0,0\nglabella,1,1,1\n";
   EXPECT_THAT(Fault("a.csv", table),
