@@ -23,14 +23,6 @@ std::string Lower(std::string_view text) {
   return lower;
 }
 
-CsvDialect DialectOf(std::string_view text) {
-  const std::string_view first = text.substr(0, text.find('\n'));
-  if (first.find(';') == first.npos) {
-    return {};
-  }
-  return {.separator = ';', .decimal = text.find(',') == text.npos ? '.' : ','};
-}
-
 // Which column holds what.
 class Columns {
  public:
@@ -88,6 +80,42 @@ Layout LayoutOf(Columns& columns) {
           .note = columns.Find({"note", "description"})};
 }
 
+std::vector<std::size_t> NumberColumns(const Layout& layout) {
+  std::vector<std::size_t> columns = {layout.x, layout.y, layout.z};
+  for (const auto& column : {layout.normal[0], layout.normal[1], layout.normal[2],
+                             layout.depth_along_normal, layout.depth_closest}) {
+    if (column) {
+      columns.push_back(*column);
+    }
+  }
+  return columns;
+}
+
+bool HasDecimalCommas(CsvReader table) {
+  Columns columns(table);
+  const std::vector<std::size_t> numbers = NumberColumns(LayoutOf(columns));
+  const auto has_comma = [&](std::size_t k) {
+    return table.Cell(k).find(',') != std::string::npos;
+  };
+  while (table.NextRow()) {
+    if (std::ranges::any_of(numbers, has_comma)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+CsvDialect DialectOf(std::string_view text, std::string_view file) {
+  const std::string_view first = text.substr(0, text.find('\n'));
+  if (first.find(';') == first.npos) {
+    return {};
+  }
+  const CsvDialect points = {.separator = ';', .decimal = '.'};
+  return HasDecimalCommas(CsvReader(text, file, points))
+             ? CsvDialect{.separator = ';', .decimal = ','}
+             : points;
+}
+
 std::optional<double> NumberAt(const CsvReader& table, std::optional<std::size_t> column) {
   const double value = column ? table.NumberOrNan(*column) : kNaN;
   return std::isnan(value) ? std::nullopt : std::optional(value);
@@ -131,7 +159,7 @@ Landmark RowOf(const CsvReader& table, const Layout& layout) {
 
 LandmarkFile ParseLandmarkTable(std::string_view text, std::string_view file,
                                 std::vector<std::string>& ignored) {
-  CsvReader table(text, file, DialectOf(text));
+  CsvReader table(text, file, DialectOf(text, file));
   Columns columns(table);
   const Layout layout = LayoutOf(columns);
   ignored = columns.Unused();

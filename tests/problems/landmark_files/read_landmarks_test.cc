@@ -288,6 +288,16 @@ TEST_F(LandmarkReadingTest, RefusesBytesThatAreNotUtf8AndNamesTheirLine) {
             "no fault");
 }
 
+TEST_F(LandmarkReadingTest, OnlyCommasInNumbersAreDecimalCommas) {
+  const auto file = Read("a.csv", "site;x;y;z;note\nn;1.5;2;3;\"a, b\"\n").file;
+  EXPECT_EQ(file.landmarks.at(0).point, (std::array{1.5, 2.0, 3.0}));
+  EXPECT_EQ(file.landmarks[0].note, "a, b");
+  const auto decimal_commas =
+      Read("a.csv", "site;x;y;z;depth_closest_mm;note\nn;1;2;3;4,5;a. b\n").file;
+  EXPECT_EQ(decimal_commas.landmarks.at(0).depth_closest_mm, 4.5);
+  EXPECT_THAT(Fault("a.csv", "site;x;y;z\nn;1,5;2;3\ng;1.5;2;3\n"), HasSubstr("a.csv:3: column"));
+}
+
 TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
   const std::string table = "site,x,y,z\nF-1,0,0,0\ngonion,0,0,0\ng,0,0,0\nglabella,1,1,1\n";
   EXPECT_THAT(Fault("a.csv", table),
