@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <pugixml.hpp>
 #include <sstream>
 
@@ -20,23 +22,40 @@ char SeparatorOf(std::string_view line) {
   return line.find(';') != line.npos ? ';' : line.find(',') != line.npos ? ',' : ' ';
 }
 
-// Without the empty ones that several blanks leave.
+constexpr std::array kEntries = {"name", "x", "y", "z"};
+
+// Several blanks are one separator; between commas or semicolons an empty cell is one that lacks.
 std::vector<std::string> CellsOf(std::string_view line) {
   std::string blanks(line);
   std::replace(blanks.begin(), blanks.end(), '\t', ' ');
-  std::vector<std::string> cells = SplitCells(blanks, SeparatorOf(blanks));
-  std::erase(cells, "");
+  const char separator = SeparatorOf(blanks);
+  std::vector<std::string> cells = SplitCells(blanks, separator);
+  if (separator == ' ') {
+    std::erase(cells, "");
+  } else if (cells.size() == kEntries.size() + 1 && cells.back().empty()) {
+    cells.pop_back();  // after a separator at the line's end
+  }
   return cells;
+}
+
+void RequireEntries(const PointLines& lines, const std::vector<std::string>& cells) {
+  if (cells.size() == 3 || (cells.size() == kEntries.size() && cells[0].empty())) {
+    lines.Fail("the point has no name; export the list with labels, as: label, x, y, z");
+  }
+  if (cells.size() != kEntries.size()) {
+    lines.Fail(fmt::format("{} entries; a line must have a name, x, y and z", cells.size()));
+  }
+  const auto empty = std::ranges::find(cells, "");
+  if (empty != cells.end()) {
+    const auto column = empty - cells.begin();
+    lines.Fail(fmt::format("column {} ({}) is empty; a line must have a name, x, y and z",
+                           column + 1, kEntries[static_cast<std::size_t>(column)]));
+  }
 }
 
 Landmark PointOf(const PointLines& lines) {
   const std::vector<std::string> cells = CellsOf(lines.line());
-  if (cells.size() == 3) {
-    lines.Fail("the point has no name; export the list with labels, as: label, x, y, z");
-  }
-  if (cells.size() != 4) {
-    lines.Fail(fmt::format("{} entries; a line must have a name, x, y and z", cells.size()));
-  }
+  RequireEntries(lines, cells);
   Landmark landmark;
   landmark.site = cells[0];
   landmark.point = {lines.Number(cells[1]), lines.Number(cells[2]), lines.Number(cells[3])};

@@ -20,7 +20,8 @@ std::string MeshLabPoints(const LandmarkFile& file);
 
 // CloudCompare's list of picked points (.txt, .asc): per line a name and three coordinates, between
 // commas, semicolons or blanks, as its export "label, x, y, z" has it. Likewise without axes.
-// Throws IoError with the line for anything else; where points have no name, it says so.
+// What follows a last separator may be empty. Throws IoError with the line for anything else; where
+// a point has no name or an entry is empty, it says so.
 LandmarkFile ParsePointList(std::string_view text, std::string_view file);
 
 }  // namespace semblance

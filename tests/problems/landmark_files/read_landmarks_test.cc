@@ -242,6 +242,12 @@ TEST_F(LandmarkReadingTest, ListsOfCloudCompare) {
     EXPECT_EQ(file.landmarks.at(1).point, (std::array{4.0, 5.0, 6.0}));
   }
   EXPECT_THAT(Fault("a.asc", "1,2,3\n"), HasSubstr("a.asc:1: the point has no name"));
+  EXPECT_THAT(Fault("a.txt", ",1,2,3\n"), HasSubstr("a.txt:1: the point has no name"));
+  for (const char* text : {"g,1,2,3\nn,1,,3\n", "g;1;2;3\nn;1; ;3\n", "\n\"n\",1,\"\",3\n"}) {
+    EXPECT_THAT(Fault("a.txt", text), HasSubstr("a.txt:2: column 3 (y) is empty")) << text;
+  }
+  EXPECT_THAT(Fault("a.txt", "n,1,2,\n"), HasSubstr("a.txt:1: column 4 (z) is empty"));
+  EXPECT_EQ(Read("a.txt", "n,1,2,3,\n").file.landmarks.at(0).point, (std::array{1.0, 2.0, 3.0}));
 }
 
 TEST_F(LandmarkReadingTest, TablesWithCommasOrSemicolons) {
