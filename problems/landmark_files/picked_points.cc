@@ -24,6 +24,22 @@ char SeparatorOf(std::string_view line) {
 
 constexpr std::array kEntries = {"name", "x", "y", "z"};
 
+constexpr std::array kCoordinates = {"x", "y", "z"};
+
+// where: file and point, for messages.
+std::array<double, 3> CoordinatesOf(const pugi::xml_node& point, const std::string& where) {
+  std::array<double, 3> values;
+  for (std::size_t d = 0; d < kCoordinates.size(); ++d) {
+    const PointLines number("", fmt::format("{}: attribute {}", where, kCoordinates[d]));
+    const pugi::xml_attribute attribute = point.attribute(kCoordinates[d]);
+    if (!attribute) {
+      number.Fail("there is none; place the point anew in MeshLab");
+    }
+    values[d] = number.Number(attribute.as_string());
+  }
+  return values;
+}
+
 // Several blanks are one separator; between commas or semicolons an empty cell is one that lacks.
 std::vector<std::string> CellsOf(std::string_view line) {
   std::string blanks(line);
@@ -72,17 +88,17 @@ LandmarkFile ParseMeshLabPoints(std::string_view text, std::string_view file) {
     throw IoError(fmt::format("{}: no PickedPoints of MeshLab{}; save the points anew", file,
                               parsed ? "" : fmt::format(" ({})", parsed.description())));
   }
-  const PointLines numbers(text, file);
+  int number = 0;
   LandmarkFile result = WithoutAxes();
   for (const pugi::xml_node& point : root.children("point")) {
     Landmark landmark;
     landmark.site = point.attribute("name").as_string();
-    landmark.point = {numbers.Number(point.attribute("x").as_string()),
-                      numbers.Number(point.attribute("y").as_string()),
-                      numbers.Number(point.attribute("z").as_string())};
+    ++number;
     if (point.attribute("active").as_string("1") == std::string_view("0")) {
       result.absent.push_back({landmark.site, "not active"});
     } else {
+      landmark.point =
+          CoordinatesOf(point, fmt::format("{}: point {} '{}'", file, number, landmark.site));
       result.landmarks.push_back(landmark);
     }
   }
@@ -95,9 +111,8 @@ std::string MeshLabPoints(const LandmarkFile& file) {
   pugi::xml_node root = document.append_child("PickedPoints");
   for (const Landmark& landmark : file.landmarks) {
     pugi::xml_node point = root.append_child("point");
-    constexpr const char* kAxes[] = {"x", "y", "z"};
-    for (int d = 0; d < 3; ++d) {
-      point.append_attribute(kAxes[d]) = fmt::format("{}", landmark.point[d]).c_str();
+    for (std::size_t d = 0; d < kCoordinates.size(); ++d) {
+      point.append_attribute(kCoordinates[d]) = fmt::format("{}", landmark.point[d]).c_str();
     }
     point.append_attribute("active") = "1";
     point.append_attribute("name") = landmark.site.c_str();

@@ -172,7 +172,8 @@ void CheckReach(const fs::path& path, const LandmarkFile& file) {
   Complain(path, faults);
 }
 
-// Bytes that are UTF-8, as all other kinds of files that a note may go to must be.
+// The bytes of a file, which must be UTF-8: its notes may go into YAML, which is read as nothing
+// else.
 std::string ReadText(const fs::path& path, const Format& format) {
   std::string text = ReadFileBytes(path);
   const std::optional<int> line = format.says_encoding ? std::nullopt : LineThatIsNotUtf8(text);

@@ -231,7 +231,15 @@ TEST_F(LandmarkReadingTest, PointsOfMeshLab) {
   EXPECT_THAT(Fault("a.pp",
                     "<PickedPoints><point x=\"1\" y=\"nan\" z=\"0\" name=\"g\"/>"
                     "</PickedPoints>"),
-              HasSubstr("'nan' is not a finite decimal number"));
+              HasSubstr("a.pp: point 1 'g': attribute y: 'nan' is not a finite decimal number"));
+  EXPECT_THAT(Fault("a.pp",
+                    "<PickedPoints><point x=\"1\" y=\"2\" z=\"3\" name=\"n\"/>"
+                    "<point x=\"1\" y=\"2\" name=\"g\"/></PickedPoints>"),
+              HasSubstr("a.pp: point 2 'g': attribute z: there is none; place the point anew"));
+  EXPECT_EQ(Fault("a.pp",
+                  "<PickedPoints><point x=\"1\" y=\"2\" z=\"3\" name=\"n\"/>"
+                  "<point x=\"nan\" active=\"0\" name=\"g\"/></PickedPoints>"),
+            "no fault");
 }
 
 TEST_F(LandmarkReadingTest, ListsOfCloudCompare) {
