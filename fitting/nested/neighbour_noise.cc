@@ -41,7 +41,7 @@ class Neighbourhood {
   std::span<const std::uint32_t> indices_;
 };
 
-// What is left of the values per degree of freedom and channel.
+// What is left of the values per degree of freedom and channel, by weighted least squares.
 double LeftOver(const NestedPoints& points, const std::vector<std::uint32_t>& near, int terms) {
   const auto count = static_cast<Eigen::Index>(near.size());
   Eigen::MatrixXd rows(count, terms), values(count, points.channels);
@@ -55,9 +55,10 @@ double LeftOver(const NestedPoints& points, const std::vector<std::uint32_t>& ne
     const double x = (points.X(k) - points.X(near[0])) / scale,
                  y = (points.Y(k) - points.Y(near[0])) / scale;
     const std::array<double, 6> row = {1, x, y, x * x, x * y, y * y};
-    rows.row(r) = Eigen::Map<const Eigen::RowVectorXd>(row.data(), terms);
+    const double as_sure = points.Scale(k);
+    rows.row(r) = as_sure * Eigen::Map<const Eigen::RowVectorXd>(row.data(), terms);
     for (int c = 0; c < points.channels; ++c) {
-      values(r, c) = points.value[k][c];
+      values(r, c) = as_sure * points.value[k][c];
     }
   }
   const Eigen::MatrixXd left = values - rows * rows.colPivHouseholderQr().solve(values);

@@ -11,15 +11,15 @@ namespace semblance {
 
 enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
 
-// Standard deviation of a point along one axis: a plane or quadratic through each of some
-// thousand points and its neighbours in (u,v), by least squares, and the median of what that leaves
-// per degree of freedom. Detail that neighbours do not share is in it, the more of it the wider the
-// neighbourhood. NaN for too few points.
+// Standard deviation of a point of mean weight along one axis: a plane or quadratic through each of
+// some thousand points and its neighbours in (u,v), by least squares, and the median of what that
+// leaves per degree of freedom. Detail that neighbours do not share is in it, the more of it the
+// wider the neighbourhood. NaN for too few points.
 double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
                       NeighbourModel model);
 
-// Of pairs of residuals: the sum of e_a . e_b over that of |e|^2. 0 for errors that do not know of
-// each other.
+// Of pairs of residuals, each times its point's Scale: the sum of e_a . e_b over that of |e|^2. 0
+// for errors that do not know of each other.
 class PairCorrelation {
  public:
   void Add(const NestedResidual& a, const NestedResidual& b);

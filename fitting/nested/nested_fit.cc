@@ -162,7 +162,17 @@ class NestedFitter {
       const Vec3& value = points_.value[k];
       residuals_.push_back({{value[0], value[1], value[2]}});
     });
-    FindOutliers(points_, every_, Residuals(), LeastSd(0), outlier_);
+    Find(Residuals(), /*noise_mm=*/0);
+  }
+
+  // Returns how many there are. What is told of points is told of those of mean weight among the
+  // others.
+  int Find(const ResidualsBetween& residuals, double noise_mm) {
+    constexpr double kAtBorders = 10;  // rounding lets the smoothness show, more so there
+    const LeastSpread least{.noise_mm = noise_mm, .rounding_mm = kAtBorders * rounding_mm_};
+    const int count = FindOutliers(points_, every_, residuals, least, outlier_);
+    points_.TakeMeanWeight(outlier_);
+    return count;
   }
 
   void FitRound() {
@@ -190,17 +200,18 @@ class NestedFitter {
   void Judge(const NestedWeight& chosen, int steps) {
     residuals_ = solve_.ResidualsOf({.every = every_});
     std::vector<double> squares;
+    double weights = 0;
     ForEachLooked([&](std::size_t n, std::uint32_t k) {
       if (IsHeld(k) && outlier_[k] == 0) {
-        squares.push_back(residuals_[n].Square());
+        squares.push_back(Scaled(residuals_[n], k).Square());
+        weights += points_.Scale(k) * points_.Scale(k);
       }
     });
     const double held = squares.empty() ? kNaN
                                         : std::accumulate(squares.begin(), squares.end(), 0.0) /
-                                              std::ssize(squares) / points_.channels;
+                                              weights / points_.channels;
     if (plan_.outliers == OutlierRule::kDrop) {
-      const double least_sd_mm = LeastSd(HeldSd(std::move(squares)));
-      outliers_ = FindOutliers(points_, every_, Residuals(), least_sd_mm, outlier_);
+      outliers_ = Find(Residuals(), HeldSd(std::move(squares)));
     }
     report_.rounds.push_back({.finest = space_.finest(),
                               .vertices = space_.Vertices(),
@@ -222,10 +233,12 @@ class NestedFitter {
   // Points without noise, on a surface that the space holds.
   bool IsMet() const { return report_.rounds.back().held_out_rms_mm <= rounding_mm_; }
 
-  // For outliers. Rounding lets the smoothness show, which is more at a border than elsewhere.
-  double LeastSd(double sd_mm) const {
-    constexpr double kAtBorders = 10;
-    return std::max(sd_mm, kAtBorders * rounding_mm_);
+  // As far as one of a point of mean weight that is as likely.
+  Residual Scaled(Residual residual, std::uint32_t k) const {
+    for (double& along : residual.along) {
+      along *= points_.Scale(k);
+    }
+    return residual;
   }
 
   // Along one axis, by the median.
@@ -275,13 +288,13 @@ class NestedFitter {
     return pairs.Value() * std::sqrt(static_cast<double>(pairs.Count())) > kSure;
   }
 
-  // Of the points looked at that are no outliers.
+  // Of the points looked at that are no outliers, scaled.
   std::vector<Residual> KeptResiduals() const {
     std::vector<Residual> kept;
     kept.reserve(residuals_.size());
     ForEachLooked([&](std::size_t n, std::uint32_t k) {
       if (outlier_[k] == 0) {
-        kept.push_back(residuals_[n]);
+        kept.push_back(Scaled(residuals_[n], k));
       }
     });
     return kept;
@@ -342,10 +355,11 @@ class NestedFitter {
         sum += points_.Weight(k) * square;
         weights += points_.Weight(k);
         if (outlier_[k] == 0) {
+          const Residual scaled = Scaled(some[k - begin], static_cast<std::uint32_t>(k));
           if (last) {
-            neighbours.Add(*last, some[k - begin]);
+            neighbours.Add(*last, scaled);
           }
-          last = some[k - begin];
+          last = scaled;
         }
       }
     }
@@ -354,7 +368,7 @@ class NestedFitter {
   }
 
   // Whether others than before are outliers.
-  bool DropOutliers(double least_sd_mm) {
+  bool DropOutliers(double noise_mm) {
     if (plan_.outliers == OutlierRule::kKeep) {
       return false;
     }
@@ -363,7 +377,7 @@ class NestedFitter {
     const ResidualsBetween between = [&](std::size_t begin, std::size_t end) {
       return residuals.Of(begin, end);
     };
-    FindOutliers(points_, every_, between, LeastSd(least_sd_mm), outlier_);
+    Find(between, noise_mm);
     return before != outlier_;
   }
 

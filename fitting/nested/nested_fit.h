@@ -20,13 +20,15 @@ struct NestedRound {
   int vertices = -1;                 // that say something of their own
   double weight = kNaN;              // of the thin-plate energy, mm^4 (SmoothnessTerm, length_mm 1)
   double degrees_of_freedom = kNaN;  // trace of the influence matrix
-  double rms_mm = kNaN;              // of the points that were fitted, along one axis
-  double held_out_rms_mm = kNaN;     // of the points that were not
+  double rms_mm = kNaN;              // of the points that were fitted, along one axis, weighted
+  double held_out_rms_mm = kNaN;     // of the points that were not, weighted
   int steps = -1;                    // of conjugate gradients
   int outliers = -1;
 };
 
-// What the fit assumed, and how far that holds.
+// What the fit assumed, and how far that holds. Of points with weights what is said of noise and of
+// points held out is said of one of mean weight: errors count by sqrt(weight / mean weight), the
+// mean being that of the points that are no outliers.
 struct AutoReport {
   std::vector<NestedRound> rounds;
   int chosen_round = -1;

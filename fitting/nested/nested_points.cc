@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -86,6 +87,23 @@ void TurnToAxes(NestedPoints& points) {
 
 }  // namespace
 
+// To the bit that of all where they are equal, so that equal weights change nothing.
+void NestedPoints::TakeMeanWeight(const std::vector<char>& left_out) {
+  double sum = 0, least = std::numeric_limits<double>::infinity(), most = 0;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < weight.size(); ++k) {
+    if (left_out.empty() || left_out[k] == 0) {
+      sum += weight[k];
+      least = std::min(least, weight[k]);
+      most = std::max(most, weight[k]);
+      ++count;
+    }
+  }
+  if (count > 0) {
+    mean_weight = least == most ? most : sum / static_cast<double>(count);
+  }
+}
+
 NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, int threads) {
   const HSplineShape shape = WithLevels(start.shape());
   const double extent = Extent(given.positions);
@@ -103,6 +121,7 @@ NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, i
   for (std::size_t k = 0; k < given.weights.size(); ++k) {
     points.weight.push_back(given.weights[points.given[k]]);
   }
+  points.TakeMeanWeight({});
   points.axes = AxesOf(points, extent);
   points.channels = static_cast<int>(points.axes.cols());
   TurnToAxes(points);

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -33,6 +34,7 @@ struct NestedPoints {
   bool periodic_u = false;     // u = 1 is u = 0
   bool periodic_v = false;     // likewise
   std::vector<double> weight;  // > 0; or none: all 1
+  double mean_weight = 1;      // of those that count (TakeMeanWeight)
   std::vector<Vec3> value;     // displacement along each channel's axis, mm; zero beyond those
   std::vector<std::uint32_t> given;
   int channels = 0;
@@ -47,6 +49,13 @@ struct NestedPoints {
     return periodic_v && uv[k].y() == 1 ? 0 : uv[k].y() * patches.y();
   }
   double Weight(std::size_t k) const { return weight.empty() ? 1 : weight[k]; }
+  // 1 for a point of mean weight. A weight is 1 / sigma^2 up to a factor, so that errors times this
+  // are of one size if the points' sigma are right.
+  double Scale(std::size_t k) const {
+    return weight.empty() ? 1 : std::sqrt(weight[k] / mean_weight);
+  }
+  // left_out: per point, not 0 for one that does not count; or none.
+  void TakeMeanWeight(const std::vector<char>& left_out);
 };
 
 NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoints& points,

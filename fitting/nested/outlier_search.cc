@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace semblance {
@@ -12,6 +13,8 @@ namespace {
 constexpr std::ptrdiff_t kBlock = 24;  // points that share a median; half as many more on each side
 constexpr int kNearest = 8, kWindow = 20, kPasses = 4;
 constexpr double kFar = 6, kAlike = 0.5;
+constexpr double kTells = 4;      // standard deviations of a point that it can tell from none
+constexpr double kMostVotes = 4;  // of a point, in those of most
 // Standard deviation along one axis over the median of the distance, for normal errors along 1, 2
 // and 3 axes.
 constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
@@ -19,12 +22,12 @@ constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
 class OutlierSearch {
  public:
   OutlierSearch(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
-                double least_sd_mm)
+                const LeastSpread& least)
       : points_(points),
         every_(every),
         count_(static_cast<std::ptrdiff_t>((points.size() + every - 1) / every)),
         all_(residuals),
-        least_sd_mm_(least_sd_mm) {}
+        least_(least) {}
 
   std::ptrdiff_t count() const { return count_; }
 
@@ -64,36 +67,64 @@ class OutlierSearch {
     const std::ptrdiff_t end = std::min(begin + kBlock, count_),
                          around = std::max<std::ptrdiff_t>(begin - kBlock / 2, 0),
                          behind = std::min(end + kBlock / 2, count_);
-    const bool calm = IsCalm(around, behind);
+    const bool calm = points_.weight.empty() && IsCalm(around, behind);
     if (!calm) {
       Look(around, behind);
     }
     bool changed = false;
     for (std::ptrdiff_t k = begin; k < end; ++k) {
-      const char is = !calm && Off(k) > far_ && !HasCompany(k) ? 1 : 0;
+      const char is = !calm && IsFar(k) && !HasCompany(k) ? 1 : 0;
       changed = changed || is != found[k];
       found[k] = is;
     }
     return changed;
   }
 
-  // All values, if too few have a vote.
-  template <class Value>
-  double MedianOf(std::ptrdiff_t begin, std::ptrdiff_t end, const Value& value) {
-    values_.clear();
+  // All, if too few have a vote.
+  void FindVoters(std::ptrdiff_t begin, std::ptrdiff_t end) {
+    voters_.clear();
     for (std::ptrdiff_t k = begin; k < end; ++k) {
       if ((*before_)[k] == 0) {
-        values_.push_back(value(k));
+        voters_.push_back(k);
       }
     }
-    if (std::ssize(values_) < kBlock / 3) {
-      values_.clear();
-      for (std::ptrdiff_t k = begin; k < end; ++k) {
-        values_.push_back(value(k));
-      }
+    if (std::ssize(voters_) < kBlock / 3) {
+      voters_.resize(end - begin);
+      std::iota(voters_.begin(), voters_.end(), begin);
+    }
+  }
+
+  // One point, one vote.
+  template <class Value>
+  double MedianOf(const Value& value) {
+    values_.clear();
+    for (const std::ptrdiff_t k : voters_) {
+      values_.push_back(value(k));
     }
     return UpperMedian(values_);
   }
+
+  // The same value where all are equally sure.
+  template <class Value>
+  double SureMedianOf(const Value& value) {
+    if (points_.weight.empty()) {
+      return MedianOf(value);
+    }
+    voices_.clear();
+    double left = 0;
+    for (const std::ptrdiff_t k : voters_) {
+      voices_.emplace_back(value(k), std::min(ScaleOf(k), most_votes_));
+      left += voices_.back().second / 2;
+    }
+    std::sort(voices_.begin(), voices_.end());
+    auto voice = voices_.begin();
+    for (; voice + 1 != voices_.end() && left >= voice->second; ++voice) {
+      left -= voice->second;
+    }
+    return voice->first;
+  }
+
+  double ScaleOf(std::ptrdiff_t k) const { return points_.Scale(k * every_); }
 
   // Whether none can be far: a median is no farther from the mean than the standard deviation.
   bool IsCalm(std::ptrdiff_t begin, std::ptrdiff_t end) const {
@@ -117,16 +148,31 @@ class OutlierSearch {
                        std::abs(mean) + std::sqrt(std::max(squares[c] / count - mean * mean, 0.0));
       middle += reach * reach;
     }
-    return voteless == 0 && std::sqrt(largest) + std::sqrt(middle) < kFar * least_sd_mm_;
+    return voteless == 0 && std::sqrt(largest) + std::sqrt(middle) <
+                                kFar * std::max(least_.noise_mm, least_.rounding_mm);
   }
 
   void Look(std::ptrdiff_t begin, std::ptrdiff_t end) {
-    for (int c = 0; c < points_.channels; ++c) {
-      middle_[c] = MedianOf(begin, end, [&](std::ptrdiff_t k) { return ResidualOf(k).along[c]; });
+    FindVoters(begin, end);
+    const bool weighted = !points_.weight.empty();
+    if (weighted) {
+      most_votes_ = kMostVotes * MedianOf([&](std::ptrdiff_t k) { return ScaleOf(k); });
     }
-    const double sd = kSdOfMedian[points_.channels] *
-                      MedianOf(begin, end, [&](std::ptrdiff_t k) { return Off(k); });
-    far_ = kFar * std::max(sd, least_sd_mm_);
+    for (int c = 0; c < points_.channels; ++c) {
+      middle_[c] = SureMedianOf([&](std::ptrdiff_t k) { return ResidualOf(k).along[c]; });
+    }
+    const double sd_of_median = kSdOfMedian[points_.channels];
+    spread_mm_ = sd_of_median * SureMedianOf([&](std::ptrdiff_t k) { return Off(k); });
+    const double noise_mm =
+        weighted ? sd_of_median * MedianOf([&](std::ptrdiff_t k) { return ScaleOf(k) * Off(k); })
+                 : spread_mm_;
+    noise_mm_ = std::max(noise_mm, least_.noise_mm);
+  }
+
+  double NoiseOf(std::ptrdiff_t k) const { return noise_mm_ / ScaleOf(k); }
+
+  bool IsFar(std::ptrdiff_t k) const {
+    return Off(k) > kFar * std::max({spread_mm_, NoiseOf(k), least_.rounding_mm});
   }
 
   double Off(std::ptrdiff_t k) const {
@@ -148,12 +194,13 @@ class OutlierSearch {
     return std::sqrt(apart) < kAlike * Off(a);
   }
 
-  // Among the points that stand next to it along the curve.
+  // Among the points that stand next to it along the curve, but for those that cannot tell.
   bool HasCompany(std::ptrdiff_t k) {
+    const double off = Off(k);
     near_.clear();
     const std::ptrdiff_t end = std::min(k + kWindow + 1, count_);
     for (std::ptrdiff_t q = std::max<std::ptrdiff_t>(k - kWindow, 0); q < end; ++q) {
-      if (q != k) {
+      if (q != k && off > kTells * NoiseOf(q)) {
         const double dx = points_.X(q * every_) - points_.X(k * every_),
                      dy = points_.Y(q * every_) - points_.Y(k * every_);
         near_.emplace_back(dx * dx + dy * dy, q);
@@ -164,7 +211,7 @@ class OutlierSearch {
     const auto alike = std::count_if(near_.begin(), near_.begin() + nearest, [&](const auto& n) {
       return (*before_)[n.second] == 0 && Alike(k, n.second);
     });
-    return 2 * alike >= kNearest;
+    return 2 * alike >= nearest;
   }
 
   const NestedPoints& points_;
@@ -173,11 +220,15 @@ class OutlierSearch {
   const ResidualsBetween& all_;
   std::span<const NestedResidual> residuals_;  // from `first_` on
   std::ptrdiff_t first_ = 0;
-  double least_sd_mm_;
+  LeastSpread least_;
   const std::vector<char>* before_ = nullptr;
   std::array<double, 3> middle_{};
-  double far_ = 0;
+  double spread_mm_ = 0;  // of the points around, whatever their weights
+  double noise_mm_ = 0;   // the same of a point of mean weight, if all of it is noise
+  double most_votes_ = 0;
+  std::vector<std::ptrdiff_t> voters_;
   std::vector<double> values_;
+  std::vector<std::pair<double, double>> voices_;  // values, and how much they count
   std::vector<std::pair<double, std::ptrdiff_t>> near_;
 };
 
@@ -198,9 +249,9 @@ std::vector<char> BesideThose(const std::vector<char>& changed) {
 
 // A pass looks again only where what the one before has found is news.
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
-                 double least_sd_mm, std::vector<char>& outlier) {
+                 const LeastSpread& least, std::vector<char>& outlier) {
   static_assert(kWindow < kBlock);
-  OutlierSearch search(points, every, residuals, least_sd_mm);
+  OutlierSearch search(points, every, residuals, least);
   std::vector<char> found(search.count());
   for (std::size_t k = 0; k < found.size(); ++k) {
     found[k] = outlier[k * every];

@@ -15,13 +15,23 @@ namespace semblance {
 using ResidualsBetween =
     std::function<std::span<const NestedResidual>(std::size_t begin, std::size_t end)>;
 
+// Standard deviations along one axis below which nothing is an outlier.
+struct LeastSpread {
+  double noise_mm = 0;     // of a point of mean weight; of others by their weight
+  double rounding_mm = 0;  // of every point
+};
+
 // Says of one point in `every` whether it is an outlier: its residual, less the median of the
 // points around it, is more than six standard deviations of theirs (by their median, so that up to
-// a third of them may be outliers too) and of `least_sd_mm`, and fewer than half of the eight
+// a third of them may be outliers too) and of `least`, and fewer than half of the eight
 // points nearest to it have one like it. So detail that the surface does not follow yet, which
 // neighbours share, is none, and the width falls with the residuals as the surface gets finer.
+// With weights the standard deviation is that of the points around it times its own sigma over
+// theirs, or theirs as it is, whichever is more: the one is what noise would do, the other what
+// detail does. Points that are surer count more for the median, at most four times as much as most;
+// and those whose own noise hides what is asked have no say.
 // outlier: per point; what stands there when it begins has no vote. Returns how many there are.
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
-                 double least_sd_mm, std::vector<char>& outlier);
+                 const LeastSpread& least, std::vector<char>& outlier);
 
 }  // namespace semblance

@@ -141,6 +141,93 @@ TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
   EXPECT_GT(ErrorAgainst(FrankePoint, kept.surface, 100).rms, 1e-2);
 }
 
+// Each with weight 1 / sigma^2. rough: whether a point is twenty times as far off as others.
+template <class IsRough>
+FitTarget OfTwoKinds(int count, const IsRough& rough) {
+  constexpr double kSigma = 1e-3;
+  FitTarget target = Heights(FrankePoint, count, 0);
+  Random random(4);
+  for (int k = 0; k < count; ++k) {
+    const double sigma = rough(k) ? 20 * kSigma : kSigma;
+    target.points[k].position.z() += sigma * random.Normal();
+    target.points[k].weight = 1 / (sigma * sigma);
+  }
+  return target;
+}
+
+NestedFitResult FitWeighted(const FitTarget& target) {
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+  std::vector<double> weights;
+  for (const FitPoint& p : target.points) {
+    positions.push_back(p.position);
+    uv.push_back(p.uv);
+    weights.push_back(p.weight);
+  }
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0};
+  return FitNested(StartSurface(shape, positions, uv), {positions, uv, weights}, {}, {});
+}
+
+// How many times its sigma a point is off, by a noise of one of mean weight.
+double SigmaFactor(const FitTarget& target, const AutoReport& report, double noise_mm) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::uint32_t k = 0; k < target.points.size(); ++k) {
+    if (!std::binary_search(report.outliers.begin(), report.outliers.end(), k)) {
+      sum += target.points[k].weight;
+      ++count;
+    }
+  }
+  return noise_mm * std::sqrt(sum / static_cast<double>(count));
+}
+
+// Where one point in five is rough, and where all but one in five are.
+TEST(NestedFit, PointsThatAreAsFarOffAsTheirSigmaSaysAreNoOutliers) {
+  for (const bool mostly_rough : {false, true}) {
+    const FitTarget target = OfTwoKinds(10000, [&](int k) { return (k % 5 == 0) != mostly_rough; });
+    const NestedFitResult fit = FitWeighted(target);
+    EXPECT_LE(fit.report.outliers.size(), 10u) << mostly_rough;
+    EXPECT_NEAR(SigmaFactor(target, fit.report, fit.report.noise_mm), 1, 0.03);
+    EXPECT_NEAR(SigmaFactor(target, fit.report, fit.report.neighbour_noise_mm), 1, 0.1);
+    EXPECT_NEAR(SigmaFactor(target, fit.report, fit.report.held_out_rms_mm), 1, 0.1);
+    EXPECT_LT(std::abs(fit.report.neighbour_correlation), 0.08);
+    EXPECT_LT(ErrorAgainst(FrankePoint, fit.surface, 100).rms, mostly_rough ? 5e-4 : 3e-4);
+  }
+}
+
+// Off by 25 of the rough points' sigma, and by 500 of the others'.
+TEST(NestedFit, OutliersAmongPointsOfTwoKindsAreFound) {
+  for (const bool mostly_rough : {false, true}) {
+    FitTarget target = OfTwoKinds(10000, [&](int k) { return (k % 5 == 0) != mostly_rough; });
+    std::vector<std::uint32_t> gross;
+    for (std::uint32_t k = 0; k < target.points.size(); k += 21) {
+      target.points[k].position.z() += k % 2 == 0 ? 0.5 : -0.5;
+      gross.push_back(k);
+    }
+    const NestedFitResult fit = FitWeighted(target);
+    const auto& found = fit.report.outliers;
+    EXPECT_TRUE(std::includes(found.begin(), found.end(), gross.begin(), gross.end()))
+        << mostly_rough;
+    EXPECT_LE(found.size(), gross.size() + 10) << mostly_rough;
+    EXPECT_NEAR(SigmaFactor(target, fit.report, fit.report.noise_mm), 1, 0.03);
+  }
+}
+
+TEST(NestedFit, WeightsThatAreEqualChangeNothing) {
+  FitTarget target = Heights(FrankePoint, 5000, 1e-3);
+  for (std::size_t k = 0; k < target.points.size(); ++k) {
+    target.points[k].position.z() += k % 50 == 0 ? 0.3 : 0;
+    target.points[k].weight = 0.25;  // a power of two, so that no product is rounded otherwise
+  }
+  const NestedFitResult with = FitWeighted(target), without = FitAuto(target);
+  EXPECT_EQ(with.report.outliers, without.report.outliers);
+  EXPECT_EQ(with.surface.Net(0).vertices, without.surface.Net(0).vertices);
+  EXPECT_EQ(with.surface.Offsets(), without.surface.Offsets());
+  EXPECT_EQ(with.report.noise_mm, without.report.noise_mm);
+  EXPECT_EQ(with.report.held_out_rms_mm, without.report.held_out_rms_mm);
+  EXPECT_EQ(with.report.neighbour_noise_mm, without.report.neighbour_noise_mm);
+}
+
 // A paraboloid is a bicubic spline: of points on a ring of it only rounding is left, which once
 // made thousands of vertices, or no smoothness that could be judged.
 TEST(NestedFit, AnExactShapeIsMetToRoundingAndNotRefined) {
