@@ -256,13 +256,19 @@ std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const HSpl
       report.outliers, options);
 }
 
-// The square root of the mean of 1 / sigma^2; NaN for points without sigma.
-double RootOfMeanWeight(const PointTable& table) {
+// By the noise of a point of mean weight, weights being 1 / sigma^2 of points that are no outliers.
+double SigmaFactorOf(const AutoReport& report, std::span<const double> weights) {
   double sum = 0;
-  for (const double weight : table.weights) {
-    sum += weight;
+  auto next = report.outliers.begin();
+  for (std::uint32_t k = 0; k < weights.size(); ++k) {
+    if (next != report.outliers.end() && *next == k) {
+      ++next;
+    } else {
+      sum += weights[k];
+    }
   }
-  return table.weights_of_sigma ? std::sqrt(sum / static_cast<double>(table.weights.size())) : kNaN;
+  return report.noise_mm *
+         std::sqrt(sum / static_cast<double>(weights.size() - report.outliers.size()));
 }
 
 // What is not needed any more is freed on the way.
@@ -326,11 +332,6 @@ JoinedFit FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<
 }  // namespace
 
 namespace {
-
-// For what is found after the fit, which takes the points apart.
-std::vector<double> WeightsKept(const PointTable& table, const PointFitOptions& options) {
-  return options.sigma || !options.attributes.empty() ? table.weights : std::vector<double>();
-}
 
 void AddAttributes(std::span<const double> weights, const RunContext& context, StepClock& step,
                    PointFit& result) {
@@ -428,8 +429,8 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   }
   const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
   CheckChord(options.chord_mm, start, {table.positions, parameters.uv}, context);
-  const double root_weight = RootOfMeanWeight(table);
-  const std::vector<double> weights = WeightsKept(table, options);
+  const bool has_sigma = table.weights_of_sigma;
+  const std::vector<double> weights = table.weights;  // the fit takes the points apart
   std::vector<ExactPoint> exact = ExactOf(table, parameters.uv);
   const Box3 box = BoxOf(table.positions);
   OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
@@ -440,7 +441,8 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   });
   PointFit result = FoundBy(std::move(parameters), std::move(joined), std::move(attributes));
   result.moves = moves;
-  result.sigma_factor = result.fit.automatic ? result.fit.automatic->noise_mm * root_weight : kNaN;
+  result.sigma_factor =
+      has_sigma && result.fit.automatic ? SigmaFactorOf(*result.fit.automatic, weights) : kNaN;
   result.reach = ReachBeyond(result.fit.surface, box);
   result.off = given ? kNaN : result.fit.point_rms_mm / box.diagonal().norm();
   AddAttributes(weights, context, step, result);

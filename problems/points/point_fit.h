@@ -121,8 +121,8 @@ struct PointFit {
   AttributeFit attribute_fit;
   std::shared_ptr<const SurfaceSigma> sigma;  // of the surface; null where it was not asked for
   std::vector<double> sigma_mm;               // at the points
-  double sigma_factor = kNaN;  // how many times the sigma that were given the points are off;
-                               // NaN where none were, or by another plan than `auto`
+  double sigma_factor = kNaN;  // how many times the sigma that were given the points are off,
+                               // outliers apart; NaN where none were, or by another plan than auto
   double reach = kNaN;         // how far the surface goes beyond the points' box, in its diagonals
   double off = kNaN;           // the points' RMS distance from it, likewise; NaN for given (u,v)
   std::vector<StepTime> times;

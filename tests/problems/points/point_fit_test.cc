@@ -489,6 +489,26 @@ TEST(PointFit, ExactPointsOfATableAreMet) {
   EXPECT_LT(ErrorAgainst(FrankePoint, result.fit.surface, 50).rms, 0.01);
 }
 
+// One point in five is twenty times as rough as the others, and says so; one in fifty is far off
+// and claims to be the surest of all. 1 is what the others are off by.
+TEST(PointFit, SigmaFactorsAreOfThePointsThatAreNoOutliers) {
+  const FitTarget target = Scattered(FrankePoint, 5000, 0, 1);
+  Random random(2);
+  std::string csv = "x,y,z,u,v,sigma\n";
+  for (int k = 0; k < 5000; ++k) {
+    const bool gross = k % 50 == 7;
+    const double sigma = k % 5 == 0 ? 2e-2 : 1e-3;
+    const Vec3 noise = sigma * Vec3(random.Normal(), random.Normal(), random.Normal());
+    const Vec3 position = target.points[k].position + noise + Vec3(0, 0, gross ? 0.5 : 0);
+    const Vec2& uv = target.points[k].uv;
+    csv += fmt::format("{},{},{},{},{},{}\n", position.x(), position.y(), position.z(), uv.x(),
+                       uv.y(), gross ? 2e-4 : sigma);
+  }
+  const PointFit result = FitPoints(ParsePointTable(csv, "test"), {}, {});
+  EXPECT_NEAR(result.sigma_factor, 1, 0.03);
+  EXPECT_NEAR(static_cast<double>(result.fit.automatic->outliers.size()), 100, 5);
+}
+
 // Two strips of points, and next to nothing between them.
 TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   std::string csv = "x,y,z,u,v\n";
