@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "fitting/nested/nested_steps.h"
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
@@ -160,6 +161,16 @@ std::vector<Term> WithSmoothness(std::span<const Term> terms, double weight) {
     all.emplace_back(smooth);
   }
   return all;
+}
+
+// A point that is to be met exactly is believed.
+void Believe(const FitTarget& target, std::vector<std::uint32_t>& outliers) {
+  std::erase_if(outliers, [&](std::uint32_t k) {
+    const FitPoint& point = target.points[k];
+    return std::ranges::any_of(target.exact, [&](const ExactPoint& exact) {
+      return exact.uv == point.uv && exact.position == point.position;
+    });
+  });
 }
 
 // The points of a target as columns.
@@ -314,6 +325,9 @@ class Fitter {
     }
     driver_.Solve(
         {.solve = [&](std::span<const Term> terms) { return SettleAlone(terms, start); }});
+    TellOf(result_.surface, points.Points(), alone.residual_mm, context_.threads,
+           *result_.automatic);
+    Believe(driver_.target(), result_.automatic->outliers);
   }
 
   // The minimum of all terms in the space that the auto plan has found, with its smoothness and

@@ -509,6 +509,42 @@ void CheckNested(const HSplineSurface& start, const ScatteredPoints& points) {
   }
 }
 
+void TellOf(const HSplineSurface& surface, const ScatteredPoints& points,
+            std::span<const double> residual_mm, int threads, AutoReport& report) {
+  constexpr double kPlainly = 1.2;
+  NestedPoints left = DisplacementsFrom(surface, points, threads);
+  std::vector<char> outlier(left.size(), 0);
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    outlier[k] = std::ranges::binary_search(report.outliers, left.given[k]) ? 1 : 0;
+  }
+  left.TakeMeanWeight(outlier);
+  double before = 0, after = 0;
+  PairCorrelation neighbours;
+  std::optional<Residual> last;
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    if (outlier[k] == 0) {
+      const Vec3 scaled = left.Scale(k) * left.value[k];
+      const Residual residual{{scaled[0], scaled[1], scaled[2]}};
+      if (last) {
+        neighbours.Add(*last, residual);
+      }
+      last = residual;
+      before += left.Weight(k) * residual_mm[left.given[k]] * residual_mm[left.given[k]];
+      after += left.Weight(k) * left.value[k].squaredNorm();
+    }
+  }
+  report.neighbour_correlation = neighbours.Value();
+  if (before > 0) {  // as many parameters as before, or as good as
+    report.noise_mm *= std::sqrt(after / before);
+  }
+  if (after > kPlainly * kPlainly * before) {
+    report.held_out_rms_mm = kNaN;
+    report.limited_by_density = false;
+    report.met_to_rounding =
+        report.met_to_rounding && report.noise_mm <= kRounding * MeanLengths(surface).norm();
+  }
+}
+
 NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
                           const RunContext& context) {
   return NestedFitter(start, std::move(points), plan, context).Run();

@@ -16,6 +16,7 @@
 #include "problems/points/residual_files.h"
 #include "problems/points/surface_ply.h"
 #include "problems/report/fit_json.h"
+#include "problems/report/plain_names.h"
 #include "problems/report/timing_json.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/hspline_files/hspline_json.h"
@@ -82,8 +83,9 @@ std::string AutoText(const AutoReport& r) {
   }
   text += '\n';
   if (!r.outliers.empty()) {
-    text += fmt::format("{} outliers left out; residuals and result.json list them\n",
-                        r.outliers.size());
+    text += fmt::format("{} left out; residuals and result.json list {}\n",
+                        Counted(std::ssize(r.outliers), "outlier"),
+                        r.outliers.size() == 1 ? "it" : "them");
   }
   return text + Verdict(r) + "\n";
 }

@@ -389,6 +389,9 @@ TEST(NestedFit, WithCeresOtherTermsTakePart) {
   };
   EXPECT_GT(from_start(FitBy(Solver::kFastest, {PointTerm{}}, target).surface), 0.1);
   EXPECT_LT(from_start(fit.surface), 1e-3);
+  EXPECT_GT(fit.automatic->noise_mm, 0.1) << "of this surface, not of that without the membrane";
+  EXPECT_GT(fit.automatic->neighbour_correlation, 0.5);
+  EXPECT_TRUE(std::isnan(fit.automatic->held_out_rms_mm));
   EXPECT_THAT(Refusal(Solver::kFastest, MembraneTerm{}), HasSubstr("need solver: ceres"));
   EXPECT_THAT(Refusal(Solver::kCeres, MembraneTerm{.weight = AutoOr<double>::Auto()}),
               HasSubstr("one 'smoothness'"));

@@ -177,6 +177,33 @@ TEST(ExactPoints, TheAutoPlanMeetsThemToo) {
   }
 }
 
+// What is said of noise is said of the surface that meets it.
+TEST(ExactPoints, AnExactPointIsNoOutlier) {
+  FitTarget target = Scattered(FrankePoint, 4000, 1e-3, 2);
+  target.points[77].position.z() += 3;
+  FitPoint& lifted = target.points[98];
+  lifted.position.z() += 0.3;
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0};
+  const FitOptions options{.plan = AutoPlan{},
+                           .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto()}},
+                           .solver = Solver::kFastest};
+  const FitResult free = Fit(testing::PlainStart(shape), target, {}, options, {});
+  EXPECT_THAT(free.automatic->outliers, ::testing::Contains(98u));
+  target.exact.push_back({.uv = lifted.uv, .position = lifted.position});
+  const FitResult fit = Fit(testing::PlainStart(shape), target, {}, options, {});
+  ExpectMet(fit.surface, target.exact);
+  EXPECT_EQ(fit.automatic->outliers, std::vector<std::uint32_t>{77});
+  const auto mean_square = [](const FitResult& of) {
+    double sum = 0;
+    for (std::size_t k = 0; k < of.residual_mm.size(); ++k) {
+      sum += k == 77 || k == 98 ? 0 : of.residual_mm[k] * of.residual_mm[k];
+    }
+    return sum;
+  };
+  EXPECT_NEAR(fit.automatic->noise_mm / free.automatic->noise_mm,
+              std::sqrt(mean_square(fit) / mean_square(free)), 1e-2);
+}
+
 TEST(ExactPoints, WhatCannotBeIsRefused) {
   FitTarget target = Scattered(FrankePoint, 500, 1e-3, 2);
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};

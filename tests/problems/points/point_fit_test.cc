@@ -11,6 +11,7 @@
 
 #include "problems/config/config.h"
 #include "problems/output/manifest.h"
+#include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/residual_files.h"
 #include "surfaces/base/random.h"
@@ -582,6 +583,15 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("fit: {plan: {type: adaptive, regions: [{u: [0.5, 0.2]}]}}\n"),
               HasSubstr("fit.plan.regions[0]"));
   EXPECT_THAT(read("sigma: true\nfit: {plan: adaptive}\n"), HasSubstr("sigma: it follows"));
+}
+
+TEST(PointFit, OutliersAreCountedInEnglish) {
+  AutoReport report{.noise_mm = 1};
+  EXPECT_THAT(AutoText(report), ::testing::Not(HasSubstr("left out")));
+  report.outliers = {7};
+  EXPECT_THAT(AutoText(report), HasSubstr("1 outlier left out; residuals and result.json list it"));
+  report.outliers = {7, 9};
+  EXPECT_THAT(AutoText(report), HasSubstr("2 outliers left out"));
 }
 
 TEST(PointFit, ConfigurationRoundTrips) {
