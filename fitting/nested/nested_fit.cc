@@ -394,6 +394,7 @@ class NestedFitter {
 
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
+    report_.weighted = points_.weighted;
     report_.met_to_rounding = report_.held_out_rms_mm <= rounding_mm_;
     report_.limited_by_density =
         !report_.met_to_rounding && finest_ < cap_ && FinestOfMost() >= finest_;

@@ -38,6 +38,7 @@ struct AutoReport {
   double closer_noise_mm = kNaN;        // by a plane through 8: less, if detail passes for noise
   double held_out_rms_mm = kNaN;        // along one axis, of a tenth that took no part
   double neighbour_correlation = kNaN;  // of residuals of points that are next to each other
+  bool weighted = false;                // some points weigh more than others
   bool met_to_rounding = false;         // held out to 1e-8 of the extent: nothing to refine for
   bool limited_by_density = false;      // finer vertices would have fewer points than they need
   std::vector<std::uint32_t> outliers;  // indices as given, ascending; they have no weight

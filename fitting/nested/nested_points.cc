@@ -122,6 +122,8 @@ NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, i
     points.weight.push_back(given.weights[points.given[k]]);
   }
   points.TakeMeanWeight({});
+  points.weighted =
+      std::ranges::any_of(points.weight, [&](double weight) { return weight != points.weight[0]; });
   points.axes = AxesOf(points, extent);
   points.channels = static_cast<int>(points.axes.cols());
   TurnToAxes(points);

@@ -35,6 +35,7 @@ struct NestedPoints {
   bool periodic_v = false;     // likewise
   std::vector<double> weight;  // > 0; or none: all 1
   double mean_weight = 1;      // of those that count (TakeMeanWeight)
+  bool weighted = false;       // some weigh more than others
   std::vector<Vec3> value;     // displacement along each channel's axis, mm; zero beyond those
   std::vector<std::uint32_t> given;
   int channels = 0;

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "problems/config/config.h"
@@ -71,6 +72,10 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Figures& r) {
       {"95th percentile", Figure(r.distance.p95_mm), "mm", ""},
       {"largest", Figure(r.distance.max_mm), "mm", ""},
       {"control vertices", std::to_string(VerticesOf(result.fit.surface)), "", ""}};
+  if (std::isfinite(result.weighted_rms_mm)) {
+    tiles.insert(tiles.begin() + 2, {"weighted RMS", Figure(result.weighted_rms_mm), "mm",
+                                     "points count by their weights, as in the fit"});
+  }
   if (const auto& tolerance = r.tolerance) {
     tiles.push_back({"tolerance", tolerance->Met() ? "met" : "missed", "",
                      fmt::format("{:.4g} mm; {} beyond it", tolerance->tolerance_mm,
@@ -80,7 +85,8 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Figures& r) {
     tiles.push_back(
         {"noise", Figure(result.fit.automatic->noise_mm), "mm",
          fmt::format(
-             "a coordinate, as found; {} left out",
+             "a coordinate{}, as found; {} left out",
+             result.fit.automatic->weighted ? " of a point of mean weight" : "",
              Counted(static_cast<long long>(result.fit.automatic->outliers.size()), "outlier"))});
   }
   return tiles;
@@ -143,8 +149,8 @@ ReportTable WorstTable(std::vector<FitCell> cells) {
   return table;
 }
 
-ReportTable RoundsTable(const FitResult& fit) {
-  ReportTable table{"Round by round",
+ReportTable RoundsTable(const FitResult& fit, std::string_view weighted) {
+  ReportTable table{fmt::format("Round by round{}", weighted),
                     {"round", "finest level", "RMS before (mm)", "RMS after (mm)", "vertices free",
                      "weight of smoothness", "steps of the solver", "solver"},
                     {}};
@@ -159,11 +165,13 @@ ReportTable RoundsTable(const FitResult& fit) {
   return table;
 }
 
-ReportTable AutoTable(const AutoReport& report) {
-  ReportTable table{"What was tried, and what it would have predicted of the points held out",
-                    {"round", "finest level", "vertices", "degrees of freedom", "weight",
-                     "RMS (mm)", "held out (mm)", "outliers"},
-                    {}};
+ReportTable AutoTable(const AutoReport& report, std::string_view weighted) {
+  ReportTable table{
+      fmt::format("What was tried, and what it would have predicted of the points held out{}",
+                  weighted),
+      {"round", "finest level", "vertices", "degrees of freedom", "weight", "RMS (mm)",
+       "held out (mm)", "outliers"},
+      {}};
   for (const NestedRound& round : report.rounds) {
     const bool chosen = static_cast<int>(table.rows.size()) == report.chosen_round;
     table.rows.push_back({fmt::format("{}{}", table.rows.size() + 1, chosen ? " (taken)" : ""),
@@ -175,13 +183,14 @@ ReportTable AutoTable(const AutoReport& report) {
   return table;
 }
 
-ReportSection RoundsSection(const FitResult& fit) {
+ReportSection RoundsSection(const FitResult& fit, bool is_weighted) {
+  const std::string_view weighted = is_weighted ? "; RMS with the points' weights" : "";
   ReportSection section{.heading = "The fit, round by round", .folded = true};
   if (fit.automatic) {
-    section.tables.push_back(AutoTable(*fit.automatic));
+    section.tables.push_back(AutoTable(*fit.automatic, weighted));
   }
   if (!fit.levels.empty()) {
-    section.tables.push_back(RoundsTable(fit));
+    section.tables.push_back(RoundsTable(fit, weighted));
   }
   return section;
 }
@@ -217,7 +226,7 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
                    "The domain: u to the right, v upwards. Grey: no point there.",
                    "points' distances and levels of the cells over the domain"}},
        .tables = {CellsTable(cells), WorstTable(cells)}},
-      RoundsSection(result.fit),
+      RoundsSection(result.fit, std::isfinite(result.weighted_rms_mm)),
       {.heading = "All options", .preformatted = WriteConfig(options), .folded = true}};
   report.footer =
       fmt::format("semblance {}; {}: SHA-256 {}", SEMBLANCE_VERSION, source.name, source.sha256);

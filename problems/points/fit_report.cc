@@ -74,7 +74,8 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
 }
 
 std::string AutoText(const AutoReport& r) {
-  std::string text = fmt::format("noise {:.3g} mm per coordinate", r.noise_mm);
+  std::string text = fmt::format("noise {:.3g} mm per coordinate{}", r.noise_mm,
+                                 r.weighted ? " of a point of mean weight" : "");
   if (std::isfinite(r.neighbour_noise_mm)) {  // few points have no neighbours to compare
     text += fmt::format(" (between neighbours {:.3g})", r.neighbour_noise_mm);
   }
@@ -190,6 +191,9 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
 Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, const PointFit& result,
                   const std::optional<TrimReport>& trim) {
   Json json = FiguresJson(options, source, result);
+  if (std::isfinite(result.weighted_rms_mm)) {
+    json["weighted_rms_mm"] = result.weighted_rms_mm;
+  }
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
   }
@@ -247,6 +251,12 @@ void WriteAttributes(const PointFit& result, OutputFolder& folder) {
 std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit& result,
                                  double chord_mm) {
   std::vector<std::string> notes;
+  if (std::isfinite(result.weighted_rms_mm)) {
+    notes.push_back(
+        fmt::format("weighted RMS {:.4g} mm: points count by their weights, as in the "
+                    "fit; in the RMS they all count alike",
+                    result.weighted_rms_mm));
+  }
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
   }

@@ -359,6 +359,7 @@ PointFit FoundBy(Parametrisation parameters, JoinedFit joined,
           .how = std::move(parameters.how),
           .map_faults = parameters.faults,
           .fit = std::move(joined.fit),
+          .weighted_rms_mm = kNaN,
           .joins = std::move(joined.joins),
           .attributes = std::move(attributes),
           .attribute_at = {},
@@ -374,6 +375,23 @@ Box3 BoxOf(std::span<const Vec3> points) {
     box.extend(p);
   }
   return box;
+}
+
+// Of the distances as residuals list them.
+double RmsOf(std::span<const double> distances) {
+  double sum = 0;
+  for (const double distance : distances) {
+    sum += distance * distance;
+  }
+  return std::sqrt(sum / static_cast<double>(distances.size()));
+}
+
+// What a fit tells of points with weights is weighted; people are told of all points alike first.
+void TellRms(std::span<const double> weights, PointFit& result) {
+  if (std::ranges::any_of(weights, [&](double weight) { return weight != weights[0]; })) {
+    result.weighted_rms_mm = result.fit.point_rms_mm;
+    result.fit.point_rms_mm = RmsOf(result.fit.residual_mm);
+  }
 }
 
 // At the corners of 64 x 64 cells of the domain.
@@ -403,10 +421,11 @@ std::vector<std::string> PointFit::Faults() const {
   constexpr double kMostOff = 0.1;
   if (faults.empty() && off > kMostOff) {
     faults.push_back(
-        fmt::format("the points lie {:.3g} mm (RMS) from the surface, {:.3g} % of their extent, as "
-                    "points that fill space or lie on several sheets do; give (u,v), other "
+        fmt::format("the points lie {:.3g} mm (RMS{}) from the surface, {:.3g} % of their extent, "
+                    "as points that fill space or lie on several sheets do; give (u,v), other "
                     "parameters, one sheet alone, or finer levels if it is one",
-                    fit.point_rms_mm, 100 * off));
+                    std::isfinite(weighted_rms_mm) ? weighted_rms_mm : fit.point_rms_mm,
+                    std::isfinite(weighted_rms_mm) ? ", weighted" : "", 100 * off));
   }
   return faults;
 }
@@ -445,6 +464,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
       has_sigma && result.fit.automatic ? SigmaFactorOf(*result.fit.automatic, weights) : kNaN;
   result.reach = ReachBeyond(result.fit.surface, box);
   result.off = given ? kNaN : result.fit.point_rms_mm / box.diagonal().norm();
+  TellRms(weights, result);
   AddAttributes(weights, context, step, result);
   if (options.sigma) {
     AddSigma(start, weights, step, result);

@@ -114,8 +114,10 @@ struct PointFit {
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
+  // Its point_rms_mm: each point counts as much as any other.
   FitResult fit;
-  std::vector<JoinReport> joins;                  // one per join
+  double weighted_rms_mm = kNaN;  // the same with the points' weights; NaN where all are equal
+  std::vector<JoinReport> joins;  // one per join
   std::vector<PointAttribute> attributes;         // as given
   std::vector<std::vector<double>> attribute_at;  // fitted, at the points
   AttributeFit attribute_fit;
@@ -124,7 +126,8 @@ struct PointFit {
   double sigma_factor = kNaN;  // how many times the sigma that were given the points are off,
                                // outliers apart; NaN where none were, or by another plan than auto
   double reach = kNaN;         // how far the surface goes beyond the points' box, in its diagonals
-  double off = kNaN;           // the points' RMS distance from it, likewise; NaN for given (u,v)
+  double off = kNaN;           // the points' RMS distance from it, weighted, likewise; NaN for
+                               // given (u,v)
   std::vector<StepTime> times;
 
   // Why the result cannot be used; empty if it can. A surface that goes three diagonals beyond the

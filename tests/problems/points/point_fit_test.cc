@@ -510,6 +510,45 @@ TEST(PointFit, SigmaFactorsAreOfThePointsThatAreNoOutliers) {
   EXPECT_NEAR(static_cast<double>(result.fit.automatic->outliers.size()), 100, 5);
 }
 
+// As residuals.csv has it, and beside it with weights, where those differ.
+TEST_F(PointFitCommand, TheRmsIsThatOfTheDistances) {
+  const FitTarget target = Scattered(FrankePoint, 2000, 1e-3, 1);
+  const auto csv = [&](auto&& sigma) {
+    std::string text = "x,y,z,u,v,sigma\n";
+    for (std::size_t k = 0; k < target.points.size(); ++k) {
+      const FitPoint& p = target.points[k];
+      text += fmt::format("{},{},{},{},{},{}\n", p.position.x(), p.position.y(),
+                          p.position.z() + (k % 10 == 0 ? 0.05 : 0), p.uv.x(), p.uv.y(), sigma(k));
+    }
+    return text;
+  };
+  Write("rough.csv", csv([](std::size_t k) { return k % 10 == 0 ? 0.05 : 1e-3; }));
+  Write("alike.csv", csv([](std::size_t) { return 1e-3; }));
+  for (const std::string name : {"rough", "alike"}) {
+    const auto outcome = Call(fmt::format("fit {0}.csv --out {0}", name));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / name / "result.json"));
+    const PointFit fit =
+        FitPoints(ParsePointTable(ReadFileBytes(folder_ / (name + ".csv")), name), {}, {});
+    double sum = 0;
+    for (const double distance : fit.fit.residual_mm) {
+      sum += distance * distance;
+    }
+    const double rms = std::sqrt(sum / 2000);
+    EXPECT_NEAR(json["rms_mm"].get<double>(), rms, 1e-9);
+    EXPECT_THAT(outcome.out, HasSubstr(fmt::format("RMS {:.4g} mm, largest", rms)));
+    const bool differ = name == "rough";
+    ASSERT_EQ(json.contains("weighted_rms_mm"), differ);
+    if (differ) {
+      EXPECT_LT(json["weighted_rms_mm"].get<double>(), 0.5 * rms);
+    }
+    EXPECT_EQ(outcome.out.find("weighted RMS") != std::string::npos, differ);
+    EXPECT_EQ(outcome.out.find("of a point of mean weight") != std::string::npos, differ);
+    const std::string page = ReadFileBytes(folder_ / name / "report.html");
+    EXPECT_EQ(page.find("weighted RMS") != std::string::npos, differ);
+  }
+}
+
 // Two strips of points, and next to nothing between them.
 TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   std::string csv = "x,y,z,u,v\n";
