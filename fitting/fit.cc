@@ -142,23 +142,13 @@ FitTarget Without(std::span<const std::uint32_t> outliers, FitTarget target) {
   return target;
 }
 
-bool HasSmoothness(std::span<const Term> terms) {
-  return std::any_of(terms.begin(), terms.end(),
-                     [](const Term& t) { return std::holds_alternative<SmoothnessTerm>(t); });
-}
-
 // With the weight that the plan has chosen, for points of weight 1 and a length of 1 mm, unless a
 // number is given.
 std::vector<Term> WithSmoothness(std::span<const Term> terms, double weight) {
   std::vector<Term> all(terms.begin(), terms.end());
-  const int automatic = AutoTerm(all);
-  SmoothnessTerm smooth =
-      automatic < 0 ? SmoothnessTerm{.length_mm = 1} : std::get<SmoothnessTerm>(all[automatic]);
-  smooth.weight = weight * PointWeight(all) / std::pow(smooth.length_mm, 4);
-  if (automatic >= 0) {
-    all[automatic] = smooth;
-  } else if (!HasSmoothness(all)) {
-    all.emplace_back(smooth);
+  if (const int automatic = AutoTerm(all); automatic >= 0) {
+    const double length_mm = std::get<SmoothnessTerm>(all[automatic]).length_mm;
+    SetWeight(weight * WeightAsWritten(all, length_mm), all[automatic]);
   }
   return all;
 }

@@ -33,6 +33,7 @@ struct AutoReport {
   std::vector<NestedRound> rounds;
   int chosen_round = -1;
   double weight = kNaN;                 // of the thin-plate energy, as NestedRound; all points
+  double length_mm = 1;                 // of the smoothness that the weights are for
   double noise_mm = kNaN;               // standard deviation of a point along one axis, by the fit
   double neighbour_noise_mm = kNaN;     // by a quadratic through each point's 20 neighbours
   double closer_noise_mm = kNaN;        // by a plane through 8: less, if detail passes for noise

@@ -111,17 +111,23 @@ class FaultFinder {
     }
   }
 
-  // What the auto plan chooses by itself is not to be asked for. Ceres takes other terms too, in
-  // the space that the plan has found.
+  // What the auto plan chooses by itself is not to be asked for, and what it weighs is to be
+  // written. Ceres takes other terms too, in the space that the plan has found.
   void TermsOfAutoPlan() {
     const bool ceres = options_.solver == Solver::kCeres;
-    int automatic = 0;
+    int automatic = 0, points = 0, smooth = 0;
     for (int k = 0; k < std::ssize(options_.terms); ++k) {
       const Term& term = options_.terms[k];
       const bool weighed = AutoTerm(std::span(&term, 1)) >= 0;
       const bool known = (ceres && !weighed) || IsOfAutoPlan(term);
       automatic += weighed ? 1 : 0;
-      if (!known || automatic > 1) {
+      points += std::holds_alternative<PointTerm>(term) ? 1 : 0;
+      smooth += std::holds_alternative<SmoothnessTerm>(term) ? 1 : 0;
+      const bool again = !ceres && points > 1 && std::holds_alternative<PointTerm>(term);
+      if (again) {
+        Add(fmt::format("terms[{}]", k),
+            "the auto plan weighs one 'points'; leave this one out, or take plan: adaptive");
+      } else if (!known || automatic > 1) {
         Add(fmt::format("terms[{}]", k),
             "the auto plan weighs 'points' without a loss (it finds outliers by itself) and one "
             "'smoothness' of the displacement with weight: auto; leave 'terms' out, or take plan: "
@@ -129,6 +135,11 @@ class FaultFinder {
       }
     }
     NeedPoints("the auto plan has no term 'points' with a weight; add one", "terms");
+    if (smooth == 0) {
+      Add("terms",
+          "the auto plan always weighs a 'smoothness'; add {type: smoothness, weight: auto}, or "
+          "take plan: adaptive");
+    }
     if (!std::holds_alternative<NoRelaxation>(options_.relaxation)) {
       Add("relaxation",
           "the auto plan moves no (u,v) between its solves; write relaxation: none and, to move "

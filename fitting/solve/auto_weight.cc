@@ -158,6 +158,10 @@ double PointWeight(std::span<const Term> terms) {
   return sum;
 }
 
+double WeightAsWritten(std::span<const Term> terms, double length_mm) {
+  return PointWeight(terms) / std::pow(length_mm, 4);
+}
+
 void SetWeight(double weight, Term& term) {
   std::visit(
       [&]<class T>(T& t) {

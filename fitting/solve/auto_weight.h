@@ -37,6 +37,9 @@ WeightChoice ChooseWeight(const WeightProblem& problem, double near = 0);
 int AutoTerm(std::span<const Term> terms);
 // The sum of those of the terms `points`.
 double PointWeight(std::span<const Term> terms);
+// What a SmoothnessTerm of that length weighs beside the terms for each unit that one of 1 mm
+// weighs beside points of weight 1, for the same surface.
+double WeightAsWritten(std::span<const Term> terms, double length_mm);
 // Gives a smoothness or membrane term a weight.
 void SetWeight(double weight, Term& term);
 

@@ -59,6 +59,7 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"closer_noise_mm", r.closer_noise_mm},
                {"held_out_rms_mm", r.held_out_rms_mm},
                {"weight", r.weight},
+               {"length_mm", r.length_mm},
                {"neighbour_correlation", r.neighbour_correlation},
                {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},

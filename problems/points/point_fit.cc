@@ -15,6 +15,7 @@
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/problem/start_surface.h"
+#include "fitting/solve/auto_weight.h"
 #include "problems/points/join_report.h"
 #include "problems/points/surface_ply.h"
 #include "surfaces/base/error.h"
@@ -394,6 +395,24 @@ void TellRms(std::span<const double> weights, PointFit& result) {
   }
 }
 
+// With them the same terms and points give the same surface by another plan.
+void TellWeights(std::span<const Term> terms, FitResult& fit) {
+  const int automatic = AutoTerm(terms);
+  if (!fit.automatic || automatic < 0) {
+    return;
+  }
+  AutoReport& report = *fit.automatic;
+  report.length_mm = std::get<SmoothnessTerm>(terms[automatic]).length_mm;
+  const double as_written = WeightAsWritten(terms, report.length_mm);
+  report.weight *= as_written;
+  for (NestedRound& round : report.rounds) {
+    round.weight *= as_written;
+  }
+  for (LevelSummary& level : fit.levels) {
+    level.auto_weight *= as_written;
+  }
+}
+
 // At the corners of 64 x 64 cells of the domain.
 double ReachBeyond(const HSplineSurface& surface, const Box3& points) {
   constexpr int kCells = 64;
@@ -469,6 +488,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   if (options.sigma) {
     AddSigma(start, weights, step, result);
   }
+  TellWeights(options.fit.terms, result.fit);
   result.times = step.Take();
   return result;
 }

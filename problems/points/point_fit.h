@@ -114,7 +114,8 @@ struct PointFit {
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
-  // Its point_rms_mm: each point counts as much as any other.
+  // Its point_rms_mm: each point counts as much as any other. The weights of its smoothness: as the
+  // written terms have them.
   FitResult fit;
   double weighted_rms_mm = kNaN;  // the same with the points' weights; NaN where all are equal
   std::vector<JoinReport> joins;  // one per join

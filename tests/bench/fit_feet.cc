@@ -84,7 +84,10 @@ Measured FitMoved(const PointSet& set, bool disturbed, int rounds) {
   const FitResult fit =
       Fit(StartSurface(shape, points.positions, points.uv),
           ScatteredPoints{points.positions, points.uv, {}},
-          {.plan = AutoPlan{}, .terms = {PointTerm{}}, .solver = Solver::kFastest}, {});
+          {.plan = AutoPlan{},
+           .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto()}},
+           .solver = Solver::kFastest},
+          {});
   return {.seconds = CpuSecondsSoFar() - begin,
           .peak_mb = PeakMb(),
           .rms_mm = DistanceOfTruth(set, fit.surface),

@@ -56,7 +56,10 @@ Measured FitUntuned(const PointSet& set, int count) {
   const double begin = CpuSecondsSoFar();
   const FitResult fit =
       Fit(StartSurface(shape, positions, uv), target, {},
-          {.plan = AutoPlan{}, .terms = {PointTerm{}}, .solver = Solver::kFastest}, {});
+          {.plan = AutoPlan{},
+           .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto()}},
+           .solver = Solver::kFastest},
+          {});
   Measured measured;
   measured.seconds = CpuSecondsSoFar() - begin;
   measured.peak_mb = PeakMb();

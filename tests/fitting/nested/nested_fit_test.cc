@@ -310,7 +310,9 @@ TEST(NestedFit, ResidualsAreTheDistancesInTheOrderGiven) {
   const HSplineSurface start =
       StartSurface({.patches_u = 8, .patches_v = 8, .max_level = 0, .closure = Closure::kPeriodicU},
                    positions, uv);
-  const FitOptions options{.plan = AutoPlan{}, .terms = {PointTerm{}}, .solver = Solver::kFastest};
+  const FitOptions options{.plan = AutoPlan{},
+                           .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto()}},
+                           .solver = Solver::kFastest};
   const FitResult fit = Fit(start, {positions, uv}, options, {});
   double sum = 0;
   for (std::size_t k = 0; k < positions.size(); ++k) {
@@ -326,6 +328,8 @@ TEST(NestedFit, APlaneIsReproduced) {
   const NestedFitResult fit = FitAuto(Scattered(plane, 500, 0, 2));
   EXPECT_LT(ErrorAgainst(plane, fit.surface, 40).largest, 1e-10);
 }
+
+const Term kSmooth = SmoothnessTerm{.weight = AutoOr<double>::Auto()};
 
 HSplineSurface PlaneUnder(const FitTarget& target) {
   std::vector<Vec3> positions;
@@ -344,7 +348,7 @@ FitResult FitBy(Solver solver, std::vector<Term> terms, const FitTarget& target)
 
 std::string Refusal(Solver solver, const Term& term) {
   return testing::WordsOf<InputError>([&] {
-    FitBy(solver, {PointTerm{}, term}, Heights(FrankePoint, 100, 0));
+    FitBy(solver, {PointTerm{}, kSmooth, term}, Heights(FrankePoint, 100, 0));
   });
 }
 
@@ -354,10 +358,10 @@ TEST(NestedFit, CeresFindsTheSameSurface) {
   for (std::size_t k = 0; k < target.points.size(); k += 100) {
     target.points[k].position.z() += 3;
   }
-  const FitResult fastest = FitBy(Solver::kFastest, {PointTerm{}}, target);
+  const FitResult fastest = FitBy(Solver::kFastest, {PointTerm{}, kSmooth}, target);
   const Term smoothness = SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 0.1};
-  for (const std::vector<Term>& terms :
-       {std::vector<Term>{PointTerm{}}, std::vector<Term>{PointTerm{.weight = 7}, smoothness}}) {
+  for (const std::vector<Term>& terms : {std::vector<Term>{PointTerm{}, kSmooth},
+                                         std::vector<Term>{PointTerm{.weight = 7}, smoothness}}) {
     const FitResult ceres = FitBy(Solver::kCeres, terms, target);
     EXPECT_EQ(ceres.automatic->outliers.size(), 30u);
     EXPECT_EQ(ceres.levels.back().solver, "ceres");
@@ -380,14 +384,14 @@ TEST(NestedFit, CeresFindsTheSameSurface) {
 TEST(NestedFit, WithCeresOtherTermsTakePart) {
   const FitTarget target = Heights(FrankePoint, 3000, 1e-3);
   const HSplineSurface start = PlaneUnder(target);
-  const FitResult fit =
-      FitBy(Solver::kCeres, {PointTerm{}, MembraneTerm{.weight = 1e4, .length_mm = 1}}, target);
+  const FitResult fit = FitBy(
+      Solver::kCeres, {PointTerm{}, kSmooth, MembraneTerm{.weight = 1e4, .length_mm = 1}}, target);
   const auto from_start = [&](const HSplineSurface& surface) {
     const Vec3 mean = surface.Point({0.5, 0.5}) - start.Point({0.5, 0.5});
     return ErrorAgainst([&](const Vec2& uv) -> Vec3 { return start.Point(uv) + mean; }, surface, 40)
         .rms;
   };
-  EXPECT_GT(from_start(FitBy(Solver::kFastest, {PointTerm{}}, target).surface), 0.1);
+  EXPECT_GT(from_start(FitBy(Solver::kFastest, {PointTerm{}, kSmooth}, target).surface), 0.1);
   EXPECT_LT(from_start(fit.surface), 1e-3);
   EXPECT_GT(fit.automatic->noise_mm, 0.1) << "of this surface, not of that without the membrane";
   EXPECT_GT(fit.automatic->neighbour_correlation, 0.5);

@@ -171,8 +171,9 @@ TEST(FootMoves, WithoutRoundsAndOfOtherFitsNothingMoves) {
   const MovedUv none = MoveToFeet(Shape(Closure::kOpen), columns.View(), {}, AutoPlan{}, {});
   EXPECT_EQ(none.moves.rounds, 0);
   EXPECT_EQ(none.uv, columns.uv);
-  const FitOptions options{
-      .plan = AutoPlan{.relaxation_rounds = 1}, .terms = {PointTerm{}}, .solver = Solver::kFastest};
+  const FitOptions options{.plan = AutoPlan{.relaxation_rounds = 1},
+                           .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto()}},
+                           .solver = Solver::kFastest};
   EXPECT_THROW(Fit(StartSurface(Shape(Closure::kOpen), columns.positions, columns.uv),
                    columns.View(), options, {}),
                InputError);

@@ -170,7 +170,10 @@ TEST(ExactPoints, TheAutoPlanMeetsThemToo) {
     const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0, .closure = closure};
     const FitResult fit =
         Fit(testing::PlainStart(shape), target, {},
-            {.plan = AutoPlan{}, .terms = {PointTerm{}}, .solver = Solver::kFastest}, {});
+            {.plan = AutoPlan{},
+             .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto()}},
+             .solver = Solver::kFastest},
+            {});
     ExpectMet(fit.surface, target.exact);
     EXPECT_LT(testing::ErrorAgainst(truth, fit.surface, 50).rms, 2e-3);
     EXPECT_THAT(fit.automatic->outliers, ::testing::Contains(77u));

@@ -549,6 +549,31 @@ TEST_F(PointFitCommand, TheRmsIsThatOfTheDistances) {
   }
 }
 
+// With the weight that was found, its length and the same points, a fit that is given numbers is
+// the same.
+TEST(PointFit, TheWeightThatIsReportedIsThatOfTheTermsAsWritten) {
+  const PointTable table =
+      ParsePointTable(Csv(Scattered(FrankePoint, 3000, 1e-3, 1), /*with_uv=*/true), "test");
+  const PointFit plain = FitPoints(table, {}, {});
+  PointFitOptions options;
+  const auto ask = [&](AutoOr<double> weight) {
+    options.fit.terms = {PointTerm{.weight = 7},
+                         SmoothnessTerm{.weight = weight, .length_mm = 0.1}};
+  };
+  ask(AutoOr<double>::Auto());
+  const PointFit found = FitPoints(table, options, {});
+  EXPECT_EQ(found.fit.residual_mm, plain.fit.residual_mm);
+  const AutoReport& report = *found.fit.automatic;
+  EXPECT_EQ(report.length_mm, 0.1);
+  EXPECT_NEAR(report.weight / plain.fit.automatic->weight, 7e4, 1);
+  EXPECT_EQ(AutoJson(report)["length_mm"], 0.1);
+  ask(report.weight);
+  options.fit.solver = Solver::kCeres;
+  const PointFit again = FitPoints(table, options, {});
+  const auto of_plain = [&](const Vec2& uv) { return plain.fit.surface.Point(uv); };
+  EXPECT_LT(ErrorAgainst(of_plain, again.fit.surface, 50).rms, 2e-5);
+}
+
 // Two strips of points, and next to nothing between them.
 TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   std::string csv = "x,y,z,u,v\n";
@@ -594,6 +619,12 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
               HasSubstr("fit.terms: the adaptive plan has no term 'points'"));
   EXPECT_THAT(read("fit: {terms: [symmetry]}\n"),
               HasSubstr("the auto plan weighs 'points' without a loss"));
+  EXPECT_THAT(read("fit: {terms: [points]}\n"),
+              HasSubstr("fit.terms: the auto plan always weighs a 'smoothness'; add"));
+  EXPECT_THAT(read("fit: {solver: ceres, terms: [points]}\n"),
+              HasSubstr("fit.terms: the auto plan always weighs a 'smoothness'; add"));
+  EXPECT_THAT(read("fit: {terms: [points, points, {type: smoothness, weight: auto}]}\n"),
+              HasSubstr("fit.terms[1]: the auto plan weighs one 'points'"));
   EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
   EXPECT_THAT(read("parameters: cylinder\nclosure: periodic_uv\n"),
               HasSubstr("go round in u alone; write closure: periodic_u"));
