@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/solve/surface_sigma.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
+#include "fitting/least_squares/sparse_factor.h"
 #include "fitting/solve/selected_inverse.h"
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
@@ -35,13 +37,17 @@ std::vector<Observation> PointsThatCount(const AttributeColumns& points,
   return observations;
 }
 
-// Of the sixteen vertices of a patch, from that of all unknowns.
-Matrix16 CovarianceOf(const SplineElement& element, const SelectedInverse& inverse) {
+// Of the sixteen vertices of a patch, from that of all unknowns. known: what is to be taken from
+// it, as a product of these rows with each other.
+Matrix16 CovarianceOf(const SplineElement& element, const SelectedInverse& inverse,
+                      const Eigen::MatrixXd& known) {
   const auto count = static_cast<Eigen::Index>(element.dofs.size());
   Eigen::MatrixXd of_dofs(count, count);
   for (Eigen::Index a = 0; a < count; ++a) {
     for (Eigen::Index b = 0; b <= a; ++b) {
-      of_dofs(a, b) = of_dofs(b, a) = inverse.At(element.dofs[a], element.dofs[b]);
+      const int row = element.dofs[a], column = element.dofs[b];
+      of_dofs(a, b) = of_dofs(b, a) =
+          inverse.At(row, column) - known.row(row).dot(known.row(column));
     }
   }
   return element.IsIdentity()
@@ -61,6 +67,44 @@ SparseMatrix Raised(SparseMatrix lower) {
   return lower;
 }
 
+// The unknowns' functions at a place, a column each.
+Eigen::MatrixXd FunctionsAt(std::span<const Vec2> places, const SplineElements& elements,
+                            Eigen::Index unknowns) {
+  Eigen::MatrixXd functions = Eigen::MatrixXd::Zero(unknowns, std::ssize(places));
+  for (Eigen::Index k = 0; k < functions.cols(); ++k) {
+    const SplineElement& element = elements[elements.At(places[k])];
+    const std::array<double, 16> weights = PatchWeights(
+        elements.shape(), PatchPointAt(elements.shape(), element.patch.level, places[k]));
+    const Eigen::Map<const Eigen::RowVectorXd> of_patch(weights.data(), 16);
+    const Eigen::RowVectorXd of_dofs =
+        element.IsIdentity() ? Eigen::RowVectorXd(of_patch) : of_patch * element.extraction;
+    for (Eigen::Index a = 0; a < of_dofs.size(); ++a) {
+      functions(element.dofs[a], k) += of_dofs[a];
+    }
+  }
+  return functions;
+}
+
+// What equations C x = d that hold take from the inverse of H, as P P^T: H^-1 C^T (C H^-1
+// C^T)^-1/2. What equations say twice counts once.
+Eigen::MatrixXd TakenBy(const Eigen::MatrixXd& equations, const SparseMatrix& lower) {
+  constexpr double kDependent = 1e-9;
+  if (equations.cols() == 0) {
+    return equations;
+  }
+  const SparseFactor factor(lower, 0);
+  if (!factor.usable()) {
+    throw InputError("sigma: rounding leaves no factor of the fit's matrix; write sigma: false");
+  }
+  const Eigen::MatrixXd ways = factor.Solve(equations);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(equations.transpose() * ways);
+  const Eigen::VectorXd& squares = gram.eigenvalues();
+  const double least = kDependent * squares.maxCoeff();
+  const Eigen::VectorXd scales =
+      squares.unaryExpr([&](double square) { return square > least ? 1 / std::sqrt(square) : 0; });
+  return ways * gram.eigenvectors() * scales.asDiagonal();
+}
+
 }  // namespace
 
 struct SurfaceSigma::Model {
@@ -78,14 +122,18 @@ struct SurfaceSigma::Model {
     const SparseMatrix of_points = Assemble(space, scale, {}).lower;
     const SparseMatrix energy =
         Assemble(space, 0, StiffnessByLevel(space.shape(), smooth, options.lengths_mm)).lower;
-    const SelectedInverse inverse(Raised(of_points + energy));
+    const SparseMatrix normal = Raised(of_points + energy);
+    const SelectedInverse inverse(normal);
     if (!inverse.usable()) {
       throw InputError("sigma: rounding leaves no factor of the fit's matrix; write sigma: false");
     }
+    const Eigen::MatrixXd known =
+        TakenBy(FunctionsAt(options.met, elements, normal.rows()), normal);
     for (int e = 0; e < elements.size(); ++e) {
-      covariances.push_back(CovarianceOf(elements[e], inverse));
+      covariances.push_back(CovarianceOf(elements[e], inverse, known));
     }
     variance = options.noise_mm * options.noise_mm / count;
+    determined = -known.cwiseProduct(of_points.selfadjointView<Eigen::Lower>() * known).sum();
     for (int k = 0; k < of_points.outerSize(); ++k) {
       for (SparseMatrix::InnerIterator entry(of_points, k); entry; ++entry) {
         const double both = entry.row() == entry.col() ? 1 : 2;
@@ -100,7 +148,7 @@ struct SurfaceSigma::Model {
   HierarchicalSplineSpace space;
   SplineElements elements;
   std::vector<Matrix16> covariances;  // of each element's vertices, for a noise of 1
-  double variance = kNaN, determined = 0;
+  double variance = kNaN, determined = kNaN;
 };
 
 SurfaceSigma::SurfaceSigma(const HSplineSurface& surface, const AttributeColumns& points,

@@ -19,14 +19,17 @@ struct SigmaOptions {
                            // the root of their weighted mean square (AutoReport)
   double weight = kNaN;    // of the thin-plate energy (SmoothnessTerm, length_mm 1), > 0 or 0
   Vec2 lengths_mm = Vec2::Constant(kNaN);  // what [0,1] stands for along u and v
+  std::span<const Vec2> met = {};          // where the surface is held to exact points
 };
 
 // The standard deviation along one axis of the penalised least squares sum w |e|^2 / sum w + weight
 // * energy, at (u,v): noise sqrt(n^T H^-1 n / count), H being its normal matrix over the unknowns
 // and n their functions at (u,v). These are the Bayesian intervals of Wahba (1983): smoothness is
 // what is known before of the surface, so that they hold its bias too, on the mean over the domain
-// (Nychka 1988) rather than at each place, and grow where points are few. They know nothing of
-// detail finer than the vertices, nor of errors that neighbours share.
+// (Nychka 1988) rather than at each place, and grow where points are few. Where the surface is
+// held, by the equations C, H^-1 becomes H^-1 - H^-1 C^T (C H^-1 C^T)^-1 C H^-1. They know nothing
+// of detail finer than the vertices, of tangents that are held, nor of errors that neighbours
+// share.
 class SurfaceSigma {
  public:
   // surface: its vertices are the unknowns. points: those of the fit, without columns. left_out:

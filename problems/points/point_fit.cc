@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -247,11 +248,20 @@ AttributeFit AttributesOver(const PointFit& result, std::span<const double> weig
                        context.threads);
 }
 
-std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const HSplineSurface& start,
-                                              std::span<const double> weights) {
+// What SigmaOver needs beside the result.
+struct SigmaSource {
+  const HSplineSurface& start;
+  std::span<const double> weights;
+  std::vector<Vec2> met;  // where the surface meets exact points
+};
+
+std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const SigmaSource& source) {
   const AutoReport& report = *result.fit.automatic;
-  const SigmaOptions options{
-      .noise_mm = report.noise_mm, .weight = report.weight, .lengths_mm = MeanLengths(start)};
+  const std::span<const double> weights = source.weights;
+  const SigmaOptions options{.noise_mm = report.noise_mm,
+                             .weight = report.weight,
+                             .lengths_mm = MeanLengths(source.start),
+                             .met = source.met};
   return std::make_shared<const SurfaceSigma>(
       result.fit.surface, AttributeColumns{.uv = result.fit.uv, .weights = weights, .columns = {}},
       report.outliers, options);
@@ -346,10 +356,9 @@ void AddAttributes(std::span<const double> weights, const RunContext& context, S
   }
 }
 
-void AddSigma(const HSplineSurface& start, std::span<const double> weights, StepClock& step,
-              PointFit& result) {
+void AddSigma(const SigmaSource& source, StepClock& step, PointFit& result) {
   if (result.Faults().empty()) {
-    result.sigma = step("sigma", [&] { return SigmaOver(result, start, weights); });
+    result.sigma = step("sigma", [&] { return SigmaOver(result, source); });
     result.sigma_mm = result.sigma->At(result.fit.uv);
   }
 }
@@ -470,6 +479,8 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   const bool has_sigma = table.weights_of_sigma;
   const std::vector<double> weights = table.weights;  // the fit takes the points apart
   std::vector<ExactPoint> exact = ExactOf(table, parameters.uv);
+  std::vector<Vec2> met;
+  std::ranges::transform(exact, std::back_inserter(met), &ExactPoint::uv);
   const Box3 box = BoxOf(table.positions);
   OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
                      std::move(table.weights)};
@@ -486,7 +497,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   TellRms(weights, result);
   AddAttributes(weights, context, step, result);
   if (options.sigma) {
-    AddSigma(start, weights, step, result);
+    AddSigma({start, weights, std::move(met)}, step, result);
   }
   TellWeights(options.fit.terms, result.fit);
   result.times = step.Take();

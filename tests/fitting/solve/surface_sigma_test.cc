@@ -106,11 +106,30 @@ TEST(SurfaceSigma, IsThatOfDenseLeastSquares) {
     EXPECT_NEAR(sigma.degrees_of_freedom(), static_cast<double>(dense.rank()), 0.05);
     const Eigen::MatrixXd inverse = dense.pseudoInverse();
     const std::vector<Vec2> at = PointsAt(50, 8).uv;
-    const std::vector<double> found = sigma.At(at);
-    for (std::size_t k = 0; k < at.size(); ++k) {
-      const Eigen::VectorXd n = row(at[k]);
-      const double expected = kNoise * std::sqrt(weights / 597 * n.dot(inverse * n));
-      EXPECT_NEAR(found[k], expected, 1e-3 * expected);
+    const auto expect = [&](const SurfaceSigma& of, const Eigen::MatrixXd& covariance) {
+      const std::vector<double> found = of.At(at);
+      for (std::size_t k = 0; k < at.size(); ++k) {
+        const Eigen::VectorXd n = row(at[k]);
+        const double expected = kNoise * std::sqrt(weights / 597 * n.dot(covariance * n));
+        EXPECT_NEAR(found[k], expected, 1e-3 * expected);
+      }
+    };
+    expect(sigma, inverse);
+    // Held at five places, one of them twice.
+    std::vector<Vec2> met = PointsAt(5, 11).uv;
+    met.push_back(met[0]);
+    const SurfaceSigma held(surface, points.Columns(), left_out,
+                            {.noise_mm = kNoise, .weight = 0, .lengths_mm = {1, 1}, .met = met});
+    Eigen::MatrixXd equations(5, normal.cols());
+    for (Eigen::Index k = 0; k < 5; ++k) {
+      equations.row(k) = row(met[static_cast<std::size_t>(k)]).transpose();
+    }
+    const Eigen::MatrixXd ways = inverse * equations.transpose();
+    const Eigen::MatrixXd taken = ways * (equations * ways).inverse() * ways.transpose();
+    expect(held, inverse - taken);
+    EXPECT_NEAR(held.degrees_of_freedom(), static_cast<double>(dense.rank()) - 5, 0.05);
+    for (const double at_held : held.At(met)) {
+      EXPECT_LT(at_held, 1e-3 * sigma.At(at)[0]);
     }
   }
 }

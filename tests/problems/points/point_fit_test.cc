@@ -482,9 +482,14 @@ TEST(PointFit, ExactPointsOfATableAreMet) {
   }
   const PointTable table = ParsePointTable(csv, "test");
   ASSERT_EQ(table.exact.size(), 20u);
-  const PointFit result = FitPoints(table, PointFitOptions(), {});
+  PointFitOptions options;
+  options.sigma = true;
+  const PointFit result = FitPoints(table, options, {});
+  std::vector<double> sigma_mm = result.sigma_mm;
+  std::nth_element(sigma_mm.begin(), sigma_mm.begin() + 1000, sigma_mm.end());
   for (const std::uint32_t k : table.exact) {
     EXPECT_LT((result.fit.surface.Point(table.uv[k]) - table.positions[k]).norm(), 1e-9);
+    EXPECT_LT(result.sigma_mm[k], 1e-2 * sigma_mm[1000]);
   }
   EXPECT_LT(std::abs(result.fit.surface.Frame(table.uv[0]).du.z()), 1e-9);
   EXPECT_LT(ErrorAgainst(FrankePoint, result.fit.surface, 50).rms, 0.01);
