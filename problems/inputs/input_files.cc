@@ -20,4 +20,11 @@ std::vector<std::filesystem::path> InputFilesOf(const Experiment& experiment) {
   return files;
 }
 
+GivenFiles GivenTo(const Experiment& experiment, const std::filesystem::path& config,
+                   std::span<const std::string_view> outputs) {
+  GivenFiles given{.files = InputFilesOf(experiment), .outputs = outputs};
+  given.files.push_back(config);
+  return given;
+}
+
 }  // namespace semblance

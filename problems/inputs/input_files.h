@@ -3,9 +3,12 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include "problems/config/named_files.h"
+#include "problems/output/given_files.h"
 #include "problems/pipeline/experiment.h"
 
 namespace semblance {
@@ -16,5 +19,10 @@ std::vector<NamedFile> NamedInputsOf(const Experiment& experiment);
 
 // The same, the files alone.
 std::vector<std::filesystem::path> InputFilesOf(const Experiment& experiment);
+
+// What a job of the experiment must not replace: its configuration and these. outputs: what the job
+// may write; they are referred to.
+GivenFiles GivenTo(const Experiment& experiment, const std::filesystem::path& config,
+                   std::span<const std::string_view> outputs);
 
 }  // namespace semblance

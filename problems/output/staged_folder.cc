@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <system_error>
+#include <utility>
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/temporary_files.h"
@@ -120,10 +121,11 @@ fs::path FreeNameBeside(const fs::path& root) {
 
 }  // namespace
 
-StagedFolder::StagedFolder(const fs::path& root, WhenNotEmpty when_not_empty)
-    : root_(Resolved(root)), when_not_empty_(when_not_empty) {
+StagedFolder::StagedFolder(const fs::path& root, WhenNotEmpty when_not_empty, GivenFiles given)
+    : root_(Resolved(root)), when_not_empty_(when_not_empty), given_(std::move(given)) {
   if (Exists(root_)) {
     RequireUsable(root_, HoldsNothing(root_) ? WhenNotEmpty::kReplaceFiles : when_not_empty);
+    RefuseToReplace(root, given_);
   }
   beside_ = CanBeBeside(root_);
   made_ = MakeAbove(root_, root);
@@ -189,6 +191,9 @@ void StagedFolder::MoveFiles() {
   for (const fs::path& file : files) {
     if (fs::is_directory(root_ / file, error)) {
       KeepAndFail(fmt::format("{} is a folder there", file.string()));
+    }
+    if (IsOneOf(given_.files, root_ / file)) {
+      KeepAndFail(fmt::format("{} is a file that was read", file.string()));
     }
   }
   if (!files.empty()) {

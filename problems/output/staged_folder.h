@@ -10,6 +10,7 @@
 
 #include "problems/output/files.h"
 #include "problems/output/folder_claim.h"
+#include "problems/output/given_files.h"
 
 namespace semblance {
 
@@ -22,8 +23,10 @@ namespace semblance {
 // cleared by the next one.
 class StagedFolder {
  public:
-  // Throws IoError as OutputFolder does, and if another process is writing `root`.
-  StagedFolder(const std::filesystem::path& root, WhenNotEmpty when_not_empty);
+  // Throws IoError as OutputFolder does, and if another process is writing `root`; InputError as
+  // RefuseToReplace does, before anything is written.
+  StagedFolder(const std::filesystem::path& root, WhenNotEmpty when_not_empty,
+               GivenFiles given = {});
   // Whatever was not published is gone, and so are folders that were made for it.
   ~StagedFolder();
   StagedFolder(const StagedFolder&) = delete;
@@ -34,8 +37,9 @@ class StagedFolder {
   // To write into, until Publish().
   OutputFolder& Files() { return *files_; }
 
-  // Moves all to Root(). Throws IoError if another program has written there meanwhile, or cannot
-  // be moved; the files then stay in a folder that the message names.
+  // Moves all to Root(). Throws IoError if another program has written there meanwhile, a given
+  // file would be replaced, or one cannot be moved; the files then stay in a folder that the
+  // message names.
   void Publish(Durability durability = Durability::kSynced);
 
  private:
@@ -46,6 +50,7 @@ class StagedFolder {
 
   std::filesystem::path root_;
   WhenNotEmpty when_not_empty_;
+  GivenFiles given_;
   bool beside_ = false;
   std::vector<std::filesystem::path> made_;  // folders above, outermost first
   FolderClaim claim_;

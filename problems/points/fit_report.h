@@ -2,8 +2,10 @@
 // What a fit of points tells: in words, as JSON, and as the files of its folder.
 #pragma once
 
+#include <array>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fitting/nested/nested_fit.h"
@@ -22,6 +24,12 @@ std::string AutoText(const AutoReport& report);
 // How (u,v) were moved before the fit.
 nlohmann::ordered_json MovesJson(const FootMoves& moves);
 std::string MovesText(const FootMoves& moves);
+
+// What WritePointFit may write (given_files.h).
+inline constexpr std::array<std::string_view, 9> kPointFitFiles = {
+    "resolved.yaml", "surface.hspline.json", "surface.ply",
+    "residuals.csv", "residuals.ply",        "attributes_*.hspline.json",
+    "report.html",   "timing.json",          "result.json"};
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
 // surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (three attributes each),

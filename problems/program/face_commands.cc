@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "problems/edits/edit_script.h"
 #include "problems/exports/export_file.h"
 #include "problems/face_template/template_io.h"
+#include "problems/output/given_files.h"
 #include "problems/prior/hspline_prior.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -40,7 +42,9 @@ struct FaceArguments {
   bool force = false;
 };
 
-void RefuseToReplace(const fs::path& path, const FaceArguments& a) {
+// given: what the command reads.
+void CheckFree(const fs::path& path, const FaceArguments& a, std::span<const fs::path> given) {
+  RefuseToReplace(path, given);
   if (!a.force && fs::exists(path)) {
     throw IoError(fmt::format("{}: it exists; name another file, or add --force to replace it",
                               path.string()));
@@ -73,12 +77,13 @@ EditScript Edited(const std::string& script, HSplineSurface& face) {
 }
 
 int Edit(const FaceArguments& a) {
-  RefuseToReplace(a.out, a);
+  const std::array<fs::path, 2> given = {a.face, a.script};
+  CheckFree(a.out, a, given);
   RefuseOneName(a.out, a.inverse);
   HSplineSurface face = ReadHSpline(a.face);
   const EditScript inverse = Edited(a.script, face);
   if (!a.inverse.empty()) {
-    RefuseToReplace(a.inverse, a);
+    CheckFree(a.inverse, a, given);
     WriteFileAtomically(a.inverse, WriteConfig(inverse));
   }
   WriteHSpline(a.out, face);
@@ -87,7 +92,7 @@ int Edit(const FaceArguments& a) {
 }
 
 int Export(const FaceArguments& a) try {
-  RefuseToReplace(a.out, a);
+  CheckFree(a.out, a, std::array<fs::path, 1>{a.face});
   const std::string bytes =
       ExportedBytes(a.face, {.extension = fs::path(a.out).extension().string(),
                              .chord_mm = a.chord_mm,
@@ -99,11 +104,15 @@ int Export(const FaceArguments& a) try {
   throw Named(error, a.face);
 }
 
-int Store(const Feature& feature, const FaceArguments& a) {
-  RefuseToReplace(fs::path(a.library) / fmt::format("{}.json", feature.name), a);
+int Store(const Feature& feature, const FaceArguments& a, std::span<const fs::path> given) {
+  CheckFree(fs::path(a.library) / fmt::format("{}.json", feature.name), a, given);
   const fs::path path = StoreFeature(a.library, feature);
   fmt::print("{}: {} vertices\n", path.string(), feature.offsets.size());
   return kDone;
+}
+
+std::vector<fs::path> FeatureFiles(const FaceArguments& a) {
+  return {a.features.begin(), a.features.end()};
 }
 
 int ExtractCommand(const FaceArguments& a) {
@@ -114,11 +123,13 @@ int ExtractCommand(const FaceArguments& a) {
         "{}: no vertex of levels {} to {} with u in {}..{} and v in {}..{} has detail; widen them",
         a.face, a.levels[0], a.levels[1], a.u[0], a.u[1], a.v[0], a.v[1]));
   }
-  return Store(feature, a);
+  return Store(feature, a, std::array<fs::path, 1>{a.face});
 }
 
 int ApplyCommand(const FaceArguments& a) {
-  RefuseToReplace(a.out, a);
+  std::vector<fs::path> given = FeatureFiles(a);
+  given.emplace_back(a.face);
+  CheckFree(a.out, a, given);
   HSplineSurface face = ReadHSpline(a.face);
   std::size_t vertices = 0;
   for (const std::string& path : a.features) {
@@ -140,13 +151,13 @@ int BlendCommand(const FaceArguments& a) {
   for (const std::string& warning : blend.warnings) {
     fmt::print(stderr, "warning: {}\n", warning);
   }
-  return Store(blend.feature, a);
+  return Store(blend.feature, a, FeatureFiles(a));
 }
 
 int MirrorCommand(const FaceArguments& a) {
   Feature feature = MirrorFeature(ReadFeature(a.features.at(0)));
   feature.name = a.name;
-  return Store(feature, a);
+  return Store(feature, a, FeatureFiles(a));
 }
 
 int ListCommand(const FaceArguments& a) {
@@ -158,15 +169,18 @@ int ListCommand(const FaceArguments& a) {
 }
 
 // The face that `semblance template` has written into a folder.
-TemplateFace TemplateIn(const fs::path& folder) {
-  return ReadTemplate({.surface = folder / "head.hspline.json",
-                       .sites = folder / "sites.csv",
-                       .features = folder / "features.json"});
+FileTemplate TemplateIn(const fs::path& folder) {
+  return {.surface = folder / "head.hspline.json",
+          .sites = folder / "sites.csv",
+          .features = folder / "features.json"};
 }
 
 int PriorCommand(const FaceArguments& a) {
-  RefuseToReplace(a.out, a);
-  const TemplateFace face = TemplateIn(a.template_folder);
+  const FileTemplate files = TemplateIn(a.template_folder);
+  CheckFree(a.out, a,
+            std::array<fs::path, 7>{a.prior.mean, a.prior.modes, a.prior.sites, a.prior.features,
+                                    files.surface, files.sites, files.features});
+  const TemplateFace face = ReadTemplate(files);
   const FacePrior prior = LoadPrior(a.prior);
   RunContext context;
   context.threads = a.threads;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "problems/config/config.h"
+#include "problems/config/named_files.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
@@ -44,14 +45,25 @@ void CheckOrder(const std::vector<std::string>& files) {
   }
 }
 
+// What is read, and what may be written.
+GivenFiles GivenTo(const FitArguments& arguments, const PointFitOptions& options) {
+  GivenFiles given{.files = {arguments.files.begin(), arguments.files.end()},
+                   .outputs = kPointFitFiles};
+  for (const NamedFile& named : NamedFiles(options)) {
+    given.files.push_back(named.file);
+  }
+  return given;
+}
+
 int FitCommand(const FitArguments& arguments) {
   CheckOrder(arguments.files);
   const std::filesystem::path path = arguments.files.at(0);
   const PointFitOptions options = FitOptionsOf(arguments);
-  PointFile file = ReadPointFile(path, options.attributes);
   const std::string name = path == "-" ? "standard input" : path.filename().string();
   StagedFolder folder = FolderOf(
-      arguments, fmt::format("out/{}", path == "-" ? "points" : name.substr(0, name.find('.', 1))));
+      arguments, fmt::format("out/{}", path == "-" ? "points" : name.substr(0, name.find('.', 1))),
+      GivenTo(arguments, options));
+  PointFile file = ReadPointFile(path, options.attributes);
   const RunContext context = ContextOf(arguments);
   const PointFit result = FitPoints(std::move(file.points), options, context);
   const std::vector<std::string> notes = WritePointFit(

@@ -18,6 +18,7 @@
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/landmark_files/site_page.h"
 #include "problems/landmark_files/site_picture.h"
+#include "problems/output/given_files.h"
 #include "problems/program/work_options.h"
 #include "problems/propose/proposal_table.h"
 #include "problems/propose/propose_landmarks.h"
@@ -52,6 +53,7 @@ void CheckFree(const std::string& out, bool force) {
 }
 
 int Convert(const LandmarkArguments& a) {
+  RefuseToReplace(a.out, std::array<fs::path, 1>{a.in});
   CheckFree(a.out, a.force);
   const LandmarkReading reading = ReadLandmarks(a.in, a.reading);
   const std::string bytes = EncodeLandmarks(reading.file, a.out);
@@ -141,12 +143,21 @@ void WriteProposal(const ProposeArguments& a, const std::string& out, const Land
       out, file.landmarks.size(), file.absent.size(), AxesIn(file, out));
 }
 
+std::vector<fs::path> GivenTo(const ProposeArguments& a) {
+  std::vector<fs::path> given = {a.skull, a.compare};
+  for (const auto& [skull, landmarks] : a.references) {
+    given.insert(given.end(), {skull, landmarks});
+  }
+  return given;
+}
+
 int Propose(const ProposeArguments& a) {
   const std::string out =
       a.out.empty() ? fmt::format("out/{}_proposed.yaml", fs::path(a.skull).stem().string())
                     : a.out;
   const bool writes = a.compare.empty() || !a.out.empty();
   if (writes) {
+    RefuseToReplace(out, GivenTo(a));
     CheckFree(out, a.force);
   }
   RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};

@@ -15,6 +15,7 @@
 #include "problems/command_line/shard.h"
 #include "problems/config/terminal_text.h"
 #include "problems/output/files.h"
+#include "problems/output/given_files.h"
 #include "problems/population/population_files.h"
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
@@ -74,6 +75,17 @@ int TellResult(const PopulationResult& result, const fs::path& root) {
   return result.Count("done") == static_cast<int>(result.subjects.size()) ? kDone : kNotUsable;
 }
 
+// What is read, and what may be written.
+GivenFiles GivenTo(const PopulationArguments& a, const PopulationPlan& plan) {
+  GivenFiles given{.files = {a.path}, .outputs = kPopulationFiles};
+  for (const PopulationEntry& entry : plan.entries) {
+    for (const NamedFile& named : NamedFiles(entry.subject)) {
+      given.files.push_back(named.file);
+    }
+  }
+  return given;
+}
+
 int PopulationCommand(const PopulationArguments& a) {
   const PopulationPlan plan = ReadPopulation(a.path);
   if (a.list) {
@@ -81,6 +93,7 @@ int PopulationCommand(const PopulationArguments& a) {
   }
   const std::string name = PlainName(a.path);
   const fs::path root = a.out.empty() ? fs::path("out") / name : fs::path(a.out);
+  RefuseToReplace(root, GivenTo(a, plan));
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   GatherSubjects(plan, root, {a.from.begin(), a.from.end()});
   const PopulationRunSummary summary = MeasureTold(plan, root, a);

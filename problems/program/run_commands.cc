@@ -70,9 +70,13 @@ int RunCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);
-  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string());
-  const RunContext context = ContextOf(arguments);
   const std::vector<NamedExperiment> named = AlternativesOf(experiment, config.parent_path());
+  GivenFiles given = GivenTo(experiment, config, kRunFiles);
+  for (const NamedExperiment& alternative : named) {
+    std::ranges::copy(InputFilesOf(alternative.experiment), std::back_inserter(given.files));
+  }
+  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string(), std::move(given));
+  const RunContext context = ContextOf(arguments);
   StageCache cache(16);
   const RunResult result = Run(experiment, context, &cache);
   std::vector<std::string> faults = result.Faults();
@@ -96,7 +100,8 @@ int DepthCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);
-  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string() + "_depth");
+  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string() + "_depth",
+                                 GivenTo(experiment, config, kDepthFiles));
   const RunContext context = ContextOf(arguments);
   const DepthResult result = MeasureDepth(experiment, context);
   WriteDepth(experiment, result, folder.Files(), context);
@@ -330,7 +335,7 @@ int ImportCtCommand(const Arguments& arguments) {
     throw InputError("--skin-value is for an MR; the skin of a CT is at --skin-hu");
   }
   PrintNotes(reading.notes);
-  StagedFolder folder = FolderOf(arguments, "out/" + PlainName(path));
+  StagedFolder folder = FolderOf(arguments, "out/" + PlainName(path), {.files = {path}});
   Import(arguments, reading, mr, folder.Files(), context);
   folder.Publish();
   const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();

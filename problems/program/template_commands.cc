@@ -7,15 +7,19 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "problems/bust/whole_head.h"
 #include "problems/command_line/exit_code.h"
 #include "problems/face_template/template_io.h"
 #include "problems/face_template/template_summary.h"
+#include "problems/inputs/input_files.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
@@ -38,8 +42,13 @@ struct TemplateArguments : WorkOptions {
   bool bust = false;
 };
 
-StagedFolder MakeFolder(const TemplateArguments& a) {
-  return FolderOf(a, fmt::format("out/{}_template", a.input.stem().string()));
+// What is written, at most.
+constexpr std::array<std::string_view, 6> kOutputs = {"head.hspline.json", "sites.csv",
+                                                      "features.json",     "template.json",
+                                                      "template.png",      "bust.json"};
+
+StagedFolder MakeFolder(const TemplateArguments& a, GivenFiles given) {
+  return FolderOf(a, fmt::format("out/{}_template", a.input.stem().string()), std::move(given));
 }
 
 void Write(const TemplateFace& face, StagedFolder& folder) {
@@ -58,7 +67,7 @@ int FromConfig(const TemplateArguments& a) {
     throw InputError("--bust is for a head with landmarks; a configuration has no mesh of one");
   }
   const auto experiment = ReadConfig<Experiment>(a.input, a.overrides);
-  StagedFolder folder = MakeFolder(a);
+  StagedFolder folder = MakeFolder(a, GivenTo(experiment, a.input, kOutputs));
   Write(LoadTemplate(experiment.face_template), folder);
   return kDone;
 }
@@ -68,6 +77,8 @@ int FromHead(const TemplateArguments& a) {
   if (!a.overrides.empty()) {
     throw InputError("--set is for a configuration; a head takes --finest and --tolerance_mm");
   }
+  GivenFiles given{.files = a.landmarks, .outputs = kOutputs};
+  given.files.push_back(a.input);
   const RunContext context = ContextOf(a);
   const TriMesh mesh = ReadMesh(a.input);
   const OuterHead head =
@@ -76,7 +87,7 @@ int FromHead(const TemplateArguments& a) {
   if (a.bust) {
     whole = FitWholeHead(mesh, a.input.string(), context);
   }
-  StagedFolder folder = MakeFolder(a);
+  StagedFolder folder = MakeFolder(a, std::move(given));
   const TemplateFit fit = FitTemplate(head, a.fit, context);
   folder.Files().Write("template.json", TemplateJson(fit, head, a.fit));
   folder.Files().Write("template.png", EncodePng(TemplatePicture(fit, head, a.threads)));
@@ -166,6 +177,14 @@ KnownHead ReadHead(const fs::path& config, const RecentreArguments& a, const Run
   return {.dowels = subject.dowels_on_bone, .skin = Submesh(*subject.skin, keep)};
 }
 
+GivenFiles GivenTo(const RecentreArguments& a) {
+  GivenFiles given{.files = a.heads, .outputs = kOutputs};
+  for (const fs::path& config : a.heads) {
+    std::ranges::copy(InputFilesOf(ReadKnown(config, a)), std::back_inserter(given.files));
+  }
+  return given;
+}
+
 int RecentreCommand(const RecentreArguments& a) {
   const RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
   const Experiment first = ReadKnown(a.heads.front(), a);
@@ -176,7 +195,8 @@ int RecentreCommand(const RecentreArguments& a) {
   for (const fs::path& config : a.heads) {
     heads.push_back(ReadHead(config, a, context));
   }
-  StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
+  StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse,
+                      GivenTo(a));
   const Recentred result = Recentre(prior, on_template, face, heads, a.options, context);
   fmt::print(
       "{} heads: sites moved by {:.1f} mm in the median, the mean by {:.2f} mm RMS, at most "

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <utility>
 
 #include "problems/command_line/exit_code.h"
 #include "problems/command_line/progress.h"
@@ -52,9 +53,10 @@ RunContext ContextOf(const WorkOptions& options) {
   return context;
 }
 
-StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out) {
+StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out,
+                      GivenFiles given) {
   return {options.out.empty() ? default_out : options.out,
-          options.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse};
+          options.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse, std::move(given)};
 }
 
 int TellFaults(const std::vector<std::string>& faults) {

@@ -57,7 +57,8 @@ void AddChoice(CLI::App& command, const std::string& name, const std::string& de
 }
 
 RunContext ContextOf(const WorkOptions& options);
-StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out);
+// given: what the command reads.
+StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out, GivenFiles given);
 
 // The exit code of a result with these faults.
 int TellFaults(const std::vector<std::string>& faults);

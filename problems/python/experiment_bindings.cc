@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "problems/inputs/input_files.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/python/arrays.h"
@@ -51,7 +52,7 @@ py::dict RunConfig(const std::string& config, const py::dict& set,
     context.stop_token = stop;
     std::optional<StagedFolder> folder;
     if (out) {
-      folder.emplace(*out, Asked(force));
+      folder.emplace(*out, Asked(force), GivenTo(experiment, config, kRunFiles));
     }
     RunResult found = Run(experiment, context);
     if (folder) {

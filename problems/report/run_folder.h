@@ -2,14 +2,23 @@
 // What a run leaves in its folder.
 #pragma once
 
+#include <array>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 
 #include "problems/output/files.h"
 #include "problems/pipeline/experiment.h"
 #include "problems/run.h"
 
 namespace semblance {
+
+// What a run may write, its alternatives among it (given_files.h).
+inline constexpr std::array<std::string_view, 18> kRunFiles = {
+    "resolved.yaml", "result.json",       "dowels.csv",      "seeds.csv",   "face.hspline.json",
+    "face.ply",      "implicit.ply",      "sample_*.ply",    "bust.*",      "depth.ply",
+    "pictures/*",    "scene.json",        "provenance.json", "report.html", "timing.json",
+    "manifest.json", "alternatives.json", "alternatives/*"};
 
 // Writes resolved.yaml, result.json, timing.json, face.hspline.json, face.ply, implicit.ply,
 // depth.ply, dowels.csv, pictures/*.png, scene.json (for the report's 3-D view), provenance.json,

@@ -3,9 +3,11 @@
 // fit, against the true depth and by cross-validation.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -48,6 +50,11 @@ std::string LeftOutCsv(const DepthResult& result);
 // The depth on the skull's shell from two sides and, where the truth is known, the error against it
 // along the direction; as PNG.
 std::string DepthPicture(const DepthResult& result, const std::string& title, int threads);
+
+// What WriteDepth writes.
+inline constexpr std::array<std::string_view, 7> kDepthFiles = {
+    "resolved.yaml", "result.json", "left_out.csv", "depth.ply",
+    "tips.ply",      "depth.png",   "timing.json"};
 
 // resolved.yaml, result.json, left_out.csv, depth.ply (depth, sd, true depths and errors per
 // vertex), tips.ply (the shell moved by its depth), depth.png, timing.json.

@@ -18,6 +18,7 @@
 #include "problems/face_template/template_io.h"
 #include "problems/inputs/input_files.h"
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/output/given_files.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/report/run_folder.h"
@@ -338,6 +339,7 @@ void ExpectWhatARunLeaves(const std::map<std::string, std::string>& files) {
   std::vector<std::string> names;
   for (const auto& [name, bytes] : files) {
     names.push_back(name);
+    EXPECT_TRUE(IsAmong(kRunFiles, name)) << name;
   }
   EXPECT_THAT(names, UnorderedElementsAreArray({"depth.ply",
                                                 "dowels.csv",

@@ -6,9 +6,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 #include <fstream>
 #include <set>
+#include <string_view>
 
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
@@ -159,6 +161,46 @@ TEST(StagedFolder, WhatAKilledProcessHasLeftIsTakenOver) {
     EXPECT_EQ(NamesIn(folder / "out"), all);
     EXPECT_EQ(NamesIn(folder.Path()).size(), all.size() + 1);
   }
+}
+
+TEST(StagedFolder, AGivenFileIsNotReplacedByAnyNameAndThatIsToldFirst) {
+  const ScratchFolder folder;
+  fs::create_directories(folder / "out/pictures");
+  std::ofstream(folder / "out/pictures/front.png") << "mine";
+  std::ofstream(folder / "out/mine.txt") << "mine";
+  fs::create_symlink(folder / "out", folder / "other");
+  fs::create_symlink(folder / "out/pictures/front.png", folder / "link");
+  constexpr std::array<std::string_view, 2> kOutputs = {"result.json", "pictures/*"};
+  for (const char* given :
+       {"out/pictures/front.png", "other/pictures/../pictures/front.png", "link"}) {
+    EXPECT_THAT(WordsOf<InputError>([&] {
+                  StagedFolder(folder / "out", WhenNotEmpty::kReplaceFiles,
+                               {.files = {folder / given}, .outputs = kOutputs});
+                }),
+                AllOf(HasSubstr(given), HasSubstr("by the pictures/front.png"),
+                      HasSubstr((folder / "out").string()), HasSubstr("give another --out")))
+        << given;
+  }
+  StagedFolder staged(folder / "out", WhenNotEmpty::kReplaceFiles,
+                      {.files = {folder / "out/mine.txt", "-", ""}, .outputs = kOutputs});
+  Fill(staged);
+  EXPECT_NO_THROW(staged.Publish()) << "it stands beside what is written";
+  EXPECT_EQ(ReadFileBytes(folder / "out/mine.txt"), "mine");
+}
+
+TEST(StagedFolder, AGivenFileWhoseNameNobodyForesawStaysToo) {
+  const ScratchFolder folder;
+  fs::create_directories(folder / "out");
+  std::ofstream(folder / "out/result.json") << "mine";
+  std::ofstream(folder / "out/manifest.json") << "old";
+  StagedFolder staged(folder / "out", WhenNotEmpty::kReplaceFiles,
+                      {.files = {folder / "out/result.json"}});
+  Fill(staged);
+  EXPECT_THAT(WordsOf<IoError>([&] { staged.Publish(); }),
+              AllOf(HasSubstr("result.json is a file that was read"), HasSubstr("out.kept-1")));
+  EXPECT_EQ(ReadFileBytes(folder / "out/result.json"), "mine");
+  EXPECT_EQ(ReadFileBytes(folder / "out/manifest.json"), "old");
+  EXPECT_EQ(NamesIn(folder / "out.kept-1"), kAll);
 }
 
 TEST(StagedFolder, AFileOfTheNameIsLeftAlone) {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/config/config.h"
+#include "problems/output/given_files.h"
 #include "problems/output/manifest.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
@@ -56,6 +57,7 @@ class PointFitCommand : public ::testing::Test {
     return testing::CallProgram(folder_, arguments);
   }
   void Write(const std::string& name, const std::string& text) {
+    fs::create_directories((folder_ / name).parent_path());
     WriteFileAtomically(folder_ / name, text);
   }
   testing::ScratchFolder folder_;
@@ -267,6 +269,9 @@ TEST_F(PointFitCommand, FurtherColumnsAreFittedOverTheSurface) {
   }
   EXPECT_EQ(ReadHSpline(folder_ / "out/attributes_2.hspline.json").shape().reference,
             OffsetReference::kWorld);
+  for (const auto& file : fs::directory_iterator(folder_ / "out")) {
+    EXPECT_TRUE(IsAmong(kPointFitFiles, file.path().filename().string())) << file.path();
+  }
   EXPECT_THAT(Call("fit colours.csv --out none --quiet --set attributes=[red]").err,
               HasSubstr("'green' is no column"));
   EXPECT_THAT(Call("fit colours.csv --out none --quiet --set attributes=[x]").err,
@@ -325,6 +330,32 @@ TEST_F(PointFitCommand, AJoinThatCannotBeIsRefusedInOneLine) {
   const auto checked = Call("check left/resolved.yaml --set 'joins=[{surface: none.json}]'");
   EXPECT_EQ(checked.code, 2);
   EXPECT_THAT(checked.out + checked.err, HasSubstr("joins[0].surface"));
+}
+
+TEST_F(PointFitCommand, NothingThatItReadsIsReplaced) {
+  Write("own/residuals.csv", Csv(Scattered(FrankePoint, 300, 1e-3, 1), /*with_uv=*/true));
+  Write("own/resolved.yaml", "chord_mm: 0.1\n");
+  ASSERT_EQ(Call(fmt::format("fit {}/left.csv --out left --quiet", kConfigs)).code, 0);
+  const auto refused = [&](const std::string& arguments, const std::string& file,
+                           const std::string& folder) {
+    const std::string before = ReadFileBytes(folder_ / file);
+    const auto outcome = Call("fit " + arguments + " --force --quiet");
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_THAT(outcome.err, ::testing::AllOf(HasSubstr(file + ": it is read here"),
+                                              HasSubstr("written into " + folder + ";"),
+                                              HasSubstr("give another --out")));
+    EXPECT_EQ(ReadFileBytes(folder_ / file), before);
+    EXPECT_FALSE(fs::exists(folder_ / folder / ".semblance-part"));
+  };
+  refused("own/residuals.csv --out own", "own/residuals.csv", "own");
+  refused(kConfigs + "/points.csv own/resolved.yaml --out own", "own/resolved.yaml", "own");
+  refused(kConfigs +
+              "/right.csv --out left --set "
+              "'joins=[{surface: left/surface.hspline.json, edge: u0, its_edge: u1}]'",
+          "left/surface.hspline.json", "left");
+  fs::rename(folder_ / "own/residuals.csv", folder_ / "own/points.csv");
+  EXPECT_EQ(Call("fit own/points.csv --out own --force --quiet").code, 0)
+      << "points may lie beside what comes of them";
 }
 
 TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {

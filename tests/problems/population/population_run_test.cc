@@ -77,9 +77,8 @@ TEST(MeasurePopulation, GoesOnWhereItWasAndShardsGiveTheSameBytes) {
       gathered(folder / "b", WhenNotEmpty::kReplaceFiles);
   WritePopulation(Analysed(plan, folder / "a"), whole);
   WritePopulation(Analysed(plan, folder / "b"), gathered);
-  for (const char* file :
-       {"table.yaml", "depths.csv", "subjects.csv", "outliers.csv", "leave_one_out.csv",
-        "dense.csv", "dense.ply", "population.json", "report.html"}) {
+  EXPECT_THAT(whole.Written(), ::testing::ElementsAreArray(kPopulationFiles));
+  for (const std::string_view file : kPopulationFiles) {
     EXPECT_EQ(ReadFileBytes(folder / "a" / file), ReadFileBytes(folder / "b" / file)) << file;
   }
 }

@@ -126,6 +126,29 @@ TEST_F(CommandLine, AFolderThatExistsIsLeftAloneUnlessForced) {
   EXPECT_THAT(ReadFileBytes(folder_ / "out" / "manifest.json"), Not(HasSubstr("mine.txt")));
 }
 
+TEST_F(CommandLine, AFolderDoesNotTakeWhatTheCommandReads) {
+  WriteBall({0, -80, 0});
+  fs::create_directories(folder_ / "out");
+  Write("out/depth.ply", "mine");
+  Write("out/resolved.yaml", "title: mine\n");
+  const auto refused = [&](const std::string& arguments, const std::string& file) {
+    ExpectRefused(arguments + " --out out --force --quiet", "out/" + file + ": it is read here");
+  };
+  refused("run out/resolved.yaml", "resolved.yaml");
+  refused("run ball.yaml --set 'interp={type: depth_map, file: out/depth.ply}'", "depth.ply");
+  refused("depth ball.yaml --set 'interp={type: depth_map, file: out/depth.ply}'", "depth.ply");
+  Write("out/table.yaml", "phantoms: {count: 3}\n");
+  ExpectRefused("population out/table.yaml --out out", "out/table.yaml: it is read here");
+  Write("e.yaml",
+        "template: {type: formula, max_level: 1}\n"
+        "fit: {plan: {type: coarse_to_fine, finest: 1}}\n");
+  ASSERT_EQ(Call("template e.yaml --out made").code, 0);
+  ExpectRefused(
+      "template e.yaml --out made --force --set 'template={type: file, surface: "
+      "made/head.hspline.json, sites: made/sites.csv, features: made/features.json}'",
+      "made/head.hspline.json: it is read here");
+}
+
 TEST_F(CommandLine, AnUnwritableFolderIsRefusedBeforeAnyWork) {
   ExpectRefused("run " + kConfigs + "/phantom.yaml --out /proc/semblance" + kQuick,
                 "/proc/semblance");

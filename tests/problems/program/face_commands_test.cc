@@ -130,6 +130,24 @@ TEST_F(FaceCommands, ExportRefusesWhatItCannotDo) {
   ExpectDone("export face.json --to face.glb --force");
 }
 
+TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
+  const std::string words = ": it is read here, and what is read is never replaced";
+  WriteFileAtomically(folder_ / "script.yaml", "edits: []\n");
+  ExpectDone("export face.json --to face.ply");
+  ExpectDone("feature extract face.json --name a --library lib");
+  const std::string before = Bytes("face.json");
+  ExpectRefused("export face.ply --to ./face.ply --force", "./face.ply" + words);
+  ExpectRefused("edit face.json script.yaml --out face.json --force", "face.json" + words);
+  ExpectRefused("edit face.json script.yaml --out new.json --inverse script.yaml --force",
+                "script.yaml" + words);
+  ExpectRefused("feature apply face.json lib/a.json --out lib/a.json --force",
+                "lib/a.json" + words);
+  ExpectRefused("feature mirror lib/a.json --name a --library lib --force", "lib/a.json" + words);
+  ExpectRefused("feature blend lib/a.json --weights 2 --name a --library lib --force",
+                "lib/a.json" + words);
+  EXPECT_EQ(Bytes("face.json"), before);
+}
+
 TEST_F(FaceCommands, AFeatureGoesFromFaceToFace) {
   ExpectDone("feature extract face.json --u 0.2 0.8 --levels 2 3 --name nose --library lib");
   const Feature nose = ReadFeature(folder_ / "lib/nose.json");

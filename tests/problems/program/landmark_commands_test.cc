@@ -39,6 +39,20 @@ TEST_F(LandmarkCommands, ReplacesNothingUnasked) {
   EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert in.csv a.pp --force").code, 0);
 }
 
+TEST_F(LandmarkCommands, WhatIsReadIsNotReplacedEvenIfAsked) {
+  const std::string before = ReadFileBytes(folder_ / "in.csv");
+  for (const char* arguments :
+       {"convert in.csv ./in.csv --force",
+        "propose skull.ply --reference other.ply in.csv --out in.csv --force",
+        "propose skull.ply --compare in.csv --out in.csv --force"}) {
+    const testing::Outcome refused =
+        testing::CallProgram(folder_, std::string("landmarks ") + arguments);
+    EXPECT_EQ(refused.code, 2) << arguments;
+    EXPECT_THAT(refused.err, HasSubstr("in.csv: it is read here")) << arguments;
+  }
+  EXPECT_EQ(ReadFileBytes(folder_ / "in.csv"), before);
+}
+
 TEST_F(LandmarkCommands, WritesNothingWhereANameIsNoSite) {
   WriteFileAtomically(folder_ / "odd.csv", "site,x,y,z\nF-1,1,2,3\ng,0,0,0\n");
   EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert odd.csv out.yaml").code, 2);

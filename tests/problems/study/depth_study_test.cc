@@ -22,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::Contains;
 using ::testing::ElementsAre;
+using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 using testing::ScratchFolder;
 using Json = nlohmann::ordered_json;
@@ -194,8 +195,7 @@ TEST(DepthStudy, TheFolderHoldsMeshesWithTheirNumbers) {
   const DepthResult result = MeasureDepth(experiment, {});
   OutputFolder output(folder / "out", WhenNotEmpty::kRefuse);
   WriteDepth(experiment, result, output, {});
-  EXPECT_THAT(output.Written(), ElementsAre("resolved.yaml", "result.json", "left_out.csv",
-                                            "depth.ply", "tips.ply", "depth.png", "timing.json"));
+  EXPECT_THAT(output.Written(), ElementsAreArray(kDepthFiles));
   // depth.ply is itself a map that can be read back.
   const DepthResult again = Measured({fmt::format("interp={{type: depth_map, file: {}}}",
                                                   (folder / "out" / "depth.ply").string())});
