@@ -130,10 +130,11 @@ double ChordFor(const HSplineSurface& surface, const AutoOr<double>& chord_mm) {
 
 namespace {
 
-std::string EncodePly(const PointFit& result, Tessellation tessellation, int threads) {
+std::string EncodePly(const PointFit& result, Tessellation tessellation, double chord_mm,
+                      int threads) {
   MeshAttributes attributes = AttributesOf(result, tessellation.uv, threads);
   attributes.normals = std::move(tessellation.normals);
-  return EncodeMesh(tessellation.mesh, ".ply", attributes);
+  return EncodeMesh(tessellation.mesh, ".ply", attributes, chord_mm);
 }
 
 }  // namespace
@@ -142,13 +143,14 @@ SurfaceMesh SurfacePly(const PointFit& result, double chord_mm, const TrimmedTo*
                        int threads) {
   const HSplineSurface& surface = result.fit.surface;
   if (trim == nullptr) {
-    return {.ply = EncodePly(result, TessellateToChord(surface, chord_mm, threads), threads)};
+    return {
+        .ply = EncodePly(result, TessellateToChord(surface, chord_mm, threads), chord_mm, threads)};
   }
   TrimmedTessellation trimmed =
       TessellateNear(surface, chord_mm, trim->places, trim->distance_mm, threads);
   const TrimReport report{
       .distance_mm = trim->distance_mm, .kept_mm2 = trimmed.kept_mm2, .cut_mm2 = trimmed.cut_mm2};
-  return {.ply = EncodePly(result, std::move(trimmed.kept), threads), .trim = report};
+  return {.ply = EncodePly(result, std::move(trimmed.kept), chord_mm, threads), .trim = report};
 }
 
 }  // namespace semblance

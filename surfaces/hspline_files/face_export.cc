@@ -64,7 +64,7 @@ std::string TriangleBytes(const HSplineSurface& surface, const std::string& exte
   if (extension == ".vtp") {
     return EncodeVtp(tessellation.mesh, attributes);
   }
-  return EncodeMesh(tessellation.mesh, extension, attributes);
+  return EncodeMesh(tessellation.mesh, extension, attributes, chord_mm);
 }
 
 }  // namespace

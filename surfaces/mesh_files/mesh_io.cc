@@ -18,6 +18,7 @@
 #include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "surfaces/mesh_files/read_stl.h"
+#include "surfaces/mesh_files/single_precision.h"
 
 namespace semblance {
 namespace {
@@ -73,16 +74,38 @@ void AppendRaw(std::string& bytes, T value) {
   bytes.append(raw, sizeof(T));
 }
 
-void AppendVector(std::string& bytes, const Vec3& v) {
+enum class Precision { kSingle, kDouble };
+
+void AppendVector(std::string& bytes, const Vec3& v, Precision precision) {
   for (int a = 0; a < 3; ++a) {
-    AppendRaw(bytes, static_cast<float>(v[a]));
+    if (precision == Precision::kDouble) {
+      AppendRaw(bytes, v[a]);
+    } else {
+      AppendRaw(bytes, static_cast<float>(v[a]));
+    }
   }
 }
 
-std::string PlyHeader(const TriMesh& mesh, const MeshAttributes& attributes) {
+// Double where single would lose of the coordinates what the mesh is to show.
+Precision PrecisionFor(const TriMesh& mesh, double chord_mm) {
+  constexpr double kOfChord = 0.02, kOfExtent = 1e-5;
+  Box3 box;
+  for (const Vec3& p : mesh.points) {
+    box.extend(p);
+  }
+  if (box.isEmpty()) {
+    return Precision::kSingle;
+  }
+  const double largest = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+  const double needed_mm =
+      std::min({kCoordinateStep_mm, kOfChord * chord_mm, kOfExtent * box.diagonal().norm()});
+  return SingleStep(largest) > needed_mm ? Precision::kDouble : Precision::kSingle;
+}
+
+std::string PlyHeader(const TriMesh& mesh, const MeshAttributes& attributes, Precision precision) {
   std::string header = "ply\nformat binary_little_endian 1.0\ncomment units mm, frame LPS\n";
-  header += fmt::format("element vertex {}\nproperty float x\nproperty float y\nproperty float z\n",
-                        mesh.points.size());
+  header += fmt::format("element vertex {0}\nproperty {1} x\nproperty {1} y\nproperty {1} z\n",
+                        mesh.points.size(), precision == Precision::kDouble ? "double" : "float");
   if (!attributes.normals.empty()) {
     header += "property float nx\nproperty float ny\nproperty float nz\n";
   }
@@ -97,12 +120,12 @@ std::string PlyHeader(const TriMesh& mesh, const MeshAttributes& attributes) {
                      mesh.triangles.size());
 }
 
-std::string EncodePly(const TriMesh& mesh, const MeshAttributes& attributes) {
-  std::string bytes = PlyHeader(mesh, attributes);
+std::string EncodePly(const TriMesh& mesh, const MeshAttributes& attributes, Precision precision) {
+  std::string bytes = PlyHeader(mesh, attributes, precision);
   for (std::size_t v = 0; v < mesh.points.size(); ++v) {
-    AppendVector(bytes, mesh.points[v]);
+    AppendVector(bytes, mesh.points[v], precision);
     if (!attributes.normals.empty()) {
-      AppendVector(bytes, attributes.normals[v]);
+      AppendVector(bytes, attributes.normals[v], Precision::kSingle);
     }
     for (std::size_t c = 0; c < 3 && !attributes.colors.empty(); ++c) {
       AppendRaw(bytes, attributes.colors[v][c]);
@@ -120,7 +143,38 @@ std::string EncodePly(const TriMesh& mesh, const MeshAttributes& attributes) {
   return bytes;
 }
 
-std::string EncodeThroughOpenMesh(const TriMesh& mesh, const std::string& extension) {
+// Digits that single precision, or double, is read back from.
+std::string CoordinatesText(const Vec3& p, Precision precision) {
+  const Vec3 single = p.cast<float>().cast<double>();
+  return precision == Precision::kDouble
+             ? fmt::format("{} {} {}", p.x(), p.y(), p.z())
+             : fmt::format("{:.9g} {:.9g} {:.9g}", single.x(), single.y(), single.z());
+}
+
+std::string EncodeObj(const TriMesh& mesh, Precision precision) {
+  std::string text =
+      fmt::format("# {} vertices, {} faces\n", mesh.points.size(), mesh.triangles.size());
+  for (const Vec3& p : mesh.points) {
+    text += "v " + CoordinatesText(p, precision) + "\n";
+  }
+  for (const Triangle& t : mesh.triangles) {
+    text += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+  }
+  return text;
+}
+
+std::string EncodeOff(const TriMesh& mesh, Precision precision) {
+  std::string text = fmt::format("OFF\n{} {} 0\n", mesh.points.size(), mesh.triangles.size());
+  for (const Vec3& p : mesh.points) {
+    text += CoordinatesText(p, precision) + "\n";
+  }
+  for (const Triangle& t : mesh.triangles) {
+    text += fmt::format("3 {} {} {} \n", t[0], t[1], t[2]);
+  }
+  return text;
+}
+
+std::string EncodeStl(const TriMesh& mesh) {
   const QuietOpenMesh quiet;
   HalfedgeMesh halfedges;
   for (const Vec3& p : mesh.points) {
@@ -132,18 +186,14 @@ std::string EncodeThroughOpenMesh(const TriMesh& mesh, const std::string& extens
   }
   if (halfedges.n_faces() != mesh.triangles.size()) {
     throw InputError(fmt::format(
-        "mesh: {} of {} triangles are non-manifold and would be lost in {}; write .ply instead",
-        mesh.triangles.size() - halfedges.n_faces(), mesh.triangles.size(), extension));
+        "mesh: {} of {} triangles are non-manifold and would be lost in .stl; write .ply instead",
+        mesh.triangles.size() - halfedges.n_faces(), mesh.triangles.size()));
   }
   std::ostringstream stream;
-  OpenMesh::IO::Options options = OpenMesh::IO::Options::Default;
-  if (extension == ".stl") {
-    halfedges.request_face_normals();
-    halfedges.update_face_normals();
-    options = OpenMesh::IO::Options::Binary;
-  }
-  if (!OpenMesh::IO::write_mesh(halfedges, stream, extension, options, 9)) {
-    throw InputError(fmt::format("mesh: it could not be written as {}", extension));
+  halfedges.request_face_normals();
+  halfedges.update_face_normals();
+  if (!OpenMesh::IO::write_mesh(halfedges, stream, ".stl", OpenMesh::IO::Options::Binary)) {
+    throw InputError("mesh: it could not be written as .stl");
   }
   return stream.str();
 }
@@ -181,10 +231,14 @@ TriMesh ReadMesh(const std::filesystem::path& path) {
 }
 
 std::string EncodeMesh(const TriMesh& mesh, const std::string& extension,
-                       const MeshAttributes& attributes) {
+                       const MeshAttributes& attributes, double chord_mm) {
   CheckExtension(extension, "mesh");
   CheckAttributes(mesh.points.size(), attributes);
-  return extension == ".ply" ? EncodePly(mesh, attributes) : EncodeThroughOpenMesh(mesh, extension);
+  const Precision precision = PrecisionFor(mesh, chord_mm);
+  return extension == ".ply"   ? EncodePly(mesh, attributes, precision)
+         : extension == ".obj" ? EncodeObj(mesh, precision)
+         : extension == ".off" ? EncodeOff(mesh, precision)
+                               : EncodeStl(mesh);
 }
 
 }  // namespace semblance

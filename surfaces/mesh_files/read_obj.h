@@ -9,7 +9,7 @@
 
 namespace semblance {
 
-// The vertices (in single precision) and polygons of an OBJ, polygons fanned into triangles.
+// The vertices (TextLines::NextPoint) and polygons of an OBJ, polygons fanned into triangles.
 // Indices may be relative (-1 is the last vertex so far). A corner that repeats an earlier one of
 // its face is left out, and with it a face without area. Texture, normals, groups, materials,
 // lines and points are not kept. name: the file, for messages.

@@ -9,7 +9,7 @@
 
 namespace semblance {
 
-// The vertices (in single precision) and polygons of a text OFF, polygons fanned into triangles.
+// The vertices (TextLines::NextPoint) and polygons of a text OFF, polygons fanned into triangles.
 // Each vertex and each face is a line; comments begin with '#'. The header may be OFF with any of
 // ST (texture), C (colours), N (normals) before it; these are not kept, neither are colours of
 // faces. name: the file, for messages.

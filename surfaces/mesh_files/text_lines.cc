@@ -11,6 +11,7 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/read_parts.h"
+#include "surfaces/mesh_files/single_precision.h"
 
 namespace semblance {
 namespace {
@@ -111,7 +112,12 @@ double TextLines::NextDouble() { return NextNumber<double>(); }
 Vec3 TextLines::NextPoint() {
   Vec3 point;
   for (int a = 0; a < 3; ++a) {
+    const std::size_t begin = at_;
     point[a] = NextFloat();
+    if (SingleStep(point[a]) > kCoordinateStep_mm && std::isfinite(point[a])) {
+      at_ = begin;
+      point[a] = NextDouble();
+    }
   }
   if (!point.allFinite()) {
     Fail("a coordinate is not finite; remove the vertex or repair the mesh");

@@ -30,7 +30,9 @@ class TextLines {
   std::string_view NextWord();  // empty at the line's end
   float NextFloat();            // may be NaN or infinite
   double NextDouble();          // may be NaN or infinite
-  Vec3 NextPoint();             // three finite numbers of single precision, mm
+  // Three finite numbers, mm: of single precision, with all their digits where its steps are more
+  // than 1e-4 mm, which is from 1024 mm on.
+  Vec3 NextPoint();
   // what: for the message, e.g. "number of vertices".
   std::int64_t NextInteger(const char* what, std::int64_t lowest, std::int64_t highest);
   void ExpectLineEnd();

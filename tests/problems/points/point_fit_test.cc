@@ -332,6 +332,26 @@ TEST_F(PointFitCommand, AJoinThatCannotBeIsRefusedInOneLine) {
   EXPECT_THAT(checked.out + checked.err, HasSubstr("joins[0].surface"));
 }
 
+// Single precision has steps of 0.5 there, ten times the chord.
+TEST_F(PointFitCommand, TheChordHoldsFarFromTheOrigin) {
+  std::string csv = "x,y,z,u,v\n";
+  for (const FitPoint& p : Scattered(FrankePoint, 2000, 1e-3, 1).points) {
+    csv += fmt::format("{},{},{},{},{}\n", 500000 + 100 * p.position.x(),
+                       5400000 + 100 * p.position.y(), 100 * p.position.z(), p.uv.x(), p.uv.y());
+  }
+  Write("far.csv", csv);
+  ASSERT_EQ(Call("fit far.csv --out far --quiet --set chord_mm=0.05").code, 0);
+  ASSERT_EQ(Call("export far/surface.hspline.json --to far.obj --chord_mm 0.05").code, 0);
+  const HSplineSurface surface = ReadHSpline(folder_ / "far/surface.hspline.json");
+  const SurfaceProjector project(surface);
+  for (const char* file : {"far/surface.ply", "far.obj"}) {
+    const TriMesh mesh = ReadMesh(folder_ / file);
+    for (std::size_t k = 0; k < mesh.points.size(); k += 37) {
+      ASSERT_LT(project.Project(mesh.points[k]).distance_mm, 1e-6) << file;
+    }
+  }
+}
+
 TEST_F(PointFitCommand, NothingThatItReadsIsReplaced) {
   Write("own/residuals.csv", Csv(Scattered(FrankePoint, 300, 1e-3, 1), /*with_uv=*/true));
   Write("own/resolved.yaml", "chord_mm: 0.1\n");

@@ -61,13 +61,45 @@ TEST_F(MeshIo, EveryFormatRoundTrips) {
   }
 }
 
-TEST_F(MeshIo, NonManifoldFacesAreKeptInPly) {
+// Law: at any place a mesh is read back to a fiftieth of its chord, and to 1e-4 mm.
+TEST_F(MeshIo, FarFromTheOriginCoordinatesKeepTheirDigits) {
+  const TriMesh sphere = SphereMesh({500000.1, 5400000.2, 300.3}, 100, 12);
+  for (const std::string extension : {".ply", ".obj", ".off"}) {
+    const TriMesh read = ReadMesh(Write("far" + extension, EncodeMesh(sphere, extension)));
+    EXPECT_EQ(read.points, sphere.points) << extension;
+    EXPECT_EQ(read.triangles, sphere.triangles) << extension;
+  }
+  const TriMesh head = SphereMesh({1, 2, -500}, 100, 12);
+  EXPECT_THAT(EncodeMesh(head, ".ply"), HasSubstr("property float x"));
+  EXPECT_THAT(EncodeMesh(head, ".ply", {}, 0.01), HasSubstr("property float x"));
+  EXPECT_THAT(EncodeMesh(head, ".ply", {}, 0.001), HasSubstr("property double x"));
+  const TriMesh small = SphereMesh({500, 0, 0}, 0.1, 12);
+  EXPECT_THAT(EncodeMesh(small, ".ply"), HasSubstr("property double x"));
+  const TriMesh huge = SphereMesh({0, 0, 0}, 1e50, 12);
+  EXPECT_EQ(ReadMesh(Write("huge.ply", EncodeMesh(huge, ".ply"))).points, huge.points);
+}
+
+TEST_F(MeshIo, TextsOfAHeadHaveTheDigitsOfSinglePrecision) {
+  const TriMesh mesh{.points = {{0.1, -0.1, 1e-12}, {1, 0, 1.0 / 3}, {0, 1, 300}},
+                     .triangles = {{0, 1, 2}}};
+  EXPECT_EQ(EncodeMesh(mesh, ".obj"),
+            "# 3 vertices, 1 faces\nv 0.100000001 -0.100000001 9.99999996e-13\nv 1 0 "
+            "0.333333343\nv 0 1 300\nf 1 2 3\n");
+  EXPECT_EQ(EncodeMesh(mesh, ".off"),
+            "OFF\n3 1 0\n0.100000001 -0.100000001 9.99999996e-13\n1 0 0.333333343\n0 1 300\n3 0 1 "
+            "2 \n");
+}
+
+TEST_F(MeshIo, NonManifoldFacesAreKeptButInStl) {
   TriMesh mesh = Plate(10, 1);
   mesh.points.emplace_back(5, 5, 5);
   mesh.triangles.push_back({0, 3, 4});  // a third triangle at the diagonal
-  EXPECT_EQ(ReadMesh(Write("fin.ply", EncodeMesh(mesh, ".ply"))).triangles, mesh.triangles);
+  for (const std::string extension : {".ply", ".obj", ".off"}) {
+    EXPECT_EQ(ReadMesh(Write("fin" + extension, EncodeMesh(mesh, extension))).triangles,
+              mesh.triangles);
+  }
   EXPECT_EQ(CheckEdges(mesh).non_manifold, 1);
-  EXPECT_THROW(EncodeMesh(mesh, ".obj"), InputError);
+  EXPECT_THROW(EncodeMesh(mesh, ".stl"), InputError);
 }
 
 TEST_F(MeshIo, PlyCarriesColoursAndNamedScalars) {
