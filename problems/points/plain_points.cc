@@ -71,7 +71,8 @@ bool PlainPoints::AddExactness() {
   const auto value = [&](PointColumn column) { return values_[static_cast<std::size_t>(column)]; };
   const double exact = value(PointColumn::kExact);
   if (exact == 1) {
-    AddExact(table_, {value(PointColumn::kNx), value(PointColumn::kNy), value(PointColumn::kNz)});
+    AddExact(table_, table_.positions.size() - 1,
+             {value(PointColumn::kNx), value(PointColumn::kNy), value(PointColumn::kNz)});
   }
   return exact == 0 || exact == 1;
 }

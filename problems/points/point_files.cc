@@ -26,6 +26,7 @@
 #include "surfaces/mesh_files/ply_header.h"
 #include "surfaces/mesh_files/read_obj.h"
 #include "surfaces/mesh_files/read_off.h"
+#include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "surfaces/mesh_files/read_stl.h"
 #include "surfaces/mesh_files/text_lines.h"
@@ -89,6 +90,12 @@ PointTable ParseXyz(std::string_view text, const std::string& name) {
   PointTable table;
   while (lines.NextLine()) {
     table.positions.push_back(NextPosition(lines));
+    if (!lines.AtLineEnd()) {
+      lines.Fail(
+          fmt::format("'{}' follows x, y and z; leave it out, or give a CSV, whose first "
+                      "line says what the further columns are",
+                      Shown(lines.RestOfLine())));
+    }
   }
   return table;
 }
@@ -163,8 +170,8 @@ void TakeWeights(const PlyHeader& header, std::string_view bytes, const std::str
     const bool positive = number > 0;
     number = sigma ? 1 / (number * number) : number;
     if (!positive || !std::isfinite(number)) {
-      throw InputError(fmt::format("{}: the {} of vertex {} is not positive and finite", name,
-                                   sigma ? "sigma" : "weight", k));
+      throw InputError(fmt::format("{}: the {} of point {} is not positive and finite", name,
+                                   sigma ? "sigma" : "weight", k + 1));
     }
   }
 }
@@ -175,10 +182,82 @@ std::vector<double> FiniteScalar(std::string_view bytes, const std::string& scal
   const auto bad =
       std::find_if_not(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   if (bad != values.end()) {
-    throw InputError(fmt::format("{}: the {} of vertex {} is not finite; leave it out", name,
-                                 scalar, bad - values.begin()));
+    throw InputError(fmt::format("{}: the {} of point {} is not finite; leave it out", name, scalar,
+                                 bad - values.begin() + 1));
   }
   return values;
+}
+
+// Nothing, `first` and `second`, or neither of them.
+std::optional<std::array<std::string_view, 2>> PairIn(const PlyHeader& header,
+                                                      std::string_view first,
+                                                      std::string_view second,
+                                                      const std::string& name) {
+  const bool has_first = HasProperties(header, {first});
+  if (has_first != HasProperties(header, {second})) {
+    throw InputError(fmt::format("{}: the vertices have '{}' without '{}'; give both, or neither",
+                                 name, has_first ? first : second, has_first ? second : first));
+  }
+  return has_first ? std::optional(std::array{first, second}) : std::nullopt;
+}
+
+// Its properties u and v, or else s and t.
+void TakeUv(const PlyHeader& header, std::string_view bytes, const std::string& name,
+            PointTable& table) {
+  auto pair = PairIn(header, "u", "v", name);
+  if (!pair) {
+    pair = PairIn(header, "s", "t", name);
+  }
+  if (!pair) {
+    return;
+  }
+  const std::vector<double> u = FiniteScalar(bytes, std::string(pair->front()), name),
+                            v = FiniteScalar(bytes, std::string(pair->back()), name);
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    table.uv.emplace_back(u[k], v[k]);
+  }
+}
+
+// What exact points are to be across; zero where the vertices have no normals.
+std::vector<Vec3> NormalsOf(const PlyHeader& header, std::string_view bytes,
+                            const std::string& name, std::size_t count) {
+  std::vector<Vec3> normals(count, Vec3::Zero());
+  constexpr std::array kNames = {"nx", "ny", "nz"};
+  const auto found = std::ranges::count_if(
+      kNames, [&](std::string_view property) { return HasProperties(header, {property}); });
+  if (found != 0 && found != 3) {
+    throw InputError(fmt::format(
+        "{}: nx, ny and nz beside 'exact' are normals of exact points; give all three, or none",
+        name));
+  }
+  for (int c = 0; c < found; ++c) {
+    const std::vector<double> values = FiniteScalar(bytes, kNames[c], name);
+    for (std::size_t k = 0; k < count; ++k) {
+      normals[k][c] = values[k];
+    }
+  }
+  return normals;
+}
+
+// Exact points of a PLY: where its property exact is 1.
+void TakeExact(const PlyHeader& header, std::string_view bytes, const std::string& name,
+               PointTable& table) {
+  if (!HasProperties(header, {"exact"})) {
+    return;
+  }
+  const std::vector<double> exact = FiniteScalar(bytes, "exact", name);
+  const std::vector<Vec3> normals = NormalsOf(header, bytes, name, exact.size());
+  for (std::size_t k = 0; k < exact.size(); ++k) {
+    if (exact[k] != 0 && exact[k] != 1) {
+      throw InputError(
+          fmt::format("{}: the exact of point {} is {}; write 1 for a point that is to be met "
+                      "exactly, else 0",
+                      name, k + 1, exact[k]));
+    }
+    if (exact[k] == 1) {
+      AddExact(table, k, normals[k]);
+    }
+  }
 }
 
 bool HasFaces(const PlyHeader& header) {
@@ -195,17 +274,12 @@ PointTable ParsePlyPoints(std::string_view bytes, const std::string& name,
   for (std::size_t k = 0; k < x.size(); ++k) {
     table.positions.emplace_back(x[k], y[k], z[k]);
     if (!table.positions.back().allFinite()) {
-      throw InputError(fmt::format("{}: vertex {} is not finite; leave it out", name, k));
+      throw InputError(fmt::format("{}: point {} is not finite; leave it out", name, k + 1));
     }
   }
-  const bool uv = HasProperties(header, {"u", "v"}), st = HasProperties(header, {"s", "t"});
-  if (uv || st) {
-    const std::vector<double> u = scalar(uv ? "u" : "s"), v = scalar(uv ? "v" : "t");
-    for (std::size_t k = 0; k < u.size(); ++k) {
-      table.uv.emplace_back(u[k], v[k]);
-    }
-  }
+  TakeUv(header, bytes, name, table);
   TakeWeights(header, bytes, name, table);
+  TakeExact(header, bytes, name, table);
   for (const std::string& attribute : attributes) {
     table.attributes.push_back({attribute, FiniteScalar(bytes, attribute, name)});
   }

@@ -15,11 +15,12 @@ struct PointFile {
   std::string sha256;  // of the bytes as they were read, lower-case hexadecimal
 };
 
-// By the ending, in any case: .csv and .txt (ParsePointTable); .xyz (three or more numbers per
-// line, the first three are x, y, z; # begins a comment); .npy (n x 3: x, y, z; n x 5: u and v
-// too); .ply (the vertices' x, y, z, u, v or s, t if they have them, weight or sigma, the
-// attributes, and the faces); .obj (the lines `v` and `f`); .stl and .off (points in single
-// precision and triangles; equal corners of an STL are one point). Each may be compressed: .csv.gz.
+// By the ending, in any case: .csv and .txt (ParsePointTable); .xyz (x, y, z on each line; #
+// begins a comment); .npy (n x 3: x, y, z; n x 5: u and v
+// too); .ply (the vertices' x, y, z, u, v or s, t if they have them, weight or sigma, exact and
+// with it nx, ny, nz, the attributes, and the faces); .obj (the lines `v` and `f`); .stl and .off
+// (points in single precision and triangles; equal corners of an STL are one point). Each may be
+// compressed: .csv.gz.
 // "-" stands for a CSV on standard input.
 //   attributes: further numbers to read, of a table or a PLY; other kinds have none.
 // Throws IoError for a file that cannot be read, another ending, or what ParsePointTable refuses;

@@ -132,9 +132,10 @@ class PointReader {
     }
     if (exact == 1) {
       const bool normal = IndexOf(indices_, PointColumn::kNx).has_value();
-      AddExact(table_, normal ? Vec3(number(PointColumn::kNx), number(PointColumn::kNy),
-                                     number(PointColumn::kNz))
-                              : Vec3::Zero());
+      AddExact(table_, table_.positions.size() - 1,
+               normal ? Vec3(number(PointColumn::kNx), number(PointColumn::kNy),
+                             number(PointColumn::kNz))
+                      : Vec3::Zero());
     }
   }
 
@@ -156,8 +157,8 @@ class PointReader {
 
 }  // namespace
 
-void AddExact(PointTable& table, const Vec3& normal) {
-  table.exact.push_back(static_cast<std::uint32_t>(table.positions.size() - 1));
+void AddExact(PointTable& table, std::size_t point, const Vec3& normal) {
+  table.exact.push_back(static_cast<std::uint32_t>(point));
   table.exact_normals.push_back(normal);
 }
 

@@ -31,8 +31,8 @@ struct PointTable {
   std::vector<Triangle> triangles;         // between the points, where the file has faces
 };
 
-// Makes the last point of a table exact.
-void AddExact(PointTable& table, const Vec3& normal);
+// Makes a point of a table exact, by its index; they are to be made so in order.
+void AddExact(PointTable& table, std::size_t point, const Vec3& normal);
 
 enum class PointColumn { kX, kY, kZ, kU, kV, kWeight, kSigma, kExact, kNx, kNy, kNz };
 constexpr std::size_t kPointColumns = 11;

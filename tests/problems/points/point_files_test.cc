@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
 #include <map>
@@ -105,7 +107,7 @@ std::string Off() {
 }
 
 std::string Xyz() {
-  return "# x y z\n" + Lines([](const Vec3& p, const Vec2&) { return Numbers(p, " ") + " 7"; });
+  return "# x y z\n" + Lines([](const Vec3& p, const Vec2&) { return Numbers(p, " "); });
 }
 
 class PointFiles : public ::testing::Test {
@@ -202,8 +204,45 @@ TEST_F(PointFiles, WeightAndSigmaOfAPlyAreThoseOfATable) {
               HasSubstr("give one of them"));
   for (const char* bad : {"weight", "sigma"}) {
     EXPECT_THAT(Refusal("bad.ply", OneScalarPly(bad, 1, 0)),
-                HasSubstr(fmt::format("the {} of vertex {} is not positive", bad, kCount - 1)));
+                HasSubstr(fmt::format("the {} of point {} is not positive", bad, kCount)));
   }
+}
+
+// With the same numbers in the columns of the two.
+TEST_F(PointFiles, ExactPointsOfAPlyAreThoseOfATable) {
+  const auto values = [](int k) { return fmt::format("{} 0 0.5 {}", k % 5 == 0 ? 1 : 0, -k); };
+  std::string csv = "x,y,z,exact,nx,ny,nz\n";
+  for (int k = 0; k < kCount; ++k) {
+    std::string row = Numbers(PointAt(k), " ") + " " + values(k) + "\n";
+    std::ranges::replace(row, ' ', ',');
+    csv += row;
+  }
+  const PointTable table = Read("a.csv", csv),
+                   ply = Read("a.ply", Ply({"exact", "nx", "ny", "nz"}, values));
+  EXPECT_EQ(ply.exact, (std::vector<std::uint32_t>{0, 5, 10}));
+  EXPECT_EQ(ply.exact, table.exact);
+  EXPECT_EQ(ply.exact_normals, table.exact_normals);
+  const PointTable plain = Read("b.ply", OneScalarPly("exact", 0, 1));
+  EXPECT_EQ(plain.exact, (std::vector<std::uint32_t>{kCount - 1}));
+  EXPECT_EQ(plain.exact_normals, std::vector<Vec3>(1, Vec3::Zero()));
+  EXPECT_THAT(Refusal("c.ply", OneScalarPly("exact", 0, 0.5)),
+              HasSubstr(fmt::format("the exact of point {} is 0.5; write 1", kCount)));
+  EXPECT_THAT(Refusal("d.ply", Ply({"exact", "nx"}, [](int) { return "1 1"; })),
+              HasSubstr("give all three, or none"));
+  EXPECT_TRUE(Read("e.ply", OneScalarPly("nx", 0, 1)).exact.empty()) << "a normal of a mesh";
+}
+
+TEST_F(PointFiles, WhatATableWouldRefuseIsRefusedOfAPlyAndAnXyz) {
+  for (const char* lone : {"u", "v", "s", "t"}) {
+    EXPECT_THAT(Refusal("lone.ply", OneScalarPly(lone, 0, 1)),
+                HasSubstr(fmt::format("the vertices have '{}' without '", lone)));
+  }
+  const auto three = [](int) { return "0 0.5 1"; };
+  EXPECT_EQ(Read("more.ply", Ply({"t", "u", "v"}, three)).uv.front(), Vec2(0.5, 1));
+  EXPECT_THAT(Refusal("nan.ply", Ply({"u", "v"}, [](int k) { return k == 4 ? "0 nan" : "0 1"; })),
+              HasSubstr("nan.ply: the v of point 5 is not finite"));
+  EXPECT_THAT(Refusal("four.xyz", "1 2 3\n1 2 3 0.5\n"),
+              HasSubstr("four.xyz: line 2: '0.5' follows x, y and z; leave it out, or give a CSV"));
 }
 
 TEST_F(PointFiles, AttributesAreOfATableOrAPly) {
