@@ -3,6 +3,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -130,16 +132,21 @@ struct Parametrisation {
   MapFaults faults = {};  // of what was chosen; none of given ones, which are not looked at
 };
 
+// What messages call a point, by its index; empty: "point 1" and so on.
+using PointNames = std::function<std::string(std::size_t)>;
+
 // Points of a file.
 struct Scan {
   std::span<const Vec3> positions;           // mm
   std::span<const Vec2> given_uv = {};       // one per point, or none
   std::span<const Triangle> triangles = {};  // between the points, or none
   Closure closure = Closure::kOpen;          // of the surface that is wanted, for AutoParameters
+  PointNames name_of = {};                   // of a point, where it was read
 };
 
 // `given` in the memory of the (u,v). Throws InputError as Parametrise does.
-Parametrisation TakeGiven(std::vector<Vec2> given_uv, const GivenParameters& given);
+Parametrisation TakeGiven(std::vector<Vec2> given_uv, const GivenParameters& given,
+                          const PointNames& name_of = {});
 
 // du x dv looks where the triangles look. Whatever is chosen is one-to-one, but for given (u,v) and
 // where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are

@@ -383,16 +383,20 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
 }
 
 // Beyond, the square of a distance is not a number any more.
-void CheckReach(const PointTable& points, const std::string& name) {
+void CheckReach(const PointTable& points) {
   constexpr double kFarthest = 1e100;
   for (std::size_t k = 0; k < points.positions.size(); ++k) {
     const double largest = points.positions[k].cwiseAbs().maxCoeff();
     if (largest > kFarthest) {
-      throw InputError(
-          fmt::format("{}: point {} has a coordinate of {:.3g}; at most 1e100 are allowed", name,
-                      k + 1, largest));
+      throw InputError(fmt::format("{} has a coordinate of {:.3g}; at most 1e100 are allowed",
+                                   NameOfPoint(points, k), largest));
     }
   }
+}
+
+// Whether each point is a line, after one with the names of the columns.
+bool IsTable(const std::filesystem::path& path) {
+  return path == "-" || IsCsv(Lower(path.extension().string()) == ".gz" ? path.stem() : path);
 }
 
 PointFile ReadAnyPointFile(const std::filesystem::path& path,
@@ -416,7 +420,9 @@ PointFile ReadAnyPointFile(const std::filesystem::path& path,
 PointFile ReadPointFile(const std::filesystem::path& path,
                         std::span<const std::string> attributes) {
   PointFile file = ReadAnyPointFile(path, attributes);
-  CheckReach(file.points, path == "-" ? "standard input" : path.string());
+  file.points.file = path == "-" ? "standard input" : path.string();
+  file.points.first_line = IsTable(path) ? 2 : 0;
+  CheckReach(file.points);
   return file;
 }
 

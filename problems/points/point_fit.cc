@@ -286,13 +286,15 @@ double SigmaFactorOf(const AutoReport& report, std::span<const double> weights) 
 Parametrisation ParametersOf(PointTable& table, const PointFitOptions& options) {
   const auto* const given = std::get_if<GivenParameters>(&options.parameters);
   const bool automatic = std::holds_alternative<AutoParameters>(options.parameters);
+  const auto name_of = [&](std::size_t point) { return NameOfPoint(table, point); };
   if (!table.uv.empty() && table.triangles.empty() && (automatic || given != nullptr)) {
-    return TakeGiven(std::move(table.uv), automatic ? GivenParameters{} : *given);
+    return TakeGiven(std::move(table.uv), automatic ? GivenParameters{} : *given, name_of);
   }
   Parametrisation parameters = Parametrise({.positions = table.positions,
                                             .given_uv = table.uv,
                                             .triangles = table.triangles,
-                                            .closure = options.closure},
+                                            .closure = options.closure,
+                                            .name_of = name_of},
                                            options.parameters);
   table.uv = std::vector<Vec2>();  // frees it, which {} would not
   table.triangles = std::vector<Triangle>();

@@ -157,6 +157,17 @@ class PointReader {
 
 }  // namespace
 
+std::string NameOfPoint(const PointTable& table, std::size_t point) {
+  const std::string name = fmt::format("point {}", point + 1);
+  if (table.file.empty()) {
+    return name;
+  }
+  return table.first_line == 0
+             ? fmt::format("{}: {}", table.file, name)
+             : fmt::format("{}:{}: {}", table.file,
+                           static_cast<std::size_t>(table.first_line) + point, name);
+}
+
 void AddExact(PointTable& table, std::size_t point, const Vec3& normal) {
   table.exact.push_back(static_cast<std::uint32_t>(point));
   table.exact_normals.push_back(normal);

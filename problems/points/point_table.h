@@ -29,7 +29,12 @@ struct PointTable {
   std::vector<std::uint32_t> exact;        // indices of points that are to be met exactly
   std::vector<Vec3> exact_normals;         // one per exact point: zero where it does not matter
   std::vector<Triangle> triangles;         // between the points, where the file has faces
+  std::string file = {};                   // that they are of, in messages; empty: of none
+  int first_line = 0;                      // of the file, where a point is a line each; else 0
 };
+
+// What messages call a point, by its index: "scan.csv:110: point 109".
+std::string NameOfPoint(const PointTable& table, std::size_t point);
 
 // Makes a point of a table exact, by its index; they are to be made so in order.
 void AddExact(PointTable& table, std::size_t point, const Vec3& normal);

@@ -289,7 +289,13 @@ TEST(Parametrise, WrongInputIsNamed) {
   };
   EXPECT_THAT(message({}, AutoParameters{}, {}), HasSubstr("there is no point"));
   EXPECT_THAT(message(points, GivenParameters{}, {}), HasSubstr("needs each point's (u,v)"));
-  EXPECT_THAT(message(points, GivenParameters{}, uv), HasSubstr("point 1 has (u,v) = (9, 0)"));
+  EXPECT_THAT(
+      message(points, GivenParameters{}, uv),
+      HasSubstr("point 2 has (u,v) = (9, 0), outside [0, 1] x [0, 1]; to take all points, write "
+                "parameters: {type: given, u_range: [0, 9], v_range: [0, 9]}"));
+  const std::vector<Vec2> lost = {{0, 0}, {9, 0}, {4.5, kNaN}};
+  EXPECT_THAT(message(points, GivenParameters{.u_range = {0, 9}}, lost),
+              HasSubstr("point 3 has (u,v) = (4.5, nan), which is not finite; give numbers"));
   EXPECT_THAT(message(points, AutoParameters{}, std::span(uv).first(2)),
               HasSubstr("2 pairs (u,v) for 3 points"));
   EXPECT_THAT(message(points, GivenParameters{.u_range = {1, 0}}, uv),

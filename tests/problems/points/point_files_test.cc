@@ -245,6 +245,12 @@ TEST_F(PointFiles, WhatATableWouldRefuseIsRefusedOfAPlyAndAnXyz) {
               HasSubstr("four.xyz: line 2: '0.5' follows x, y and z; leave it out, or give a CSV"));
 }
 
+TEST_F(PointFiles, APointIsCalledByItsFileAndLine) {
+  EXPECT_EQ(NameOfPoint(Read("a.csv", Csv()), 3), (folder_ / "a.csv:5: point 4").string());
+  EXPECT_EQ(NameOfPoint(Read("a.ply", PlainPly()), 3), (folder_ / "a.ply: point 4").string());
+  EXPECT_EQ(NameOfPoint(PointTable(), 3), "point 4");
+}
+
 TEST_F(PointFiles, AttributesAreOfATableOrAPly) {
   const PointTable table = Read("a.ply", OneScalarPly("warmth", 3, 5), {"warmth"});
   ASSERT_EQ(table.attributes.size(), 1u);
@@ -264,7 +270,8 @@ TEST_F(PointFiles, WhatIsNotOfItsKindIsRefusedByName) {
   EXPECT_THAT(Refusal("b.xyz", "1 2 inf\n"), HasSubstr("b.xyz"));
   EXPECT_THAT(Refusal("d.xyz", "1 2 3\n1 -2e200 3\n"),
               HasSubstr("d.xyz: point 2 has a coordinate"));
-  EXPECT_THAT(Refusal("d.csv", "x,y,z\n1,2e200,3\n"), HasSubstr("d.csv: point 1 has a coordinate"));
+  EXPECT_THAT(Refusal("d.csv", "x,y,z\n1,2e200,3\n"),
+              HasSubstr("d.csv:2: point 1 has a coordinate"));
   EXPECT_THAT(Refusal("c.xyz", "# nothing\n"), HasSubstr("there is no point"));
   EXPECT_THAT(Refusal("a.obj", "v 1 2 nan\n"), HasSubstr("a.obj"));
   EXPECT_THAT(Refusal("b.obj", "vn 0 0 1\n"), HasSubstr("there is no point"));

@@ -398,6 +398,10 @@ TEST_F(PointFitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   refused("good.csv --set chord_mm=1e-9", "chord_mm: 1e-09 is too fine");
   Write("franke.csv", Csv(Scattered(FrankePoint, 2000, 1e-3, 1), /*with_uv=*/true));
   refused("franke.csv --set chord_mm=1e-6", "chord_mm: 1e-06 is too fine for these points");
+  Write("wide.csv", "x,y,z,u,v\n0,0,0,0,0\n1,0,0,2.5,0\n0,1,0,0,-1\n1,1,0,2,0\n");
+  refused("wide.csv",
+          "wide.csv:3: point 2 has (u,v) = (2.5, 0), outside [0, 1] x [0, 1]; to take all "
+          "points, write parameters: {type: given, u_range: [0, 2.5], v_range: [-1, 1]}");
   refused("good.csv cylinder.yaml", "closure: periodic_u");
   refused("good.csv plain.yaml --set parameters=given", "columns u and v");
   refused("good.csv plain.yaml --set fit.terms[1].weight=some", "expected a number");
