@@ -104,10 +104,18 @@ std::string AttributesFault(const std::vector<std::string>& names) {
   return "";
 }
 
-// Empty if there is a surface of so many patches.
+// Empty if there is a surface of so many patches, and memory for its level 0: a fit takes about a
+// gigabyte for as many vertices as are allowed, however few points there are.
 std::string ShapeFault(const HSplineShape& shape) try {
+  constexpr std::int64_t kMostVertices = 1'100'000;  // 1024 x 1024 patches
   CheckShape(shape);
-  return "";
+  const std::int64_t vertices = std::int64_t{shape.Columns(0)} * shape.Rows(0);
+  return vertices <= kMostVertices
+             ? ""
+             : fmt::format(
+                   "{} x {} patches have {} control vertices; level 0 may have {}; take "
+                   "fewer patches, and finer levels where the points have detail",
+                   shape.patches_u, shape.patches_v, vertices, kMostVertices);
 } catch (const InputError& error) {
   return error.what();
 }

@@ -695,6 +695,14 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
               HasSubstr("patches_v: H-spline: 8 x 3 patches are not allowed"));
   EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
   EXPECT_THAT(read("patches_u: 1\nclosure: periodic_u\n"), HasSubstr("patches_u: H-spline: 1 x 8"));
+  // What is said to be allowed is.
+  EXPECT_THAT(read("patches_u: 3\nclosure: periodic_u\n"), HasSubstr("use 4..8192 x 1..8192"));
+  EXPECT_NO_THROW(ReadConfigText<PointFitOptions>("patches_u: 8192\n", "x.yaml"));
+  EXPECT_NO_THROW(ReadConfigText<PointFitOptions>("patches_u: 1024\npatches_v: 1024\n", "x.yaml"));
+  EXPECT_THAT(
+      read("patches_u: 4096\npatches_v: 4096\n"),
+      HasSubstr("patches_u: 4096 x 4096 patches have 16801801 control vertices; level 0 may "
+                "have 1100000; take fewer patches"));
   for (const char* term : {"landmarks", "prior_shape", "spring", "non_penetration"}) {
     EXPECT_THAT(read(fmt::format("fit: {{plan: until, terms: [points, {}]}}\n", term)),
                 HasSubstr("and points of a file have none"));
