@@ -12,7 +12,7 @@ namespace semblance {
 // MeshLab's PickedPoints (.pp): names as `site`, coordinates as they stand; `axes` is empty, for
 // the file does not say. A point that is not active becomes an absent one, whatever its
 // coordinates. file: its name, for messages. Throws IoError for anything else: no XML, another
-// root, a coordinate that lacks or is not a finite number, with the point's number and name.
+// root, a coordinate that is missing or is not a finite number, with the point's number and name.
 LandmarkFile ParseMeshLabPoints(std::string_view text, std::string_view file);
 
 // Normals, depths, certainties and notes have no place there.

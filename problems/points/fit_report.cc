@@ -240,7 +240,7 @@ void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& fol
   }
 }
 
-// Three columns a file.
+// Three columns per file.
 void WriteAttributes(const PointFit& result, OutputFolder& folder) {
   for (std::size_t k = 0; k < result.attribute_fit.surfaces.size(); ++k) {
     folder.Write(fmt::format("attributes_{}.hspline.json", k + 1),

@@ -66,8 +66,9 @@ struct Phantom {
   double thickness = kNaN;             // by which all its depths exceed those of an average adult
 };
 
-// Of the rings: empty, or what is wrong and what to do. There are 8 to 1000, and at least 30 where
-// the bone is rough: the mesh of fewer would miss the sites by more than 3 mm.
+// Of the rings: empty, or what is wrong and what to do. There are 8 to 1000 (16 at least in a
+// configuration, whose runs need them), and at least 30 where the bone is rough: the mesh of fewer
+// would miss the sites by more than 3 mm.
 std::string RingsFault(const PhantomOptions& options);
 
 // The same options give the same bytes. Throws InputError for a fault of the rings.

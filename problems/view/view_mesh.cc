@@ -11,7 +11,7 @@
 namespace semblance {
 namespace {
 
-// One vertex a cell of a grid, for meshes that are no manifolds.
+// One vertex per cell of a grid, for meshes that are no manifolds.
 TriMesh Clustered(const TriMesh& mesh, double cell_mm) {
   std::map<std::array<long, 3>, std::int32_t> of_cell;
   std::vector<std::int32_t> to(mesh.points.size());

@@ -65,14 +65,6 @@ double Area(const TriMesh& mesh) {
   return area;
 }
 
-double SignedVolume(const TriMesh& mesh) {
-  double six_volumes = 0;
-  for (const Triangle& t : mesh.triangles) {
-    six_volumes += mesh.points[t[0]].dot(mesh.points[t[1]].cross(mesh.points[t[2]]));
-  }
-  return six_volumes / 6.0;
-}
-
 std::vector<Vec3> VertexNormals(const TriMesh& mesh) {
   std::vector<Vec3> normals(mesh.points.size(), Vec3::Zero());
   for (const Triangle& t : mesh.triangles) {

@@ -26,8 +26,6 @@ Box3 Bounds(const TriMesh& mesh);  // empty box for an empty mesh
 Vec3 TriangleCentroid(const TriMesh& mesh, const Triangle& t);
 Vec3 TriangleAreaVector(const TriMesh& mesh, const Triangle& t);  // normal times area, mm^2
 double Area(const TriMesh& mesh);                                 // mm^2
-double SignedVolume(
-    const TriMesh& mesh);  // mm^3; > 0 if closed and outward; origin-dependent if open
 
 // Unit normals per vertex, weighted by the area of its triangles, so that the slivers of marching
 // cubes hardly count. Zero where a vertex has no triangle of positive area.

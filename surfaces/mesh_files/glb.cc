@@ -39,7 +39,7 @@ void AppendVector(std::string& bytes, const Eigen::Vector3f& v) {
   }
 }
 
-// A colour of 8 bits a channel has 16 where light adds up linearly.
+// A colour of 8 bits per channel has 16 where light adds up linearly.
 std::uint16_t LinearShort(std::uint8_t srgb) {
   return static_cast<std::uint16_t>(std::lround(65535 * LinearFromSrgb(srgb / 255.0)));
 }
@@ -50,7 +50,7 @@ void CheckPart(const GlbPart& part) {
       !fits(part.uv.size()) || !fits(part.colours.size())) {
     throw InputError(fmt::format(
         "glTF '{}': {} triangles, {} points, {} normals, {} uv and {} colours; at least one "
-        "triangle and one normal a point are needed, and uv and colours of all points or none",
+        "triangle and one normal per point are needed, and uv and colours of all points or none",
         part.material.name, part.triangles.size(), part.points.size(), part.normals.size(),
         part.uv.size(), part.colours.size()));
   }

@@ -7,6 +7,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/skull_fill.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

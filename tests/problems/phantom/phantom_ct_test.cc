@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

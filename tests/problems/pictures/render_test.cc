@@ -17,6 +17,7 @@
 #include "surfaces/base/srgb.h"
 #include "tests/testing/pixels.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

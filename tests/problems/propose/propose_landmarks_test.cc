@@ -12,6 +12,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

@@ -11,6 +11,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 #include "tests/testing/shuffled.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

@@ -10,6 +10,7 @@
 #include "surfaces/implicit_face.h"
 #include "surfaces/marching/edge_intersections.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

@@ -5,6 +5,7 @@
 
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/testing/shapes.h"
+#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {
