@@ -10,16 +10,16 @@ namespace semblance {
 namespace {
 
 constexpr int kLevels = 19;  // of 5 % each
+constexpr double kRounding = 1e-9;
 
-// The share that the smallest central interval with this error in it should hold.
-double ShareOf(double error, double sd) {
+}  // namespace
+
+double ShareAround(double error, double sd) {
   if (sd > 0) {
     return std::erf(std::abs(error) / (sd * std::numbers::sqrt2));
   }
-  return error == 0 ? 0 : 1;
+  return std::abs(error) <= kRounding ? 0 : 1;
 }
-
-}  // namespace
 
 std::vector<double> Coverage(std::span<const double> errors, std::span<const double> sds,
                              std::span<const double> weights) {
@@ -29,7 +29,7 @@ std::vector<double> Coverage(std::span<const double> errors, std::span<const dou
     if (!std::isfinite(errors[i]) || !std::isfinite(sds[i])) {
       continue;
     }
-    const double weight = weights.empty() ? 1 : weights[i], share = ShareOf(errors[i], sds[i]);
+    const double weight = weights.empty() ? 1 : weights[i], share = ShareAround(errors[i], sds[i]);
     all += weight;
     for (int k = 0; k < kLevels; ++k) {
       within[k] += share <= (k + 1) / 20.0 ? weight : 0;

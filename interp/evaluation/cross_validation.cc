@@ -17,8 +17,6 @@
 namespace semblance {
 namespace {
 
-constexpr double kSigmas90 = 1.6448536269514722;  // of a normal distribution, both sides
-
 Interpolator AnyInterpolator(const DepthScheme& scheme) {
   return std::visit(
       [&](const auto& options) -> Interpolator {
@@ -91,7 +89,7 @@ void Summarise(CrossValidation& result) {
     errors_mm.push_back(out.error_mm);
     sds_mm.push_back(out.sd_mm);
     if (std::isfinite(out.error_mm) && std::isfinite(out.sd_mm)) {
-      out.within_90 = std::abs(out.error_mm) <= kSigmas90 * out.sd_mm;
+      out.within_90 = ShareAround(out.error_mm, out.sd_mm) <= 0.9;
     }
     if (std::isfinite(out.error_mm)) {
       ++result.predicted;
@@ -174,7 +172,7 @@ CrossValidation CrossValidate(const DepthScheme& scheme, const OutsideRule& rule
       const Dowel& dowel = input.dowels[folds[f][k]];
       LeftOut out = Compared(dowel, fields[f], k);
       out.nearest_mm = shown.NearestTo_mm(dowel.base);
-      result.own_sd |= out.status == DepthStatus::kAssigned && std::isfinite(out.sd_mm);
+      result.own_sd |= out.status == DepthStatus::kAssigned && out.sd_mm > 0;
       left_out[f].push_back(std::move(out));
     }
   }

@@ -46,13 +46,14 @@ struct CrossValidation {
   double coverage_90 = kNaN;     // its share at 90 %; 0.9 where the sd is true
   DepthScores scores;            // where the scheme itself answers
   DepthScores scores_with_rule;  // and where the outside rule does
-  bool own_sd = false;           // does the scheme state an sd of its own?
+  bool own_sd = false;           // does the scheme state an sd of its own, above 0 somewhere?
   SdByDistance sd;               // learned from all folds; of a scheme without one
 };
 
-// Leaves each fold out, as LeaveOut (stacking/leave_out.h). Where the scheme states no sd_mm of its
-// own at any dowel, that of a fold is learned from what was missed in the other folds
-// (sd_by_distance.h). Throws as LeaveOut.
+// Leaves each fold out, as LeaveOut (stacking/leave_out.h). Where the scheme states no sd_mm above
+// 0 of its own at any dowel, that of a fold is learned from what was missed in the other folds
+// (sd_by_distance.h): a scheme that hands on what the dowels have has 0 all over the bone where all
+// of them are known exactly, and that is no word about the bone between them. Throws as LeaveOut.
 CrossValidation CrossValidate(const DepthScheme& scheme, const OutsideRule& rule,
                               const DepthInput& input, const Folds& folds, const RunContext& run);
 

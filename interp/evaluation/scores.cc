@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <boost/math/special_functions/erf.hpp>
 #include <cmath>
+#include <limits>
 #include <numbers>
+
+#include "interp/evaluation/calibration.h"
 
 namespace semblance {
 namespace {
@@ -12,8 +15,7 @@ namespace {
 double Density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::numbers::pi); }
 double Cumulative(double z) { return std::erfc(-z / std::numbers::sqrt2) / 2; }
 
-constexpr double kReach50 = 0.6744897501960817, kReach90 = 1.6448536269514722,
-                 kReach95 = 1.959963984540054;
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 // Half the width of the central interval that holds the share, in standard deviations.
 double Reach(double share) { return std::numbers::sqrt2 * boost::math::erf_inv(share); }
@@ -23,6 +25,7 @@ struct Sums {
   double weight = 0, absolute = 0, squares = 0, error = 0;
   double stated = 0, crps = 0, log_score = 0, interval = 0, sd = 0;
   double within_50 = 0, within_90 = 0, within_95 = 0;
+  bool certain_and_right = false, certain_and_wrong = false;
   std::vector<double> pit = std::vector<double>(kPitBins, 0);
 
   void AddError(double e, double by) {
@@ -34,15 +37,31 @@ struct Sums {
   void AddStated(double e, double sd_mm, double by) {
     stated += by;
     crps += by * GaussianCrps_mm(e, sd_mm);
-    log_score += by * GaussianLogScore(e, sd_mm);
     interval += by * GaussianIntervalScore_mm(e, sd_mm, 0.9);
     sd += by * sd_mm;
-    const double z = std::abs(e) / sd_mm;
-    within_50 += z <= kReach50 ? by : 0;
-    within_90 += z <= kReach90 ? by : 0;
-    within_95 += z <= kReach95 ? by : 0;
+    const double share = ShareAround(e, sd_mm);
+    within_50 += share <= 0.5 ? by : 0;
+    within_90 += share <= 0.9 ? by : 0;
+    within_95 += share <= 0.95 ? by : 0;
+    if (sd_mm > 0) {
+      log_score += by * GaussianLogScore(e, sd_mm);
+    } else {
+      (share == 0 ? certain_and_right : certain_and_wrong) = true;
+    }
+    AddPit(e, sd_mm, by);
+  }
+  void AddPit(double e, double sd_mm, double by) {
+    if (sd_mm == 0 && ShareAround(e, sd_mm) == 0) {
+      for (double& part : pit) {
+        part += by / kPitBins;
+      }
+      return;
+    }
     const int bin = static_cast<int>(kPitBins * GaussianPit(e, sd_mm));
     pit[std::min(bin, kPitBins - 1)] += by;
+  }
+  double LogScore() const {
+    return certain_and_wrong ? kInfinite : certain_and_right ? -kInfinite : log_score / stated;
   }
 };
 
@@ -54,7 +73,7 @@ void PutMeans(const Sums& sums, DepthScores& scores) {
   }
   if (sums.stated > 0) {
     scores.crps_mm = sums.crps / sums.stated;
-    scores.log_score = sums.log_score / sums.stated;
+    scores.log_score = sums.LogScore();
     scores.interval_score_90_mm = sums.interval / sums.stated;
     scores.coverage_50 = sums.within_50 / sums.stated;
     scores.coverage_90 = sums.within_90 / sums.stated;
@@ -69,12 +88,18 @@ void PutMeans(const Sums& sums, DepthScores& scores) {
 }  // namespace
 
 double GaussianCrps_mm(double error_mm, double sd_mm) {
+  if (sd_mm == 0) {
+    return std::abs(error_mm);
+  }
   const double z = error_mm / sd_mm;
   return sd_mm *
          (z * std::erf(z / std::numbers::sqrt2) + 2 * Density(z) - 1 / std::sqrt(std::numbers::pi));
 }
 
 double GaussianLogScore(double error_mm, double sd_mm) {
+  if (sd_mm == 0) {
+    return ShareAround(error_mm, sd_mm) == 0 ? -kInfinite : kInfinite;
+  }
   const double z = error_mm / sd_mm;
   return std::log(sd_mm * std::sqrt(2 * std::numbers::pi)) + z * z / 2;
 }
@@ -97,8 +122,9 @@ DepthScores ScoreDepths(std::span<const double> errors, std::span<const double> 
     const double weight = weights.empty() ? 1 : weights[i];
     ++scores.points;
     sums.AddError(errors[i], weight);
-    if (std::isfinite(sds[i]) && sds[i] > 0) {
+    if (std::isfinite(sds[i])) {
       ++scores.stated;
+      scores.certain += sds[i] == 0 ? 1 : 0;
       sums.AddStated(errors[i], sds[i], weight);
     }
   }

@@ -25,7 +25,7 @@ struct Foresight {
                      // known; known: given the depths at PopulationFile::known; person_known: given
                      // both; else the id of a published table
   std::vector<PredictedDepth> depths;
-  DepthScores scores;             // over all of them, an sd of 0 or none not counted
+  DepthScores scores;             // over all of them
   std::vector<double> mae_mm;     // one per subject; NaN without a depth
   SampleSummary against_mean_mm;  // per subject: its mae less that of `mean`
 };

@@ -85,6 +85,7 @@ Json VariogramToJson(const DepthComparison& comparison) {
 Json ScoresToJson(const DepthScores& s) {
   return {{"n", s.points},
           {"stated", s.stated},
+          {"certain", s.certain},
           {"mae_mm", s.mae_mm},
           {"rmse_mm", s.rmse_mm},
           {"bias_mm", s.bias_mm},

@@ -10,7 +10,8 @@
 
 namespace semblance {
 
-// n, stated, the errors, the proper scores, coverage_50, _90, _95, mean_sd_mm and pit.
+// n, stated, certain, the errors, the proper scores (an infinite log_score is null), coverage_50,
+// _90, _95, mean_sd_mm and pit.
 nlohmann::ordered_json ScoresToJson(const DepthScores& scores);
 
 // Counts of vertices by status, range and mean of the assigned depths, dowels and areas; shares{}

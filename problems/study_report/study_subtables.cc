@@ -158,6 +158,12 @@ ReportTable ScoresTable(const StudyResults& results, const std::vector<Treatment
             {"within 95 %", "coverage_95"}})) {
     columns.push_back({head, prefix + name, std::string_view(name) == "n" ? 0 : 3});
   }
+  if (std::ranges::any_of(results.trials, [&](const TrialRow& row) {
+        const auto certain = row.metrics.find(prefix + "certain");
+        return certain != row.metrics.end() && certain->second > 0;
+      })) {  // whose log score is infinite, and in no mean
+    columns.push_back({"stated as certain", prefix + "certain", 1});
+  }
   return TableOf(results, ranked, caption, columns);
 }
 

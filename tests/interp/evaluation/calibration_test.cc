@@ -45,6 +45,7 @@ TEST(Coverage, CountsByWeightAndLeavesOutWhatIsNotStated) {
 
 TEST(Coverage, ADeviationOfZeroHoldsNoError) {
   EXPECT_THAT(Coverage(std::vector<double>{0, 1}, std::vector<double>{0, 0}), Each(0.5));
+  EXPECT_THAT(Coverage(std::vector<double>{1e-15}, std::vector<double>{0}), Each(1));  // rounding
 }
 
 TEST(Coverage, OfNothingIsNothing) {

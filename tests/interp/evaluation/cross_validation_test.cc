@@ -159,6 +159,25 @@ TEST(CrossValidation, GivesAFieldTheSdThatItsErrorsShow) {
       testing::SameBytes(WithStatedSd(own, Validate(Kriging{}, scene), scene.Input(), {}), own));
 }
 
+// Schemes that hand on the dowels' sd have 0 everywhere where all dowels are exact.
+TEST(CrossValidation, ExactDowelsSayNothingOfTheBoneBetweenThem) {
+  DowelScene scene = ScatteredScene(20);
+  for (Dowel& dowel : scene.dowels) {
+    dowel.sd_mm = 0;
+  }
+  const CrossValidation known = Validate(Nearest{}, scene);
+  EXPECT_FALSE(known.own_sd);
+  EXPECT_EQ(known.scores.certain, 0);
+  EXPECT_GT(known.coverage_90, 0.5);
+  const DepthField field =
+      WithStatedSd(InterpolateDepth(Nearest{}, scene.Input(), {}), known, scene.Input(), {});
+  for (std::size_t v = 0; v < field.status.size(); ++v) {
+    EXPECT_TRUE(!std::isfinite(field.depth_mm[v]) || field.sd_mm[v] > 0);
+  }
+  scene.dowels[3].sd_mm = 1;  // one that is not: what the scheme states stands, also 0
+  EXPECT_TRUE(Validate(Nearest{}, scene).own_sd);
+}
+
 TEST(CrossValidation, AsksWhetherTheErrorIsWithinTheStatedSd) {
   // Nearest to sg are g and rhi alike, g first: 7 +- 2 for 4. For n: 7 +- 2 for 9. For g: n would
   // be 9 +- 3 as near as sg, n first. For rhi: n 9 +- 3 for 5.

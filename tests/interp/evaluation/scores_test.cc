@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
+#include "interp/evaluation/calibration.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
@@ -126,6 +128,53 @@ TEST(Scores, AreMeansByWeightOverWhatIsKnown) {
   EXPECT_NEAR(scores.crps_mm, (3 * GaussianCrps_mm(1, 1) + GaussianCrps_mm(-2, 2)) / 4, 1e-12);
   EXPECT_EQ(scores.coverage_90, 1);
   EXPECT_EQ(scores.coverage_50, 0);
+}
+
+// What the scores of ever smaller deviations tend to, without a jump at 0.
+TEST(Scores, OfACertainForecastAreTheLimitsOfSmallDeviations) {
+  for (const double error : {-0.3, 0.7}) {
+    EXPECT_NEAR(GaussianCrps_mm(error, 0), GaussianCrps_mm(error, 1e-9), 1e-8);
+    EXPECT_NEAR(GaussianIntervalScore_mm(error, 0, 0.9), GaussianIntervalScore_mm(error, 1e-9, 0.9),
+                1e-7);
+    EXPECT_EQ(GaussianPit(error, 0), error > 0 ? 0 : 1);
+    EXPECT_EQ(GaussianLogScore(error, 0), std::numeric_limits<double>::infinity());
+  }
+  EXPECT_EQ(GaussianCrps_mm(0, 0), 0);
+  EXPECT_EQ(GaussianIntervalScore_mm(0, 0, 0.9), 0);
+  EXPECT_EQ(GaussianLogScore(0, 0), -std::numeric_limits<double>::infinity());
+}
+
+TEST(Scores, CountACertainForecastAsStated) {
+  const DepthScores scores =
+      ScoreDepths(std::vector<double>{0, 3, -1, 2, 1}, std::vector<double>{0, 0, 0, 2, kNaN});
+  EXPECT_EQ(scores.stated, 4);
+  EXPECT_EQ(scores.certain, 3);
+  EXPECT_NEAR(scores.crps_mm, (3 + 1 + GaussianCrps_mm(2, 2)) / 4, 1e-12);
+  EXPECT_NEAR(scores.interval_score_90_mm,
+              (20 * 3 + 20 * 1 + GaussianIntervalScore_mm(2, 2, 0.9)) / 4, 1e-12);
+  EXPECT_EQ(scores.coverage_50, 0.25);
+  EXPECT_EQ(scores.coverage_90, 0.5);
+  EXPECT_EQ(scores.mean_sd_mm, 0.5);
+  EXPECT_EQ(scores.log_score, std::numeric_limits<double>::infinity());
+  EXPECT_NEAR(std::accumulate(scores.pit.begin(), scores.pit.end(), 0.0), 1, 1e-12);
+  EXPECT_NEAR(scores.pit.front(), 0.275, 1e-12);  // one too thick, and a tenth of the right one
+  EXPECT_EQ(ScoreDepths(std::vector<double>{1e-12, 1}, std::vector<double>{0, 1}).log_score,
+            -std::numeric_limits<double>::infinity());
+}
+
+// The same points within the same intervals, by scores and by calibration.
+TEST(Scores, CoverAsCalibrationDoes) {
+  Random random(7);
+  std::vector<double> errors, sds;
+  for (int n = 0; n < 500; ++n) {
+    sds.push_back(n % 3 == 0 ? 0 : random.Uniform(0.5, 3));
+    errors.push_back(n % 6 == 0 ? 0 : random.BoundedNormal());
+  }
+  const DepthScores scores = ScoreDepths(errors, sds);
+  const std::vector<double> coverage = Coverage(errors, sds);
+  EXPECT_DOUBLE_EQ(scores.coverage_50, coverage[9]);
+  EXPECT_DOUBLE_EQ(scores.coverage_90, coverage[17]);
+  EXPECT_DOUBLE_EQ(scores.coverage_95, coverage[18]);
 }
 
 TEST(Scores, OfNothingAreNothing) {
