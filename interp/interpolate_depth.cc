@@ -2,6 +2,7 @@
 #include "interp/interpolate_depth.h"
 
 #include <algorithm>
+#include <ranges>
 #include <type_traits>
 
 namespace semblance {
@@ -52,6 +53,24 @@ bool NeedsNetwork(const DepthScheme& scheme) {
           return false;
         } else {
           return SingleNeedsNetwork(options);
+        }
+      },
+      scheme);
+}
+
+std::size_t FewestDowels(const DepthScheme& scheme) {
+  return std::visit(
+      [](const auto& options) -> std::size_t {
+        using Scheme = std::decay_t<decltype(options)>;
+        if constexpr (std::is_same_v<Scheme, AutoScheme>) {
+          const auto& schemes = options.schemes;
+          return schemes.empty()
+                     ? 1
+                     : std::ranges::min(schemes | std::views::transform(SingleFewestDowels));
+        } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
+          return 1;
+        } else {
+          return SingleFewestDowels(options);
         }
       },
       scheme);

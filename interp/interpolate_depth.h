@@ -3,6 +3,7 @@
 // its overload of InterpolateDepth in a file of its own, and one entry of SingleScheme.
 #pragma once
 
+#include <cstddef>
 #include <utility>
 #include <variant>
 
@@ -33,5 +34,8 @@ bool NeedsExpected(const DepthScheme& scheme);
 
 // Does the scheme work on the dowel network, so that one without an area will not do?
 bool NeedsNetwork(const DepthScheme& scheme);
+
+// The fewest dowels, at places of their own, with which the scheme can be asked: 1 of most.
+std::size_t FewestDowels(const DepthScheme& scheme);
 
 }  // namespace semblance

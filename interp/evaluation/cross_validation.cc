@@ -29,7 +29,8 @@ Interpolator AnyInterpolator(const DepthScheme& scheme) {
                       },
                   .left_out = {},
                   .needs_surface = NeedsSurface(scheme),
-                  .needs_network = NeedsNetwork(scheme)};
+                  .needs_network = NeedsNetwork(scheme),
+                  .fewest_dowels = FewestDowels(scheme)};
         }
       },
       scheme);

@@ -30,6 +30,10 @@ Eigen::MatrixXd ExpectedAt(std::span<const Vec3> points, std::span<const Dowel> 
 
 }  // namespace
 
+std::size_t FewestDowels(DepthMean mean) {
+  return mean == DepthMean::kCovariates ? 1 + kReliefScales_mm.size() : 1;
+}
+
 struct MeanRegressors::Relief {
   Relief(const TriMesh& skull, const RunContext& run)
       : surface(skull, kReliefEdge_mm, run),
@@ -63,12 +67,12 @@ MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const De
   }
   if (mean == DepthMean::kCovariates) {
     CheckSurface(scheme, input.skull);
-    constexpr std::size_t kRegressors = 1 + kReliefScales_mm.size();
-    if (DepthSamples(input.dowels).size() < kRegressors) {
-      throw InputError(
-          fmt::format("{}: `mean: covariates` finds {} factors, which {} dowels do not tell; place "
-                      "more, or choose `mean: constant`",
-                      scheme, kRegressors, input.dowels.size()));
+    const std::size_t places = DepthSamples(input.dowels).size();
+    if (places < FewestDowels(mean)) {
+      throw InputError(fmt::format(
+          "{}: `mean: covariates` finds {} factors, which {} do not tell; place "
+          "more, or choose `mean: constant`",
+          scheme, FewestDowels(mean), places == 1 ? "1 dowel" : fmt::format("{} dowels", places)));
     }
     relief_ = std::make_unique<Relief>(input.skull, run);
   }

@@ -28,6 +28,9 @@ void MeanField(Visitor& visit, DepthMean& mean) {
         mean);
 }
 
+// The factors that the mean has, and so the fewest dowels, at places of their own, that tell them.
+std::size_t FewestDowels(DepthMean mean);
+
 // The regressors of the mean at any point; the process finds their coefficients.
 //   constant    1
 //   table       t(x): ordinary kriging of the expected depths, by straight distances. Its

@@ -9,6 +9,7 @@
 #include <map>
 #include <string>
 
+#include "interp/dowels/dowel_samples.h"
 #include "interp/schemes/outside_rule.h"
 #include "interp/stacking/leave_out.h"
 #include "interp/stacking/sd_by_distance.h"
@@ -68,12 +69,29 @@ Folds EveryNth(std::span<const Dowel> dowels, std::size_t count) {
   return folds;
 }
 
+// A scheme without a cheaper way to leave out is solved only so often.
+Folds FoldsFor(const Interpolator& scheme, std::span<const Dowel> dowels) {
+  const bool is_dear = scheme.needs_surface && !scheme.left_out;
+  return EveryNth(dowels, is_dear ? kMostSolves : dowels.size());
+}
+
+// Does each fold leave the scheme what it works on?
+bool CanBeJudged(const SingleScheme& scheme, const DepthInput& input) {
+  if (SingleNeedsNetwork(scheme) && input.network.areas.empty()) {
+    return false;
+  }
+  const std::size_t fewest = SingleFewestDowels(scheme);
+  return fewest == 1 ||  // which CheckFolds asks for
+         std::ranges::all_of(FoldsFor(InterpolatorOf(scheme), input.dowels), [&](const auto& fold) {
+           return DepthSamples(Without(input, fold).dowels).size() >= fewest;
+         });
+}
+
 // What a scheme errs at each judge that it is not shown, in their order.
 Eigen::VectorXd ErrorsOf(const SingleScheme& scheme, const DepthInput& judges,
                          const RunContext& run) {
   const Interpolator interpolator = InterpolatorOf(scheme);
-  const bool is_dear = interpolator.needs_surface && !interpolator.left_out;
-  const Folds folds = EveryNth(judges.dowels, is_dear ? kMostSolves : judges.dowels.size());
+  const Folds folds = FoldsFor(interpolator, judges.dowels);
   const std::vector<DepthField> fields =
       LeaveOut(interpolator, ExtendNetwork{}, judges, folds, run);
   Eigen::VectorXd errors(std::ssize(judges.dowels));
@@ -112,9 +130,8 @@ Eigen::VectorXd BestAlone(const Eigen::MatrixXd& errors, const Eigen::VectorXd& 
 
 Mixture Choose(const AutoScheme& options, const DepthInput& input, const RunContext& run) {
   Mixture mixture{options.schemes, {}, {}};
-  std::erase_if(mixture.schemes, [&](const SingleScheme& scheme) {
-    return SingleNeedsNetwork(scheme) && input.network.areas.empty();
-  });
+  std::erase_if(mixture.schemes,
+                [&](const SingleScheme& scheme) { return !CanBeJudged(scheme, input); });
   if (mixture.schemes.empty()) {
     mixture.schemes = {options.schemes.front()};  // which says what it lacks
   }

@@ -49,9 +49,10 @@ void Fields(Visitor& visit, AutoScheme& o) {
 // there is continued by the `extend` rule. Where none has one, the status is that of the scheme
 // with the most weight. One scheme alone, or a single dowel, which can tell nothing: the first, as
 // it is, with its own sd. Otherwise sd_mm is sd_by_distance.h's from the mixture's errors at
-// left-out dowels, with weights of the other dowels. A scheme on the network is passed over where
-// there is no area. `shares` of the field name the schemes and their weights. Throws as the schemes
-// do.
+// left-out dowels, with weights of the other dowels. A scheme is passed over that cannot be
+// judged: one on the network where there is no area, one of which a left-out fold leaves too few
+// dowels for its mean's factors. `shares` of the field name the schemes and their weights. Throws
+// as the schemes do.
 DepthField InterpolateDepth(const AutoScheme& options, const DepthInput& input,
                             const RunContext& run);
 

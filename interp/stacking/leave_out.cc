@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "interp/dowels/dowel_samples.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -32,13 +33,13 @@ struct Bases {
   }
 };
 
-// What the scheme gives, before the rule. A scheme on the network of which the fold leaves no area
-// knows no depth anywhere.
+// What the scheme gives, before the rule. A scheme on the network of which the fold leaves no area,
+// or one to which it leaves too few dowels, knows no depth anywhere.
 DepthField Interpolated(const Interpolator& scheme, const DepthInput& input,
                         const RunContext& run) {
-  return scheme.needs_network && input.network.areas.empty()
-             ? EmptyDepthField(input.skull.points.size())
-             : scheme.interpolate(input, run);
+  const bool cannot = (scheme.needs_network && input.network.areas.empty()) ||
+                      DepthSamples(input.dowels).size() < scheme.fewest_dowels;
+  return cannot ? EmptyDepthField(input.skull.points.size()) : scheme.interpolate(input, run);
 }
 
 // Of each dowel the skull's vertex at which a field on the skull is asked for its depth.
@@ -118,7 +119,8 @@ Interpolator InterpolatorOf(const SingleScheme& scheme) {
   Interpolator interpolator{.interpolate = {},
                             .left_out = {},
                             .needs_surface = SingleNeedsSurface(scheme),
-                            .needs_network = SingleNeedsNetwork(scheme)};
+                            .needs_network = SingleNeedsNetwork(scheme),
+                            .fewest_dowels = SingleFewestDowels(scheme)};
   std::visit(
       [&](const auto& options) {
         interpolator.interpolate = [options](const DepthInput& input, const RunContext& run) {

@@ -20,6 +20,7 @@ struct Interpolator {
       left_out;
   bool needs_surface = false;
   bool needs_network = false;
+  std::size_t fewest_dowels = 1;  // at places of their own
 };
 
 Interpolator InterpolatorOf(const SingleScheme& scheme);
@@ -27,10 +28,10 @@ Interpolator InterpolatorOf(const SingleScheme& scheme);
 // One field a fold, with an entry for each of its dowels at their bases, as if the bone there faced
 // along the dowel's direction; after the outside rule. A scheme on the surface without a cheaper
 // way is solved on all of the skull once a fold and asked at the nearest corner of the closest
-// triangle. Where a scheme on the network is left without an area, the rule alone answers. Folds
-// on run.threads threads; no result depends on them. Throws InputError as CheckDepthInput, if a
-// fold names a dowel that is not there or leaves none, and what the scheme throws without the
-// fold's dowels; Cancelled if stopped.
+// triangle. Where a scheme on the network is left without an area, or one with a mean of several
+// factors with too few dowels, the rule alone answers. Folds on run.threads threads; no result
+// depends on them. Throws InputError as CheckDepthInput, if a fold names a dowel that is not there
+// or leaves none, and what the scheme throws without the fold's dowels; Cancelled if stopped.
 std::vector<DepthField> LeaveOut(const Interpolator& scheme, const OutsideRule& rule,
                                  const DepthInput& input, const Folds& folds,
                                  const RunContext& run);

@@ -44,4 +44,15 @@ bool SingleNeedsNetwork(const SingleScheme& scheme) {
          std::holds_alternative<NetworkSpline>(scheme);
 }
 
+std::size_t SingleFewestDowels(const SingleScheme& scheme) {
+  return std::visit(
+      [](const auto& options) -> std::size_t {
+        if constexpr (requires { FewestDowels(options.mean); }) {
+          return FewestDowels(options.mean);
+        }
+        return 1;
+      },
+      scheme);
+}
+
 }  // namespace semblance

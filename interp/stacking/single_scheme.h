@@ -3,6 +3,7 @@
 // one entry here.
 #pragma once
 
+#include <cstddef>
 #include <variant>
 
 #include "interp/kriging/kriging.h"
@@ -32,5 +33,8 @@ bool SingleNeedsExpected(const SingleScheme& scheme);
 
 // Does the scheme work on the dowel network, so that one without an area will not do?
 bool SingleNeedsNetwork(const SingleScheme& scheme);
+
+// The fewest dowels, at places of their own, with which the scheme can be asked: 1 of most.
+std::size_t SingleFewestDowels(const SingleScheme& scheme);
 
 }  // namespace semblance

@@ -254,6 +254,21 @@ TEST(CrossValidation, DoesNotDependOnThreads) {
   }
 }
 
+// Of four or five dowels a left-out pair leaves too few for the three factors of a mean.
+TEST(CrossValidation, LeavesTheRuleToAnswerWhereAFoldLeavesTooFewDowels) {
+  DowelScene scene = ScatteredScene(5);
+  const Kriging relief{.mean = DepthMean::kCovariates};
+  for (const DepthScheme& scheme :
+       {DepthScheme{relief}, DepthScheme{AutoScheme{.schemes = {relief}}}}) {
+    const CrossValidation result = CrossValidate(scheme, ConstantDepth{.depth_mm = 6},
+                                                 scene.Input(), {{0, 1, 2}, {3}}, OnThreads(1));
+    EXPECT_EQ(result.predicted, 4);
+    EXPECT_EQ(result.left_out[0].predicted_mm, 6);
+    EXPECT_EQ(result.left_out[0].status, DepthStatus::kOutside);
+    EXPECT_EQ(result.left_out[3].status, DepthStatus::kAssigned);
+  }
+}
+
 TEST(CrossValidation, SaysWhatIsWrongWithAFold) {
   const DowelScene scene = FlatScene();
   EXPECT_EQ(ErrorOf(scene, {{0}, {4}}),

@@ -93,6 +93,21 @@ TEST(AutoScheme, PassesOverSchemesOnANetworkThatIsNotThere) {
 }
 
 // A rough field, whose roughness the dowels show: the stated sd holds on bone between them.
+// Each of three dowels left out leaves two, which do not tell a mean of three factors.
+TEST(AutoScheme, PassesOverSchemesThatTooFewDowelsAreLeftFor) {
+  const DowelScene scene = ScatteredScene(3);
+  const Kriging relief{.mean = DepthMean::kCovariates};
+  const DepthField field =
+      InterpolateDepth(AutoScheme{.schemes = {relief, Mean{}}}, scene.Input(), {});
+  ASSERT_EQ(field.shares.size(), 1u);
+  EXPECT_EQ(field.shares[0].scheme, "mean");
+  const DepthField alone = InterpolateDepth(AutoScheme{.schemes = {relief}}, scene.Input(), {});
+  EXPECT_EQ(alone.shares[0].scheme, "kriging");
+  EXPECT_EQ(InterpolateDepth(AutoScheme{.schemes = {relief, Mean{}}}, ScatteredScene(4).Input(), {})
+                .shares.size(),
+            2u);
+}
+
 TEST(AutoScheme, StatesAnSdThatHolds) {
   const auto depth_at = [](const Vec3& p) {
     return 12 + 2 * std::sin(p.x() / 9) * std::cos(p.z() / 11) + std::sin((p.x() + p.z()) / 7);
