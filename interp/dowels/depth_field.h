@@ -31,6 +31,7 @@ struct DepthProcess {
   double signal_mm = kNaN;  // standard deviation
   double nugget_mm = kNaN;  // that all dowels have beside their own; 0 where none is sought
   double mean_mm = kNaN;    // by generalised least squares: that of the mean over the dowels
+  std::vector<std::string> at_end = {};  // in words, what the likelihood's range held back
 };
 
 // All vectors but the last have one entry per vertex.

@@ -102,4 +102,22 @@ Eigen::VectorXd FindMinimum(const SearchRange& bounds, const SmoothCost& cost,
   return bounded->NumbersOf(arguments.data());
 }
 
+// At a minimum within the range the cost has no slope; beside an end where it still falls outward
+// it has.
+RangeEnd EndOfRange(const SearchRange& bounds, const SmoothCost& cost, const Eigen::VectorXd& x,
+                    Eigen::Index number) {
+  constexpr double kBeside = 0.1;  // of the range: the logistic map never reaches its ends
+  constexpr double kSlope = 1e-3;  // far above what rounding leaves of a minimum's
+  const double range = bounds.high[number] - bounds.low[number];
+  if (!(range > 0)) {
+    return RangeEnd::kNone;
+  }
+  Eigen::VectorXd slope;
+  cost(x, &slope);
+  const double share = (x[number] - bounds.low[number]) / range;
+  return share < kBeside && slope[number] > kSlope        ? RangeEnd::kLow
+         : share > 1 - kBeside && slope[number] < -kSlope ? RangeEnd::kHigh
+                                                          : RangeEnd::kNone;
+}
+
 }  // namespace semblance

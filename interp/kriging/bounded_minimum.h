@@ -22,4 +22,10 @@ using SmoothCost = std::function<double(const Eigen::VectorXd& x, Eigen::VectorX
 Eigen::VectorXd FindMinimum(const SearchRange& bounds, const SmoothCost& cost,
                             const RunContext& run);
 
+// Where a number of the minimum stands: free, or at an end of its range that holds it back.
+enum class RangeEnd { kNone, kLow, kHigh };
+// x: what FindMinimum found. A number that is held fixed is at no end.
+RangeEnd EndOfRange(const SearchRange& bounds, const SmoothCost& cost, const Eigen::VectorXd& x,
+                    Eigen::Index number);
+
 }  // namespace semblance

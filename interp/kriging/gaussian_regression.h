@@ -23,6 +23,8 @@ class GaussianRegression {
   double added() const { return added_; }
   Eigen::VectorXd Solve(const Eigen::VectorXd& right) const { return factor_.solve(right); }
 
+  // r'V^-1 r, r = y - F b.
+  double Misfit() const { return misfit_; }
   // log |V| + log |F'V^-1 F| + r'V^-1 r, r = y - F b: minus twice the restricted log likelihood,
   // but for a constant (Harville 1974).
   double Deviance() const;

@@ -96,7 +96,7 @@ KrigingHyper HyperFor(const Kriging& options, const KrigingScene& scene, const R
 DepthProcess ProcessOf(const KrigingHyper& hyper, const KrigingScene& scene,
                        const KrigingProcess& process) {
   return {hyper.length_mm, hyper.signal_mm, 0,
-          (scene.data.regressors * process.coefficients()).mean()};
+          (scene.data.regressors * process.coefficients()).mean(), hyper.at_end};
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/kriging/kriging_likelihood.h"
 
-#include <algorithm>
-#include <cmath>
+#include <fmt/format.h>
 
-#include "interp/kriging/bounded_minimum.h"
+#include <algorithm>
+#include <array>
+#include <cmath>
 
 namespace semblance {
 namespace {
@@ -28,7 +29,40 @@ SearchRange SearchBounds(const Kriging& options, const KrigingData& data) {
 
 KrigingHyper HyperOf(const Eigen::VectorXd& logs) { return {std::exp(logs[0]), std::exp(logs[1])}; }
 
+// Of correlations, without nuggets.
+double MisfitAt(const Kriging& options, KrigingData data, double length_mm) {
+  data.nugget_mm2.setZero();
+  return KrigingProcess(options.covariance, data, {length_mm, 1}).Misfit();
+}
+
 }  // namespace
+
+std::vector<std::string> EndsInWords(std::span<const std::string_view> names,
+                                     const SearchRange& bounds, const SmoothCost& cost,
+                                     const Eigen::VectorXd& logs) {
+  std::vector<std::string> words;
+  for (Eigen::Index k = 0; k < std::ssize(names); ++k) {
+    const RangeEnd end = EndOfRange(bounds, cost, logs, k);
+    if (end != RangeEnd::kNone) {
+      words.push_back(fmt::format("the {}, {:.3g} mm, is the {} that is searched", names[k],
+                                  std::exp(logs[k]), end == RangeEnd::kLow ? "least" : "greatest"));
+    }
+  }
+  return words;
+}
+
+Eigen::VectorXd FindLogs(SearchRange& bounds, const SmoothCost& cost,
+                         const std::function<double(double)>& misfit_mm2, const RunContext& run) {
+  constexpr Eigen::Index kSignal = 1;
+  const Eigen::VectorXd logs = FindMinimum(bounds, cost, run);
+  if (EndOfRange(bounds, cost, logs, kSignal) != RangeEnd::kHigh) {
+    return logs;
+  }
+  const double most = misfit_mm2(std::exp(bounds.high[0]));
+  bounds.high[kSignal] = std::max(bounds.high[kSignal], std::log(4 * most) / 2);
+  const Eigen::VectorXd wider = FindMinimum(bounds, cost, run);
+  return cost(wider, nullptr) < cost(logs, nullptr) ? wider : logs;
+}
 
 double DepthSpread(const Eigen::VectorXd& depth_mm) {
   const double mean = depth_mm.mean();
@@ -36,6 +70,7 @@ double DepthSpread(const Eigen::VectorXd& depth_mm) {
 }
 
 KrigingHyper FitHyper(const Kriging& options, const KrigingData& data, const RunContext& run) {
+  constexpr std::array<std::string_view, 2> kNames = {"length", "signal"};
   if (options.length_mm && options.signal_mm) {
     return {*options.length_mm, *options.signal_mm};
   }
@@ -48,7 +83,12 @@ KrigingHyper FitHyper(const Kriging& options, const KrigingData& data, const Run
     }
     return process.Deviance() + away * away;
   };
-  return HyperOf(FindMinimum(SearchBounds(options, data), cost, run));
+  SearchRange bounds = SearchBounds(options, data);
+  const Eigen::VectorXd logs = FindLogs(
+      bounds, cost, [&](double length_mm) { return MisfitAt(options, data, length_mm); }, run);
+  KrigingHyper hyper = HyperOf(logs);
+  hyper.at_end = EndsInWords(kNames, bounds, cost, logs);
+  return hyper;
 }
 
 }  // namespace semblance

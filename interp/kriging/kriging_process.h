@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
+#include <vector>
 
 #include "interp/kriging/gaussian_regression.h"
 #include "interp/kriging/kriging.h"
@@ -22,6 +24,7 @@ struct KrigingData {
 struct KrigingHyper {
   double length_mm = 1;
   double signal_mm = 1;
+  std::vector<std::string> at_end = {};  // DepthProcess::at_end
 };
 
 // Correlation at a distance, and its derivative by the logarithm of the length.
@@ -43,6 +46,7 @@ class KrigingProcess {
   const Eigen::VectorXd& coefficients() const { return regression_.coefficients(); }
 
   double Deviance() const { return regression_.Deviance(); }
+  double Misfit() const { return regression_.Misfit(); }
   // Its derivatives by the logarithms of the length and of the signal.
   Vec2 DevianceGradient() const;
 

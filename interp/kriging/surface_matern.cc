@@ -184,7 +184,7 @@ DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& inpu
         return DepthValue{limits(value.mm), value.sd_mm};
       });
   field.process = {hyper.length_mm, hyper.signal_mm, hyper.nugget_mm,
-                   (scene.data.regressors * process.coefficients()).mean()};
+                   (scene.data.regressors * process.coefficients()).mean(), hyper.at_end};
   return field;
 }
 

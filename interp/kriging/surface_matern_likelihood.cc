@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/kriging/surface_matern_likelihood.h"
 
+#include <array>
 #include <cmath>
 
 #include "interp/kriging/bounded_minimum.h"
@@ -82,10 +83,21 @@ double SurfaceMaternCost(const SurfaceMatern& options, const SurfaceMaternData& 
 
 SurfaceMaternHyper FitHyper(const SurfaceMatern& options, const SurfaceMaternData& data,
                             const ReducedMatern& correlations, const RunContext& run) {
+  constexpr std::array<std::string_view, 2> kNames = {"length", "signal"};
   const auto cost = [&](const Eigen::VectorXd& logs, Eigen::VectorXd* gradient) {
     return SurfaceMaternCost(options, data, correlations, logs, gradient);
   };
-  return HyperOf(options, FindMinimum(SearchBounds(options, data), cost, run));
+  const auto misfit_mm2 = [&](double length_mm) {
+    return GaussianRegression(correlations.At(options.alpha, length_mm).value, 1, data.depth_mm,
+                              data.regressors)
+        .Misfit();
+  };
+  SearchRange bounds = SearchBounds(options, data);
+  const Eigen::VectorXd logs = FindLogs(bounds, cost, misfit_mm2, run);
+  SurfaceMaternHyper hyper = HyperOf(options, logs);
+  // A nugget at its low end is none, which is no fault.
+  hyper.at_end = EndsInWords(kNames, bounds, cost, logs);
+  return hyper;
 }
 
 }  // namespace semblance

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "interp/kriging/surface_matern.h"
@@ -22,6 +23,7 @@ struct SurfaceMaternHyper {
   double length_mm = 1;
   double signal_mm = 1;
   double nugget_mm = 0;
+  std::vector<std::string> at_end = {};  // DepthProcess::at_end
 };
 
 // The values of kappa^2 at which correlations are to be known for a search over lengths: eight over
@@ -36,8 +38,8 @@ double SurfaceMaternCost(const SurfaceMatern& options, const SurfaceMaternData& 
                          Eigen::VectorXd* gradient);
 
 // The least of that cost within a factor of 12 (e^2.5) of the prior's median, a signal of 1/30 to
-// 10 times and a nugget of 1/100 to 1 times the depths' spread. What the options fix stays so.
-// Throws Cancelled if stopped.
+// 10 times the depths' spread, or more where the likelihood asks for it (FindLogs), and a nugget of
+// 1/100 to 1 times the spread. What the options fix stays so. Throws Cancelled if stopped.
 SurfaceMaternHyper FitHyper(const SurfaceMatern& options, const SurfaceMaternData& data,
                             const ReducedMatern& correlations, const RunContext& run);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/pipeline/skull_stage.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <span>
 #include <string>
@@ -12,6 +14,17 @@
 
 namespace semblance {
 namespace {
+
+// What the dowels do not tell of the process that they are taken for.
+void NoteEnds(const DepthField& depth, std::vector<std::string>& notes) {
+  for (const std::string& words :
+       depth.process ? depth.process->at_end : std::vector<std::string>()) {
+    notes.push_back(
+        fmt::format("interp: {}, and the likelihood would go on; the dowels do not tell it. Set "
+                    "length_mm or signal_mm, or a smaller length_prior_spread",
+                    words));
+  }
+}
 
 DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
                 const RunContext& context) {
@@ -44,6 +57,7 @@ DepthStage Make(const Experiment& e, StageCache& cache, StepClock& step,
     return ApplyOutsideRule(e.outside, stage.Input(),
                             InterpolateDepth(e.interp, stage.Input(), context), context);
   });
+  NoteEnds(stage.depth, stage.subject.notes);
   FillOpenDowels(stage.shell, stage.depth, stage.subject);
   return stage;
 }

@@ -94,12 +94,17 @@ std::string SharesText(const DepthField& depth) {
 
 // What the scheme took the depths for.
 std::string ProcessText(const DepthField& depth) {
-  return depth.process
-             ? fmt::format(
-                   "process: mean {:.1f} mm, sd {:.1f} mm, length {:.0f} mm, nugget {:.2f} mm\n",
-                   depth.process->mean_mm, depth.process->signal_mm, depth.process->length_mm,
-                   depth.process->nugget_mm)
-             : "";
+  if (!depth.process) {
+    return "";
+  }
+  std::string text =
+      fmt::format("process: mean {:.1f} mm, sd {:.1f} mm, length {:.0f} mm, nugget {:.2f} mm\n",
+                  depth.process->mean_mm, depth.process->signal_mm, depth.process->length_mm,
+                  depth.process->nugget_mm);
+  for (const std::string& words : depth.process->at_end) {
+    text += fmt::format("  {}: the dowels do not tell it\n", words);
+  }
+  return text;
 }
 
 std::string ScoresLine(const std::string& what, const DepthScores& s) {

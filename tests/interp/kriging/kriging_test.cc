@@ -198,6 +198,46 @@ TEST(KrigingFit, KeepsWhatTheOptionsFix) {
   EXPECT_NEAR(ModelOf({.signal_mm = 1.5}, scene).signal_mm, 1.5, 1e-12);
 }
 
+// Without nuggets the best signal at a length is r'R^-1 r / (n - q), however long the length is.
+TEST_P(EveryCovariance, FitOfALongLengthFindsTheClosedForm) {
+  const auto covariance = static_cast<Covariance>(GetParam());
+  DowelScene scene = ScatteredScene(12);
+  scene.network.areas.clear();
+  for (Dowel& dowel : scene.dowels) {
+    dowel.sd_mm = kNaN;
+  }
+  const KrigingData data = DataOf(scene);
+  const auto n = data.depth_mm.size();
+  for (const double length_mm : {60.0, 1000.0, 10000.0}) {
+    Eigen::MatrixXd r = 1e-10 * Eigen::MatrixXd::Identity(n, n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      for (Eigen::Index k = 0; k < n; ++k) {
+        r(j, k) += CorrelationAt(covariance, data.distance_mm(j, k), length_mm).value;
+      }
+    }
+    const Eigen::VectorXd one = Eigen::VectorXd::Ones(n);
+    const Eigen::LDLT<Eigen::MatrixXd> factor(r);
+    const double mean = factor.solve(data.depth_mm).sum() / factor.solve(one).sum();
+    const Eigen::VectorXd residual = data.depth_mm - mean * one;
+    const double best = std::sqrt(residual.dot(factor.solve(residual)) / (n - 1));
+    const DepthProcess found = ModelOf({.covariance = covariance, .length_mm = length_mm}, scene);
+    EXPECT_NEAR(found.signal_mm / best, 1, 1e-3) << length_mm;
+    EXPECT_TRUE(found.at_end.empty());
+  }
+}
+
+TEST(KrigingFit, SaysWhatItsRangeHeldBack) {
+  DowelScene scene = ScatteredScene(12);
+  EXPECT_TRUE(ModelOf({}, scene).at_end.empty());
+  for (std::size_t k = 0; k < scene.dowels.size(); ++k) {  // less unlike than they are uncertain
+    scene.dowels[k].depth_mm = k % 2 == 0 ? 9 : 11;
+    scene.dowels[k].sd_mm = 1.5;
+  }
+  EXPECT_THAT(ModelOf({}, scene).at_end,
+              ::testing::Contains(::testing::HasSubstr("is the least that is searched")));
+  EXPECT_TRUE(ModelOf({.length_mm = 60, .signal_mm = 1}, scene).at_end.empty());
+}
+
 TEST(KrigingFit, ComesWithTheField) {
   const DowelScene scene = ScatteredScene(20);
   const DepthProcess found = FitKriging(Kriging{}, scene.Input(), RunContext{});

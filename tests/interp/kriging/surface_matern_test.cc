@@ -189,6 +189,24 @@ TEST_P(EveryAlpha, FitIsNoWorseThanAnyPointOfAGrid) {
   }
 }
 
+// As kriging's: a signal of many times the depths' spread where the length is long.
+TEST_P(EveryAlpha, FitOfALongLengthIsNoWorseThanAnySignal) {
+  const DowelScene scene = SmallScene();
+  SurfaceMaternData data = DataOf(scene);
+  data.nugget_mm2.setZero();
+  const SurfaceMatern options{.alpha = GetParam(), .length_mm = 5000};
+  const ReducedMatern correlations = CorrelationsOf(scene, options);
+  const SurfaceMaternHyper best = FitHyper(options, data, correlations, {});
+  EXPECT_TRUE(best.at_end.empty());
+  const auto cost = [&](double signal_mm) {
+    const Vec3 logs(std::log(5000.0), std::log(signal_mm), 0);
+    return SurfaceMaternCost(options, data, correlations, logs, nullptr);
+  };
+  for (double signal_mm = 0.1; signal_mm < 1e5; signal_mm *= 1.1) {
+    EXPECT_GE(cost(signal_mm), cost(best.signal_mm) - 1e-6) << signal_mm;
+  }
+}
+
 TEST(GaussianRegression, OfTwoRegressorsIsGeneralisedLeastSquares) {
   Eigen::MatrixXd v(4, 4), f(4, 2);
   v << 2, 1, 0.5, 0, 1, 2, 1, 0.5, 0.5, 1, 2, 1, 0, 0.5, 1, 2;
