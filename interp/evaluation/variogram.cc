@@ -11,9 +11,14 @@ namespace {
 
 constexpr int kPoints = 1500;
 
-// Indices of the points that take part, one at each equal step of the sum of weights.
-std::vector<std::size_t> EvenlyByWeight(std::span<const double> values,
-                                        std::span<const double> weights) {
+// A point that takes part, and what it counts.
+struct Taken {
+  std::size_t point = 0;
+  double weight = 0;
+};
+
+// All with a weight; of too many those at equal steps of the sum of weights.
+std::vector<Taken> EvenlyByWeight(std::span<const double> values, std::span<const double> weights) {
   const auto weight = [&](std::size_t k) {
     return !std::isfinite(values[k]) ? 0.0 : weights.empty() ? 1.0 : weights[k];
   };
@@ -23,13 +28,21 @@ std::vector<std::size_t> EvenlyByWeight(std::span<const double> values,
     total += weight(k);
     count += weight(k) > 0 ? 1 : 0;
   }
-  const double step = count <= kPoints ? 0 : total / kPoints;
-  std::vector<std::size_t> taken;
-  double sum = 0;
+  const bool all = count <= kPoints;
+  const double step = total / kPoints;
+  std::vector<Taken> taken;
+  double sum = 0, steps = 0;
   for (std::size_t k = 0; k < values.size(); ++k) {
+    if (!(weight(k) > 0)) {
+      continue;
+    }
     sum += weight(k);
-    if (weight(k) > 0 && sum >= (static_cast<double>(taken.size()) + 0.5) * step) {
-      taken.push_back(k);
+    const double before = steps;
+    while (sum >= (steps + 0.5) * step) {
+      ++steps;
+    }
+    if (const double counts = all ? weight(k) : steps - before; counts > 0) {
+      taken.push_back({k, counts});
     }
   }
   return taken;
@@ -84,26 +97,30 @@ std::vector<VariogramBin> EmpiricalVariogram(std::span<const Vec3> points,
                                              std::span<const double> values,
                                              std::span<const double> weights, double bin_mm,
                                              double reach_mm) {
-  const std::vector<std::size_t> taken = EvenlyByWeight(values, weights);
+  const std::vector<Taken> taken = EvenlyByWeight(values, weights);
   const auto count = static_cast<std::size_t>(std::ceil(reach_mm / bin_mm));
   std::vector<VariogramBin> bins(count, {.distance_mm = 0, .semivariance_mm2 = 0});
+  std::vector<double> sums(count, 0);  // of weights
   for (std::size_t i = 0; i < taken.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      const double distance_mm = (points[taken[i]] - points[taken[j]]).norm();
+      const auto& [a, weight_a] = taken[i];
+      const auto& [b, weight_b] = taken[j];
+      const double distance_mm = (points[a] - points[b]).norm();
       const auto k = static_cast<std::size_t>(distance_mm / bin_mm);
       if (distance_mm < reach_mm && k < count) {
-        const double difference = values[taken[i]] - values[taken[j]];
-        bins[k].distance_mm += distance_mm;
-        bins[k].semivariance_mm2 += difference * difference / 2;
+        const double difference = values[a] - values[b], weight = weight_a * weight_b;
+        bins[k].distance_mm += weight * distance_mm;
+        bins[k].semivariance_mm2 += weight * difference * difference / 2;
+        sums[k] += weight;
         ++bins[k].pairs;
       }
     }
   }
-  std::erase_if(bins, [](const VariogramBin& bin) { return bin.pairs == 0; });
-  for (VariogramBin& bin : bins) {
-    bin.distance_mm /= static_cast<double>(bin.pairs);
-    bin.semivariance_mm2 /= static_cast<double>(bin.pairs);
+  for (std::size_t k = 0; k < count; ++k) {
+    bins[k].distance_mm /= sums[k];
+    bins[k].semivariance_mm2 /= sums[k];
   }
+  std::erase_if(bins, [](const VariogramBin& bin) { return bin.pairs == 0; });
   return bins;
 }
 

@@ -12,8 +12,8 @@
 namespace semblance {
 
 struct VariogramBin {
-  double distance_mm = kNaN;       // mean of the bin's pairs
-  double semivariance_mm2 = kNaN;  // half the mean of their squared differences
+  double distance_mm = kNaN;       // mean of the bin's pairs, by weight
+  double semivariance_mm2 = kNaN;  // half the mean of their squared differences, by weight
   std::int64_t pairs = 0;          // above 0
 };
 
@@ -27,8 +27,10 @@ struct VariogramModel {
 };
 
 // Straight distances, in bins of bin_mm up to reach_mm; empty bins are left out. Values that are
-// not finite take no part. Of more than 1500 points it takes 1500, evenly by weight in their order.
-// weights: one per point, >= 0, or none for equal ones. bin_mm, reach_mm > 0.
+// not finite take no part. A pair counts by the product of its points' weights, so that with areas
+// as weights no figure depends on where a mesh is finer. Of more than 1500 points it takes 1500,
+// evenly by weight in their order; one that weighs several steps counts so many times. weights: one
+// per point, >= 0, or none for equal ones. bin_mm, reach_mm > 0.
 std::vector<VariogramBin> EmpiricalVariogram(std::span<const Vec3> points,
                                              std::span<const double> values,
                                              std::span<const double> weights, double bin_mm,

@@ -20,9 +20,7 @@ std::string Called(const ComparedTreatment& treatment) {
   return fmt::format("{}: {}", treatment.study, treatment.label);
 }
 
-const char* Direction(const StudyComparison& comparison) {
-  return comparison.better == Better::kHigher ? "higher is better" : "lower is better";
-}
+std::string Direction(const StudyComparison& comparison) { return comparison.preference.InWords(); }
 
 std::string IntervalText(const Interval& interval) {
   return std::isfinite(interval.low)
@@ -46,7 +44,8 @@ ReportTable TreatmentTable(const StudyComparison& comparison) {
 
 ReportTable PairTable(const StudyComparison& comparison) {
   ReportTable table{
-      "Each treatment of the later studies less its reference, over the subjects that both have",
+      "Each treatment of the later studies less its reference, over the subjects that both have" +
+          comparison.preference.OfWhat(),
       {"treatment", "reference", "subjects", "mean difference", "95 % interval", "worse in",
        "p, Holm"},
       {}};

@@ -26,9 +26,15 @@ std::map<std::string, BySubject> ByLabel(const NamedStudy& study, const std::str
   return treatments;
 }
 
+// Of the metric, and of what it costs.
+struct MeansOfAll {
+  std::vector<double> value, cost;
+};
+
 // Over the subjects that have all of the treatments.
-std::vector<double> Means(const std::map<std::string, BySubject>& treatments,
-                          const std::vector<std::string>& labels, const NamedStudy& study) {
+MeansOfAll Means(const std::map<std::string, BySubject>& treatments,
+                 const std::vector<std::string>& labels, const NamedStudy& study,
+                 const Preference& preference) {
   std::map<std::string, std::size_t> have;
   for (const std::string& label : labels) {
     for (const auto& [subject, value] : treatments.at(label)) {
@@ -42,13 +48,15 @@ std::vector<double> Means(const std::map<std::string, BySubject>& treatments,
                     "run the trials that are missing",
                     study.folder.string()));
   }
-  std::vector<double> means;
+  MeansOfAll means;
   for (const std::string& label : labels) {
-    double sum = 0;
+    double sum = 0, cost = 0;
     for (const auto& [subject, count] : have) {
       sum += treatments.at(label).at(subject);
+      cost += preference.CostOf(treatments.at(label).at(subject));
     }
-    means.push_back(sum / static_cast<double>(have.size()));
+    means.value.push_back(sum / static_cast<double>(have.size()));
+    means.cost.push_back(cost / static_cast<double>(have.size()));
   }
   return means;
 }
@@ -76,20 +84,16 @@ RankAgreement CompareRanks(const NamedStudy& reference, const NamedStudy& other,
         "order takes three",
         reference.folder.string(), other.folder.string(), labels.size(), agreement.metric));
   }
-  const Better better = options.better ? *options.better : BetterOf(agreement.metric);
-  std::array<std::vector<double>, 2> means = {Means(first, labels, reference),
-                                              Means(second, labels, other)},
-                                     ranks;
-  for (std::size_t s = 0; s < 2; ++s) {
-    std::vector<double> cost = means[s];
-    for (double& value : cost) {
-      value = better == Better::kHigher ? -value : value;
-    }
-    ranks[s] = MeanRanks(cost);
-  }
-  agreement.spearman = Spearman(means[0], means[1]);
+  agreement.preference =
+      PreferenceFor(agreement.metric,
+                    options.better ? *options.better
+                                   : BetterIn(std::array{&reference, &other}, agreement.metric));
+  const MeansOfAll one = Means(first, labels, reference, agreement.preference),
+                   two = Means(second, labels, other, agreement.preference);
+  const std::vector<double> of_one = MeanRanks(one.cost), of_two = MeanRanks(two.cost);
+  agreement.spearman = Spearman(one.cost, two.cost);
   for (std::size_t k = 0; k < labels.size(); ++k) {
-    agreement.treatments.push_back({labels[k], means[0][k], means[1][k], ranks[0][k], ranks[1][k]});
+    agreement.treatments.push_back({labels[k], one.value[k], two.value[k], of_one[k], of_two[k]});
   }
   std::ranges::stable_sort(agreement.treatments, {}, &RankedTreatment::reference_rank);
   return agreement;
@@ -100,9 +104,9 @@ std::string RankText(const RankAgreement& agreement) {
   for (const RankedTreatment& t : agreement.treatments) {
     width = std::max(width, t.label.size());
   }
-  std::string text =
-      fmt::format("{} of {} and of {}\n{:<{}}  rank       mean  rank       mean\n",
-                  agreement.metric, agreement.reference, agreement.study, "treatment", width);
+  std::string text = fmt::format(
+      "{} of {} and of {}; {}\n{:<{}}  rank       mean  rank       mean\n", agreement.metric,
+      agreement.reference, agreement.study, agreement.preference.InWords(), "treatment", width);
   for (const RankedTreatment& t : agreement.treatments) {
     text += fmt::format("{:<{}} {:5.1f} {:10.4g} {:5.1f} {:10.4g}\n", t.label, width,
                         t.reference_rank, t.reference_mean, t.rank, t.mean);

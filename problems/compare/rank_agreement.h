@@ -18,13 +18,15 @@ struct RankedTreatment {
 
 struct RankAgreement {
   std::string metric, reference, study;
+  Preference preference = {};
   std::vector<RankedTreatment>
       treatments;          // of the same label in both, best of the reference first
   double spearman = kNaN;  // rank correlation, -1 to 1; NaN below 3 treatments
 };
 
-// Over the subjects that have all the treatments that both studies have. Throws InputError as
-// CompareStudies, and where the studies have fewer than three treatments in common.
+// Over the subjects that have all the treatments that both studies have; which values are better as
+// CompareStudies takes it. Throws InputError as CompareStudies, and where the studies have fewer
+// than three treatments in common.
 RankAgreement CompareRanks(const NamedStudy& reference, const NamedStudy& other,
                            const CompareOptions& options);
 

@@ -59,27 +59,6 @@ std::set<std::string> SubjectsOf(const NamedStudy& study, const std::string& met
   return subjects;
 }
 
-Better TakenAsBetter(const NamedStudy& study) {
-  return study.results.higher_is_better ? Better::kHigher : Better::kLower;
-}
-
-// Of the studies' own metric they have said it; of another one its name does.
-Better BetterIn(std::span<const NamedStudy> studies, const std::string& metric) {
-  const NamedStudy* teller = nullptr;
-  for (const NamedStudy& study : studies) {
-    if (study.results.metric != metric) {
-      continue;
-    }
-    if (teller != nullptr && TakenAsBetter(*teller) != TakenAsBetter(study)) {
-      throw InputError(fmt::format(
-          "'{}': {} took {} values of it as better, and {} the others; say which are with --better",
-          metric, teller->name, teller->results.higher_is_better ? "higher" : "lower", study.name));
-    }
-    teller = &study;
-  }
-  return teller == nullptr ? BetterOf(metric) : TakenAsBetter(*teller);
-}
-
 std::vector<std::string> CommonSubjects(std::span<const NamedStudy> studies,
                                         const std::string& metric) {
   std::set<std::string> common = SubjectsOf(studies.front(), metric);
@@ -95,8 +74,13 @@ std::vector<std::string> CommonSubjects(std::span<const NamedStudy> studies,
   return {common.begin(), common.end()};
 }
 
-// As a number of which less is better.
-double CostOf(double value, Better better) { return better == Better::kHigher ? -value : value; }
+double MeanCost(const ComparedTreatment& treatment, const Preference& preference) {
+  double sum = 0;
+  for (const auto& [subject, value] : treatment.by_subject) {
+    sum += preference.CostOf(value);
+  }
+  return sum / static_cast<double>(treatment.by_subject.size());
+}
 
 std::vector<ComparedTreatment> TreatmentsOf(const NamedStudy& study,
                                             const StudyComparison& comparison) {
@@ -115,9 +99,7 @@ std::vector<ComparedTreatment> TreatmentsOf(const NamedStudy& study,
     one.summary = Summarize(values);
     compared.push_back(std::move(one));
   }
-  const auto cost = [&](const ComparedTreatment& t) {
-    return CostOf(t.summary.mean, comparison.better);
-  };
+  const auto cost = [&](const ComparedTreatment& t) { return MeanCost(t, comparison.preference); };
   std::ranges::stable_sort(compared, [&](const auto& a, const auto& b) {
     return a.summary.n > 0 && (b.summary.n == 0 || cost(a) < cost(b));
   });
@@ -125,7 +107,7 @@ std::vector<ComparedTreatment> TreatmentsOf(const NamedStudy& study,
 }
 
 TreatmentPair Pair(const ComparedTreatment& reference, const ComparedTreatment& other,
-                   Better better) {
+                   const Preference& preference) {
   TreatmentPair pair{.reference = reference,
                      .other = other,
                      .same_label = reference.label == other.label,
@@ -135,14 +117,15 @@ TreatmentPair Pair(const ComparedTreatment& reference, const ComparedTreatment& 
   for (const auto& [subject, value] : other.by_subject) {
     if (const auto before = reference.by_subject.find(subject);
         before != reference.by_subject.end()) {
-      differences.push_back(value - before->second);
-      const double cost = CostOf(differences.back(), better);
-      pair.better += cost < 0 ? 1 : 0;
-      pair.worse += cost > 0 ? 1 : 0;
+      differences.push_back(preference.Compared(value) - preference.Compared(before->second));
+      pair.better += preference.IsBetter(differences.back(), 0) ? 1 : 0;
+      pair.worse += preference.IsBetter(0, differences.back()) ? 1 : 0;
     }
   }
   pair.difference = Summarize(differences);
-  pair.test = Wilcoxon(differences);
+  if (pair.difference.n >= kFewestForTest) {
+    pair.test = Wilcoxon(differences);
+  }
   return pair;
 }
 
@@ -150,7 +133,7 @@ void AdjustTests(std::vector<TreatmentPair>& pairs) {
   std::vector<double> p;
   std::vector<TreatmentPair*> tested;
   for (TreatmentPair& pair : pairs) {
-    if (pair.difference.n >= kFewestForTest && pair.test.n > 0) {
+    if (pair.test.n > 0) {
       tested.push_back(&pair);
       p.push_back(pair.test.p);
     }
@@ -208,14 +191,40 @@ std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
   return studies;
 }
 
+// Of the studies' own metric they have said it; of another one its name does.
+Better BetterIn(std::span<const NamedStudy* const> studies, const std::string& metric) {
+  const NamedStudy* teller = nullptr;
+  const auto taken = [](const NamedStudy* study) { return study->results.preference.better; };
+  const auto word = [&](const NamedStudy* study) {
+    return EnumNames(Better())[static_cast<std::size_t>(taken(study))];
+  };
+  for (const NamedStudy* study : studies) {
+    if (study->results.metric != metric) {
+      continue;
+    }
+    if (teller != nullptr && taken(teller) != taken(study)) {
+      throw InputError(fmt::format(
+          "'{}': {} took {} values of it as better, and {} {} ones; say which are with --better",
+          metric, teller->name, word(teller), study->name, word(study)));
+    }
+    teller = study;
+  }
+  return teller == nullptr ? BetterOf(metric) : taken(teller);
+}
+
 StudyComparison CompareStudies(std::span<const NamedStudy> studies, const CompareOptions& options) {
   if (studies.size() < 2) {
     throw InputError("one study alone cannot be compared; name two folders or more");
   }
   const std::string metric =
       options.metric.empty() ? studies.front().results.metric : options.metric;
+  std::vector<const NamedStudy*> each;
+  for (const NamedStudy& study : studies) {
+    each.push_back(&study);
+  }
+  const Better better = options.better ? *options.better : BetterIn(each, metric);
   StudyComparison comparison{.metric = metric,
-                             .better = options.better ? *options.better : BetterIn(studies, metric),
+                             .preference = PreferenceFor(metric, better),
                              .studies = {},
                              .subjects = {},
                              .treatments = {},
@@ -229,7 +238,7 @@ StudyComparison CompareStudies(std::span<const NamedStudy> studies, const Compar
       if (&study != &studies.front()) {
         const auto same = std::ranges::find(first, treatment.label, &ComparedTreatment::label);
         comparison.pairs.push_back(
-            Pair(same == first.end() ? first.front() : *same, treatment, comparison.better));
+            Pair(same == first.end() ? first.front() : *same, treatment, comparison.preference));
       }
       comparison.treatments.push_back(std::move(treatment));
     }

@@ -38,14 +38,15 @@ struct TreatmentPair {
   ComparedTreatment reference, other;
   bool same_label = false;    // else the reference is the best of the first study
   int better = 0, worse = 0;  // subjects of which the other has the better or the worse metric
-  SampleSummary difference;   // other less reference, over the subjects that both have
-  WilcoxonResult test;        // of the differences
+  SampleSummary difference;   // other less reference (Preference::Compared), over the subjects that
+                              // both have
+  WilcoxonResult test;        // of the differences; none below 6 subjects
   double p_holm = kNaN;       // adjusted for all pairs (Holm 1979); NaN below 6 subjects
 };
 
 struct StudyComparison {
   std::string metric;
-  Better better = Better::kLower;
+  Preference preference = {};
   std::vector<std::string> studies;
   std::vector<std::string> subjects;          // that all studies have, sorted
   std::vector<ComparedTreatment> treatments;  // study by study, best mean first
@@ -58,10 +59,14 @@ struct CompareOptions {
   std::optional<Better> better;  // none: as the studies of this metric took it, else BetterOf
 };
 
+// What the studies of this metric took as better; where none is of it, BetterOf. Throws InputError
+// if they contradict each other.
+Better BetterIn(std::span<const NamedStudy* const> studies, const std::string& metric);
+
 // A treatment of a later study is paired with the one of the same label in the first, else with the
 // best of the first. The unit is the subject, by its name. Throws InputError for fewer than two
 // studies, if no subject is in all of them, if a study has no number of that name, or if one study
-// took lower values of the metric as better and another one higher, and `better` does not say.
+// took other values of the metric as better than another one, and `better` does not say.
 StudyComparison CompareStudies(std::span<const NamedStudy> studies, const CompareOptions& options);
 
 }  // namespace semblance

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The command line. Exit codes: 0 done, 1 ran but the result is not usable, 2 bad input.
 #include <fmt/format.h>
+#include <glog/logging.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -69,10 +70,15 @@ int ParseAndRun(int argc, char** argv) {
   return line.chosen();
 }
 
+// Ceres warns through glog of what its results tell, e.g. of a cost without a slope. Only what ends
+// the program anyway is let through: glog writes to the standard error output, also with --quiet.
+void SilenceLibraries() { FLAGS_minloglevel = google::GLOG_FATAL; }
+
 // Runs before the constructors of the shared libraries, in which memory can run out already.
 void BeforeLibraries() { std::set_terminate(&EndInWords); }
 
 int Main(int argc, char** argv) {
+  SilenceLibraries();
   try {
     return Flushed(ParseAndRun(argc, argv));
   } catch (...) {

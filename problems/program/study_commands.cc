@@ -61,6 +61,15 @@ int PrintPlan(const StudyPlan& plan, const std::string& only) {
   return kDone;
 }
 
+// A number that no trial has ranks nothing; false then.
+bool TellOfMetric(const StudyResults& results) {
+  const bool has = results.HasMetric() || results.Count("done") == 0;
+  if (!has) {
+    Tell("no trial has the number '{}'; trials.csv lists those that there are\n", results.metric);
+  }
+  return has;
+}
+
 // What a study's folder holds, and how to go on.
 int PrintStudyState(const StudyResults& results, const fs::path& root) {
   for (const TrialRow& row : results.trials) {
@@ -81,7 +90,10 @@ int PrintStudyState(const StudyResults& results, const fs::path& root) {
   } else {
     Tell("no report yet; semblance merge {} makes one of what is there\n", root.string());
   }
-  return results.Count("done") == static_cast<int>(results.trials.size()) ? kDone : kNotUsable;
+  const bool has_metric = TellOfMetric(results);
+  return has_metric && results.Count("done") == static_cast<int>(results.trials.size())
+             ? kDone
+             : kNotUsable;
 }
 
 // Of the trials that were asked for; the others may be missing.
@@ -100,7 +112,7 @@ int PrintPartState(const StudyResults& results, const std::vector<bool>& asked,
   Tell("{} of the {} trials asked for done; of all {} of the study {} are missing\n", done, count,
        results.trials.size(), results.Count("missing"));
   Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
-  return done == count ? kDone : kNotUsable;
+  return TellOfMetric(results) && done == count ? kDone : kNotUsable;
 }
 
 // With its progress on the terminal, unless it is to be quiet.
@@ -201,7 +213,9 @@ int StatusCommand(const StudyArguments& a) {
 int CompareCommand(const StudyArguments& a) {
   CompareOptions options{.metric = a.metric, .better = std::nullopt};
   if (!a.better.empty()) {
-    options.better = a.better == "higher" ? Better::kHigher : Better::kLower;
+    options.better = a.better == "higher"    ? Better::kHigher
+                     : a.better == "nearest" ? Better::kNearest
+                                             : Better::kLower;
   }
   const std::vector<NamedStudy> studies = ReadStudies({a.files.begin(), a.files.end()});
   if (a.ranks) {
@@ -307,8 +321,9 @@ void DeclareCompare(CLI::App& compare, CommandLine& line) {
   compare
       .add_option("--better", a.better,
                   "which values of the metric are better; else as the studies took it, or as its "
-                  "name says: higher for shares within a distance, lower for all others")
-      ->check(CLI::IsMember({"lower", "higher"}));
+                  "name says: higher for shares within a distance, nearest to 0 for signed errors, "
+                  "nearest to the stated share for coverage, lower for all others")
+      ->check(CLI::IsMember({"lower", "higher", "nearest"}));
   CLI::Option* const out =
       compare.add_option("--out", a.out, "folder for pairs.csv, values.csv and report.html");
   compare

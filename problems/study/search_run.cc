@@ -87,6 +87,7 @@ class SearchRun {
 
   // Of the steps from there on; false if a trial is not there.
   bool ReadCosts(std::size_t first_step) {
+    const Preference preference = PreferenceFor(plan_.metric, search_.options.better);
     for (std::size_t n = first_step; n < plan_.steps.size(); ++n) {
       double sum = 0;
       for (const std::string& id : plan_.steps[n].trials) {
@@ -94,13 +95,11 @@ class SearchRun {
         if (!trial) {
           return false;
         }
-        sum += MetricIn(*trial, plan_.metric);
+        sum += preference.CostOf(MetricIn(*trial, plan_.metric));
       }
-      const double mean = sum / static_cast<double>(plan_.steps[n].trials.size());
-      const Better better = search_.options.better.value_or(BetterOf(plan_.metric));
-      costs_.push_back(better == Better::kHigher ? -mean : mean);
+      costs_.push_back(sum / static_cast<double>(plan_.steps[n].trials.size()));
       const bool is_full = plan_.steps[n].cost == 1;
-      if (is_full && std::isfinite(mean) && (best_ < 0 || costs_[n] < costs_[Best()])) {
+      if (is_full && std::isfinite(costs_.back()) && (best_ < 0 || costs_[n] < costs_[Best()])) {
         best_ = static_cast<int>(n);
       }
     }

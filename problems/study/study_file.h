@@ -135,9 +135,11 @@ void CheckValue(Report& report, const StudySamples& o) {
   }
 }
 
-// Which end of a metric a search is for.
-enum class Better { kLower, kHigher };
-constexpr auto EnumNames(Better) { return std::to_array<std::string_view>({"lower", "higher"}); }
+// Which values of a metric a search is for: those at an end, or those nearest to what it should be.
+enum class Better { kLower, kHigher, kNearest };
+constexpr auto EnumNames(Better) {
+  return std::to_array<std::string_view>({"lower", "higher", "nearest"});
+}
 
 struct SearchedNumber {
   ConfigNode low, high;  // as they are written, because 1 and 5 ask for whole numbers and 1.0 not
@@ -187,7 +189,9 @@ void Fields(Visitor& visit, StudySearch& o) {
   visit(
       FieldInfo{.name = "better",
                 .doc = "which values of the metric are better; left out, higher for shares within "
-                       "a distance, as face.within_2_5mm, and lower for all others"},
+                       "a distance, as face.within_2_5mm, nearest to 0 for signed errors, nearest "
+                       "to the stated share for coverage_50, _90 and _95, and lower for all "
+                       "others"},
       o.better);
   visit(FieldInfo{.name = "ranges",
                   .doc = "numbers by option path, as in {seeds.weight: {low: 0.1, high: 10.0, log: "

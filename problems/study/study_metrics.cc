@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "problems/config/spelling_suggestion.h"
@@ -14,6 +17,7 @@
 #include "problems/report/run_folder.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"
+#include "problems/subject/sites.h"
 
 namespace semblance {
 namespace {
@@ -64,12 +68,25 @@ HSplineSurface AnySurface() {
   return {shape, net};
 }
 
+template <class... Schemes>
+std::vector<SchemeShare> SharesOfEach(const std::variant<Schemes...>&) {
+  return {{std::string(Schemes::kName), kNaN}...};
+}
+
+// Of kriging, which has a process, and of an average of all schemes at once.
+DepthField EmptyDepthOfAllKinds() {
+  DepthField depth;
+  depth.shares = SharesOfEach(SingleScheme());
+  depth.process = DepthProcess{};
+  return depth;
+}
+
 RunResult EmptyRun() {
   const HSplineSurface surface = AnySurface();
   RunResult result{.subject = {},
                    .shell = {},
                    .origin = {},
-                   .depth = {},
+                   .depth = EmptyDepthOfAllKinds(),
                    .implicit = {},
                    .face_from_template = {},
                    .placed = {.surface = surface, .site_uv = {}, .features = {}},
@@ -94,6 +111,7 @@ RunResult EmptyRun() {
 DepthResult EmptyDepth() {
   DepthResult result;
   result.stage = std::make_shared<const DepthStage>();
+  result.depth = EmptyDepthOfAllKinds();
   result.truth = EmptyComparison();
   for (const char* kind : {"landmark", "side", "k_fold"}) {
     result.left_out.emplace_back(kind, CrossValidation{});
@@ -107,13 +125,44 @@ Json EmptyResultJson(StudyJob job) {
                                   : IdentifyResultJson(Experiment{}, {.run = EmptyRun()});
 }
 
-// What a subject has for each of its landmarks, features and regions.
-bool IsOfOneSubject(const std::string& metric) {
+bool IsOneOfThem(const std::string& start, const std::set<std::string>& names) {
+  const auto first = names.lower_bound(start);
+  return first != names.end() && first->starts_with(start);
+}
+
+// What a subject has for each of its landmarks, features and regions, and beside numbers that every
+// subject has: a kind of cross-validation that there is not has no site.
+bool IsOfOneSubject(const std::string& metric, const std::set<std::string>& names) {
   constexpr std::array kGroups = {".landmarks.", ".features.", ".sites.", ".feature_distortion.",
                                   ".coverage_90_of."};
-  return std::ranges::any_of(
-             kGroups, [&](const char* group) { return metric.find(group) != metric.npos; }) ||
-         (metric.starts_with("cross_validation.") && metric.find(".regions.") != metric.npos);
+  const auto has = [&](const char* group) {
+    const std::size_t at = metric.find(group);
+    return at != metric.npos && IsOneOfThem(metric.substr(0, at + 1), names);
+  };
+  return std::ranges::any_of(kGroups, has) ||
+         (metric.starts_with("cross_validation.") && has(".regions."));
+}
+
+// "depth.shares.kriging 2", where a scheme stands there twice.
+bool IsNumberedShare(const std::string& metric, const std::set<std::string>& names) {
+  const std::size_t blank = metric.rfind(' ');
+  return metric.starts_with("depth.shares.") && blank != metric.npos && blank + 1 < metric.size() &&
+         metric.find_first_not_of("0123456789", blank + 1) == metric.npos &&
+         names.contains(metric.substr(0, blank));
+}
+
+// A dowel may be the experiment's own, of any name; but one of a pair has a side.
+std::string ComplaintAboutSiteIn(const std::string& metric) {
+  constexpr std::string_view kGroup = ".sites.";
+  const std::size_t at = metric.find(kGroup);
+  const std::string site = at == metric.npos ? "" : metric.substr(at + kGroup.size());
+  const auto is_site = [](const std::string& code) {
+    return IsStandardSite(code) || IsFurtherSite(code);
+  };
+  return site.empty() || is_site(site) || !is_site(site + "_l")
+             ? ""
+             : fmt::format("no trial has a number '{}': '{}' is of a pair; write {}_l or {}_r",
+                           metric, site, site, site);
 }
 
 }  // namespace
@@ -126,11 +175,11 @@ std::set<std::string> MetricsOf(StudyJob job) {
 
 std::string ComplaintAboutMetric(const std::string& metric, StudyJob job) {
   const std::set<std::string> names = MetricsOf(job);
-  const auto group = metric.substr(0, metric.find('.')) + ".";
-  const auto of_group = names.lower_bound(group);
-  const bool has_group = of_group != names.end() && of_group->starts_with(group);
-  if (names.contains(metric) || (has_group && IsOfOneSubject(metric))) {
+  if (names.contains(metric) || IsNumberedShare(metric, names)) {
     return "";
+  }
+  if (IsOfOneSubject(metric, names)) {
+    return ComplaintAboutSiteIn(metric);
   }
   const std::vector<std::string> known(names.begin(), names.end());
   const std::string nearest = NearestWord(metric, known);
@@ -149,10 +198,65 @@ bool NeedsTrueSkin(const std::string& metric) {
   return std::ranges::any_of(kParts, [&](const char* part) { return metric.starts_with(part); });
 }
 
-Better BetterOf(const std::string& metric) {
+namespace {
+
+// The last name of a path.
+std::string LeafOf(const std::string& metric) {
   const std::size_t dot = metric.rfind('.');
-  const std::string last = dot == metric.npos ? metric : metric.substr(dot + 1);
-  return last.starts_with("within_") ? Better::kHigher : Better::kLower;
+  return dot == metric.npos ? metric : metric.substr(dot + 1);
+}
+
+// The share that it should be, e.g. 0.9 of coverage_90 and coverage_90_of.nose; none of others.
+std::optional<double> ShareToHold(const std::string& metric) {
+  for (const auto& [name, share] : std::to_array<std::pair<const char*, double>>(
+           {{"coverage_50", 0.5}, {"coverage_90", 0.9}, {"coverage_95", 0.95}})) {
+    if (LeafOf(metric) == name || metric.find(fmt::format(".{}_of.", name)) != metric.npos) {
+      return share;
+    }
+  }
+  return std::nullopt;
+}
+
+// With a sign that tells too thick from too thin.
+bool IsSigned(const std::string& metric) {
+  return LeafOf(metric) == "mean_signed_mm" || LeafOf(metric) == "bias_mm" ||
+         (metric.starts_with("cross_validation.") && metric.find(".sites.") != metric.npos);
+}
+
+}  // namespace
+
+Better BetterOf(const std::string& metric) {
+  return LeafOf(metric).starts_with("within_")     ? Better::kHigher
+         : IsSigned(metric) || ShareToHold(metric) ? Better::kNearest
+                                                   : Better::kLower;
+}
+
+double Preference::CostOf(double value) const {
+  return better == Better::kHigher    ? -value
+         : better == Better::kNearest ? std::abs(value - target)
+                                      : value;
+}
+
+double Preference::Compared(double value) const {
+  return better == Better::kNearest ? CostOf(value) : value;
+}
+
+bool Preference::IsBetter(double compared, double than) const {
+  return better == Better::kHigher ? compared > than : compared < than;
+}
+
+std::string Preference::InWords() const {
+  return better == Better::kHigher    ? "higher is better"
+         : better == Better::kNearest ? fmt::format("nearest to {} is better", target)
+                                      : "lower is better";
+}
+
+std::string Preference::OfWhat() const {
+  return better == Better::kNearest ? fmt::format(", distance from {}", target) : "";
+}
+
+Preference PreferenceFor(const std::string& metric, std::optional<Better> said) {
+  return {.better = said.value_or(BetterOf(metric)), .target = ShareToHold(metric).value_or(0)};
 }
 
 }  // namespace semblance

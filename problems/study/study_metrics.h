@@ -2,6 +2,7 @@
 // The numbers that a trial can have, known before any has run.
 #pragma once
 
+#include <optional>
 #include <set>
 #include <string>
 
@@ -20,8 +21,27 @@ std::string ComplaintAboutMetric(const std::string& metric, StudyJob job);
 // number.
 bool NeedsTrueSkin(const std::string& metric);
 
-// Which of its values are better: higher of shares within a distance, as face.within_2_5mm; of all
-// others lower.
+// Which of its values are better: higher of shares within a distance, as face.within_2_5mm; nearest
+// to 0 of signed errors (mean_signed_mm, bias_mm, a site's when it was left out), to the share that
+// is stated of coverage_50, _90 and _95; of all others lower.
 Better BetterOf(const std::string& metric);
+
+// The same with what is meant by nearest.
+struct Preference {
+  Better better = Better::kLower;
+  double target = 0;  // of kNearest
+
+  // Of which less is better. A treatment's is the mean over its subjects: errors of either sign do
+  // not make up for each other.
+  double CostOf(double value) const;
+  // What differences and curves are of: the value; of kNearest its distance from the target.
+  double Compared(double value) const;
+  bool IsBetter(double compared, double than) const;  // of two such
+  std::string InWords() const;                        // "nearest to 0.9 is better"
+  std::string OfWhat() const;  // behind the metric: ", distance from 0.9"; "" of the others
+};
+
+// said: by the study or the user; then the target is still the metric's own, 0 of most.
+Preference PreferenceFor(const std::string& metric, std::optional<Better> said = std::nullopt);
 
 }  // namespace semblance

@@ -13,7 +13,6 @@
 #include <thread>
 #include <utility>
 
-#include "problems/study/study_metrics.h"
 #include "problems/study/trial_folder.h"
 #include "problems/study/trial_numbers.h"
 #include "surfaces/base/atomic_file.h"
@@ -121,6 +120,15 @@ std::string AreaMetricOf(const StudyResults& results) {
   return "";
 }
 
+// What a search was told; none where the metric says it itself.
+std::optional<Better> SaidBetter(const Json& plan) {
+  if (!plan.contains("search")) {
+    return std::nullopt;
+  }
+  const std::string said = plan["search"].at("better");
+  return said == "higher" ? Better::kHigher : said == "nearest" ? Better::kNearest : Better::kLower;
+}
+
 // Of the plan; its figures are read later.
 TrialRow RowOf(const Json& trial) {
   TrialRow row;
@@ -136,6 +144,12 @@ TrialRow RowOf(const Json& trial) {
 int StudyResults::Count(const std::string& status) const {
   return static_cast<int>(std::count_if(trials.begin(), trials.end(),
                                         [&](const TrialRow& row) { return row.status == status; }));
+}
+
+bool StudyResults::HasMetric() const {
+  return std::ranges::any_of(trials, [&](const TrialRow& row) {
+    return row.status == "done" && row.metrics.contains(metric);
+  });
 }
 
 StudyResults ReadStudyResults(const fs::path& folder) {
@@ -162,9 +176,7 @@ StudyResults ReadStudyResults(const fs::path& folder) {
     }
     ReadTrials(folder, results.trials);
     results.tags = plan.value("tags", std::vector<std::string>());
-    results.higher_is_better = plan.contains("search")
-                                   ? plan["search"].at("better").get<std::string>() == "higher"
-                                   : BetterOf(results.metric) == Better::kHigher;
+    results.preference = PreferenceFor(results.metric, SaidBetter(plan));
   } catch (const nlohmann::json::exception&) {
     throw fail();
   }

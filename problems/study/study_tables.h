@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "problems/metrics/statistics.h"
+#include "problems/study/study_metrics.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance {
@@ -36,9 +37,11 @@ struct StudyResults {
   std::vector<TrialRow> trials;    // in the order of the plan
   std::vector<std::string> notes;  // of the plan; AreaNotes; the tags
   std::vector<std::string> tags = {};
-  bool higher_is_better = false;  // of the metric: what a search was told, else BetterOf
+  Preference preference = {};  // of the metric: what a search was told, else its own
 
   int Count(const std::string& status) const;
+  // Does a trial that is done have the metric?
+  bool HasMetric() const;
 };
 
 // Throws IoError if plan.json is missing or not that of a study.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <set>
 
 #include "problems/plots/axis_plot.h"
 #include "problems/report/plain_names.h"
@@ -19,9 +20,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-double ValueOf(const TrialRow& row, const std::string& metric) {
-  const auto value = row.metrics.find(metric);
-  return row.status == "done" && value != row.metrics.end() ? value->second : kNaN;
+// The metric; where the values nearest to something are sought, its distance from that.
+double ValueOf(const TrialRow& row, const StudyResults& results) {
+  const auto value = row.metrics.find(results.metric);
+  return row.status == "done" && value != row.metrics.end()
+             ? results.preference.Compared(value->second)
+             : kNaN;
 }
 
 bool IsBase(const TrialRow& row) {
@@ -41,7 +45,7 @@ double BaseOf(const StudyResults& results) {
   std::vector<double> values;
   for (const TrialRow& row : results.trials) {
     if (IsBase(row) && !row.aside) {
-      values.push_back(ValueOf(row, results.metric));
+      values.push_back(ValueOf(row, results));
     }
   }
   return MeanOf(values);
@@ -50,7 +54,7 @@ double BaseOf(const StudyResults& results) {
 void AddTreatments(const Json& steps, const StudyResults& results, SearchResults& search) {
   std::map<std::string, double> by_id;
   for (const TrialRow& row : results.trials) {
-    by_id[row.id] = ValueOf(row, results.metric);
+    by_id[row.id] = ValueOf(row, results);
   }
   double spent = 0, best = kNaN;
   for (const Json& step : steps) {
@@ -64,8 +68,7 @@ void AddTreatments(const Json& steps, const StudyResults& results, SearchResults
     SearchedTreatment treatment{.label = {}, .cost = cost, .spent = spent, .value = MeanOf(values)};
     treatment.values = step.at("values").get<std::vector<std::string>>();
     treatment.label = TreatmentLabel(results.axes, treatment.values);
-    const bool is_better =
-        search.higher_is_better ? treatment.value > best : treatment.value < best;
+    const bool is_better = search.preference.IsBetter(treatment.value, best);
     if (cost == 1 && std::isfinite(treatment.value) && (is_better || !std::isfinite(best))) {
       best = treatment.value;
       search.improvements.push_back(search.treatments.size());
@@ -79,7 +82,7 @@ void AddHeldOut(const StudyResults& results, SearchResults& search) {
   for (const TrialRow& row : results.trials) {
     if (row.aside && IsBase(row)) {
       place[row.subject] = search.held_out.size();
-      search.held_out.push_back({row.subject, ValueOf(row, results.metric), kNaN});
+      search.held_out.push_back({row.subject, ValueOf(row, results), kNaN});
     }
   }
   if (!search.ended || search.improvements.empty()) {
@@ -89,7 +92,7 @@ void AddHeldOut(const StudyResults& results, SearchResults& search) {
   for (const TrialRow& row : results.trials) {
     const auto at = place.find(row.subject);
     if (row.aside && at != place.end() && row.values == best) {
-      search.held_out[at->second].best = ValueOf(row, results.metric);
+      search.held_out[at->second].best = ValueOf(row, results);
     }
   }
 }
@@ -117,9 +120,9 @@ std::string Verdict(const SearchResults& search) {
   }
   const SampleSummary s = Summarize(d);
   const auto better =
-      std::ranges::count_if(d, [&](double x) { return search.higher_is_better ? x > 0 : x < 0; });
+      std::ranges::count_if(d, [&](double x) { return search.preference.IsBetter(x, 0); });
   const bool is_sure = std::isfinite(s.mean_95.low) && (s.mean_95.low > 0 || s.mean_95.high < 0);
-  const bool is_better = search.higher_is_better ? s.mean > 0 : s.mean < 0;
+  const bool is_better = search.preference.IsBetter(s.mean, 0);
   const std::string interval =
       std::isfinite(s.mean_95.low)
           ? fmt::format(", 95 % interval {:.4g} to {:.4g}", s.mean_95.low, s.mean_95.high)
@@ -151,14 +154,34 @@ std::string MethodWords(std::string_view flow) {
   return options.empty() ? parts[1].str() : fmt::format("{} ({})", parts[1].str(), options);
 }
 
+// A search among few choices draws some of them again and again.
+std::string TreatmentsInWords(const SearchResults& search) {
+  std::set<std::vector<std::string>> different;
+  for (const SearchedTreatment& treatment : search.treatments) {
+    different.insert(treatment.values);
+  }
+  const std::string asked = Counted(std::ssize(search.treatments), "treatment");
+  return different.size() == search.treatments.size()
+             ? asked
+             : fmt::format("{}, {}", Counted(std::ssize(search.treatments), "draw"),
+                           Counted(std::ssize(different), "different treatment"));
+}
+
 std::string Summary(const StudyResults& results, const SearchResults& search) {
+  const Preference& wanted = search.preference;
+  const std::string which =
+      wanted.better == Better::kNearest
+          ? fmt::format(
+                "values of {} nearest to {} are better, and the values here are their "
+                "distances from it",
+                WordsOfMetric(results.metric), wanted.target)
+          : fmt::format("{} values of {} are better",
+                        wanted.better == Better::kHigher ? "higher" : "lower",
+                        WordsOfMetric(results.metric));
   return fmt::format(
-      "Searched by {}: {:.4g} of {} full runs spent on {}{}; {} values of {} are better. The "
-      "base as it stands has {}.",
-      MethodWords(search.method), Spent(search), search.budget,
-      Counted(std::ssize(search.treatments), "treatment"),
-      search.ended ? "" : ", and the search has not ended",
-      search.higher_is_better ? "higher" : "lower", WordsOfMetric(results.metric),
+      "Searched by {}: {:.4g} of {} full runs spent on {}{}; {}. The base as it stands has {}.",
+      MethodWords(search.method), Spent(search), search.budget, TreatmentsInWords(search),
+      search.ended ? "" : ", and the search has not ended", which,
       std::isfinite(search.base) ? TableNumber(search.base) : "no value");
 }
 
@@ -220,7 +243,7 @@ std::optional<SearchResults> ReadSearchResults(const std::filesystem::path& fold
     SearchResults search{.method = json.at("method"),
                          .budget = json.at("budget"),
                          .ended = json.at("ended"),
-                         .higher_is_better = results.higher_is_better,
+                         .preference = results.preference,
                          .treatments = {},
                          .improvements = {},
                          .base = BaseOf(results),
@@ -240,11 +263,11 @@ ReportSection SearchSection(const StudyResults& results, const SearchResults& se
   ReportSection section{.heading = "The search"};
   section.paragraphs = {Summary(results, search), Verdict(search)};
   if (!search.improvements.empty()) {
-    section.images = {
-        {AxisPlotSvg(CurvesOf(search), "full runs spent", WordsOfMetric(results.metric)),
-         "The best of the full runs so far, mean over the subjects. Short runs count "
-         "by their length, and are not drawn.",
-         "the best value found so far against the runs spent"}};
+    section.images = {{AxisPlotSvg(CurvesOf(search), "full runs spent",
+                                   WordsOfMetric(results.metric) + search.preference.OfWhat()),
+                       "The best of the full runs so far, mean over the subjects. Short runs count "
+                       "by their length, and are not drawn.",
+                       "the best value found so far against the runs spent"}};
     section.tables = {ImprovementsTable(search)};
   }
   if (!search.held_out.empty()) {

@@ -32,7 +32,7 @@ struct SearchResults {
   std::string method;  // as in the study's file
   int budget = 0;
   bool ended = false;
-  bool higher_is_better = false;
+  Preference preference = {};  // values here are as it compares them
   std::vector<SearchedTreatment> treatments;
   std::vector<std::size_t> improvements;  // runs in full that were better than all before
   double base = kNaN;                     // the base's mean over the subjects

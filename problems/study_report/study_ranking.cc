@@ -23,12 +23,25 @@ double MeanOf(const Treatment& treatment) {
 
 std::vector<Treatment> Ranked(const StudyResults& results) {
   std::vector<Treatment> treatments = Treatments(results, results.metric);
-  const double sign = results.higher_is_better ? -1 : 1;
+  const auto cost = [&](const Treatment& treatment) {
+    double sum = 0;
+    for (const auto& [subject, value] : treatment.by_subject) {
+      sum += results.preference.CostOf(value);
+    }
+    return sum / static_cast<double>(treatment.by_subject.size());  // NaN without one
+  };
   std::ranges::stable_sort(treatments, [&](const Treatment& a, const Treatment& b) {
-    const double x = sign * MeanOf(a), y = sign * MeanOf(b);
+    const double x = cost(a), y = cost(b);
     return std::isfinite(x) && (!std::isfinite(y) || x < y);
   });
   return treatments;
+}
+
+std::string BestFirst(const Preference& preference) {
+  return preference.better == Better::kLower ? "best mean first"
+         : preference.better == Better::kHigher
+             ? "best mean first (higher is better)"
+             : fmt::format("best first ({}: by the mean distance from it)", preference.InWords());
 }
 
 double MeanSeconds(const StudyResults& results, const Treatment& treatment) {
@@ -57,9 +70,8 @@ std::string RankingText(const StudyResults& results) {
   if (ranked.empty()) {
     return {};
   }
-  std::string text =
-      fmt::format("{}, best mean first{}{}:\n", WordsOfMetric(results.metric),
-                  results.higher_is_better ? " (higher is better)" : "", WordsOfNames(results));
+  std::string text = fmt::format("{}, {}{}:\n", WordsOfMetric(results.metric),
+                                 BestFirst(results.preference), WordsOfNames(results));
   for (std::size_t n = 0; n < std::min(ranked.size(), kMost); ++n) {
     const double seconds = MeanSeconds(results, ranked[n]);
     const auto subjects = static_cast<long long>(ranked[n].by_subject.size());

@@ -49,12 +49,11 @@ std::string Seconds(double seconds) {
 
 // Each treatment leads to the first of its trials.
 ReportTable RankingTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportTable table{
-      fmt::format("Treatments by {}, best mean first{}{}", WordsOfMetric(results.metric),
-                  results.higher_is_better ? " (higher is better)" : "", WordsOfNames(results)),
-      {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median", "min", "max",
-       "mean seconds"},
-      {}};
+  ReportTable table{fmt::format("Treatments by {}, {}{}", WordsOfMetric(results.metric),
+                                BestFirst(results.preference), WordsOfNames(results)),
+                    {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median",
+                     "min", "max", "mean seconds"},
+                    {}};
   for (const Treatment& treatment : ranked) {
     const SampleSummary s = Summarize(ValuesOf(treatment));
     table.rows.push_back({treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "",
@@ -68,31 +67,32 @@ ReportTable RankingTable(const StudyResults& results, const std::vector<Treatmen
   return table;
 }
 
-std::vector<double> Differences(const Treatment& treatment, const Treatment& best) {
+std::vector<double> Differences(const Treatment& treatment, const Treatment& best,
+                                const Preference& preference) {
   std::vector<double> differences;
   for (const auto& [subject, value] : treatment.by_subject) {
     if (const auto other = best.by_subject.find(subject); other != best.by_subject.end()) {
-      differences.push_back(value - other->second);
+      differences.push_back(preference.Compared(value) - preference.Compared(other->second));
     }
   }
   return differences;
 }
 
 ReportTable PairsTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportTable table{
-      fmt::format("Each treatment less the best ({}), paired by subject", ranked[0].label),
-      {"treatment", "pairs", "mean difference", "95 % interval", "worse in", "Wilcoxon p",
-       "p, Holm"},
-      {}};
+  ReportTable table{fmt::format("Each treatment less the best ({}), paired by subject{}",
+                                ranked[0].label, results.preference.OfWhat()),
+                    {"treatment", "pairs", "mean difference", "95 % interval", "worse in",
+                     "Wilcoxon p", "p, Holm"},
+                    {}};
   std::vector<double> p;
   for (std::size_t n = 1; n < ranked.size(); ++n) {
-    const std::vector<double> d = Differences(ranked[n], ranked[0]);
+    const std::vector<double> d = Differences(ranked[n], ranked[0], results.preference);
     const SampleSummary s = Summarize(d);
     const WilcoxonResult w = Wilcoxon(d);
     const bool enough = s.n >= kLeastSubjects && std::isfinite(w.p);
     p.push_back(enough ? w.p : 1);
-    const auto worse = std::ranges::count_if(
-        d, [&](double x) { return results.higher_is_better ? x < 0 : x > 0; });
+    const auto worse =
+        std::ranges::count_if(d, [&](double x) { return results.preference.IsBetter(0, x); });
     table.rows.push_back({ranked[n].label, std::to_string(s.n), TableNumber(s.mean),
                           IntervalText(s.mean_95), fmt::format("{} of {}", worse, s.n),
                           enough ? fmt::format("{:.4f}{}", w.p, w.exact ? "" : " (normal)") : "",
@@ -115,7 +115,7 @@ std::vector<std::vector<double>> CompleteTable(const StudyResults& results,
     std::vector<double> row;
     for (const Treatment& treatment : treatments) {
       if (const auto it = treatment.by_subject.find(subject); it != treatment.by_subject.end()) {
-        row.push_back(results.higher_is_better ? -it->second : it->second);
+        row.push_back(results.preference.CostOf(it->second));
       }
     }
     if (row.size() == treatments.size()) {

@@ -93,15 +93,19 @@ std::set<std::string> NamesBetween(const StudyResults& results, const std::strin
   return names;
 }
 
-// Where a search took higher values of the metric as better, its own columns are to be read so.
+// Where not the lower values of the metric are better, its own columns are to be read so.
 std::string Direction(const StudyResults& results) {
-  return results.higher_is_better ? ", higher is better" : "";
+  return results.preference.better == Better::kLower ? "" : ", " + results.preference.InWords();
+}
+
+bool HigherIsBetter(const StudyResults& results) {
+  return results.preference.better == Better::kHigher;
 }
 
 ReportTable SiblingsTable(const StudyResults& results, const std::vector<Treatment>& ranked,
                           const std::string& parent) {
   std::vector<Column> columns;
-  if (results.higher_is_better) {  // it is no error, and so none of the others
+  if (HigherIsBetter(results)) {  // it is no error, and so none of the others
     columns.push_back({WordsOfMetric(results.metric) + Direction(results), results.metric});
   }
   for (const auto& [head, name] : std::to_array<std::pair<const char*, const char*>>(
@@ -112,12 +116,12 @@ ReportTable SiblingsTable(const StudyResults& results, const std::vector<Treatme
             {"max (mm)", "max_mm"},
             {"signed mean (mm)", "mean_signed_mm"},
             {"within stated 90 %", "coverage_90"}})) {
-    if (parent + name != results.metric || !results.higher_is_better) {
+    if (parent + name != results.metric || !HigherIsBetter(results)) {
       columns.push_back({head, parent + name});
     }
   }
   return TableOf(results, ranked,
-                 results.higher_is_better
+                 HigherIsBetter(results)
                      ? "The metric and the error by other measures (lower is better), means over "
                        "subjects"
                      : "The same error by other measures, means over subjects",

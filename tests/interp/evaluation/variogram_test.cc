@@ -33,6 +33,48 @@ TEST(Variogram, LeavesOutWhatIsUnknownAndWhatWeighsNothing) {
   EXPECT_DOUBLE_EQ(bins[0].semivariance_mm2, 2);
 }
 
+// Points that stand for three times as much count as three points there do; so for few points,
+// which are all taken, and for many.
+TEST(Variogram, DoesNotDependOnWhereAMeshIsFiner) {
+  for (const int count : {60, 4000}) {
+    Random random(5);
+    std::vector<Vec3> points, split;
+    std::vector<double> values, weights, of_split;
+    for (int k = 0; k < count; ++k) {
+      const Vec3 p = random.InBox(0, 100);
+      points.push_back(p);
+      values.push_back(p.x() / 10 + (k % 2 == 0 ? 1 : 0));
+      weights.push_back(p.x() < 50 ? 3 : 1);
+      for (int n = 0; n < weights.back(); ++n) {
+        split.push_back(p);
+        of_split.push_back(values.back());
+      }
+    }
+    const auto by_weight = EmpiricalVariogram(points, values, weights, 20, 60);
+    const auto finer = EmpiricalVariogram(split, of_split, {}, 20, 60);
+    ASSERT_EQ(by_weight.size(), finer.size());
+    for (std::size_t k = 1; k < finer.size(); ++k) {  // the first has pairs of one place
+      EXPECT_NEAR(by_weight[k].semivariance_mm2, finer[k].semivariance_mm2,
+                  count == 60 ? 1e-9 : 0.1 * finer[k].semivariance_mm2);
+    }
+  }
+}
+
+// One that weighs as much as all others together is in half of the pairs' weight.
+TEST(Variogram, APointOfSeveralStepsCountsSoManyTimes) {
+  std::vector<Vec3> points;
+  std::vector<double> values, weights;
+  for (int k = 0; k < 2000; ++k) {
+    points.emplace_back(0.001 * k, 0, 0);
+    values.push_back(k == 1000 ? 2 : 0);
+    weights.push_back(k == 1000 ? 1999 : 1);
+  }
+  const auto bins = EmpiricalVariogram(points, values, weights, 10, 100);
+  ASSERT_EQ(bins.size(), 1u);
+  // 2^2 / 2 in the pairs with it: w w of w w + w^2 / 2 of the others.
+  EXPECT_NEAR(bins[0].semivariance_mm2, 2 * 2 / 3.0, 0.01);
+}
+
 TEST(Variogram, FitFindsTheModelThatMadeIt) {
   const VariogramModel truth{.nugget_mm2 = 1.5, .sill_mm2 = 20, .length_mm = 17};
   std::vector<VariogramBin> bins;

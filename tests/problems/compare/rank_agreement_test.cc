@@ -49,6 +49,21 @@ TEST(RankAgreement, TakesOnlySubjectsThatHaveAllTreatments) {
   EXPECT_NEAR(CompareRanks(heads, phantoms, {}).spearman, 1, 1e-12);
 }
 
+// As the studies took the metric, or as the caller says; and it is told.
+TEST(RankAgreement, RanksByWhatTheStudiesTookAsBetter) {
+  NamedStudy a = Study("a", "s", {{1}, {2}, {3}}), b = Study("b", "s", {{4}, {2}, {3}});
+  EXPECT_EQ(CompareRanks(a, b, {}).treatments[0].label, "t0");
+  EXPECT_THAT(RankText(CompareRanks(a, b, {})), ::testing::HasSubstr("; lower is better\n"));
+  a.results.preference.better = b.results.preference.better = Better::kHigher;
+  const RankAgreement agreement = CompareRanks(a, b, {});
+  EXPECT_EQ(agreement.treatments[0].label, "t2");
+  EXPECT_EQ(agreement.treatments[2].rank, 1);
+  EXPECT_THAT(RankText(agreement), ::testing::HasSubstr("; higher is better\n"));
+  EXPECT_EQ(CompareRanks(a, b, {.metric = "", .better = Better::kLower}).treatments[0].label, "t0");
+  b.results.preference.better = Better::kLower;
+  EXPECT_THROW(CompareRanks(a, b, {}), InputError);
+}
+
 TEST(RankAgreement, RefusesTwoTreatments) {
   const NamedStudy a = Study("a", "s", {{1}, {2}, {3}}), b = Study("b", "s", {{1}, {2}});
   EXPECT_THAT([&] { CompareRanks(a, b, {}); },

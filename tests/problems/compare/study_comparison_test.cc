@@ -128,6 +128,8 @@ TEST(StudyComparison, BelowSixSubjectsThereIsNoTest) {
   const StudyComparison comparison =
       CompareStudies(std::vector{Study("a", {"x"}, 5, 1), Study("b", {"x"}, 5, 2)}, {});
   EXPECT_TRUE(std::isnan(comparison.pairs[0].p_holm));
+  EXPECT_TRUE(std::isnan(comparison.pairs[0].test.p));
+  EXPECT_THAT(PairsCsv(comparison), ::testing::EndsWith(",,\n"));  // neither p nor p_holm
 }
 
 TEST(StudyComparison, WhatCannotBeComparedIsRefusedOrSaid) {
@@ -165,8 +167,8 @@ TEST(StudyComparison, WhereHigherIsBetterAllIsTurnedRound) {
     return CompareStudies(std::vector{a, b}, {.metric = metric, .better = {}});
   };
   const StudyComparison share = by(kShare), negative = by("negative");
-  EXPECT_EQ(share.better, Better::kHigher);
-  EXPECT_EQ(negative.better, Better::kLower);
+  EXPECT_EQ(share.preference.better, Better::kHigher);
+  EXPECT_EQ(negative.preference.better, Better::kLower);
   ASSERT_THAT(share.pairs, SizeIs(2));
   for (std::size_t k = 0; k < share.pairs.size(); ++k) {
     const TreatmentPair &x = share.pairs[k], &y = negative.pairs[k];
@@ -183,20 +185,46 @@ TEST(StudyComparison, WhereHigherIsBetterAllIsTurnedRound) {
   EXPECT_THAT(ComparisonText(negative), HasSubstr("lower is better"));
 }
 
+// Errors of either sign, and shares on either side of what is stated, do not make up for each
+// other.
+TEST(StudyComparison, SignedErrorsAndSharesWithinTheStatedAreBestNearestToWhatTheyShouldBe) {
+  NamedStudy a = Study("a", {"bold", "right"}, 8, 1), b = Study("b", {"right"}, 8, 2);
+  for (NamedStudy* study : {&a, &b}) {
+    for (std::size_t n = 0; n < study->results.trials.size(); ++n) {
+      TrialRow& row = study->results.trials[n];
+      const double off = row.values[0] == "right" ? 0.02 : n % 4 == 0 ? -0.3 : 0.1;
+      row.metrics["depth_truth.closest.coverage_90"] = 0.9 + off;
+      row.metrics["depth_truth.closest.mean_signed_mm"] = 10 * off;
+    }
+  }
+  const auto by = [&](const char* metric) {
+    return CompareStudies(std::vector{a, b}, {.metric = metric, .better = {}});
+  };
+  const StudyComparison share = by("depth_truth.closest.coverage_90"),
+                        error = by("depth_truth.closest.mean_signed_mm");
+  EXPECT_EQ(share.preference.better, Better::kNearest);
+  EXPECT_EQ(share.treatments[0].label, "right");  // the lower mean is bold's
+  EXPECT_EQ(error.treatments[0].label, "right");
+  EXPECT_NEAR(share.pairs[0].difference.mean, 0, 1e-12);
+  EXPECT_THAT(ComparisonText(share), HasSubstr("nearest to 0.9 is better"));
+  EXPECT_THAT(ComparisonText(error), HasSubstr("nearest to 0 is better"));
+}
+
 TEST(StudyComparison, WhatASearchTookAsBetterIsKeptAndAContradictionIsAskedAbout) {
   NamedStudy a = Study("a", {"x"}, 8, 1), b = Study("b", {"x"}, 8, 2);
-  a.results.higher_is_better = true;
+  a.results.preference.better = Better::kHigher;
   EXPECT_THAT(WordsOf<InputError>([&] {
                 CompareStudies(std::vector{a, b}, {});
               }),
               AllOf(HasSubstr("a took higher values"), HasSubstr("--better")));
-  EXPECT_EQ(CompareStudies(std::vector{a, b}, {.metric = "", .better = Better::kLower}).better,
-            Better::kLower);
-  b.results.higher_is_better = true;
-  EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).better, Better::kHigher);
-  b.results.higher_is_better = false;
+  EXPECT_EQ(
+      CompareStudies(std::vector{a, b}, {.metric = "", .better = Better::kLower}).preference.better,
+      Better::kLower);
+  b.results.preference.better = Better::kHigher;
+  EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).preference.better, Better::kHigher);
+  b.results.preference.better = Better::kLower;
   b.results.metric = "face.mean_abs_mm";  // says nothing of the metric that is compared
-  EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).better, Better::kHigher);
+  EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).preference.better, Better::kHigher);
 }
 
 TEST(StudyComparison, FoldersAreCalledByAsMuchOfTheirPathAsTellsThemApart) {

@@ -72,6 +72,26 @@ class CommandLine : public ::testing::Test {
   ScratchFolder folder_;
 };
 
+TEST_F(CommandLine, AMetricThatNoTrialHasIsSaidAndNothingIsRanked) {
+  Write("study.yaml", fmt::format("base: {}/phantom.yaml\nset: {{subject.rings: 20}}\njob: depth\n"
+                                  "metric: cross_validation.landmark.sites.nonsense\n",
+                                  kConfigs));
+  const Outcome outcome = Call("study study.yaml --out s --quiet");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.out, HasSubstr("no trial has the number "
+                                     "'cross_validation.landmark.sites.nonsense'"));
+  EXPECT_EQ(Call("status s").code, 1);
+}
+
+// Ceres tells a line search of a flat cost through glog, which would tell it on the terminal.
+TEST_F(CommandLine, LibrariesAreSilent) {
+  const Outcome outcome = Call("depth " + kConfigs +
+                               "/phantom.yaml --out d --quiet --set subject.rings=30 --set "
+                               "'interp={type: kriging, length_mm: 3000}'");
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_EQ(outcome.err, "");
+}
+
 TEST_F(CommandLine, AStudysPlanIsListedAndNothingRuns) {
   Write("study.yaml", fmt::format("base: {}/phantom.yaml\ngrid: {{rounds: [1, 2]}}\n", kConfigs));
   const Outcome plan = Call("study plan study.yaml --out out");

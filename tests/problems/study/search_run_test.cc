@@ -7,10 +7,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "problems/study/study_run.h"
 #include "problems/study_report/search_report.h"
+#include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_report.h"
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_file.h"
@@ -142,6 +144,41 @@ TEST_F(SearchRunTest, TheBestIsTheBestOfWhatWasTriedEitherWayRound) {
     EXPECT_THAT(SearchText(ReadStudyResults(root), found),
                 HasSubstr(higher ? "higher values" : "lower values"));
   }
+}
+
+// Four choices drawn eight times are four treatments.
+TEST_F(SearchRunTest, DrawsOfTheSameTreatmentAreNotTakenForOthers) {
+  RunStudy(Plan("search:\n  method: random\n  budget: 8\n  choices: {interp.covariance: "
+                "[matern_1_2, matern_5_2]}\n"),
+           folder_ / "run", {}, {});
+  const SearchResults found = Results(folder_ / "run");
+  EXPECT_THAT(SearchText(ReadStudyResults(folder_ / "run"), found),
+              HasSubstr("8 of 8 full runs spent on 8 draws, 2 different treatments;"));
+}
+
+// Of a signed error it is the size that counts, of each subject by itself.
+TEST_F(SearchRunTest, ASignedErrorIsBestNearestToZero) {
+  const std::string metric = "depth_truth.along_direction.mean_signed_mm";
+  std::string text = kBase + "search:\n  method: random\n  budget: 5\n" + kAxes;
+  const std::string other = "depth_truth.along_direction.rms_mm";
+  text.replace(text.find(other), other.size(), metric);
+  WriteFileAtomically(folder_ / "study.yaml", text);
+  RunStudy(ReadStudy(folder_ / "study.yaml"), folder_ / "run", {}, {});
+  const StudyResults results = ReadStudyResults(folder_ / "run");
+  const SearchResults found = Results(folder_ / "run");
+  ASSERT_FALSE(found.improvements.empty());
+  const double best = found.treatments[found.improvements.back()].value;
+  for (const Treatment& treatment : Treatments(results, metric)) {
+    double off = 0;
+    for (const auto& [subject, value] : treatment.by_subject) {
+      off += std::abs(value) / static_cast<double>(treatment.by_subject.size());
+    }
+    if (treatment.label != "base") {
+      EXPECT_GE(off, best - 1e-12);
+    }
+  }
+  EXPECT_THAT(SearchText(results, found), HasSubstr("nearest to 0 are better"));
+  EXPECT_THAT(RankingText(results), HasSubstr("nearest to 0 is better: by the mean distance"));
 }
 
 // The judge: what the search found and the base as it stands, on a subject that it never saw.

@@ -23,7 +23,7 @@ StudyResults Results(bool higher) {
                        .axes = {"interp"},
                        .trials = {},
                        .notes = {}};
-  results.higher_is_better = higher;
+  results.preference = PreferenceFor(results.metric);
   for (const auto& [label, share, rms] :
        {std::tuple("narrow", 0.5, 1.5), std::tuple("wide", 0.9, 2.5)}) {
     results.trials.push_back({.id = label,
