@@ -63,6 +63,12 @@ class Welder {
   TriMesh mesh_;
 };
 
+// In letters of either case.
+bool Is(std::string_view word, std::string_view expected) {
+  return std::equal(word.begin(), word.end(), expected.begin(), expected.end(),
+                    [](unsigned char a, char b) { return std::tolower(a) == b; });
+}
+
 class TextReader {
  public:
   TextReader(std::string_view bytes, const std::string& name) : lines_(bytes, name, {}) {}
@@ -122,12 +128,6 @@ class TextReader {
     }
   }
 
-  // In letters of either case.
-  static bool Is(std::string_view word, std::string_view expected) {
-    return std::equal(word.begin(), word.end(), expected.begin(), expected.end(),
-                      [](unsigned char a, char b) { return std::tolower(a) == b; });
-  }
-
   TextLines lines_;
   Welder welder_;
 };
@@ -182,8 +182,9 @@ bool IsText(std::string_view bytes) {
   if (bytes.size() >= kHeader && bytes.size() == kHeader + kRecord * HeaderCount(bytes)) {
     return false;
   }
+  constexpr std::string_view kFirst = "solid";
   const std::size_t begin = bytes.find_first_not_of(" \t\r\n");
-  return begin != std::string_view::npos && bytes.substr(begin).starts_with("solid") &&
+  return begin != std::string_view::npos && Is(bytes.substr(begin, kFirst.size()), kFirst) &&
          bytes.substr(0, kHeader).find('\0') == std::string_view::npos;
 }
 

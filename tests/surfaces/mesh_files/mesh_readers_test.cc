@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <cstdlib>
 #include <new>
 #include <random>
@@ -254,10 +255,20 @@ TEST(MeshReaders, AnStlIsWeldedInOrderOfFirstUse) {
   EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {2, 1, 3}, {4, 0, 1}}));
 }
 
+TEST(MeshReaders, ATextStlMayBeInCapitals) {
+  std::string capitals = kTextStl;
+  std::ranges::transform(capitals, capitals.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  EXPECT_EQ(Read(".stl", capitals).points, Read(".stl", kTextStl).points);
+  EXPECT_EQ(Read(".stl", capitals).triangles, Read(".stl", kTextStl).triangles);
+}
+
 TEST(MeshReaders, ABinaryStlMayBeginWithSolid) {
-  std::string bytes = EncodeMesh(Plate(10, 1), ".stl");
-  bytes.replace(0, 12, "solid facet ");
-  EXPECT_EQ(Read(".stl", bytes).triangles.size(), 2u);
+  for (const char* begin : {"solid facet ", "SOLID FACET "}) {
+    std::string bytes = EncodeMesh(Plate(10, 1), ".stl");
+    bytes.replace(0, 12, begin);
+    EXPECT_EQ(Read(".stl", bytes).triangles.size(), 2u);
+  }
 }
 
 // Every beginning of a file is read or refused; of a binary file it is refused.
