@@ -7,6 +7,7 @@
 
 #include "problems/ct/half_maximum_edge.h"
 #include "problems/ct/head_mask.h"
+#include "problems/ct/head_size.h"
 #include "problems/ct/volume_surface.h"
 #include "problems/ct/voxel_mask.h"
 #include "surfaces/base/error.h"
@@ -83,6 +84,7 @@ TriMesh SkullSurface(const CtVolume& volume, const VoxelMask& head, const CtImpo
                     "Hounsfield units? Lower bone_hu or smallest_bone_cm2",
                     options.bone_hu, options.smallest_bone_cm2));
   }
+  CheckIsNotTooSmall(skull, "the skull");
   return skull;
 }
 
@@ -138,6 +140,7 @@ CtImport ImportCoarser(const CtVolume& volume, const CtImportOptions& options,
 CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
                   const RunContext& context) {
   CheckVolume(volume, "import-ct");
+  CheckHeadFits(volume);
   if (!(options.skin_hu < options.bone_hu)) {
     throw InputError(fmt::format("import-ct: skin_hu {} is not below bone_hu {}", options.skin_hu,
                                  options.bone_hu));

@@ -98,9 +98,9 @@ struct CtImport {
   std::vector<std::string> notes;  // what people should know, a line each
 };
 
-// Throws InputError if the volume has no tissue, no bone or no outside air at these values, or is
-// no volume any more once it is made coarser;
-// Cancelled on request.
+// Throws InputError if the volume or its bone is smaller than a head, has no tissue, no bone or no
+// outside air at these values, or is no volume any more once it is made coarser; Cancelled on
+// request.
 CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
                   const RunContext& context);
 

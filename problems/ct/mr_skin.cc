@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "problems/ct/head_mask.h"
+#include "problems/ct/head_size.h"
 #include "problems/ct/volume_surface.h"
 #include "surfaces/base/error.h"
 
@@ -70,6 +71,7 @@ double OtsuThreshold(const CtVolume& volume) {
 MrSkin ImportMrSkin(const CtVolume& volume, const MrSkinOptions& options,
                     const RunContext& context) {
   CheckVolume(volume, "import-ct");
+  CheckHeadFits(volume);
   MrSkin result;
   result.skin_value = options.skin_value > 0 ? options.skin_value : OtsuThreshold(volume);
   context.Report("import mr", "head and outside air");
@@ -82,6 +84,7 @@ MrSkin ImportMrSkin(const CtVolume& volume, const MrSkinOptions& options,
   result.notes = mask.notes;
   result.skin = SkinSurface(volume, mask, result.skin_value, 2 * std::abs(result.skin_value) + 1,
                             context, result.dropped);
+  CheckIsNotTooSmall(result.skin, "the skin");
   result.notes.push_back(fmt::format("skin at the grey value {:.0f}{}", result.skin_value,
                                      options.skin_value > 0 ? "" : ", found by Otsu's method"));
   result.notes.push_back(

@@ -28,7 +28,8 @@ struct MrSkin {
 // both (Otsu 1979), of 256 classes up to the brightest but one in a thousand.
 double OtsuThreshold(const CtVolume& volume);
 
-// Throws InputError if nothing is as thick as a head, or no dark voxels reach the sides.
+// Throws InputError if the volume or the skin is smaller than a head, nothing is as thick as one,
+// or no dark voxels reach the sides.
 MrSkin ImportMrSkin(const CtVolume& volume, const MrSkinOptions& options,
                     const RunContext& context);
 

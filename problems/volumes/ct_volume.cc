@@ -37,7 +37,8 @@ void CheckVolume(const CtVolume& volume, const std::string& where) {
   const Vec3& s = volume.spacing_mm;
   if (!s.allFinite() || s.minCoeff() < kLeastSpacing_mm || s.maxCoeff() > kMostSpacing_mm) {
     throw InputError(
-        fmt::format("{}: a spacing of {} x {} x {} mm is not usable; each must be {} to {} mm",
+        fmt::format("{}: a spacing of {} x {} x {} mm is not usable; each must be {} to {} mm: "
+                    "correct it in the header if its unit is another",
                     where, s.x(), s.y(), s.z(), kLeastSpacing_mm, kMostSpacing_mm));
   }
   constexpr double kFlattest = 0.1;  // volume of the cell of unit steps; 1 if they are square

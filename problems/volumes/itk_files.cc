@@ -15,14 +15,14 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <limits>
 #include <sstream>
 
+#include "problems/volumes/header_place.h"
+#include "problems/volumes/nifti_file.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -180,10 +180,9 @@ VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::filesystem::path& f
   return array;
 }
 
-std::string HeadOf(const std::filesystem::path& file) {
-  constexpr std::uintmax_t kHead = 4096;
+std::string HeadOf(const std::filesystem::path& file, std::uintmax_t most = 4096) {
   std::ifstream in(file, std::ios::binary);
-  std::string head(std::min(std::filesystem::file_size(file), kHead), ' ');
+  std::string head(std::min(std::filesystem::file_size(file), most), ' ');
   in.read(head.data(), static_cast<std::streamsize>(head.size()));
   return head;
 }
@@ -203,77 +202,59 @@ void CheckMetaImageAxes(const std::filesystem::path& file) {
   }
 }
 
-// A value of a NIfTI header, whose bytes may stand the other way round.
-template <class Value>
-Value NiftiValue(const std::string& head, std::size_t at, bool swapped) {
-  std::array<char, sizeof(Value)> bytes{};
-  std::memcpy(bytes.data(), head.data() + at, bytes.size());
-  if (swapped) {
-    std::ranges::reverse(bytes);
-  }
-  return std::bit_cast<Value>(bytes);
-}
-
-// How the voxels lie, in a NIfTI-1 file that is not packed: steps, quaternion with its place, rows
-// of a matrix. ITK takes the matrix apart without end if it holds what is not a number, or a huge
-// one.
-void CheckNiftiPlaces(const std::filesystem::path& file) {
-  constexpr std::size_t kHeader = 348;
-  constexpr double kFarthest_mm = 1e9;
+// Neither NIfTI's nor MetaImage's library says that a file ends too early; NRRD's does. What is in
+// a MetaImage can be seen from its size where it is one file and not compressed.
+void CheckMetaImageWhole(const std::filesystem::path& file, std::uintmax_t needed) {
   const std::string head = HeadOf(file);
-  if (head.size() < kHeader) {
-    return;  // the library says that it is cut short
-  }
-  const bool swapped = NiftiValue<std::int32_t>(head, 0, /*swapped=*/true) == kHeader;
-  const auto check = [&](std::size_t from, int count) {
-    for (int k = 0; k < count; ++k) {
-      const double value = NiftiValue<float>(head, from + 4 * static_cast<std::size_t>(k), swapped);
-      if (!(std::abs(value) <= kFarthest_mm)) {
-        throw InputError(
-            fmt::format("{}: one of the numbers that say how its voxels lie is {}; export it again",
-                        file.string(), value));
-      }
-    }
-  };
-  const bool has_quaternion = NiftiValue<std::int16_t>(head, 252, swapped) > 0;
-  const bool has_matrix = NiftiValue<std::int16_t>(head, 254, swapped) > 0;
-  check(80, 3);
-  check(256, has_quaternion ? 6 : 0);
-  check(280, has_matrix ? 12 : 0);
-}
-
-// The bytes before the voxels: NIfTI's header, or MetaImage's up to the line that says LOCAL.
-std::uintmax_t HeaderBytes(const std::string& head, VolumeFormat format) {
-  constexpr std::uintmax_t kNiftiHeader = 348;
-  return format == VolumeFormat::kNifti ? kNiftiHeader : head.find('\n', head.find("LOCAL")) + 1;
-}
-
-// Neither NIfTI's nor MetaImage's library says that a file ends too early. What can be seen from
-// its size is: of NIfTI, and of a MetaImage that is one file and not compressed.
-void CheckWhole(const std::filesystem::path& file, VolumeFormat format, std::uintmax_t needed) {
-  constexpr std::uintmax_t kMostHeader = 1 << 20;
-  std::uintmax_t has = std::filesystem::file_size(file);
-  const std::string head = HeadOf(file);
-  std::uintmax_t most = std::numeric_limits<std::uintmax_t>::max();
-  if (format == VolumeFormat::kNifti && head.starts_with("\x1f\x8b")) {
-    std::uint32_t unpacked = 0;  // the last four bytes of gzip: the size before, modulo 2^32
-    std::ifstream in(file, std::ios::binary);
-    in.seekg(-4, std::ios::end);
-    in.read(reinterpret_cast<char*>(&unpacked), sizeof unpacked);
-    has = unpacked;
-    needed &= 0xffffffff;
-    most = needed + kMostHeader;
-  } else if (format == VolumeFormat::kMetaImage &&
-             (head.find("LOCAL") == head.npos || head.find("CompressedData = True") != head.npos)) {
-    return;
-  } else if (format == VolumeFormat::kNrrd) {
+  const std::size_t local = head.find("LOCAL");
+  if (local == head.npos || head.find("CompressedData = True") != head.npos) {
     return;
   }
-  if (has < needed + HeaderBytes(head, format) || has > most) {
-    throw IoError(
-        fmt::format("{}: the file is cut short: {} bytes of voxels are needed; copy or "
-                    "export it again",
-                    file.string(), needed));
+  if (std::filesystem::file_size(file) < needed + head.find('\n', local) + 1) {
+    throw IoError(fmt::format(
+        "{}: the file is cut short: {} bytes of voxels are needed; copy or export it again",
+        file.string(), needed));
+  }
+}
+
+// What ends the libraries, or keeps them busy for ever. ITK takes a NIfTI's matrix apart without
+// end if it holds what is not a number, or a huge one.
+void CheckForLibrary(const std::filesystem::path& file, VolumeFormat format) {
+  if (format == VolumeFormat::kMetaImage) {
+    CheckMetaImageAxes(file);
+  } else if (format == VolumeFormat::kNifti) {
+    CheckNiftiPlaces(file);
+  }
+}
+
+// A NIfTI's size is not that which ITK says: it makes floats of voxels with a slope.
+void CheckWhole(const std::filesystem::path& file, VolumeFormat format,
+                const itk::ImageIOBase& io) {
+  if (format == VolumeFormat::kMetaImage) {
+    CheckMetaImageWhole(file, static_cast<std::uintmax_t>(io.GetImageSizeInBytes()));
+  } else if (format == VolumeFormat::kNifti) {
+    CheckNiftiWhole(file, static_cast<double>(io.GetImageSizeInPixels()));
+  }
+}
+
+HeaderPlace PlaceOfNifti(const std::filesystem::path& file) {
+  HeaderPlace place;
+  if (!NiftiSaysHowItLies(file)) {
+    place.notes.emplace_back(
+        "the file does not say how it lies (its qform_code and sform_code are 0); taken as LPS");
+  }
+  return place;
+}
+
+HeaderPlace PlaceOf(const std::filesystem::path& file, VolumeFormat format) {
+  constexpr std::uintmax_t kLongestText = 1 << 20;
+  switch (format) {
+    case VolumeFormat::kNifti:
+      return PlaceOfNifti(file);
+    case VolumeFormat::kNrrd:
+      return PlaceOfNrrd(HeadOf(file, kLongestText), file.string());
+    default:
+      return PlaceOfMetaImage(HeadOf(file, kLongestText));
   }
 }
 
@@ -425,20 +406,18 @@ VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat forma
   SilenceLibraries();
   const std::string where = file.string();
   const Reader reader = ReaderOf(format);
-  if (format == VolumeFormat::kMetaImage) {
-    CheckMetaImageAxes(file);
-  } else if (format == VolumeFormat::kNifti && !HeadOf(file).starts_with("\x1f\x8b")) {
-    CheckNiftiPlaces(file);
-  }
+  CheckForLibrary(file, format);
   try {
     if (!reader.io->CanReadFile(where.c_str())) {
       throw IoError(
           fmt::format("{}: it is no {} file, or its header is damaged", where, reader.name));
     }
+    const HeaderPlace place = PlaceOf(file, format);
     reader.io->SetFileName(where);
     reader.io->ReadImageInformation();
     VoxelArray array = GeometryOf(*reader.io, file);
-    CheckWhole(file, format, static_cast<std::uintmax_t>(reader.io->GetImageSizeInBytes()));
+    CheckWhole(file, format, *reader.io);
+    TakePlace(place, array);
     array.values.reserve(VoxelCount(array));
     AppendVoxels(*reader.io, VoxelCount(array), array, where);
     return array;

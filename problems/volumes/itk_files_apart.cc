@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include "problems/volumes/apart.h"
 #include "problems/volumes/itk_files.h"
@@ -45,6 +46,22 @@ void Take(std::string_view& bytes, std::string& text) {
   Take(bytes, size);
   text = bytes.substr(0, size);
   bytes.remove_prefix(size);
+}
+
+void Put(std::string& bytes, const std::vector<std::string>& texts) {
+  Put(bytes, texts.size());
+  for (const std::string& text : texts) {
+    Put(bytes, text);
+  }
+}
+
+void Take(std::string_view& bytes, std::vector<std::string>& texts) {
+  std::size_t count = 0;
+  Take(bytes, count);
+  texts.resize(count);
+  for (std::string& text : texts) {
+    Take(bytes, text);
+  }
 }
 
 template <int rows, int columns>
@@ -96,6 +113,7 @@ std::string BytesOf(const VoxelArray& array) {
   Put(bytes, array.steps);
   Put(bytes, array.clipped);
   Put(bytes, array.not_finite);
+  Put(bytes, array.notes);
   bytes.append(reinterpret_cast<const char*>(array.values.data()),
                array.values.size() * sizeof array.values[0]);
   return bytes;
@@ -108,6 +126,7 @@ VoxelArray ArrayOf(std::string_view bytes) {
   Take(bytes, array.steps);
   Take(bytes, array.clipped);
   Take(bytes, array.not_finite);
+  Take(bytes, array.notes);
   array.values.resize(bytes.size() / sizeof array.values[0]);
   std::memcpy(array.values.data(), bytes.data(), bytes.size());
   return array;

@@ -67,7 +67,7 @@ void NoteGeometry(const CtVolume& volume, std::vector<std::string>& notes) {
 }
 
 VolumeReading Finish(VoxelArray array, VolumeReading reading, const std::string& where) {
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = array.notes;
   CheckValues(array, where, notes);
   reading.volume = ToCtVolume(std::move(array), where);
   NoteGeometry(reading.volume, reading.notes);

@@ -18,6 +18,7 @@ struct VoxelArray {
   std::vector<std::int16_t> values;    // the first axis runs fastest
   std::int64_t clipped = 0;            // values beyond int16, set to its ends
   std::int64_t not_finite = 0;         // values that are no numbers, set to the lowest
+  std::vector<std::string> notes;  // what the file leaves open, and how it is taken, a line each
 };
 
 // The same voxels at the same places, with the axes of CtVolume: exchanged and turned about where

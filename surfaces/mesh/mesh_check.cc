@@ -13,28 +13,20 @@
 namespace semblance {
 namespace {
 
-// A head, or the scanned part of one, is of this size.
-constexpr double kSmallest_mm = 60, kLargest_mm = 500;
-
-void CheckUnit(double size, const std::string& name) {
-  if (size >= kSmallest_mm && size <= kLargest_mm) {
-    return;
-  }
+// The unit in which a size is nearest to that of a head, and what is to be done; else to check it.
+std::string UnitGuess(double size, const std::string& remedy) {
   constexpr double kUsual_mm = 230;  // of a skull or a head
   std::string guess = "check its unit";
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [unit, factor] : {std::pair("metres", 1000.0), std::pair("centimetres", 10.0),
                                      std::pair("inches", 25.4), std::pair("micrometres", 0.001)}) {
-    const double off = std::abs(std::log(size * factor / kUsual_mm));
-    if (size * factor >= 1.5 * kSmallest_mm && size * factor <= 0.8 * kLargest_mm && off < least) {
+    const double size_mm = size * factor, off = std::abs(std::log(size_mm / kUsual_mm));
+    if (size_mm >= 1.5 * kSmallestHead_mm && size_mm <= 0.8 * kLargestHead_mm && off < least) {
       least = off;
-      guess = fmt::format("it looks like {}; multiply by {}, or say its unit (subject.units)", unit,
-                          factor);
+      guess = fmt::format("it looks like {}; {}", unit, fmt::format(fmt::runtime(remedy), factor));
     }
   }
-  throw InputError(
-      fmt::format("{}: its longest side is {:.4g} mm, which is no head's ({} to {} mm); {}", name,
-                  size, kSmallest_mm, kLargest_mm, guess));
+  return guess;
 }
 
 // Beyond this, numbers of a file's single precision lie more than 0.01 mm apart.
@@ -82,11 +74,20 @@ double OutwardShare(const TriMesh& mesh) {
 
 }  // namespace
 
+void CheckHeadSize(double longest_mm, const std::string& name, const std::string& remedy) {
+  if (!(longest_mm >= kSmallestHead_mm && longest_mm <= kLargestHead_mm)) {
+    throw InputError(
+        fmt::format("{}: its longest side is {:.4g} mm, which is no head's ({} to {} mm); {}", name,
+                    longest_mm, kSmallestHead_mm, kLargestHead_mm, UnitGuess(longest_mm, remedy)));
+  }
+}
+
 std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& name) {
   if (mesh.triangles.empty()) {
     throw InputError(fmt::format("{}: the mesh has no triangles", name));
   }
-  CheckUnit(Bounds(mesh).sizes().maxCoeff(), name);
+  CheckHeadSize(Bounds(mesh).sizes().maxCoeff(), name,
+                "multiply by {}, or say its unit (subject.units)");
   CheckPlace(mesh, name);
   CheckArea(mesh, name);
   const double outward = OutwardShare(mesh);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "problems/ct/half_maximum_edge.h"
+#include "problems/ct/mr_skin.h"
 #include "surfaces/marching/polygonize.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/ct_phantom.h"
@@ -213,6 +214,21 @@ TEST_F(ImportCtTest, VolumesWithoutAHeadAreOneClearError) {
   std::fill(full.values.begin(), full.values.end(), 40);
   EXPECT_THAT(WordsOf<InputError>([&] { ImportCt(full, {}, {}); }),
               HasSubstr("no air below -200 HU"));
+}
+
+// A header is all that says where voxels lie: subject.units is for meshes.
+TEST_F(ImportCtTest, WhatIsTooSmallForAHeadIsToldWithWhatToDo) {
+  const auto to_do = HasSubstr(
+      "it looks like centimetres; multiply spacing and origin in the "
+      "volume's header by 10");
+  CtVolume small = volume_;
+  small.spacing_mm = Vec3(0.3, 0.3, 0.3);
+  EXPECT_THAT(WordsOf<InputError>([&] { ImportCt(small, {}, {}); }),
+              AllOf(HasSubstr("import-ct: the volume: its longest side is 24.3 mm"), to_do));
+  EXPECT_THAT(WordsOf<InputError>([&] { ImportMrSkin(small, {}, {}); }), to_do);
+  const CtVolume aside = CtPhantom{.skin_mm = 16, .bone_mm = 13, .brain_mm = 8}.Make();
+  EXPECT_THAT(WordsOf<InputError>([&] { ImportCt(aside, {}, {}); }),
+              AllOf(HasSubstr("import-ct: the skull: its longest side is 26"), to_do));
 }
 
 // A slope blurred evenly crosses half its height where its edge is, wherever the threshold was.

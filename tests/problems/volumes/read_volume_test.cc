@@ -4,6 +4,8 @@
 
 #include <Eigen/Dense>  // before ITK, which else brings a part of an older one
 
+#include <archive.h>
+#include <archive_entry.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -34,6 +36,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::ScratchFolder;
 using testing::SliceWords;
 using testing::WordsOf;
@@ -89,6 +92,48 @@ CtVolume Resampled(const CtVolume& from, CtVolume to) {
   return to;
 }
 
+// Bytes of the machine, which are little-endian.
+template <class Value>
+std::string BytesOf(const std::vector<Value>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value)};
+}
+
+template <class Value>
+void PutAt(std::size_t at, Value value, std::string& bytes) {
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+// One member.
+std::string Gzipped(const std::string& bytes) {
+  std::string packed(bytes.size() + 1000, ' ');
+  std::size_t used = 0;
+  archive* a = archive_write_new();
+  archive_write_add_filter_gzip(a);
+  archive_write_set_format_raw(a);
+  archive_write_set_bytes_in_last_block(a, 1);
+  archive_write_open_memory(a, packed.data(), packed.size(), &used);
+  archive_entry* entry = archive_entry_new();
+  archive_entry_set_filetype(entry, AE_IFREG);
+  archive_write_header(a, entry);
+  archive_write_data(a, bytes.data(), bytes.size());
+  archive_entry_free(entry);
+  archive_write_free(a);
+  packed.resize(used);
+  return packed;
+}
+
+// Of an NRRD that lies in LPS, as its header says it.
+std::string LpsDirections(const VoxelArray& a, const Vec3& to_space, const char* more = "") {
+  std::string directions;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 step = to_space.cwiseProduct(a.steps.col(axis));
+    directions += fmt::format("({},{},{}{}) ", step.x(), step.y(), step.z(), more);
+  }
+  const Vec3 origin = to_space.cwiseProduct(a.origin);
+  return fmt::format("space directions: {}\nspace origin: ({},{},{}{})\n", directions, origin.x(),
+                     origin.y(), origin.z(), more);
+}
+
 class ReadVolumeTest : public ::testing::Test {
  protected:
   VolumeReading Read(const fs::path& name, const ReadVolumeOptions& options = {}) const {
@@ -110,6 +155,25 @@ class ReadVolumeTest : public ::testing::Test {
           (read.World(at.x(), at.y(), at.z()) - head_.volume.World(at.x(), at.y(), at.z())).norm(),
           1e-3);
     }
+  }
+
+  void WriteNrrd(const std::string& name, const std::string& lines) const {
+    WriteFileAtomically(
+        folder_ / name,
+        fmt::format("NRRD0004\ntype: short\ndimension: 3\nsizes: {}\n{}endian: little\nencoding: "
+                    "raw\n\n{}",
+                    fmt::join(array_.counts, " "), lines, BytesOf(array_.values)));
+  }
+  void WriteMetaImage(const std::string& name, const std::string& lines) const {
+    WriteFileAtomically(
+        folder_ / name,
+        fmt::format("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = "
+                    "False\n{}DimSize = {}\nElementType = MET_SHORT\nElementDataFile = LOCAL\n{}",
+                    lines, fmt::join(array_.counts, " "), BytesOf(array_.values)));
+  }
+  std::string NiftiBytes() const {
+    WriteItk(folder_ / "plain.nii", array_, *itk::NiftiImageIO::New());
+    return ReadFileBytes(folder_ / "plain.nii");
   }
 
   // The skull of what was read lies within half a voxel of the phantom's, at its outer side.
@@ -185,6 +249,132 @@ TEST_F(ReadVolumeTest, BigEndianFilesAreRead) {
                   "domain\nendian: big\nencoding: raw\nspace origin: ({},{},{})\n\n{}",
                   sizes, -o.x(), -o.y(), o.z(), swapped));
   ExpectTheHead(Read("big.nrrd"));
+}
+
+// ITK makes floats of these: twice the bytes that are in the file.
+TEST_F(ReadVolumeTest, ANiftiWithSlopeAndInterceptIsWhole) {
+  constexpr std::size_t kType = 70, kSlope = 112, kIntercept = 116, kVoxels = 352;
+  std::string bytes = NiftiBytes().substr(0, kVoxels);
+  std::vector<std::uint16_t> stored;
+  for (const std::int16_t value : array_.values) {
+    stored.push_back(static_cast<std::uint16_t>(value + 1024));
+  }
+  PutAt<std::int16_t>(kType, 512, bytes);
+  PutAt(kSlope, 1.0F, bytes);
+  PutAt(kIntercept, -1024.0F, bytes);
+  bytes += BytesOf(stored);
+  WriteFileAtomically(folder_ / "a.nii", bytes);
+  WriteFileAtomically(folder_ / "a.nii.gz", Gzipped(bytes));
+  ExpectTheHead(Read("a.nii"));
+  ExpectTheHead(Read("a.nii.gz"));
+  WriteFileAtomically(folder_ / "cut.nii", bytes.substr(0, bytes.size() - 2));
+  EXPECT_THAT(Words("cut.nii"), HasSubstr(fmt::format("cut short: {} bytes", 2 * stored.size())));
+}
+
+TEST_F(ReadVolumeTest, GzipOfSeveralMembersOrPaddedIsReadAndNothingThatIsCut) {
+  const std::string bytes = NiftiBytes();
+  const std::string first = Gzipped(bytes.substr(0, bytes.size() / 3));
+  const std::string both = first + Gzipped(bytes.substr(bytes.size() / 3));
+  for (const std::string& whole : {both, both + std::string(512, '\0'), Gzipped(bytes)}) {
+    WriteFileAtomically(folder_ / "a.nii.gz", whole);
+    ExpectTheHead(Read("a.nii.gz"));
+  }
+  for (const std::size_t size : {both.size() - 1, both.size() - 9, both.size() / 2,
+                                 first.size() + 5, first.size(), first.size() - 4}) {
+    WriteFileAtomically(folder_ / "a.nii.gz", both.substr(0, size));
+    EXPECT_THAT(Words("a.nii.gz"), HasSubstr("a.nii.gz: the file is cut short")) << size;
+  }
+}
+
+TEST_F(ReadVolumeTest, EverySpaceOfAnNrrdIsTurnedToLps) {
+  const Vec3 lps(1, 1, 1), ras(-1, -1, 1), las(1, -1, 1);
+  for (const auto& [space, to_space] :
+       {std::pair("left-posterior-superior", lps), std::pair("LPS", lps),
+        std::pair("right-anterior-superior", ras), std::pair("ras", ras),
+        std::pair("Left-Anterior-Superior", las), std::pair("LAS", las)}) {
+    WriteNrrd("a.nrrd",
+              fmt::format("# space: LPS\nspace: {}\n{}", space, LpsDirections(array_, to_space)));
+    const VolumeReading reading = Read("a.nrrd");
+    ExpectTheHead(reading);
+    EXPECT_THAT(reading.notes, Not(Contains(HasSubstr("taken as"))));
+  }
+  WriteFileAtomically(
+      folder_ / "time.nrrd",
+      fmt::format(
+          "NRRD0004\ntype: short\ndimension: 4\nsizes: {} 1\nspace: LAST\n{}endian: "
+          "little\nencoding: raw\n\n{}",
+          fmt::join(array_.counts, " "),
+          [&] {
+            std::string lines = LpsDirections(array_, las, ",0");
+            return lines.replace(lines.find("\n"), 1, "(0,0,0,1)\n");
+          }(),
+          BytesOf(array_.values)));
+  ExpectTheHead(Read("time.nrrd"));
+}
+
+TEST_F(ReadVolumeTest, SpacesThatSayNothingOfTheHeadAreTold) {
+  const std::string directions = LpsDirections(array_, Vec3::Ones());
+  for (const auto& [space, why] : {std::pair("space: scanner-xyz\n", "its space is scanner-xyz"),
+                                   std::pair("space: 3D-right-handed\n", "is 3D-right-handed"),
+                                   std::pair("space dimension: 3\n", "has no 'space'")}) {
+    WriteNrrd("a.nrrd", space + directions);
+    const VolumeReading reading = Read("a.nrrd");
+    ExpectTheHead(reading);
+    EXPECT_THAT(reading.notes, Contains(AllOf(HasSubstr("does not say how it lies"), HasSubstr(why),
+                                              HasSubstr("taken as LPS"))));
+  }
+  WriteNrrd("a.nrrd", "space: 3D-left-handed\n" + directions);
+  EXPECT_THAT(Words("a.nrrd"), AllOf(HasSubstr("mirror image"), HasSubstr("(LAS)")));
+  for (const char* none : {"RPS", "LPI", "3DRH"}) {
+    WriteNrrd("a.nrrd", fmt::format("space: {}\n{}", none, directions));
+    EXPECT_THAT(Words("a.nrrd"), HasSubstr(fmt::format("'{}' is no space of NRRD", none)));
+  }
+  WriteNrrd("a.nrrd", "space: LPS\nspace directions: (1,0) (0,1) (1,1)\n");
+  EXPECT_THAT(Words("a.nrrd"), HasSubstr("no vectors of three numbers"));
+}
+
+TEST_F(ReadVolumeTest, AFileThatDoesNotSayHowItLiesIsTold) {
+  constexpr std::size_t kQformCode = 252, kSformCode = 254;
+  std::string nifti = NiftiBytes();
+  PutAt<std::int16_t>(kQformCode, 0, nifti);
+  PutAt<std::int16_t>(kSformCode, 0, nifti);
+  WriteFileAtomically(folder_ / "a.nii", nifti);
+  WriteFileAtomically(folder_ / "a.nii.gz", Gzipped(nifti));
+  WriteNrrd("a.nrrd", "spacings: 2.5 2.5 3.5\n");
+  WriteMetaImage("a.mha", "ElementSpacing = 2.5 2.5 3.5\n");
+  for (const char* name : {"a.nii", "a.nii.gz", "a.nrrd", "a.mha"}) {
+    const VolumeReading reading = Read(name);
+    EXPECT_THAT(reading.notes, Contains(AllOf(HasSubstr("the file does not say how it lies ("),
+                                              HasSubstr("); taken as LPS"))))
+        << name;
+    EXPECT_EQ(reading.volume.values, array_.values) << name;
+    EXPECT_EQ(reading.volume.origin, Vec3(0, 0, 0)) << name;
+    EXPECT_LT((reading.volume.spacing_mm - Vec3(2.5, 2.5, 3.5)).norm(), 1e-6) << name;
+  }
+  WriteNrrd("a.nrrd", "");
+  EXPECT_THAT(Read("a.nrrd").notes, Contains(HasSubstr("taken as LPS, its voxels 1 mm apart")));
+  WriteFileAtomically(folder_ / "a.nii", NiftiBytes());
+  EXPECT_THAT(Read("a.nii").notes, Not(Contains(HasSubstr("taken as"))));
+}
+
+TEST_F(ReadVolumeTest, TheUnitThatAHeaderNamesIsTaken) {
+  VoxelArray cm = array_;
+  cm.steps /= 10;
+  cm.origin /= 10;
+  const std::string lines = "space: LPS\n" + LpsDirections(cm, Vec3::Ones());
+  WriteNrrd("a.nrrd", lines + "space units: \"cm\" \"cm\" \"cm\"\n");
+  WriteMetaImage("a.mha", fmt::format("TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = {} {} {}\n"
+                                      "ElementSpacing = .25 .25 .35\nDistanceUnits = cm\n",
+                                      cm.origin.x(), cm.origin.y(), cm.origin.z()));
+  for (const char* name : {"a.nrrd", "a.mha"}) {
+    const VolumeReading reading = Read(name);
+    ExpectTheHead(reading);
+    EXPECT_THAT(reading.notes, Contains(HasSubstr("lengths are in cm; multiplied by 10 to mm")));
+  }
+  WriteNrrd("a.nrrd", lines + "space units: \"el\" \"el\" \"el\"\n");
+  EXPECT_THAT(Read("a.nrrd").notes, Contains(HasSubstr("in 'el', which is not known here")));
+  WriteNrrd("a.nrrd", "spacings: .25 .25 .35\nunits: \"cm\" \"cm\" \"cm\"\n");
+  EXPECT_LT((Read("a.nrrd").volume.spacing_mm - Vec3(2.5, 2.5, 3.5)).norm(), 1e-6);
 }
 
 TEST_F(ReadVolumeTest, DicomIsSortedBySpaceAndDecompressed) {
@@ -375,8 +565,10 @@ TEST_F(ReadVolumeTest, ANiftiWhoseVoxelsLieNowhereIsRefusedAtOnce) {
       bytes[252] = bytes[254] = 1;
       std::memcpy(bytes.data() + at, &value, sizeof value);
       WriteFileAtomically(folder_ / "x.nii", bytes);
-      EXPECT_THAT(WordsOf<Error>([&] { Read("x.nii"); }),
-                  HasSubstr("numbers that say how its voxels lie"));
+      WriteFileAtomically(folder_ / "x.nii.gz", Gzipped(bytes));
+      for (const char* name : {"x.nii", "x.nii.gz"}) {
+        EXPECT_THAT(Words(name), HasSubstr("numbers that say how its voxels lie"));
+      }
     }
   }
 }
