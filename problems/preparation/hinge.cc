@@ -16,6 +16,7 @@ namespace semblance {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kLeastCondyles_mm = 40;  // apart; those of adults are 80 to 120
 
 Vec3 PointOf(const std::array<double, 3>& p) { return {p[0], p[1], p[2]}; }
 
@@ -47,6 +48,23 @@ void TurnLandmark(const Hinge& hinge, double opening_deg, Landmark& landmark) {
 
 }  // namespace
 
+std::string CondyleFault(const std::array<double, 3>& left, const std::array<double, 3>& right) {
+  const double apart_mm = (PointOf(left) - PointOf(right)).norm();
+  if (!(apart_mm >= kLeastCondyles_mm)) {
+    return fmt::format(
+        "the condyles are {:.1f} mm apart, and an axis needs at least {} mm; give the middle of "
+        "each, in mm",
+        apart_mm, kLeastCondyles_mm);
+  }
+  if (!(left[0] > right[0])) {
+    return fmt::format(
+        "the left condyle lies to the right of the right one (x of {} and {} mm; in LPS +x is the "
+        "subject's left); exchange the two, or negate x and y of points that are RAS",
+        left[0], right[0]);
+  }
+  return "";
+}
+
 Vec3 Hinge::Opened(const Vec3& p, double opening_deg) const {
   if (opening_deg == 0) {
     return p;
@@ -56,6 +74,10 @@ Vec3 Hinge::Opened(const Vec3& p, double opening_deg) const {
 
 Hinge HingeOf(const MandibleOptions& options, const LandmarkFile& landmarks) {
   if (options.condyle_left && options.condyle_right) {
+    if (const std::string fault = CondyleFault(*options.condyle_left, *options.condyle_right);
+        !fault.empty()) {
+      throw InputError("subject.mandible.condyle_left: " + fault);
+    }
     return {PointOf(*options.condyle_left), PointOf(*options.condyle_right)};
   }
   std::vector<SitePoint> cranium;

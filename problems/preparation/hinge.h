@@ -43,11 +43,16 @@ void Fields(Visitor& visit, MandibleOptions& o) {
         o.bite_mm);
   visit(FieldInfo{.name = "condyle_left",
                   .unit = "mm",
-                  .doc = "middle of the left condyle, LPS; else predicted from the landmarks"},
+                  .doc = "middle of the left condyle, LPS (+x is the subject's left); else "
+                         "predicted from the landmarks"},
         o.condyle_left);
   visit(FieldInfo{.name = "condyle_right", .unit = "mm", .doc = "of the right one; both or none"},
         o.condyle_right);
 }
+
+// What is wrong with two condyles, in words; empty where they can be an axis. Exchanged ones would
+// open a mouth that is to close, and points that are all but one have no direction.
+std::string CondyleFault(const std::array<double, 3>& left, const std::array<double, 3>& right);
 
 template <class Report>
 void CheckValue(Report& report, const MandibleOptions& o) {
@@ -57,6 +62,11 @@ void CheckValue(Report& report, const MandibleOptions& o) {
   if (o.condyle_left.has_value() != o.condyle_right.has_value()) {
     report(o.condyle_left ? "condyle_left" : "condyle_right",
            "an axis needs both condyles; give the other one too, or none");
+  }
+  if (o.condyle_left && o.condyle_right) {
+    if (const std::string fault = CondyleFault(*o.condyle_left, *o.condyle_right); !fault.empty()) {
+      report("condyle_left", fault);
+    }
   }
   if (o.mesh.empty() && (o.opening_deg || o.bite_mm || o.condyle_left)) {
     report("mesh", "there is no mesh to turn; name that of the mandible");
@@ -72,7 +82,8 @@ struct Hinge {
 };
 
 // The condyles of the options, else where the average skull has them (jaw_pose.h), laid onto the
-// cranium's sites. Throws InputError if those are fewer than three, or on a line.
+// cranium's sites. Throws InputError if those are fewer than three, or on a line, and for condyles
+// with a CondyleFault.
 Hinge HingeOf(const MandibleOptions& options, const LandmarkFile& landmarks);
 
 // The opening nearest to 0 that brings `lower`, which turns, to bite_mm from `upper`. Throws

@@ -15,6 +15,7 @@
 namespace semblance {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -123,6 +124,31 @@ TEST(MandibleOptions, WhatDoesNotGoTogetherIsToldAtItsLine) {
   EXPECT_THAT(words("{mesh: a.ply, condyle_left: [1, 2, 3]}"), HasSubstr("needs both condyles"));
   EXPECT_THAT(words("{opening_deg: 3}"), HasSubstr("there is no mesh to turn"));
   EXPECT_THAT(words("{mesh: a.ply, opening_deg: 90}"), HasSubstr("opening_deg"));
+}
+
+TEST(MandibleOptions, CondylesAreAnAxisFromRightToLeft) {
+  const auto words = [](const std::string& condyles) {
+    return WordsOf<ConfigError>([&] {
+      ReadConfigText<MandibleOptions>("{mesh: a.ply, opening_deg: -10, " + condyles + "}",
+                                      "a.yaml");
+    });
+  };
+  EXPECT_THAT(words("condyle_left: [-48, 75, -40], condyle_right: [50, 76, -38]"),
+              AllOf(HasSubstr("condyle_left"), HasSubstr("exchange the two")));
+  EXPECT_THAT(words("condyle_left: [50, 76, -38], condyle_right: [50, 76, -38]"),
+              HasSubstr("0.0 mm apart"));
+  EXPECT_THAT(words("condyle_left: [5.0, 7.6, -3.8], condyle_right: [-4.8, 7.5, -4.0]"),
+              HasSubstr("at least 40 mm"));
+  const auto options = ReadConfigText<MandibleOptions>(
+      "{mesh: a.ply, condyle_left: [50, 76, -38], condyle_right: [-48, 75, -40]}", "a.yaml");
+  EXPECT_EQ(HingeOf(options, {}).left, kHinge.left);
+}
+
+TEST(Hinge, CondylesThatNoConfigurationHasCheckedAreRefusedToo) {
+  MandibleOptions options;
+  options.condyle_left = options.condyle_right = {50, 76, -38};
+  EXPECT_THAT(WordsOf<InputError>([&] { HingeOf(options, {}); }),
+              HasSubstr("subject.mandible.condyle_left: the condyles are 0.0 mm apart"));
 }
 
 }  // namespace
