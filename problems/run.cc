@@ -205,6 +205,12 @@ RunResult ResultOf(const SkullStage& skull, Case subject, MadeFace made) {
 
 }  // namespace
 
+std::vector<std::string> RunResult::Notes() const {
+  std::vector<std::string> notes = subject.notes;
+  notes.insert(notes.end(), implicit.notes.begin(), implicit.notes.end());
+  return notes;
+}
+
 std::vector<std::string> RunResult::Faults() const {
   std::vector<std::string> faults = FaultsIn(fit);
   if (face.mesh.points.empty()) {
@@ -232,6 +238,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   const auto skull = MakeSkullStage(experiment, shared, step, context);
   const DepthStage& bone = *skull->depth_stage;
   Case subject = bone.subject;
+  CheckFaceOptions(experiment, subject);
   auto scored =
       step("find the skin to score", [&] { return SkinToScore(experiment, subject, shared); });
   const FacesAtHand faces = GivenFaces(experiment, shared, step, subject, context);
@@ -241,7 +248,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
     return MakeFace({experiment, *faces.generic, prior, subject, seedable, bone.shell}, context);
   });
   NoteDraw(experiment, subject);
-  auto before_edits = EditByHand(experiment, made.fitted, subject);
+  auto before_edits = EditByHand(experiment, made, subject);
   CheckFinite(made.fitted.fit.surface);
   Tessellation face =
       step("tessellate", [&] { return Tessellate(made.fitted.fit.surface, kFaceQuadsPerPatch); });

@@ -55,6 +55,8 @@ struct RunResult {
   std::optional<Bust> bust;                     // of bust_model
   std::vector<StepTime> times;                  // not part of the result proper
 
+  // What people should know, a line each: of the subject and its face, then of the implicit face.
+  std::vector<std::string> Notes() const;
   // Why the face cannot be used; empty if it can.
   std::vector<std::string> Faults() const;
   bool usable() const { return Faults().empty(); }

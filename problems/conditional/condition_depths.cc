@@ -19,87 +19,6 @@ using Notes = std::vector<std::string>;
 
 constexpr double kThinnest_mm = 0.5;
 
-// The sites that a code means: a pair's code without side both of them.
-std::vector<std::string> SitesOf(const std::string& code) {
-  std::vector<std::string> sites;
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    for (const Site& site : *list) {
-      if (site.code == code || site.landmark == code) {
-        sites.push_back(site.code);
-      }
-    }
-  }
-  return sites;
-}
-
-[[noreturn]] void RefuseSite(const char* option, const std::string& code) {
-  throw InputError(fmt::format("tissue.given.{}: {}", option, ComplaintAboutLandmark(code)));
-}
-
-void Add(const char* option, const std::string& site, double depth_mm,
-         std::map<std::string, double>& known) {
-  if (!known.emplace(site, depth_mm).second) {
-    throw InputError(fmt::format("tissue.given.{}: the depth of {} is given twice; leave one out",
-                                 option, SiteInWords(site)));
-  }
-}
-
-std::optional<double> MeasuredAt(const LandmarkFile& file, const std::string& site) {
-  const auto at = std::ranges::find(file.landmarks, site, &Landmark::site);
-  if (at == file.landmarks.end()) {
-    return std::nullopt;
-  }
-  return at->depth_along_normal_mm ? at->depth_along_normal_mm : at->depth_closest_mm;
-}
-
-void AddMeasured(const std::string& code, const LandmarkFile& file,
-                 std::map<std::string, double>& known) {
-  const std::vector<std::string> sites = SitesOf(code);
-  if (sites.empty()) {
-    RefuseSite("measured", code);
-  }
-  bool any = false;
-  for (const std::string& site : sites) {
-    if (const auto depth_mm = MeasuredAt(file, site)) {
-      Add("measured", site, *depth_mm, known);
-      any = true;
-    }
-  }
-  if (!any) {
-    throw InputError(fmt::format(
-        "tissue.given.measured: {} has no measured depth in the landmarks' file; measure it there, "
-        "or give it under depths_mm",
-        SiteInWords(code)));
-  }
-}
-
-void AddAllMeasured(const LandmarkFile& file, std::map<std::string, double>& known) {
-  for (const Landmark& landmark : file.landmarks) {
-    const auto depth_mm = MeasuredAt(file, landmark.site);
-    if (depth_mm && !known.contains(landmark.site)) {
-      known[landmark.site] = *depth_mm;
-    }
-  }
-}
-
-// Of depths_mm and measured, by site with side.
-std::map<std::string, double> KnownDepths(const TissueGiven& given, const LandmarkFile& file) {
-  std::map<std::string, double> known;
-  for (const auto& [code, depth_mm] : given.depths_mm) {
-    const std::vector<std::string> sites = SitesOf(code);
-    if (sites.empty()) {
-      RefuseSite("depths_mm", code);
-    }
-    for (const std::string& site : sites) {
-      Add("depths_mm", site, depth_mm, known);
-    }
-  }
-  for (const std::string& code : given.measured) {
-    code == "all" ? AddAllMeasured(file, known) : AddMeasured(code, file, known);
-  }
-  return known;
-}
-
 std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
   std::map<std::string, double> known;
   const auto add = [&](const char* name, const std::optional<double>& value) {
@@ -112,11 +31,6 @@ std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
   add("age_years", given.age_years);
   add("bmi", given.bmi);
   return known;
-}
-
-// Whether the depth of a site is set by hand and so not a table's.
-bool IsSet(const TissueOptions& options, const std::string& site) {
-  return options.set_mm.contains(site) || options.set_mm.contains(WithoutSide(site));
 }
 
 // The tables' means in place of those of the table of spreads.
@@ -267,8 +181,8 @@ std::vector<std::string> ConditionDepths(const TissueOptions& options,
   std::vector<std::string> kept;
   for (Dowel& dowel : dowels) {
     const auto own = depths.find(dowel.site);
-    if (IsSet(options, dowel.site)) {
-      continue;
+    if (!SetFor(options, dowel.site).empty()) {
+      continue;  // set by hand, and so no table's
     }
     if (!Give(options, joint, expected, dowel)) {
       own == depths.end() ? kept.push_back(dowel.site) : void(dowel.sd_mm = options.given.error_mm);

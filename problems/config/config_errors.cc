@@ -10,26 +10,31 @@
 
 namespace semblance {
 
+namespace {
+
+// Defaults, which stand in no source, come first.
+std::tuple<int, int, int> PlaceOf(const ConfigFault& fault) {
+  const ConfigLocation& at = fault.location;
+  return {at.source ? at.source->order : -1, at.line, at.column};
+}
+
+}  // namespace
+
 void ConfigErrors::Add(const ConfigLocation& location, std::string_view path,
                        std::string_view what) {
-  const std::string_view separator = path.empty() ? "" : ": ";
-  errors_.push_back({.order = location.source ? location.source->order : -1,
-                     .line = location.line,
-                     .column = location.column,
-                     .text = fmt::format("{}: {}{}{}", ToText(location), path, separator, what)});
+  faults_.push_back({location, std::string(path), std::string(what)});
 }
 
 void ConfigErrors::ThrowIfAny() const {
-  if (errors_.empty()) {
+  if (faults_.empty()) {
     return;
   }
-  std::vector<OneError> sorted = errors_;
-  std::stable_sort(sorted.begin(), sorted.end(), [](const OneError& a, const OneError& b) {
-    return std::tie(a.order, a.line, a.column) < std::tie(b.order, b.line, b.column);
-  });
+  std::vector<ConfigFault> sorted = faults_;
+  std::ranges::stable_sort(sorted, {}, PlaceOf);
   std::string lines;
-  for (const OneError& error : sorted) {
-    lines += (lines.empty() ? "" : "\n") + error.text;
+  for (const ConfigFault& fault : sorted) {
+    lines += fmt::format("{}{}: {}{}{}", lines.empty() ? "" : "\n", ToText(fault.location),
+                         fault.path, fault.path.empty() ? "" : ": ", fault.what);
   }
   throw ConfigError(lines);
 }

@@ -15,24 +15,25 @@ struct OptionFault {
   std::string path, what;
 };
 
+// One that is told, with its place.
+struct ConfigFault {
+  ConfigLocation location;
+  std::string path, what;
+};
+
 class ConfigErrors {
  public:
   // `path` is that of the entry ("a.b[0].c"), empty for the document as a whole; `what` is one
   // clause or more, with the remedy.
   void Add(const ConfigLocation& location, std::string_view path, std::string_view what);
-  std::size_t size() const { return errors_.size(); }
+  std::size_t size() const { return faults_.size(); }
+  const std::vector<ConfigFault>& faults() const { return faults_; }
   // Throws ConfigError with one line an error, in the order of sources, lines and columns; does
   // nothing if there are none.
   void ThrowIfAny() const;
 
  private:
-  struct OneError {
-    int order;
-    int line;
-    int column;
-    std::string text;
-  };
-  std::vector<OneError> errors_;
+  std::vector<ConfigFault> faults_;
 };
 
 }  // namespace semblance

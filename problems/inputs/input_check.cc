@@ -58,6 +58,10 @@ bool IsMade(const Experiment& experiment) {
   return std::holds_alternative<PhantomOptions>(experiment.subject);
 }
 
+bool UsesAllLandmarks(const Experiment& experiment) {
+  return std::holds_alternative<KeepAll>(experiment.landmarks.keep);
+}
+
 // A loader stops at the first file that is at fault; this looks at each by itself.
 void LookAtParts(const FileSubject& subject, CheckFindings& findings) {
   for (const fs::path& mesh : {subject.skull, subject.skin, subject.mandible.mesh}) {
@@ -214,11 +218,13 @@ CheckFindings InputCheck::LookAtFace(const Experiment& experiment) {
 }
 
 CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
-  if (IsMade(experiment) && experiment.sites.empty()) {
+  if (IsMade(experiment) && UsesAllLandmarks(experiment) && experiment.sites.empty() &&
+      experiment.rules.points.empty()) {
     return {};  // its landmarks lie on its bone
   }
-  const std::string key = StageKey("case", experiment.subject, experiment.landmarks,
-                                   experiment.tissue, experiment.sites, experiment.network);
+  const std::string key =
+      StageKey("case", experiment.subject, experiment.landmarks, experiment.tissue,
+               experiment.sites, experiment.network, experiment.rules, WayToFace(experiment));
   return Once(key, [&](CheckFindings& found) {
     const auto subject = loaded_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
       return LoadSubject(experiment.subject, context_);
@@ -226,7 +232,7 @@ CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
     if (!IsMade(experiment)) {
       found.warnings = CheckSubject(*subject, experiment.landmarks);
     }
-    MakeCase(*subject, experiment);
+    CheckFaceOptions(experiment, MakeCase(*subject, experiment));
   });
 }
 

@@ -27,7 +27,9 @@ struct CheckFindings {
 // name it. Phantoms are made only for what cannot be known without them.
 class InputCheck {
  public:
-  explicit InputCheck(const RunContext& context) : context_(context) {}
+  // loaded: keeps what was read for who runs the experiments afterwards; null: nobody does.
+  explicit InputCheck(const RunContext& context, StageCache* loaded = nullptr)
+      : context_(context), loaded_(loaded == nullptr ? own_ : *loaded) {}
 
   // All faults of the experiment's inputs. What rests on an input that is at fault (the landmarks
   // on a skull that cannot be read) is left out. Throws Cancelled.
@@ -44,7 +46,8 @@ class InputCheck {
   CheckFindings LookAtCase(const Experiment& experiment);
 
   RunContext context_;
-  StageCache loaded_{6};
+  StageCache own_{6};
+  StageCache& loaded_;
   std::map<std::string, CheckFindings> known_;
 };
 

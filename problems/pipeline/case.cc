@@ -175,7 +175,7 @@ std::vector<std::string> UseSome(const SubjectData& data, const PlaceOptions& op
                                  Case& subject) {
   UsedLandmarks used = LandmarksInUse(data.landmarks, skull, options);
   subject.dowels_on_bone = PlaceDowels(used.file, data.skull, skull, options);
-  Append(used.notes, FillDepths(tissue, used.file, subject.dowels_on_bone));
+  Append(used.notes, FillDepths(tissue, data.landmarks, subject.dowels_on_bone));
   return used.notes;
 }
 
@@ -268,6 +268,22 @@ void LayScoredNetwork(const NetworkPlan& plan, Case& subject) {
   subject.scored_network = BuildNetwork(plan, subject.scored_on_bone);
 }
 
+// A prior's most likely face has its own places for the sites, which no fit moves.
+void AddUnusedUv(const Experiment& experiment, const Case& subject,
+                 std::vector<std::string>& mistakes) {
+  if (!std::holds_alternative<PriorFace>(WayToFace(experiment))) {
+    return;
+  }
+  for (const auto& [name, site] : experiment.sites) {
+    if (site.uv && subject.points.contains(name)) {
+      mistakes.push_back(fmt::format(
+          "sites.{0}.uv: `face: prior` has a place of its own for the landmark {0} and does not "
+          "look at this one; leave it out, or write `face: prior_then_fit` and `hold: true`",
+          name));
+    }
+  }
+}
+
 void AppendInputs(const Experiment& experiment, Case& subject) {
   subject.inputs.push_back(experiment.network);
   Append(subject.inputs, TablesOf(ExpectedTissue(experiment).value_or(experiment.tissue)));
@@ -319,6 +335,20 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQ
   LayScoredNetwork(plan, subject);
   AppendInputs(experiment, subject);
   return subject;
+}
+
+void CheckFaceOptions(const Experiment& experiment, const Case& subject) {
+  std::vector<std::string> mistakes;
+  AddUnusedUv(experiment, subject, mistakes);
+  if (!experiment.rules.points.empty()) {
+    const auto& pose = subject.basis.sites;
+    Append(mistakes,
+           MistakesOfRulePoints(experiment.rules, MeshQuery(subject.skull),
+                                pose ? &pose->skull_from_average : nullptr, experiment.landmarks));
+  }
+  if (!mistakes.empty()) {
+    throw InputError(fmt::format("{}", fmt::join(mistakes, "\n")));
+  }
 }
 
 ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options) {

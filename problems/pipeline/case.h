@@ -63,6 +63,11 @@ Case MakeCase(const SubjectData& subject, const Experiment& experiment);
 // The same where the query of the subject's skull is at hand.
 Case MakeCase(const SubjectData& subject, const Experiment& experiment, const MeshQuery& skull);
 
+// Whether what `rules` and `sites` say of the face can hold for this subject. Throws InputError, a
+// line each, for a point of a rule that is off the bone or on the other side, and for the (u,v) of
+// a landmark where the way to the face does not look at it.
+void CheckFaceOptions(const Experiment& experiment, const Case& subject);
+
 // Of the subject's skin, which must be there.
 ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options);
 ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& felt,

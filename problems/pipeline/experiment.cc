@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -172,6 +173,40 @@ void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faul
   }
 }
 
+std::string_view NameOf(const FaceSource& face) {
+  return std::visit([](const auto& way) { return way.kName; }, face);
+}
+
+// What of `uncertainty` this way to a face does not look at. template_sd_mm and unseen_sd_mm may
+// stand with any: they say of a template, which a phantom's has in common, whether it is exact.
+void CheckUncertainty(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  const FaceSource face = WayToFace(experiment);
+  if (std::holds_alternative<FittedTemplate>(face)) {
+    return;
+  }
+  const UncertaintyOptions usual, &given = experiment.uncertainty;
+  const bool asks = AsksPrior(face);
+  const auto refuse = [&](const char* field, const std::string& remedy) {
+    faults.push_back(
+        {fmt::format("uncertainty.{}", field),
+         fmt::format("`face: {}` does not look at it; leave it out{}", NameOf(face), remedy)});
+  };
+  const auto of_fit = [&](const char* field, double UncertaintyOptions::*option,
+                          const char* of_prior) {
+    if (given.*option != usual.*option) {
+      refuse(field, (asks ? of_prior : std::string()) + ", or write `face: fit`");
+    }
+  };
+  of_fit("dowel_sd_mm", &UncertaintyOptions::dowel_sd_mm, "");
+  of_fit("implicit_sd_mm", &UncertaintyOptions::implicit_sd_mm,
+         ", say it under face.implicit_spread");
+  of_fit("own", &UncertaintyOptions::own, ", say it under face.table_depths.own");
+  of_fit("shared", &UncertaintyOptions::shared, ", say it under face.table_depths.shared");
+  if (given.samples > 0 && !asks) {
+    refuse("samples", ", or write `face: fit` or one of a prior, which can be drawn from");
+  }
+}
+
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
@@ -194,6 +229,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   CheckPhantom(experiment.subject, faults);
   CheckRegion(experiment.region, faults);
   CheckWayToFace(experiment, faults);
+  CheckUncertainty(experiment, faults);
   CheckAutoPlan(experiment, faults);
   CheckBust(experiment, faults);
   return faults;

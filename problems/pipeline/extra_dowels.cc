@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
+#include <set>
 
 #include "interp/dowels/network_insertion.h"
 #include "problems/conditional/condition_depths.h"
@@ -100,16 +102,15 @@ void CheckApart(const Dowel& dowel, std::span<const Dowel> others) {
   }
 }
 
-// The depth of the first table that has the site, with the table's name.
-std::optional<std::pair<TissueDepth, std::string>> DepthInTables(const TissueOptions& tissue,
-                                                                 const std::string& site) {
+// The name of the first table that has a depth for the site; empty where none has.
+std::string TableWith(const TissueOptions& tissue, const std::string& site) {
   for (const std::filesystem::path& path : TablesOf(tissue)) {
     const TissueTable table = ReadTissueTable(path);
-    if (const auto depth = FindDepth(table, tissue.sex, tissue.build, site)) {
-      return std::pair(*depth, table.id);
+    if (FindDepth(table, tissue.sex, tissue.build, site)) {
+      return table.id;
     }
   }
-  return std::nullopt;
+  return "";
 }
 
 [[noreturn]] void RefuseWithoutDepth(const std::string& name) {
@@ -118,24 +119,6 @@ std::optional<std::pair<TissueDepth, std::string>> DepthInTables(const TissueOpt
       "sites.{}: no depth is given, and no table in use has one; write `depth:` in mm, or `auto` "
       "for the interpolated one{}",
       name, near.empty() ? "" : fmt::format(" (or is '{}' meant?)", near)));
-}
-
-// Sets the depth where it is known, and tells where it comes from.
-std::string GiveDepth(const ExtraSite& site, const TissueOptions& tissue,
-                      const LandmarkFile& landmarks, Dowel& dowel) {
-  if (site.depth) {
-    dowel.depth_mm = site.depth->automatic ? kNaN : site.depth->value;
-    return site.depth->automatic ? "as deep as interpolated there; it changes no other depth"
-                                 : fmt::format("{} mm, set by hand", site.depth->value);
-  }
-  const auto depth = DepthInTables(tissue, dowel.site);
-  if (!depth) {
-    RefuseWithoutDepth(dowel.site);
-  }
-  dowel.depth_mm = depth->first.mean_mm;
-  dowel.sd_mm = depth->first.sd_mm.value_or(kNaN);
-  ConditionDepths(tissue, landmarks, std::span(&dowel, 1));  // its notes are the landmarks' own
-  return fmt::format("{:.4g} mm, from table '{}'", dowel.depth_mm, depth->second);
 }
 
 // Whether a site of the landmarks is only given a (u,v) or a depth. Throws if it is placed anew.
@@ -150,6 +133,91 @@ bool IsLandmark(const std::string& name, const ExtraSite& site, const LandmarkFi
         name, SiteInWords(name)));
   }
   return true;
+}
+
+// Sets the depth that `sites` states, and tells where it comes from.
+std::string TakeOwnDepth(const AutoOr<double>& depth, Dowel& dowel) {
+  dowel.depth_mm = depth.automatic ? kNaN : depth.value;
+  return depth.automatic ? "as deep as interpolated there; it changes no other depth"
+                         : fmt::format("{} mm, set by hand", depth.value);
+}
+
+// Where a depth comes from that `sites` does not state. Throws InputError where there is none.
+std::string SourceOf(const TissueOptions& tissue, const LandmarkFile& landmarks,
+                     const std::string& site) {
+  if (!SetFor(tissue, site).empty()) {
+    return "of tissue.set_mm";
+  }
+  if (KnownDepths(tissue.given, landmarks).contains(site)) {
+    return "known of this person (tissue.given)";
+  }
+  const std::string table = TableWith(tissue, site);
+  if (table.empty()) {
+    RefuseWithoutDepth(site);
+  }
+  return fmt::format("from table '{}'", table);
+}
+
+// The keys of set_mm that hold for one of the sites.
+std::set<std::string> SetsFor(const TissueOptions& tissue, std::span<const std::string> sites) {
+  std::set<std::string> keys;
+  for (const std::string& site : sites) {
+    keys.insert(SetFor(tissue, site));
+  }
+  return keys;
+}
+
+// Takes the entries of set_mm away that are for inserted dowels and no landmark: the landmarks'
+// depths would tell them as unused.
+void LeaveToInserted(std::span<const std::string> inserted, const LandmarkFile& landmarks,
+                     TissueOptions& tissue) {
+  std::vector<std::string> sites;
+  std::ranges::transform(landmarks.landmarks, std::back_inserter(sites), &Landmark::site);
+  const std::set<std::string> theirs = SetsFor(tissue, inserted), ours = SetsFor(tissue, sites);
+  std::erase_if(tissue.set_mm, [&](const auto& entry) {
+    return theirs.contains(entry.first) && !ours.contains(entry.first);
+  });
+}
+
+// The depths that `sites` does not state, as landmarks get theirs. Returns what people should know.
+std::vector<std::string> TakeTissueDepths(TissueOptions tissue, const LandmarkFile& landmarks,
+                                          std::vector<Dowel>& dowels) {
+  if (dowels.empty()) {
+    return {};
+  }
+  std::vector<std::string> sites;
+  std::ranges::transform(dowels, std::back_inserter(sites), &Dowel::site);
+  const std::set<std::string> sets = SetsFor(tissue, sites);
+  std::erase_if(tissue.set_mm, [&](const auto& entry) { return !sets.contains(entry.first); });
+  std::vector<std::string> notes = FillDepths(tissue, landmarks, dowels);
+  ConditionDepths(tissue, landmarks, dowels);  // its notes are the landmarks' own
+  return notes;
+}
+
+// Gives each dowel its depth. Returns where each comes from, and what else people should know.
+std::vector<std::string> GiveInserted(const Experiment& experiment, const LandmarkFile& landmarks,
+                                      std::vector<Dowel>& dowels) {
+  std::vector<Dowel> of_tissue;
+  for (const Dowel& dowel : dowels) {
+    if (!experiment.sites.at(dowel.site).depth) {
+      SourceOf(experiment.tissue, landmarks, dowel.site);  // throws where there is none
+      of_tissue.push_back(dowel);
+    }
+  }
+  const std::vector<std::string> more = TakeTissueDepths(experiment.tissue, landmarks, of_tissue);
+  std::vector<std::string> notes;
+  for (Dowel& dowel : dowels) {
+    const auto& own = experiment.sites.at(dowel.site).depth;
+    const auto filled = std::ranges::find(of_tissue, dowel.site, &Dowel::site);
+    dowel = filled == of_tissue.end() ? dowel : *filled;
+    notes.push_back(
+        fmt::format("site {}: dowel inserted, {}", SiteInWords(dowel.site),
+                    own ? TakeOwnDepth(*own, dowel)
+                        : fmt::format("{:.4g} mm, {}", dowel.depth_mm,
+                                      SourceOf(experiment.tissue, landmarks, dowel.site))));
+  }
+  notes.insert(notes.end(), more.begin(), more.end());
+  return notes;
 }
 
 bool IsNamed(const NetworkPlan& plan, const std::string& site) {
@@ -175,20 +243,27 @@ double DepthAt(const MeshPoint& at, const Triangle& corners, const DepthField& d
 
 TissueOptions WithSiteDepths(const Experiment& experiment, const LandmarkFile& landmarks) {
   TissueOptions tissue = experiment.tissue;
+  std::vector<std::string> inserted;
   for (const auto& [name, site] : experiment.sites) {
-    if (!site.depth || !IsLandmark(name, site, landmarks)) {
+    if (site.depth && experiment.tissue.set_mm.contains(name)) {
+      throw InputError(fmt::format(
+          "sites.{}.depth: the depth appears twice, here and in tissue.set_mm; leave one out",
+          name));
+    }
+    const bool is_landmark = IsLandmark(name, site, landmarks);
+    if (!is_landmark && !site.depth && IsKnown(name)) {
+      inserted.push_back(name);
+    }
+    if (!is_landmark || !site.depth) {
       continue;
     }
     if (site.depth->automatic) {
       throw InputError(fmt::format(
           "sites.{}.depth: auto is for a site that is not among the landmarks; give mm", name));
     }
-    if (!tissue.set_mm.emplace(name, site.depth->value).second) {
-      throw InputError(fmt::format(
-          "sites.{}.depth: the depth appears twice, here and in tissue.set_mm; leave one out",
-          name));
-    }
+    tissue.set_mm.emplace(name, site.depth->value);
   }
+  LeaveToInserted(inserted, landmarks, tissue);
   return tissue;
 }
 
@@ -208,10 +283,10 @@ void InsertDowels(const Experiment& experiment, const SubjectData& data, const M
     Dowel dowel = OnBone(name, placing.At(name, site), data, skull, experiment.landmarks);
     CheckApart(dowel, subject.dowels_on_bone);
     CheckApart(dowel, inserted);
-    subject.notes.push_back(fmt::format("site {}: dowel inserted, {}", SiteInWords(name),
-                                        GiveDepth(site, experiment.tissue, data.landmarks, dowel)));
     inserted.push_back(std::move(dowel));
   }
+  const std::vector<std::string> notes = GiveInserted(experiment, data.landmarks, inserted);
+  subject.notes.insert(subject.notes.end(), notes.begin(), notes.end());
   for (Dowel& dowel : inserted) {
     (std::isnan(dowel.depth_mm) ? subject.open_dowels : subject.dowels_on_bone)
         .push_back(std::move(dowel));

@@ -14,15 +14,18 @@
 
 namespace semblance {
 
-// The experiment's tissue with the depths of `sites` that are landmarks' among set_mm. Throws
+// The experiment's tissue as it holds for the landmarks: with the depths of `sites` that are
+// landmarks' among set_mm, and without those of set_mm that only inserted dowels take. Throws
 // InputError where a depth is in both, or is auto.
 TissueOptions WithSiteDepths(const Experiment& experiment, const LandmarkFile& landmarks);
 
 // Adds a dowel for each of experiment.sites that is no landmark, with a note: to dowels_on_bone, or
-// to open_dowels where its depth is to be interpolated. `near`: laid on the nearest bone; `uv`: on
-// the bone under that point of the generic face, which is brought to the subject's dowels. Its role
-// is kLandmark at a site of sites.h, else kInserted. Throws InputError for a site that is a
-// landmark already, stands on another dowel, is off the bone, or has no depth in a table either.
+// to open_dowels where its depth is to be interpolated. One whose depth is not stated has the
+// tissue's, as a landmark there would (FillDepths, whose notes come after). `near`: laid on the
+// nearest bone; `uv`: on the bone under that point of the generic face, which is brought to the
+// subject's dowels. Its role is kLandmark at a site of sites.h, else kInserted. Throws InputError
+// for a site that is a landmark already, stands on another dowel, is off the bone, or has no depth
+// in a table either.
 void InsertDowels(const Experiment& experiment, const SubjectData& data, const MeshQuery& skull,
                   Case& subject);
 

@@ -7,15 +7,18 @@
 
 namespace semblance {
 
-std::optional<HSplineSurface> EditByHand(const Experiment& experiment, FaceFit& fitted,
+std::optional<HSplineSurface> EditByHand(const Experiment& experiment, MadeFace& made,
                                          Case& subject) {
   if (experiment.edits.empty()) {
     return std::nullopt;
   }
   const EditScript script = ReadEditScript(experiment.edits);
-  HSplineSurface before = fitted.fit.surface;
-  ApplyEdits(script, fitted.fit.surface);
-  MeasureResiduals(fitted);
+  HSplineSurface before = made.fitted.fit.surface;
+  ApplyEdits(script, made.fitted.fit.surface);
+  for (HSplineSurface& sample : made.samples) {
+    ApplyEdits(script, sample);
+  }
+  MeasureResiduals(made.fitted);
   subject.inputs.push_back(experiment.edits);
   subject.notes.push_back(
       fmt::format("the face was changed by hand: {} vertices and {} parts of it, by {}; what is "

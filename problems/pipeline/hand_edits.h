@@ -9,10 +9,11 @@
 
 namespace semblance {
 
-// Replays experiment.edits on the face, where there is one, and says so in the subject's notes and
-// inputs; the residuals are then those of the edited face. Returns the face as it was before; none
-// where there is no script. Throws as ReadEditScript and ApplyEdits.
-std::optional<HSplineSurface> EditByHand(const Experiment& experiment, FaceFit& fitted,
+// Replays experiment.edits on the face and on those drawn beside it, where there is a script, and
+// says so in the subject's notes and inputs; the residuals are then those of the edited face.
+// Returns the face as it was before; none where there is no script. Throws as ReadEditScript and
+// ApplyEdits.
+std::optional<HSplineSurface> EditByHand(const Experiment& experiment, MadeFace& made,
                                          Case& subject);
 
 }  // namespace semblance

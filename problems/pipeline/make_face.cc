@@ -341,9 +341,26 @@ MadeFace MakeFace(const FittedTemplate&, PlacedTemplate placed, const FaceInput&
   return {std::move(placed), std::move(fitted), {}};
 }
 
+// Where the estimate met the dowels: at the prior's own sites, whatever `sites` says of them, and
+// elsewhere at the point of the face that is nearest to the tip.
+void MeetDowels(const LoadedPrior& prior, MadeFace& made) {
+  const std::map<std::string, Vec2>& own = made.placed.face.site_uv;
+  for (std::size_t k = 0; k < made.fitted.target.points.size(); ++k) {
+    FitPoint& point = made.fitted.target.points[k];
+    if (!prior.face.sites.contains(point.label)) {
+      point.uv = ProjectFrom(made.fitted.fit.surface, point.position, point.uv).uv;
+    } else if (const auto site = own.find(point.label); site != own.end()) {
+      point.uv = site->second;
+    }
+    made.fitted.fit.uv[k] = point.uv;
+  }
+  MeasureResiduals(made.fitted);
+}
+
 MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
   MadeFace made = MostLikelyFace(o.use, std::move(placed), in, context);
+  MeetDowels(*in.prior, made);
   TakeDraws(o.use, *in.prior, made);
   return made;
 }

@@ -30,34 +30,40 @@ void Fields(Visitor& visit, UncertaintyOptions& o) {
   visit(FieldInfo{.name = "samples",
                   .min = 0,
                   .max = 1000,
-                  .doc = "faces drawn from the same distribution, sample_0.ply and on"},
+                  .doc = "faces drawn from the same distribution, sample_0.ply and on; of a fit or "
+                         "a prior's face, not of one that is only placed or bent"},
         o.samples);
   visit(FieldInfo{.name = "random_seed", .doc = "which faces are drawn"}, o.random_seed);
-  visit(FieldInfo{.name = "dowel_sd_mm",
-                  .unit = "mm",
-                  .min = 0,
-                  .max = 50,
-                  .doc = "standard deviation of the depth of dowels whose source states none; 0: "
-                         "measured ones are exact, and those of a table have the published "
-                         "deviation of their site (Hona & Stephan 2024)"},
-        o.dowel_sd_mm);
-  visit(FieldInfo{.name = "implicit_sd_mm",
-                  .unit = "mm",
-                  .min = 0,
-                  .max = 50,
-                  .doc = "how far the implicit face, and so a seed, is off even where all depths "
-                         "are right"},
-        o.implicit_sd_mm);
+  visit(
+      FieldInfo{.name = "dowel_sd_mm",
+                .unit = "mm",
+                .min = 0,
+                .max = 50,
+                .doc = "of a fit without a prior: standard deviation of the depth of dowels whose "
+                       "source states none; 0: measured ones are exact, and those of a table "
+                       "have the published deviation of their site (Hona & Stephan 2024)"},
+      o.dowel_sd_mm);
+  visit(
+      FieldInfo{.name = "implicit_sd_mm",
+                .unit = "mm",
+                .min = 0,
+                .max = 50,
+                .doc = "of a fit without a prior: how far the implicit face, and so a seed, is off "
+                       "even where all depths are right; for a prior's face there is "
+                       "face.implicit_spread"},
+      o.implicit_sd_mm);
   visit(FieldInfo{.name = "own",
                   .min = 0,
                   .max = 5,
-                  .doc = "part of the standard deviation of a table's depths by which a person's "
-                         "depths err each by itself"},
+                  .doc = "of a fit without a prior: part of the standard deviation of a table's "
+                         "depths by which a person's depths err each by itself; for a prior's face "
+                         "there is face.table_depths"},
         o.own);
   visit(FieldInfo{.name = "shared",
                   .min = 0,
                   .max = 5,
-                  .doc = "part of it in which they all err together: a fat face is fat everywhere"},
+                  .doc = "of a fit without a prior: part of it in which they all err together: a "
+                         "fat face is fat everywhere"},
         o.shared);
   visit(FieldInfo{.name = "template_sd_mm",
                   .unit = "mm",

@@ -156,6 +156,28 @@ void RuleBook::Subnasale(const RuleUse& rule) {
   }
 }
 
+// How far a point is to the left of the middle of an average skull, mm of the subject.
+double LeftOfMiddle_mm(const Vec3& p, const Similarity& skull_from_average) {
+  return (skull_from_average.rotation * Vec3::UnitX()).dot(p - skull_from_average * Vec3::Zero());
+}
+
+// Empty where the point lies on the side that its name says, or near the middle, whose place is not
+// that well known.
+std::string WrongSide(const std::string& code, const Vec3& p, const Similarity& pose) {
+  constexpr double kMiddle_mm = 5;
+  const bool left = code.ends_with("_l");
+  if (!left && !code.ends_with("_r")) {
+    return "";
+  }
+  const double left_mm = LeftOfMiddle_mm(p, pose), own_mm = left ? left_mm : -left_mm;
+  return own_mm >= -kMiddle_mm
+             ? ""
+             : fmt::format(
+                   "rules.points.{}: it lies {:.0f} mm to the {} of the skull's middle; exchange "
+                   "_l and _r, or correct the point (LPS: +x is the subject's left)",
+                   code, -own_mm, left ? "right" : "left");
+}
+
 bool HasMultiPie(const FacePrior& prior) { return prior.features.size() == kFeatures; }
 
 }  // namespace
@@ -174,6 +196,26 @@ std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules) {
     }
   }
   return faults;
+}
+
+std::vector<std::string> MistakesOfRulePoints(const FeatureRules& rules, const MeshQuery& skull,
+                                              const Similarity* skull_from_average,
+                                              const PlaceOptions& options) {
+  std::vector<std::string> mistakes;
+  for (const auto& [code, point] : rules.points) {
+    const Vec3 p(point[0], point[1], point[2]);
+    const double off_mm = skull.Closest(p).distance_mm;
+    std::string side = skull_from_average == nullptr ? "" : WrongSide(code, p, *skull_from_average);
+    if (!(off_mm <= options.max_distance_mm)) {
+      mistakes.push_back(
+          fmt::format("rules.points.{}: it is {:.1f} mm from the skull, and at most {} mm are "
+                      "allowed (landmarks.max_distance_mm); correct the point (mm, LPS)",
+                      code, off_mm, options.max_distance_mm));
+    } else if (!side.empty()) {
+      mistakes.push_back(std::move(side));
+    }
+  }
+  return mistakes;
 }
 
 RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> landmarks,

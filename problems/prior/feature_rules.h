@@ -10,7 +10,9 @@
 
 #include "problems/config/config_errors.h"
 #include "problems/prior/face_prior.h"
+#include "problems/subject/landmarks.h"
 #include "surfaces/base/fields.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 
@@ -87,6 +89,14 @@ const std::vector<std::string>& RulePointCodes();
 
 // An unknown name under `points`, as "points.NAME".
 std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules);
+
+// What is wrong with `points` on a subject's skull, a line each: one that is further from the bone
+// than a landmark may be (options.max_distance_mm), and one on the other side of the head than its
+// name says, as when _l and _r are exchanged. skull_from_average: as MarksOfRules; null where the
+// pose is not known, and with it no side.
+std::vector<std::string> MistakesOfRulePoints(const FeatureRules& rules, const MeshQuery& skull,
+                                              const Similarity* skull_from_average,
+                                              const PlaceOptions& options);
 
 // A rule at work. One that predicts two coordinates appears twice.
 struct AppliedRule {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/program/run_commands.h"
-#include "problems/output/files.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -22,6 +22,7 @@
 #include "problems/ct/mr_skin.h"
 #include "problems/inputs/input_check.h"
 #include "problems/inputs/input_files.h"
+#include "problems/output/files.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"
@@ -66,11 +67,46 @@ void PrintFaceError(const char* what, const FaceMetrics& m) {
       what, s.mean_abs_mm, s.rms_mm, s.median_mm, s.p95_mm, 100 * s.within_2_5mm, s.area_cm2);
 }
 
+void PrintNotes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes) {
+    fmt::print("note: {}\n", note);
+  }
+}
+
+// The alternatives of an experiment that was read from the file.
+std::vector<NamedExperiment> AlternativesIn(const std::filesystem::path& file,
+                                            const Arguments& arguments,
+                                            const Experiment& experiment) {
+  ConfigErrors errors;
+  const ConfigNode tree =
+      LoadConfigTree(file, arguments.overrides, ConfigTreeOf(Experiment{}), errors);
+  return AlternativesOf(experiment, file.parent_path(), tree);
+}
+
+// What an alternative would be refused for ends the run before the long work, not after it. What
+// is wrong with the experiment itself the run will say.
+void CheckAlternatives(const std::filesystem::path& config, const Experiment& experiment,
+                       const std::vector<NamedExperiment>& named, StageCache& cache,
+                       const RunContext& context) {
+  if (named.empty()) {
+    return;
+  }
+  InputCheck inputs(context, &cache);
+  const CheckFindings own = inputs.Look(experiment);
+  std::vector<std::string> faults = LookAtAlternatives(named, own, inputs).faults;
+  if (own.sound() && !faults.empty()) {
+    for (std::string& fault : faults) {
+      fault = fmt::format("{}: {}", config.string(), fault);
+    }
+    throw InputError(fmt::format("{}", fmt::join(faults, "\n")));
+  }
+}
+
 int RunCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);
-  const std::vector<NamedExperiment> named = AlternativesOf(experiment, config.parent_path());
+  const std::vector<NamedExperiment> named = AlternativesIn(config, arguments, experiment);
   GivenFiles given = GivenTo(experiment, config, kRunFiles);
   for (const NamedExperiment& alternative : named) {
     std::ranges::copy(InputFilesOf(alternative.experiment), std::back_inserter(given.files));
@@ -78,15 +114,14 @@ int RunCommand(const Arguments& arguments) {
   StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string(), std::move(given));
   const RunContext context = ContextOf(arguments);
   StageCache cache(16);
+  CheckAlternatives(config, experiment, named, cache, context);
   const RunResult result = Run(experiment, context, &cache);
   std::vector<std::string> faults = result.Faults();
   std::ranges::copy(RunAlternatives(experiment, named, result, cache, folder.Files(), context),
                     std::back_inserter(faults));
   WriteRun(experiment, result, folder.Files(), context);
   folder.Publish();
-  for (const std::string& note : result.subject.notes) {
-    fmt::print("note: {}\n", note);
-  }
+  PrintNotes(result.Notes());
   if (result.truth) {
     fmt::print("{}; closest-point distances\n", InWords(result.truth->skin));
     PrintFaceError("implicit face", result.truth->implicit);
@@ -158,16 +193,11 @@ CheckFindings CheckStudy(const std::string& file, const Arguments& arguments, In
 CheckFindings CheckExperiment(const std::string& file, const Arguments& arguments,
                               InputCheck& inputs) {
   const auto experiment = ReadChecked<Experiment>(file, arguments, &NamedInputsOf);
+  const std::vector<NamedExperiment> named = AlternativesIn(file, arguments, experiment);
   CheckFindings findings;
-  std::vector<Experiment> all = {experiment};
-  for (const NamedExperiment& alternative :
-       AlternativesOf(experiment, std::filesystem::path(file).parent_path())) {
-    all.push_back(alternative.experiment);
-  }
-  for (const Experiment& one : all) {
-    if (!arguments.without_inputs) {
-      findings.Add(inputs.Look(one));
-    }
+  if (!arguments.without_inputs) {
+    findings = inputs.Look(experiment);
+    findings.Add(LookAtAlternatives(named, findings, inputs));
   }
   return findings;
 }
@@ -283,12 +313,6 @@ int OptionsCommand(const Arguments& arguments) {
                    : arguments.options_of == "fit"      ? OptionsText<PointFitOptions>(schema)
                                                         : OptionsText<Experiment>(schema));
   return kDone;
-}
-
-void PrintNotes(const std::vector<std::string>& notes) {
-  for (const std::string& note : notes) {
-    fmt::print("note: {}\n", note);
-  }
 }
 
 // Checked as whoever reads it will.

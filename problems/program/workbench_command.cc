@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/program/workbench_command.h"
-#include "problems/output/files.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -18,6 +17,7 @@
 #include <vector>
 
 #include "problems/command_line/exit_code.h"
+#include "problems/output/files.h"
 #include "problems/program/stop_signals.h"
 #include "problems/serving/http_server.h"
 #include "surfaces/base/error.h"

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -46,14 +47,62 @@ void StartPathsAt(const fs::path& folder, ConfigNode& node) {
   }
 }
 
-Experiment Read(const std::string& text, const Alternative& alternative, const fs::path& folder) {
-  ConfigErrors errors;
+Experiment Read(const std::string& text, const Alternative& alternative, const fs::path& folder,
+                ConfigErrors& errors) {
   ConfigNode tree = LoadConfigTextTree(text, "alternative " + alternative.name, alternative.set,
                                        ConfigTreeOf(Experiment{}), errors);
   StartPathsAt(fs::absolute(folder), tree);
   auto experiment = ReadConfigTree<Experiment>(tree, errors);
-  errors.ThrowIfAny();
+  experiment.title += " (" + alternative.name + ")";
   return experiment;
+}
+
+// Faults of one alternative are told where the configuration has it.
+class AlternativeFaults {
+ public:
+  AlternativeFaults(const ConfigNode& tree, std::size_t index, const Alternative& alternative,
+                    ConfigErrors& errors)
+      : tree_(tree),
+        at_(fmt::format("alternatives[{}]", index)),
+        alternative_(alternative),
+        errors_(errors) {}
+
+  void Add(const std::string& what) { errors_.Add(LocationOf(tree_, at_), Name(), what); }
+
+  void Add(const ConfigErrors& of_settings) {
+    for (const ConfigFault& fault : of_settings.faults()) {
+      errors_.Add(LocationOf(tree_, at_ + SettingOf(fault)), Name(),
+                  fault.path + (fault.path.empty() ? "" : ": ") + fault.what);
+    }
+  }
+
+ private:
+  std::string Name() const { return fmt::format("{} '{}'", at_, alternative_.name); }
+
+  // ".set[1]": what the fault is of; empty where no setting is by itself at fault.
+  std::string SettingOf(const ConfigFault& fault) const {
+    for (std::size_t k = 0; k < alternative_.set.size(); ++k) {
+      if (fault.location.source && fault.location.source->name == "--set " + alternative_.set[k]) {
+        return fmt::format(".set[{}]", k);
+      }
+    }
+    return "";
+  }
+
+  const ConfigNode& tree_;
+  std::string at_;
+  const Alternative& alternative_;
+  ConfigErrors& errors_;
+};
+
+// Those of `lines` that are not among `known`, with the alternative's name.
+void AddNamed(const std::string& name, const std::vector<std::string>& lines,
+              const std::vector<std::string>& known, std::vector<std::string>& named) {
+  for (const std::string& line : lines) {
+    if (std::ranges::find(known, line) == known.end()) {
+      named.push_back(fmt::format("alternative '{}': {}", name, line));
+    }
+  }
 }
 
 // What of a result the comparison needs; the rest is let go.
@@ -62,7 +111,8 @@ struct Answer {
   Scene scene;
   TriMesh face;
   std::vector<Vec3> normals;
-  std::set<std::string> sites;  // with a dowel
+  std::set<std::string> sites;      // with a dowel
+  std::set<std::string> landmarks;  // with a dowel or without
   Json json;
 };
 
@@ -74,6 +124,14 @@ std::set<std::string> SitesOf(const RunResult& result) {
   return sites;
 }
 
+std::set<std::string> LandmarksOf(const RunResult& result) {
+  std::set<std::string> landmarks;
+  for (const auto& [site, point] : result.subject.points) {
+    landmarks.insert(site);
+  }
+  return landmarks;
+}
+
 Answer AnswerOf(const std::string& name, const std::vector<std::string>& set,
                 const RunResult& result) {
   Answer answer{.name = name,
@@ -81,6 +139,7 @@ Answer AnswerOf(const std::string& name, const std::vector<std::string>& set,
                 .face = result.face.mesh,
                 .normals = result.face.normals,
                 .sites = SitesOf(result),
+                .landmarks = LandmarksOf(result),
                 .json = {{"name", name}, {"set", set}, {"usable", result.usable()}}};
   answer.json["dowels"] = answer.sites.size();
   answer.json["face"] = nullptr;
@@ -91,7 +150,7 @@ Answer AnswerOf(const std::string& name, const std::vector<std::string>& set,
                            {"p95_mm", s.p95_mm},
                            {"within_2_5mm", s.within_2_5mm}};
   }
-  answer.json["notes"] = result.subject.notes;
+  answer.json["notes"] = result.Notes();
   return answer;
 }
 
@@ -126,12 +185,10 @@ Json DifferenceJson(const std::vector<double>& outside, const TriMesh& mesh) {
 void Compare(std::vector<Answer>& answers) {
   const Answer& own = answers.front();
   for (Answer& answer : answers) {
+    std::set<std::string> wanted = answer.landmarks;
+    wanted.insert(own.sites.begin(), own.sites.end());
     Json left_out = Json::array();
-    for (const std::string& site : own.sites) {
-      if (!answer.sites.contains(site)) {
-        left_out.push_back(site);
-      }
-    }
+    std::ranges::set_difference(wanted, answer.sites, std::back_inserter(left_out));
     answer.json["left_out"] = left_out;
     answer.json["difference"] = DifferenceJson(Outside(answer, own), own.face);
   }
@@ -192,28 +249,42 @@ class ComparedPictures {
 
 }  // namespace
 
-std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const fs::path& folder) {
+std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const fs::path& folder,
+                                            const ConfigNode& tree) {
   Experiment own = experiment;
   own.alternatives.clear();
   const std::string text = WriteConfig(own);
   std::vector<NamedExperiment> result;
   std::set<std::string> names;
-  for (const Alternative& alternative : experiment.alternatives) {
-    if (!IsName(alternative.name) || !names.insert(alternative.name).second) {
-      throw InputError(
-          fmt::format("alternatives: '{}' is not a name, or appears twice; letters, digits, '_', "
-                      "'-' and '+' make "
-                      "one",
-                      alternative.name));
+  ConfigErrors errors;
+  for (std::size_t k = 0; k < experiment.alternatives.size(); ++k) {
+    const Alternative& alternative = experiment.alternatives[k];
+    AlternativeFaults faults(tree, k, alternative, errors);
+    if (!IsName(alternative.name)) {
+      faults.Add("this is no name of a folder; take 1 to 60 letters, digits, '_', '-' and '+'");
+    } else if (!names.insert(alternative.name).second) {
+      faults.Add("the name appears twice; give each alternative one of its own");
     }
-    result.push_back({alternative.name, Read(text, alternative, folder)});
-    result.back().experiment.title += " (" + alternative.name + ")";
+    ConfigErrors of_settings;
+    result.push_back({alternative.name, Read(text, alternative, folder, of_settings)});
+    faults.Add(of_settings);
     if (!result.back().experiment.alternatives.empty()) {
-      throw InputError(fmt::format("alternatives: '{}' sets alternatives of its own; it has none",
-                                   alternative.name));
+      faults.Add("it sets alternatives of its own; set them beside it");
     }
   }
+  errors.ThrowIfAny();
   return result;
+}
+
+CheckFindings LookAtAlternatives(const std::vector<NamedExperiment>& named,
+                                 const CheckFindings& own, InputCheck& inputs) {
+  CheckFindings all;
+  for (const auto& [name, experiment] : named) {
+    const CheckFindings found = inputs.Look(experiment);
+    AddNamed(name, found.faults, own.faults, all.faults);
+    AddNamed(name, found.warnings, own.warnings, all.warnings);
+  }
+  return all;
 }
 
 std::vector<std::string> RunAlternatives(const Experiment& experiment,

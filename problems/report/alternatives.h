@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "problems/config/config_tree.h"
+#include "problems/inputs/input_check.h"
 #include "problems/output/files.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/run.h"
@@ -17,19 +19,26 @@ struct NamedExperiment {
   Experiment experiment;  // without alternatives of its own
 };
 
-// Throws ConfigError or InputError, with the alternative's name, for what `check` refuses: a name
-// that appears twice or is no name of a folder, a setting that is none. folder: of the
-// configuration; relative paths in what alternatives set start there.
+// folder: of the configuration; relative paths in what alternatives set start there. tree: what the
+// experiment was read from, for the lines of faults. Throws ConfigError with a line for each fault
+// of each alternative: a name that appears twice or is no name of a folder, a setting that is none.
 std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment,
-                                            const std::filesystem::path& folder);
+                                            const std::filesystem::path& folder,
+                                            const ConfigNode& tree);
+
+// What is found of the alternatives' inputs beside `own`, which is what is found of the
+// experiment's; each line names its alternative.
+CheckFindings LookAtAlternatives(const std::vector<NamedExperiment>& named,
+                                 const CheckFindings& own, InputCheck& inputs);
 
 // Makes each alternative and writes it into alternatives/NAME below the folder, as WriteRun does.
 // Then, for the report of the run itself: alternatives.json (what is otherwise, the errors where
-// the truth is known, how far each face lies outside the run's own, which sites have no dowel) and
+// the truth is known, how far each face lies outside the run's own, which landmarks and which sites
+// of the run's own dowels have no dowel, notes) and
 // pictures/alternatives_front.png, _three_quarter.png, _side.png and _difference.png, the run's own
 // first, all under one camera. Nothing without alternatives. What they share with the run is taken
 // from `cache`. Returns the faults of those that are not usable. Throws as Run does.
-// named: AlternativesOf(experiment).
+// named: AlternativesOf(experiment, ...).
 std::vector<std::string> RunAlternatives(const Experiment& experiment,
                                          const std::vector<NamedExperiment>& named,
                                          const RunResult& own, StageCache& cache,

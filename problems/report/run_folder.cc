@@ -327,10 +327,7 @@ Json ResultJson(const Experiment& experiment, const RunResult& result) {
     json["bust"] = BustJson(*result.bust);
   }
   json["uncertainty"] = UncertaintyJson(result);
-  json["notes"] = result.subject.notes;
-  for (const std::string& note : result.implicit.notes) {
-    json["notes"].push_back(note);
-  }
+  json["notes"] = result.Notes();
   return json;
 }
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "problems/config/config.h"
 #include "problems/plots/svg_plot.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/report.h"
@@ -287,6 +288,17 @@ std::string Words(const Json& list, const char* between) {
   return words;
 }
 
+// A folder may hold the alternatives of another run that was made in it before.
+bool HasAlternatives(const OutputFolder& folder) {
+  const std::filesystem::path file = folder.Root() / "resolved.yaml";
+  ConfigErrors ignored;
+  const ConfigNode options = ParseConfigText(
+      ReadFileBytes(file), {.name = file.string(), .folder = folder.Root()}, ignored);
+  const ConfigNode* const list = options.Find("alternatives");
+  return list != nullptr && !list->items.empty() &&
+         std::filesystem::exists(folder.Root() / "alternatives.json");
+}
+
 // Where the run has alternatives (alternatives.h).
 ReportSection AlternativesSection(const Json& answers, const OutputFolder& folder) {
   ReportSection section{.heading = "Alternatives side by side", .folded = true};
@@ -421,8 +433,8 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   if (!result.at("face").is_null()) {
     sections.push_back(ErrorSection(result, folder));
   }
-  const std::filesystem::path alternatives = folder.Root() / "alternatives.json";
-  if (std::filesystem::exists(alternatives)) {
+  if (HasAlternatives(folder)) {
+    const std::filesystem::path alternatives = folder.Root() / "alternatives.json";
     sections.push_back(
         AlternativesSection(ParseJson(ReadFileBytes(alternatives), alternatives.string()), folder));
   }

@@ -150,7 +150,27 @@ void NoteLeftOut(const TissueOptions& options, const TissueTable& table,
   }
 }
 
-void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open, Notes& notes) {
+// Sets the depths that no table has and `given` knows; returns the dowels that still need one.
+std::vector<Dowel*> ApplyKnown(const TissueOptions& options, const LandmarkFile& landmarks,
+                               const std::vector<Dowel*>& open, Notes& notes) {
+  const std::map<std::string, double> known = KnownDepths(options.given, landmarks);
+  std::vector<Dowel*> left;
+  for (Dowel* dowel : open) {
+    const auto own = known.find(dowel->site);
+    if (own == known.end()) {
+      left.push_back(dowel);
+      continue;
+    }
+    dowel->depth_mm = own->second;
+    dowel->sd_mm = options.given.error_mm;
+    notes.push_back(fmt::format("site {}: no table has a depth; the known one of {} mm is taken",
+                                SiteInWords(dowel->site), own->second));
+  }
+  return left;
+}
+
+void FillFromTable(const TissueOptions& options, const LandmarkFile& landmarks,
+                   const std::vector<Dowel*>& open, Notes& notes) {
   if (open.empty()) {
     return;
   }
@@ -167,7 +187,7 @@ void FillFromTable(const TissueOptions& options, const std::vector<Dowel*>& open
     left = ApplyTable(options, filling, lacking, notes);
     NoteFilled(table, filling, lacking, notes);
   }
-  NoteLeftOut(options, table, left, notes);
+  NoteLeftOut(options, table, ApplyKnown(options, landmarks, left, notes), notes);
 }
 
 const Landmark& LandmarkAt(const LandmarkFile& file, const std::string& site) {
@@ -197,7 +217,87 @@ void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open,
   }
 }
 
+// The sites that a code means: a pair's code without side both of them.
+std::vector<std::string> SitesMeant(const std::string& code) {
+  std::vector<std::string> sites;
+  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
+    for (const Site& site : *list) {
+      if (site.code == code || site.landmark == code) {
+        sites.push_back(site.code);
+      }
+    }
+  }
+  return sites;
+}
+
+[[noreturn]] void RefuseSite(const char* option, const std::string& code) {
+  throw InputError(fmt::format("tissue.given.{}: {}", option, ComplaintAboutLandmark(code)));
+}
+
+void AddKnown(const char* option, const std::string& site, double depth_mm,
+              std::map<std::string, double>& known) {
+  if (!known.emplace(site, depth_mm).second) {
+    throw InputError(fmt::format("tissue.given.{}: the depth of {} is given twice; leave one out",
+                                 option, SiteInWords(site)));
+  }
+}
+
+std::optional<double> MeasuredAt(const LandmarkFile& file, const std::string& site) {
+  const auto at = std::ranges::find(file.landmarks, site, &Landmark::site);
+  if (at == file.landmarks.end()) {
+    return std::nullopt;
+  }
+  return at->depth_along_normal_mm ? at->depth_along_normal_mm : at->depth_closest_mm;
+}
+
+void AddMeasured(const std::string& code, const LandmarkFile& file,
+                 std::map<std::string, double>& known) {
+  const std::vector<std::string> sites = SitesMeant(code);
+  if (sites.empty()) {
+    RefuseSite("measured", code);
+  }
+  bool any = false;
+  for (const std::string& site : sites) {
+    if (const auto depth_mm = MeasuredAt(file, site)) {
+      AddKnown("measured", site, *depth_mm, known);
+      any = true;
+    }
+  }
+  if (!any) {
+    throw InputError(fmt::format(
+        "tissue.given.measured: {} has no measured depth in the landmarks' file; measure it there, "
+        "or give it under depths_mm",
+        SiteInWords(code)));
+  }
+}
+
+void AddAllMeasured(const LandmarkFile& file, std::map<std::string, double>& known) {
+  for (const Landmark& landmark : file.landmarks) {
+    const auto depth_mm = MeasuredAt(file, landmark.site);
+    if (depth_mm && !known.contains(landmark.site)) {
+      known[landmark.site] = *depth_mm;
+    }
+  }
+}
+
 }  // namespace
+
+std::map<std::string, double> KnownDepths(const TissueGiven& given, const LandmarkFile& file) {
+  std::map<std::string, double> known;
+  for (const auto& [code, depth_mm] : given.depths_mm) {
+    const std::vector<std::string> sites = SitesMeant(code);
+    if (sites.empty()) {
+      RefuseSite("depths_mm", code);
+    }
+    for (const std::string& site : sites) {
+      AddKnown("depths_mm", site, depth_mm, known);
+    }
+  }
+  for (const std::string& code : given.measured) {
+    code == "all" ? AddAllMeasured(file, known) : AddMeasured(code, file, known);
+  }
+  return known;
+}
 
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels) {
@@ -206,7 +306,7 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
   const std::vector<Dowel*> open = ApplySets(options, dowels, notes);
   NoteUnusedSets(options, dowels, notes);
   if (options.depths == DepthSource::kTable) {
-    FillFromTable(options, open, notes);
+    FillFromTable(options, landmarks, open, notes);
   } else {
     FillFromMeasured(landmarks, open, notes);
   }
@@ -218,6 +318,11 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
                     fmt::join(notes, "; ")));
   }
   return notes;
+}
+
+std::string SetFor(const TissueOptions& options, const std::string& site) {
+  const auto set = FindSet(options, site);
+  return set == options.set_mm.end() ? "" : set->first;
 }
 
 std::vector<std::filesystem::path> TablesOf(const TissueOptions& options) {

@@ -185,15 +185,24 @@ void CheckValue(Report& report, const TissueOptions& o) {
 
 // Sets depth_mm and sd_mm of each dowel. A depth under set_mm comes first (that of "go_l" before
 // that of "go"). Measured depths are those along the normal, else to the closest skin. Dowels of
-// landmarks without any measured depth, or without one in a table, are removed.
+// landmarks without any measured depth, or without one in a table and in `given`, are removed.
 //
 // Returns what people should know: suspect cells used, rows used whose depths do not grow with the
-// build, sites filled from the second table, entries of set_mm used and unused, depths to the
-// closest skin, dowels removed and why. `given` has its own function (condition_depths.h), which
-// comes after this one. Throws InputError if a table is needed and not given, if
-// set_mm names an unknown site, or if no dowel is left; IoError and ConfigError as ReadTissueTable.
+// build, sites filled from the second table or from `given`, entries of set_mm used and unused,
+// depths to the closest skin, dowels removed and why. What else `given` says has its own function
+// (condition_depths.h), which comes after this one. Throws InputError if a table is needed and not
+// given, if set_mm names an unknown site, if no dowel is left, or as KnownDepths; IoError and
+// ConfigError as ReadTissueTable.
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels);
+
+// The depths that are known of this person, by site with side: of depths_mm and measured. Throws
+// InputError for a site that is unknown or appears twice, or one in `measured` without a measured
+// depth.
+std::map<std::string, double> KnownDepths(const TissueGiven& given, const LandmarkFile& landmarks);
+
+// The key of set_mm that holds for the site; empty where none does.
+std::string SetFor(const TissueOptions& options, const std::string& site);
 
 // The tables that the options name and use, in the order in which they are asked.
 std::vector<std::filesystem::path> TablesOf(const TissueOptions& options);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/workbench/bench_open.h"
-#include "problems/output/files.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -16,6 +15,7 @@
 
 #include "problems/ct/mr_skin.h"
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/output/files.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/volumes/read_volume.h"
 #include "problems/workbench/bench_actions.h"

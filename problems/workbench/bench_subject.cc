@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/workbench/bench_subject.h"
-#include "problems/output/files.h"
 
 #include <fmt/format.h>
 
@@ -9,6 +8,7 @@
 #include <initializer_list>
 
 #include "problems/landmark_files/read_landmarks.h"
+#include "problems/output/files.h"
 #include "problems/phantom/phantom_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/view/view_mesh.h"

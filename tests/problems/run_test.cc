@@ -119,6 +119,34 @@ TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
   EXPECT_THAT(ResultJson(experiment, result).dump(), HasSubstr("coefficients_rms"));
 }
 
+// At a site that the prior lacks: the point of the face nearest to the tip.
+TEST(Run, APriorsFaceIsMeasuredWhereItMeetsTheDowels) {
+  const std::string mine = "sites={mine: {near: [im_l, lo_l], depth: 12}}";
+  const RunResult result = semblance::Run(PhantomWithPrior({mine}), {});
+  const auto at = std::ranges::find(result.target.points, "mine", &FitPoint::label);
+  ASSERT_NE(at, result.target.points.end());
+  const double nearest_mm = MeshQuery(result.face.mesh).Closest(at->position).distance_mm;
+  EXPECT_NEAR(result.fit.residual_mm[at - result.target.points.begin()], nearest_mm, 0.1);
+  EXPECT_THAT(WordsOf<InputError>(
+                  [] { semblance::Run(PhantomWithPrior({"sites={g: {uv: [0.3, 0.3]}}"}), {}); }),
+              HasSubstr("sites.g.uv: `face: prior` has a place of its own for the landmark g"));
+}
+
+TEST(Run, EditsChangeTheFacesDrawnBesideAsTheDrawItself) {
+  const ScratchFolder folder;
+  WriteFileAtomically(folder / "mine.yaml", "edits: [{level: 0, i: 3, j: 3, offset: [0, 0, 6]}]\n");
+  const std::string edits = "edits=" + (folder / "mine.yaml").string();
+  StageCache cache(8);
+  const auto run = [&](const std::vector<std::string>& more) {
+    return semblance::Run(PhantomWithPrior(more), {}, &cache);
+  };
+  const RunResult plain = run({"uncertainty.samples=1"}),
+                  edited = run({"uncertainty.samples=1", edits}),
+                  drawn = run({"face.draw=1", edits});
+  EXPECT_EQ(edited.uncertainty->samples[0].Offsets(), drawn.fit.surface.Offsets());
+  EXPECT_NE(edited.uncertainty->samples[0].Offsets(), plain.uncertainty->samples[0].Offsets());
+}
+
 TEST(Run, ASampleIsTheFaceOfTheDrawOfItsNumber) {
   StageCache cache(8);
   const RunResult likely = semblance::Run(

@@ -91,6 +91,24 @@ TEST(ConditionDepths, APairsCodeMeansBothSidesAndAnErrorLeavesRoom) {
   EXPECT_LT(At(given, "zy_l").sd_mm, 1);
 }
 
+TEST(ConditionDepths, AKnownDepthIsHonouredWhereTheTableLacksTheSite) {
+  TissueOptions options = FromTTable();
+  options.given.depths_mm = {{"fe", 4.0}, {"g", 6.0}};
+  options.given.error_mm = 0.3;
+  std::vector<Dowel> dowels = Dowels({"g", "fe_l", "fe_r", "sg"});
+  const auto on_depths = FillDepths(options, {}, dowels);
+  const auto on_known = ConditionDepths(options, {}, dowels);
+  ASSERT_EQ(dowels.size(), 3u);  // sg has no depth anywhere
+  for (const std::size_t k : {1, 2}) {
+    EXPECT_EQ(dowels[k].depth_mm, 4) << dowels[k].site;
+    EXPECT_EQ(dowels[k].sd_mm, 0.3) << dowels[k].site;
+  }
+  EXPECT_THAT(on_depths, Contains(HasSubstr("fe_l (Frontal Eminence): no table has a depth; the "
+                                            "known one of 4 mm is taken")));
+  EXPECT_THAT(on_depths, Contains(HasSubstr("dowel left out")).Times(1));
+  EXPECT_THAT(on_known, Contains(HasSubstr("fe_l, fe_r tells nothing of the others")));
+}
+
 TEST(ConditionDepths, MeasuredDepthsComeFromTheLandmarks) {
   LandmarkFile file;
   for (const char* site : {"g", "pg", "n"}) {

@@ -23,6 +23,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using testing::ScratchFolder;
 using ::testing::SizeIs;
 
@@ -87,6 +88,29 @@ TEST_F(InputCheckTest, WhatATableDoesNotCoverIsSaid) {
       kConfigs, kConfigs));
   EXPECT_THAT(found.faults, IsEmpty());
   EXPECT_THAT(found.warnings, Contains(HasSubstr("no depth for 2 of the 32 landmarks")));
+}
+
+TEST_F(InputCheckTest, WhatRulesAndSitesSayOfAPhantomIsLookedAt) {
+  const std::string base =
+      fmt::format("base: {}/phantom.yaml\nsubject: {{type: phantom, rings: 20}}\n", kConfigs);
+  EXPECT_THAT(Look(base + "rules: {points: {uc_l: [18000, 0, -60]}}\n").faults,
+              Contains(HasSubstr("rules.points.uc_l: it is")));
+  EXPECT_THAT(Look(base + "landmarks: {keep: {type: names, sites: [g, n]}}\n").faults,
+              Contains(HasSubstr("landmarks.keep leaves 2 of 32")));
+  const std::string uv = "sites: {g: {uv: [0.5, 0.6]}}\ntemplate: ict\n";
+  EXPECT_THAT(Look(base + uv + "face: prior\n").faults,
+              Contains(HasSubstr("sites.g.uv: `face: prior` has a place of its own")));
+  EXPECT_THAT(Look(base + uv).faults, IsEmpty());
+}
+
+TEST_F(InputCheckTest, AKnownDepthIsOneWhereTheTableHasNone) {
+  const CheckFindings found = Look(fmt::format(
+      "base: {0}/phantom.yaml\ntissue: {{depths: table, table: {0}/tables/t_table_2023.yaml, "
+      "given: {{depths_mm: {{fe: 4}}}}}}\n",
+      kConfigs));
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.warnings, Contains(HasSubstr("no depth for ")));
+  EXPECT_THAT(found.warnings, Not(Contains(HasSubstr("fe_l"))));
 }
 
 TEST_F(InputCheckTest, AnInputIsToldOnceHoweverManyExperimentsNameIt) {

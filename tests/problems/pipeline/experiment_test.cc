@@ -52,6 +52,20 @@ TEST(Experiment, TheWayToTheFaceFollowsTemplateAndPrior) {
   EXPECT_NO_THROW(ReadConfigText<Experiment>("uncertainty: {samples: 2}\n", "a.yaml"));
 }
 
+TEST(Experiment, WhatAFaceDoesNotLookAtOfItsUncertaintyIsToldAtItsLine) {
+  EXPECT_THAT(Faults("uncertainty: {dowel_sd_mm: 3}\n"),
+              HasSubstr("a.yaml:1:28: uncertainty.dowel_sd_mm: `face: prior_then_fit` does not"));
+  EXPECT_THAT(Faults("uncertainty: {own: 0.5, shared: 0.2, implicit_sd_mm: 1}\n"),
+              AllOf(HasSubstr("face.table_depths.own"), HasSubstr("face.table_depths.shared"),
+                    HasSubstr("face.implicit_spread")));
+  EXPECT_THAT(Faults("face: placed\nuncertainty: {samples: 2}\n"),
+              HasSubstr("a.yaml:2:24: uncertainty.samples: `face: placed` does not look at it"));
+  EXPECT_THAT(Faults("face: thin_plate\nuncertainty: {own: 0.5}\n"), HasSubstr("uncertainty.own"));
+  EXPECT_NO_THROW(ReadConfigText<Experiment>(
+      "face: fit\nuncertainty: {samples: 2, dowel_sd_mm: 3, own: 0.5, implicit_sd_mm: 1}\n",
+      "a.yaml"));
+}
+
 // What a trial would refuse only after its skull was filled.
 TEST(Experiment, APriorThatIsAskedNamesItsFiles) {
   EXPECT_THAT(Faults("prior: hspline\n"), HasSubstr("prior.modes: no file is named"));

@@ -20,6 +20,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::WordsOf;
 
 Experiment Phantom30(const std::string& sites, std::vector<std::string> overrides = {}) {
@@ -110,6 +111,25 @@ TEST(ExtraDowels, ATablesOwnSiteHasItsDepth) {
   EXPECT_THAT(subject.notes, Contains(HasSubstr("from table 't_table_2023'")));
 }
 
+TEST(ExtraDowels, ADepthThatIsNotStatedIsTheTissuesWithAllThatItSays) {
+  const std::string table = SEMBLANCE_SOURCE_DIR "/configs/tables/t_table_2023.yaml";
+  const auto of = [&](std::vector<std::string> overrides) {
+    overrides.insert(overrides.begin(), "tissue={depths: table, table: " + table + "}");
+    return CaseOf(Phantom30("mn: {near: [n, rhi]}", overrides));
+  };
+  EXPECT_EQ(At(of({"tissue.sds=1"}).dowels_on_bone, "mn").depth_mm, 4.5 + 1.5);
+  EXPECT_EQ(At(of({"tissue.sds=-3"}).dowels_on_bone, "mn").depth_mm, 0.5);
+  const Case set = of({"tissue.set_mm={mn: 7}"});
+  EXPECT_EQ(At(set.dowels_on_bone, "mn").depth_mm, 7);
+  EXPECT_THAT(set.notes, Contains(HasSubstr("mn (Mid-nasal): depth set to 7 mm by hand")));
+  EXPECT_THAT(set.notes, Not(Contains(HasSubstr("no dowel takes the depth"))));
+  const Case known = of({"tissue.given={depths_mm: {mn: 6}}"});
+  EXPECT_EQ(At(known.dowels_on_bone, "mn").depth_mm, 6);
+  EXPECT_THAT(known.notes, Contains(HasSubstr("6 mm, known of this person")));
+  const Case measured = CaseOf(Phantom30("mn: {near: [n, rhi]}", {"tissue.set_mm={mn: 7}"}));
+  EXPECT_EQ(At(measured.dowels_on_bone, "mn").depth_mm, 7);
+}
+
 TEST(ExtraDowels, WhatCannotBePlacedIsToldInOneLine) {
   const auto words = [](const std::string& sites, std::vector<std::string> overrides = {}) {
     return WordsOf<InputError>([&] { CaseOf(Phantom30(sites, std::move(overrides))); });
@@ -122,6 +142,8 @@ TEST(ExtraDowels, WhatCannotBePlacedIsToldInOneLine) {
   EXPECT_THAT(words("mn: {depth: 3}"), HasSubstr("sites.mn: mn (Mid-nasal) is not among the"));
   EXPECT_THAT(words("n: {depth: auto}"), HasSubstr("sites.n.depth: auto is for a site that is"));
   EXPECT_THAT(words("n: {depth: 5}", {"tissue.set_mm={n: 6}"}), HasSubstr("appears twice, here"));
+  EXPECT_THAT(words("mn: {near: [n, rhi], depth: 5}", {"tissue.set_mm={mn: 6}"}),
+              HasSubstr("sites.mn.depth: the depth appears twice, here"));
 }
 
 TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {

@@ -11,11 +11,14 @@
 #include "problems/prior/hspline_prior.h"
 #include "problems/subject/average_skull.h"
 #include "surfaces/base/error.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 const FacePrior& Ict() {
   static const FacePrior prior = LoadPrior(IctPrior{.count = 1}, LoadTemplate(IctTemplate{}));
@@ -59,6 +62,25 @@ TEST(FeatureRules, ARuleIsOnWhenItsPointsAreThere) {
   off.eye_height.use = off.eye_protrusion.use = off.mouth_width.use = off.pronasale.use = false;
   off.subnasale.use = false;
   EXPECT_TRUE(MarksOfRules(off, AverageLandmarks(), {}, Ict()).marks.empty());
+}
+
+TEST(FeatureRules, PointsStandOnTheBoneAndOnTheirSide) {
+  const MeshQuery ball(testing::SphereMesh({0, 0, 0}, 60, 60));
+  const Similarity pose;
+  const auto mistakes = [&](const char* left, const char* right, const Similarity* known) {
+    FeatureRules rules;
+    rules.points = {{left, {36, -48, 0}}, {right, {-36, -48, 0}}, {"ss", {0, -60, 0}}};
+    return MistakesOfRulePoints(rules, ball, known, {});
+  };
+  EXPECT_THAT(mistakes("uc_l", "uc_r", &pose), IsEmpty());
+  EXPECT_THAT(mistakes("uc_r", "uc_l", &pose),
+              ElementsAre(HasSubstr("rules.points.uc_l: it lies 36 mm to the right"),
+                          HasSubstr("rules.points.uc_r: it lies 36 mm to the left")));
+  EXPECT_THAT(mistakes("uc_r", "uc_l", nullptr), IsEmpty());  // of a pose that is not known
+  FeatureRules far;
+  far.points = {{"uc_l", {18000, 0, -60}}};
+  EXPECT_THAT(MistakesOfRulePoints(far, ball, &pose, {}),
+              ElementsAre(HasSubstr("rules.points.uc_l: it is 17940.1 mm from the skull")));
 }
 
 TEST(FeatureRules, PredictWhatTheirFormulasSay) {
