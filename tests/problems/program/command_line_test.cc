@@ -150,7 +150,7 @@ TEST_F(CommandLine, AFolderDoesNotTakeWhatTheCommandReads) {
   WriteBall({0, -80, 0});
   fs::create_directories(folder_ / "out");
   Write("out/depth.ply", "mine");
-  Write("out/resolved.yaml", "title: mine\n");
+  Write("out/resolved.yaml", fmt::format("base: {}/phantom.yaml\n", kConfigs));
   const auto refused = [&](const std::string& arguments, const std::string& file) {
     ExpectRefused(arguments + " --out out --force --quiet", "out/" + file + ": it is read here");
   };
@@ -241,9 +241,9 @@ TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
 }
 
 TEST_F(CommandLine, CheckTellsAFitFromAnExperimentAndRefusesTheFaultsOfEither) {
-  Write("fit.yaml", "patches_u: 4\nclosure: periodic_u\nfit: {terms: [points]}\n");
+  Write("fit.yaml", "patches_u: 4\nclosure: periodic_u\nfit: {plan: adaptive, terms: [points]}\n");
   EXPECT_EQ(Call("check fit.yaml").code, 0);
-  Write("fit.yaml", "patches_u: 4\nclosure: periodic\nfit: {terms: [points]}\n");
+  Write("fit.yaml", "patches_u: 4\nclosure: periodic\nfit: {plan: adaptive, terms: [points]}\n");
   ExpectRefused("check fit.yaml", "fit.yaml:2:");
   Write("both.yaml", "patches_u: 4\nsubject: phantom\nrounds: 2\n");
   ExpectRefused("check both.yaml", "patches_u");

@@ -143,7 +143,7 @@ TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
   ExpectRefused("feature apply face.json lib/a.json --out lib/a.json --force",
                 "lib/a.json" + words);
   ExpectRefused("feature mirror lib/a.json --name a --library lib --force", "lib/a.json" + words);
-  ExpectRefused("feature blend lib/a.json --weights 2 --name a --library lib --force",
+  ExpectRefused("feature blend lib/a.json --weights 1 --name a --library lib --force",
                 "lib/a.json" + words);
   EXPECT_EQ(Bytes("face.json"), before);
 }
