@@ -60,9 +60,8 @@ int FitCommand(const FitArguments& arguments) {
   const std::filesystem::path path = arguments.files.at(0);
   const PointFitOptions options = FitOptionsOf(arguments);
   const std::string name = path == "-" ? "standard input" : path.filename().string();
-  StagedFolder folder = FolderOf(
-      arguments, fmt::format("out/{}", path == "-" ? "points" : name.substr(0, name.find('.', 1))),
-      GivenTo(arguments, options));
+  StagedFolder folder = FolderOf(arguments, "out/" + (path == "-" ? "points" : PlainName(path)),
+                                 GivenTo(arguments, options));
   PointFile file = ReadPointFile(path, options.attributes);
   const RunContext context = ContextOf(arguments);
   const PointFit result = FitPoints(std::move(file.points), options, context);
