@@ -34,10 +34,10 @@ CheckFindings LookAtAlternatives(const std::vector<NamedExperiment>& named,
 // Makes each alternative and writes it into alternatives/NAME below the folder, as WriteRun does.
 // Then, for the report of the run itself: alternatives.json (what is otherwise, the errors where
 // the truth is known, how far each face lies outside the run's own, which landmarks and which sites
-// of the run's own dowels have no dowel, notes) and
-// pictures/alternatives_front.png, _three_quarter.png, _side.png and _difference.png, the run's own
-// first, all under one camera. Nothing without alternatives. What they share with the run is taken
-// from `cache`. Returns the faults of those that are not usable. Throws as Run does.
+// of the run's own dowels have no dowel, notes) and pictures/alternatives_front.png,
+// _three_quarter.png, _side.png and _difference.png, the run's own first, all under one camera.
+// Nothing without alternatives. What they share with the run is taken from `cache`. Returns the
+// faults of those that are not usable. Throws as Run does.
 // named: AlternativesOf(experiment, ...).
 std::vector<std::string> RunAlternatives(const Experiment& experiment,
                                          const std::vector<NamedExperiment>& named,
