@@ -725,7 +725,8 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
 }
 
 TEST(PointFit, OutliersAreCountedInEnglish) {
-  AutoReport report{.noise_mm = 1};
+  AutoReport report;
+  report.noise_mm = 1;
   EXPECT_THAT(AutoText(report), ::testing::Not(HasSubstr("left out")));
   report.outliers = {7};
   EXPECT_THAT(AutoText(report), HasSubstr("1 outlier left out; residuals and result.json list it"));
