@@ -78,11 +78,11 @@ std::vector<EdgeWay> WaysOf(const OpenedJoin& opened, std::span<const FitPoint> 
   return ways;
 }
 
-// A twisted patch, or one that is drawn right across the given surface, is what nobody wants:
+// A twisted surface, or one that is drawn right across the given surface, is what nobody wants:
 // points near an edge say which edge it follows, and which way it runs.
 void CheckPlace(const OpenedJoin& opened, std::size_t index, std::span<const FitPoint> points) {
   constexpr double kPlainly = 4;
-  const PatchJoin& join = opened.join;
+  const SurfaceJoin& join = opened.join;
   const std::vector<EdgeWay> ways = WaysOf(opened, points);
   const auto given = std::ranges::find_if(ways, [&](const EdgeWay& w) {
     return w.its_edge == join.its_edge && w.reversed == join.reversed;
@@ -208,7 +208,7 @@ class JoinFitter {
   }
 
   std::vector<EdgeMeeting> MeetingsOf(std::size_t k, const HSplineSurface& surface) const {
-    const PatchJoin& join = joins_[k].join;
+    const SurfaceJoin& join = joins_[k].join;
     return MeetingsAlong({surface, join.edge}, {joins_[k].surface, join.its_edge},
                          {.reversed = join.reversed});
   }
@@ -245,7 +245,7 @@ class JoinFitter {
   }
 
   // How many would be needed: each makes an eighth of a gap, and of an angle.
-  double Halvings(const PatchJoin& join, const EdgeMeeting& meeting) const {
+  double Halvings(const SurfaceJoin& join, const EdgeMeeting& meeting) const {
     const double gap = std::log(meeting.gap_mm / (kMostJoinGap * extent_mm_)) / std::log(8),
                  angle = std::log(meeting.angle_deg / kMostJoinAngle_deg) / std::log(8);
     return join.continuity == JoinContinuity::kTangentPlane ? std::fmax(gap, angle) : gap;

@@ -10,7 +10,7 @@
 #include "fitting/plan/fit_result.h"
 #include "fitting/problem/fit_target.h"
 #include "problems/points/join_report.h"
-#include "problems/points/patch_join.h"
+#include "problems/points/surface_join.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {

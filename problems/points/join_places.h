@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
-#include "problems/points/patch_join.h"
+#include "problems/points/surface_join.h"
 
 namespace semblance {
 

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "problems/points/patch_join.h"
+#include "problems/points/surface_join.h"
 
 namespace semblance {
 
 // Over 1,000 places of the edge at which it is not held (MeetingsAlong).
 struct JoinReport {
-  PatchJoin join;
+  SurfaceJoin join;
   std::string sha256;               // of the given surface's file
   int places = -1;                  // at which the edge is held
   double largest_gap_mm = kNaN;     // between the two surfaces

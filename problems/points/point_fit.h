@@ -21,8 +21,8 @@
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_trim.h"
 #include "problems/points/join_report.h"
-#include "problems/points/patch_join.h"
 #include "problems/points/point_table.h"
+#include "problems/points/surface_join.h"
 #include "surfaces/base/auto_or.h"
 
 namespace semblance {
@@ -40,7 +40,7 @@ struct PointFitOptions {
   Closure closure = Closure::kOpen;          // whether u, or u and v, go round
   Parameters parameters;                     // where the points' (u,v) come from
   std::vector<std::string> attributes = {};  // further columns that are fitted
-  std::vector<PatchJoin> joins = {};         // edges that continue other surfaces
+  std::vector<SurfaceJoin> joins = {};       // edges that continue other surfaces
   FitOptions fit = {
       .plan = AutoPlan{},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},

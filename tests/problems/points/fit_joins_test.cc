@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Patches that continue others: no gap, no crease, and their points still followed.
+// Surfaces that continue others: no gap, no crease, and their points still followed.
 #include "problems/points/fit_joins.h"
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 #include "problems/points/join_places.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
-#include "tests/testing/joined_patches.h"
+#include "tests/testing/joined_surfaces.h"
 #include "tests/testing/scratch_file.h"
 
 namespace semblance {
@@ -24,9 +24,9 @@ using testing::ErrorAgainst;
 using testing::FreeFit;
 using ::testing::HasSubstr;
 using testing::JoinFit;
+using testing::NewSurface;
 using testing::Opened;
 using testing::OptionsOf;
-using testing::PatchShape;
 using testing::PlaceBeside;
 using testing::PlaceOf;
 using testing::PlainStart;
@@ -43,7 +43,7 @@ constexpr SurfaceEdge kEdges[] = {SurfaceEdge::kU0, SurfaceEdge::kU1, SurfaceEdg
 Vec2 Itself(const Vec2& uv) { return uv; }
 bool Everywhere(const Vec2&) { return true; }
 
-HSplineSurface GivenSurface(const PatchShape& shape = {}) {
+HSplineSurface GivenSurface(const NewSurface& shape = {}) {
   return FreeFit(WavyTarget(Itself, 1500, 1e-3, 1), shape).surface;
 }
 
@@ -66,7 +66,7 @@ class EveryEdge : public ::testing::TestWithParam<std::tuple<SurfaceEdge, Surfac
 
 TEST_P(EveryEdge, JoinsEveryOther) {
   const auto [edge, its_edge, reversed] = GetParam();
-  const PatchJoin join{.edge = edge, .its_edge = its_edge, .reversed = reversed};
+  const SurfaceJoin join{.edge = edge, .its_edge = its_edge, .reversed = reversed};
   const OpenedJoin opened = Opened(GivenSurface(), join);
   const FitTarget target =
       WavyTarget([&](const Vec2& uv) { return PlaceBeside(join, uv); }, 1500, 1e-3, 2);
@@ -85,7 +85,7 @@ INSTANTIATE_TEST_SUITE_P(Joins, EveryEdge,
                          ::testing::Combine(::testing::ValuesIn(kEdges),
                                             ::testing::ValuesIn(kEdges), ::testing::Bool()));
 
-const PatchJoin kRight{.edge = SurfaceEdge::kU0, .its_edge = SurfaceEdge::kU1};
+const SurfaceJoin kRight{.edge = SurfaceEdge::kU0, .its_edge = SurfaceEdge::kU1};
 
 FitTarget RightOf(int count, double noise = 1e-3) {
   return WavyTarget([](const Vec2& uv) { return PlaceBeside(kRight, uv); }, count, noise, 2);
@@ -125,9 +125,9 @@ TEST(FitJoins, OtherPatchesAreFollowedAsFarAsTheyCanBe) {
 }
 
 TEST(FitJoins, PositionAloneLeavesTheAngleFree) {
-  PatchJoin join = kRight;
+  SurfaceJoin join = kRight;
   join.continuity = JoinContinuity::kPosition;
-  // A roof: the new patch goes down from the edge.
+  // A roof: the new surface goes down from the edge.
   FitTarget target = RightOf(1500);
   for (FitPoint& p : target.points) {
     p.position.z() -= p.uv.x();
@@ -139,7 +139,7 @@ TEST(FitJoins, PositionAloneLeavesTheAngleFree) {
 }
 
 TEST(FitJoins, TheAutoPlanJoinsToo) {
-  const PatchShape shape{.plan = AutoPlan{}};
+  const NewSurface shape{.plan = AutoPlan{}};
   const FitTarget target = RightOf(4000);
   const FitResult free = FreeFit(target, shape);
   const JoinedFit joined = JoinFit(target, {Opened(GivenSurface(shape), kRight)}, shape);
@@ -176,7 +176,7 @@ TEST(FitJoins, ACornerOfTwoJoinsCloses) {
   const auto target = [](double x, double y) {
     return WavyTarget(MovedBy(x, y), 1500, 1e-3, static_cast<std::uint64_t>(10 + 2 * x + y));
   };
-  const PatchJoin above{.edge = SurfaceEdge::kV0, .its_edge = SurfaceEdge::kV1};
+  const SurfaceJoin above{.edge = SurfaceEdge::kV0, .its_edge = SurfaceEdge::kV1};
   const HSplineSurface first = FreeFit(target(0, 0), {}).surface;
   const HSplineSurface right = JoinFit(target(1, 0), {Opened(first, kRight)}, {}).fit.surface;
   const HSplineSurface upper = JoinFit(target(0, 1), {Opened(first, above)}, {}).fit.surface;
@@ -234,17 +234,17 @@ TEST(FitJoins, ExactPointsAreMetBesideThem) {
 TEST(FitJoins, ContradictionsAreRefused) {
   const HSplineSurface given = GivenSurface();
   const FitTarget target = RightOf(500);
-  const auto refusal = [&](const std::vector<OpenedJoin>& joins, const PatchShape& shape) {
+  const auto refusal = [&](const std::vector<OpenedJoin>& joins, const NewSurface& shape) {
     return WordsOf<InputError>([&] { JoinFit(target, joins, shape); });
   };
   const OpenedJoin right = Opened(given, kRight);
   EXPECT_THAT(
       refusal({right, Opened(given, {.edge = SurfaceEdge::kV0, .its_edge = SurfaceEdge::kV1})}, {}),
       HasSubstr("at the corner of u0 and v0 the given surfaces are 1.4"));
-  PatchJoin turned = kRight;
+  SurfaceJoin turned = kRight;
   turned.reversed = true;
   EXPECT_THAT(refusal({Opened(given, turned)}, {}), HasSubstr("write reversed: false"));
-  PatchJoin far = kRight;
+  SurfaceJoin far = kRight;
   far.its_edge = SurfaceEdge::kU0;
   EXPECT_THAT(refusal({Opened(given, far)}, {}),
               AllOf(HasSubstr("joins[0].its_edge: the points beside u0 are"),
@@ -280,7 +280,7 @@ TEST(FitJoins, ACreaseAtACornerIsRefused) {
 TEST(FitJoins, TheNumberOfThreadsChangesNothing) {
   const FitTarget target = RightOf(2000);
   const std::vector<OpenedJoin> joins = {Opened(GivenSurface(), kRight)};
-  for (const SchedulePlan& plan : {SchedulePlan(AutoPlan{}), PatchShape().plan}) {
+  for (const SchedulePlan& plan : {SchedulePlan(AutoPlan{}), NewSurface().plan}) {
     EXPECT_EQ(HSplineToJson(JoinFit(target, joins, {.plan = plan}, 1).fit.surface),
               HSplineToJson(JoinFit(target, joins, {.plan = plan}, 2).fit.surface));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/points/patch_join.h"
+#include "problems/points/surface_join.h"
 
 #include <fmt/format.h>
 
@@ -27,7 +27,7 @@ std::string EdgeFault(const HSplineShape& shape, SurfaceEdge edge, std::string_v
 }
 
 void CheckItsEdge(const OpenedJoin& opened, std::string_view option, Closure closure) {
-  const PatchJoin& join = opened.join;
+  const SurfaceJoin& join = opened.join;
   const HSplineShape& its = opened.surface.shape();
   const std::string where = fmt::format("{}: {}", option, join.surface.filename().string());
   if (const std::string fault = EdgeFault(its, join.its_edge, "its_edge"); !fault.empty()) {
@@ -44,7 +44,7 @@ void CheckItsEdge(const OpenedJoin& opened, std::string_view option, Closure clo
 
 }  // namespace
 
-std::vector<OptionFault> JoinFaults(std::span<const PatchJoin> joins, Closure closure) {
+std::vector<OptionFault> JoinFaults(std::span<const SurfaceJoin> joins, Closure closure) {
   std::vector<OptionFault> faults;
   for (std::size_t k = 0; k < joins.size(); ++k) {
     const std::string option = fmt::format("joins[{}]", k);
@@ -56,7 +56,7 @@ std::vector<OptionFault> JoinFaults(std::span<const PatchJoin> joins, Closure cl
       faults.push_back({option + ".edge", "a surface of this closure " + fault});
     }
     const auto earlier = joins.first(k);
-    if (std::ranges::find(earlier, joins[k].edge, &PatchJoin::edge) != earlier.end()) {
+    if (std::ranges::find(earlier, joins[k].edge, &SurfaceJoin::edge) != earlier.end()) {
       faults.push_back({option + ".edge", fmt::format("{} is joined already; join each edge once",
                                                       NameOf(joins[k].edge))});
     }
@@ -82,9 +82,9 @@ bool OpenedJoin::FitsInto(int patches) const {
   return odd_part(ItsPatches()) == odd_part(patches);
 }
 
-std::vector<OpenedJoin> OpenJoins(std::span<const PatchJoin> joins, Closure closure) {
+std::vector<OpenedJoin> OpenJoins(std::span<const SurfaceJoin> joins, Closure closure) {
   std::vector<OpenedJoin> opened;
-  for (const PatchJoin& join : joins) {
+  for (const SurfaceJoin& join : joins) {
     const std::string text = ReadFileBytes(join.surface);
     opened.push_back({.join = join,
                       .sha256 = Sha256OfText(text),

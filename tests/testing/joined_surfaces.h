@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Square patches of one graph over a plane, side by side in every way, for tests of joins.
+// Square surfaces of one graph over a plane, side by side in every way, for tests of joins.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -22,9 +22,9 @@ inline Vec3 WavyPoint(const Vec2& place) {
   return {place.x(), place.y(), 0.2 * std::sin(2 * place.x() + place.y()) * std::cos(place.y())};
 }
 
-// Where a patch beside the unit square, joined to its edge `its_edge`, has its (u,v): its edge
+// Where a surface beside the unit square, joined to its edge `its_edge`, has its (u,v): its edge
 // `edge` lies on the square's, and it goes outwards from there.
-inline Vec2 PlaceBeside(const PatchJoin& join, const Vec2& uv) {
+inline Vec2 PlaceBeside(const SurfaceJoin& join, const Vec2& uv) {
   const int along = RunsAlongV(join.edge) ? 1 : 0, across = 1 - along;
   const double t = uv[along], out = std::abs(uv[across] - OnEdge(join.edge, t)[across]);
   const Vec2 on_edge = OnEdge(join.its_edge, join.reversed ? 1 - t : t);
@@ -39,18 +39,18 @@ inline FitTarget WavyTarget(const PlaceOf& place, int count, double noise,
   return Scattered([&](const Vec2& uv) { return WavyPoint(place(uv)); }, count, noise, random_seed);
 }
 
-struct PatchShape {
+struct NewSurface {
   int patches_u = 4, patches_v = 4;
   SchedulePlan plan = AdaptivePlan{.tolerance_mm = 0.02, .finest = 3};
 };
 
-inline FitOptions OptionsOf(const PatchShape& shape) {
+inline FitOptions OptionsOf(const NewSurface& shape) {
   return {.plan = shape.plan,
           .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
           .solver = Solver::kFastest};
 }
 
-inline HSplineSurface StartOf(const FitTarget& target, const PatchShape& shape) {
+inline HSplineSurface StartOf(const FitTarget& target, const NewSurface& shape) {
   std::vector<Vec3> positions;
   std::vector<Vec2> uv;
   for (const FitPoint& p : target.points) {
@@ -63,17 +63,17 @@ inline HSplineSurface StartOf(const FitTarget& target, const PatchShape& shape) 
                       positions, uv);
 }
 
-inline FitResult FreeFit(const FitTarget& target, const PatchShape& shape) {
+inline FitResult FreeFit(const FitTarget& target, const NewSurface& shape) {
   return Fit(StartOf(target, shape), target, {}, OptionsOf(shape), {});
 }
 inline JoinedFit JoinFit(const FitTarget& target, const std::vector<OpenedJoin>& joins,
-                         const PatchShape& shape, int threads = 1) {
+                         const NewSurface& shape, int threads = 1) {
   RunContext context;
   context.threads = threads;
   return FitJoined(StartOf(target, shape), target, joins, OptionsOf(shape), context);
 }
 
-inline OpenedJoin Opened(const HSplineSurface& surface, const PatchJoin& join) {
+inline OpenedJoin Opened(const HSplineSurface& surface, const SurfaceJoin& join) {
   OpenedJoin opened{.join = join, .sha256 = "", .surface = surface};
   opened.join.surface = "given.hspline.json";
   return opened;

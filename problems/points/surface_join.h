@@ -25,7 +25,7 @@ constexpr auto EnumNames(JoinContinuity) {
 inline constexpr double kMostJoinGap = 1e-6;  // of the points' extent
 inline constexpr double kMostJoinAngle_deg = 0.1;
 
-struct PatchJoin {
+struct SurfaceJoin {
   std::filesystem::path surface = {};                         // of an H-spline
   SurfaceEdge edge = SurfaceEdge::kU0;                        // of the new surface
   SurfaceEdge its_edge = SurfaceEdge::kU1;                    // of the given one
@@ -33,7 +33,7 @@ struct PatchJoin {
   JoinContinuity continuity = JoinContinuity::kTangentPlane;  // G0 or G1
 };
 template <class Visitor>
-void Fields(Visitor& visit, PatchJoin& o) {
+void Fields(Visitor& visit, SurfaceJoin& o) {
   visit(FieldInfo{.name = "surface",
                   .doc = "an H-spline, such as another fit's "
                          "surface.hspline.json"},
@@ -53,11 +53,11 @@ void Fields(Visitor& visit, PatchJoin& o) {
 
 // What is wrong with them whatever the surfaces are: a file that is not named, an edge that is
 // joined twice, or one that the new surface, which may be closed, has not.
-std::vector<OptionFault> JoinFaults(std::span<const PatchJoin> joins, Closure closure);
+std::vector<OptionFault> JoinFaults(std::span<const SurfaceJoin> joins, Closure closure);
 
 // A join whose surface has been read.
 struct OpenedJoin {
-  PatchJoin join;
+  SurfaceJoin join;
   std::string sha256;  // of the file
   HSplineSurface surface;
 
@@ -73,6 +73,6 @@ struct OpenedJoin {
 
 // closure: of the new surface. Throws IoError as ReadHSpline, and InputError for a given edge that
 // is no border, or is closed where the new one is open, or the other way round.
-std::vector<OpenedJoin> OpenJoins(std::span<const PatchJoin> joins, Closure closure);
+std::vector<OpenedJoin> OpenJoins(std::span<const SurfaceJoin> joins, Closure closure);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/points/patch_join.h"
+#include "problems/points/surface_join.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,9 +22,9 @@ using ::testing::HasSubstr;
 using testing::SmoothSurface;
 using testing::WordsOf;
 
-class PatchJoins : public ::testing::Test {
+class SurfaceJoins : public ::testing::Test {
  protected:
-  PatchJoins() {
+  SurfaceJoins() {
     WriteHSpline(
         folder_ / "open.json",
         SmoothSurface({.patches_u = 4, .patches_v = 4, .max_level = 1}, /*random_seed=*/1));
@@ -42,21 +42,21 @@ class PatchJoins : public ::testing::Test {
 
   std::vector<OpenedJoin> Open(const std::string& name, SurfaceEdge edge, SurfaceEdge its_edge,
                                Closure closure = Closure::kOpen) {
-    const PatchJoin join{.surface = folder_ / name, .edge = edge, .its_edge = its_edge};
+    const SurfaceJoin join{.surface = folder_ / name, .edge = edge, .its_edge = its_edge};
     return OpenJoins(std::span(&join, 1), closure);
   }
 
   testing::ScratchFolder folder_;
 };
 
-TEST_F(PatchJoins, AreReadWithTheHashOfTheirFile) {
+TEST_F(SurfaceJoins, AreReadWithTheHashOfTheirFile) {
   const OpenedJoin opened = Open("open.json", SurfaceEdge::kU0, SurfaceEdge::kU1).at(0);
   EXPECT_EQ(opened.sha256, Sha256OfFile(folder_ / "open.json"));
   EXPECT_EQ(opened.surface.shape().patches_v, 4);
 }
 
 // The place at t, and the spans, as the new edge sees them.
-TEST_F(PatchJoins, AReversedEdgeIsSeenFromItsEnd) {
+TEST_F(SurfaceJoins, AReversedEdgeIsSeenFromItsEnd) {
   OpenedJoin opened = Open("open.json", SurfaceEdge::kU0, SurfaceEdge::kU1).at(0);
   opened.surface.SetOffset({1, 10, 1}, Vec3(0, 0, 1));  // near v = 0
   const std::vector<EdgeSpan> spans = opened.ItsSpans();
@@ -74,7 +74,7 @@ TEST_F(PatchJoins, AReversedEdgeIsSeenFromItsEnd) {
   EXPECT_EQ(opened.ItsSpans().front().level, 0);
 }
 
-TEST_F(PatchJoins, EdgesThatAreNoneAreRefused) {
+TEST_F(SurfaceJoins, EdgesThatAreNoneAreRefused) {
   const auto refusal = [&](const std::string& name, SurfaceEdge edge, SurfaceEdge its_edge,
                            Closure closure) {
     return WordsOf<InputError>([&] { Open(name, edge, its_edge, closure); });
@@ -97,7 +97,7 @@ TEST_F(PatchJoins, EdgesThatAreNoneAreRefused) {
               HasSubstr("mesh.ply: not an H-spline"));
 }
 
-TEST(PatchJoin, WhatIsWrongIsToldWhenTheFileIsRead) {
+TEST(SurfaceJoin, WhatIsWrongIsToldWhenTheFileIsRead) {
   const auto read = [](const std::string& text) {
     return WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
   };
@@ -125,7 +125,7 @@ TEST(PatchJoin, WhatIsWrongIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("joins: [{surface: a.json, edge: u2}]\n"), HasSubstr("joins[0].edge"));
 }
 
-TEST(PatchJoin, ConfigurationRoundTrips) {
+TEST(SurfaceJoin, ConfigurationRoundTrips) {
   const auto options = ReadConfigText<PointFitOptions>(
       "joins: [{surface: /a.json, edge: v1, its_edge: v0, reversed: true, continuity: position}]\n",
       "x.yaml");
