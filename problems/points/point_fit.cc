@@ -256,20 +256,42 @@ AttributeFit AttributesOver(const PointFit& result, std::span<const double> weig
                        context.threads);
 }
 
-// What SigmaOver needs beside the result.
-struct SigmaSource {
-  const HSplineSurface& start;
-  std::span<const double> weights;
+Box3 BoxOf(std::span<const Vec3> points) {
+  Box3 box;
+  for (const Vec3& p : points) {
+    box.extend(p);
+  }
+  return box;
+}
+
+// What is asked of the points after the fit, which takes them apart.
+struct GivenPoints {
+  std::vector<double> weights;
   std::vector<Vec2> met;  // where the surface meets exact points
+  Box3 box;
+  bool has_uv = false;
+  bool has_sigma = false;
 };
 
-std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const SigmaSource& source) {
+GivenPoints GivenOf(const PointTable& table, ParameterSource source,
+                    std::span<const ExactPoint> exact) {
+  GivenPoints given{.weights = table.weights,
+                    .met = {},
+                    .box = BoxOf(table.positions),
+                    .has_uv = source == ParameterSource::kGiven,
+                    .has_sigma = table.weights_of_sigma};
+  std::ranges::transform(exact, std::back_inserter(given.met), &ExactPoint::uv);
+  return given;
+}
+
+std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const GivenPoints& given,
+                                              const HSplineSurface& start) {
   const AutoReport& report = *result.fit.automatic;
-  const std::span<const double> weights = source.weights;
+  const std::span<const double> weights = given.weights;
   const SigmaOptions options{.noise_mm = report.noise_mm,
                              .weight = report.weight,
-                             .lengths_mm = MeanLengths(source.start),
-                             .met = source.met};
+                             .lengths_mm = MeanLengths(start),
+                             .met = given.met};
   return std::make_shared<const SurfaceSigma>(
       result.fit.surface, AttributeColumns{.uv = result.fit.uv, .weights = weights, .columns = {}},
       report.outliers, options);
@@ -324,6 +346,26 @@ FootMoves MoveUv(const PointTable& table, std::span<const Triangle> triangles,
   return moved.moves;
 }
 
+struct PlacedPoints {
+  Parametrisation parameters;
+  std::optional<FootMoves> moves;  // where they were asked for
+};
+
+// Frees the table's (u,v) and triangles.
+PlacedPoints PlacePoints(PointTable& table, const PointFitOptions& options, StepClock& step,
+                         const RunContext& context) {
+  const bool moving = RoundsOfMoves(options.fit) > 0;
+  const std::vector<Triangle> triangles = moving ? table.triangles : std::vector<Triangle>();
+  PlacedPoints placed{step("parameters", [&] { return ParametersOf(table, options); }), {}};
+  CheckJoinParameters(placed.parameters.source, options);
+  if (moving) {
+    placed.moves = step("relaxation", [&] {
+      return MoveUv(table, triangles, options, context, placed.parameters.uv);
+    });
+  }
+  return placed;
+}
+
 std::vector<ExactPoint> ExactOf(const PointTable& table, std::span<const Vec2> uv) {
   std::vector<ExactPoint> exact;
   for (std::size_t k = 0; k < table.exact.size(); ++k) {
@@ -350,10 +392,6 @@ JoinedFit FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<
   return {FitAlone(start, std::move(points), std::get<AutoPlan>(options.plan), context), {}};
 }
 
-}  // namespace
-
-namespace {
-
 void AddAttributes(std::span<const double> weights, const RunContext& context, StepClock& step,
                    PointFit& result) {
   if (!result.Faults().empty()) {
@@ -366,18 +404,19 @@ void AddAttributes(std::span<const double> weights, const RunContext& context, S
   }
 }
 
-void AddSigma(const SigmaSource& source, StepClock& step, PointFit& result) {
+void AddSigma(const GivenPoints& given, const HSplineSurface& start, StepClock& step,
+              PointFit& result) {
   if (result.Faults().empty()) {
-    result.sigma = step("sigma", [&] { return SigmaOver(result, source); });
+    result.sigma = step("sigma", [&] { return SigmaOver(result, given, start); });
     result.sigma_mm = result.sigma->At(result.fit.uv);
   }
 }
 
-PointFit FoundBy(Parametrisation parameters, JoinedFit joined,
-                 std::vector<PointAttribute> attributes) {
-  return {.parameters = std::string(NameOf(parameters.source)),
-          .how = std::move(parameters.how),
-          .map_faults = parameters.faults,
+PointFit FoundBy(PlacedPoints placed, JoinedFit joined, std::vector<PointAttribute> attributes) {
+  return {.parameters = std::string(NameOf(placed.parameters.source)),
+          .how = std::move(placed.parameters.how),
+          .map_faults = placed.parameters.faults,
+          .moves = placed.moves,
           .fit = std::move(joined.fit),
           .weighted_rms_mm = kNaN,
           .joins = std::move(joined.joins),
@@ -387,14 +426,6 @@ PointFit FoundBy(Parametrisation parameters, JoinedFit joined,
           .sigma = nullptr,
           .sigma_mm = {},
           .times = {}};
-}
-
-Box3 BoxOf(std::span<const Vec3> points) {
-  Box3 box;
-  for (const Vec3& p : points) {
-    box.extend(p);
-  }
-  return box;
 }
 
 // Of the distances as residuals list them.
@@ -445,6 +476,14 @@ double ReachBeyond(const HSplineSurface& surface, const Box3& points) {
   return farthest / points.diagonal().norm();
 }
 
+void CompareWith(const GivenPoints& given, PointFit& result) {
+  const std::optional<AutoReport>& report = result.fit.automatic;
+  result.sigma_factor = given.has_sigma && report ? SigmaFactorOf(*report, given.weights) : kNaN;
+  result.reach = ReachBeyond(result.fit.surface, given.box);
+  result.off = given.has_uv ? kNaN : result.fit.point_rms_mm / given.box.diagonal().norm();
+  TellRms(given.weights, result);
+}
+
 }  // namespace
 
 std::vector<std::string> PointFit::Faults() const {
@@ -474,40 +513,22 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   std::vector<PointAttribute> attributes = AttributesAsked(table, options);
   const std::vector<OpenedJoin> joins = OpenJoins(options.joins, options.closure);
   StepClock step(context);
-  const std::vector<Triangle> triangles =
-      RoundsOfMoves(options.fit) > 0 ? table.triangles : std::vector<Triangle>();
-  Parametrisation parameters = step("parameters", [&] { return ParametersOf(table, options); });
-  CheckJoinParameters(parameters.source, options);
-  const bool given = parameters.source == ParameterSource::kGiven;
-  std::optional<FootMoves> moves;
-  if (RoundsOfMoves(options.fit) > 0) {
-    moves = step("relaxation",
-                 [&] { return MoveUv(table, triangles, options, context, parameters.uv); });
-  }
-  const HSplineSurface start = StartSurface(shape, table.positions, parameters.uv);
-  CheckChord(options.chord_mm, start, {table.positions, parameters.uv}, context);
-  const bool has_sigma = table.weights_of_sigma;
-  const std::vector<double> weights = table.weights;  // the fit takes the points apart
-  std::vector<ExactPoint> exact = ExactOf(table, parameters.uv);
-  std::vector<Vec2> met;
-  std::ranges::transform(exact, std::back_inserter(met), &ExactPoint::uv);
-  const Box3 box = BoxOf(table.positions);
-  OwnedPoints points{std::move(table.positions), std::move(parameters.uv),
-                     std::move(table.weights)};
+  PlacedPoints placed = PlacePoints(table, options, step, context);
+  std::vector<Vec2>& uv = placed.parameters.uv;
+  const HSplineSurface start = StartSurface(shape, table.positions, uv);
+  CheckChord(options.chord_mm, start, {table.positions, uv}, context);
+  std::vector<ExactPoint> exact = ExactOf(table, uv);
+  const GivenPoints given = GivenOf(table, placed.parameters.source, exact);
+  OwnedPoints points{std::move(table.positions), std::move(uv), std::move(table.weights)};
   JoinedFit joined = step("fit", [&] {
     return FitOwned(start, std::move(points), std::move(exact), joins, AfterMoves(options.fit),
                     context);
   });
-  PointFit result = FoundBy(std::move(parameters), std::move(joined), std::move(attributes));
-  result.moves = moves;
-  result.sigma_factor =
-      has_sigma && result.fit.automatic ? SigmaFactorOf(*result.fit.automatic, weights) : kNaN;
-  result.reach = ReachBeyond(result.fit.surface, box);
-  result.off = given ? kNaN : result.fit.point_rms_mm / box.diagonal().norm();
-  TellRms(weights, result);
-  AddAttributes(weights, context, step, result);
+  PointFit result = FoundBy(std::move(placed), std::move(joined), std::move(attributes));
+  CompareWith(given, result);
+  AddAttributes(given.weights, context, step, result);
   if (options.sigma) {
-    AddSigma({start, weights, std::move(met)}, step, result);
+    AddSigma(given, start, step, result);
   }
   TellWeights(options.fit.terms, result.fit);
   result.times = step.Take();
