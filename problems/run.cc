@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 
 #include "fitting/plan/fit_faults.h"
@@ -162,7 +163,8 @@ std::optional<Bust> BustOf(const BustModel* model, const BustSource& source, con
   });
 }
 
-void NoteDraw(const Experiment& experiment, Case& subject) {
+void NoteFace(const Experiment& experiment, Case& subject) {
+  std::ranges::move(UnusedOptions(experiment), std::back_inserter(subject.notes));
   const FaceSource way = WayToFace(experiment);
   const PriorUse* const use = PriorUseOf(way);
   if (use != nullptr && use->draw > 0) {
@@ -247,7 +249,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   MadeFace made = step("fit", [&] {
     return MakeFace({experiment, *faces.generic, prior, subject, seedable, bone.shell}, context);
   });
-  NoteDraw(experiment, subject);
+  NoteFace(experiment, subject);
   auto before_edits = EditByHand(experiment, made, subject);
   CheckFinite(made.fitted.fit.surface);
   Tessellation face =

@@ -198,6 +198,7 @@ CheckFindings InputCheck::LookAtTissue(const Experiment& experiment) {
 
 CheckFindings InputCheck::LookAtFace(const Experiment& experiment) {
   CheckFindings findings;
+  findings.warnings = UnusedOptions(experiment);
   if (NamesAFile(experiment)) {
     const std::string key = StageKey("face", experiment.face_template, experiment.prior,
                                      experiment.bust, experiment.face);

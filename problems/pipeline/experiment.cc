@@ -11,6 +11,8 @@
 
 #include "fitting/plan/fit_check.h"
 #include "problems/bust/bust_model.h"
+#include "problems/config/config_writer.h"
+#include "problems/pipeline/experiment_config.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
@@ -207,6 +209,24 @@ void CheckUncertainty(const Experiment& experiment, std::vector<OptionFault>& fa
   }
 }
 
+// The paths of what differs, as deep as both are maps.
+void AddDifferences(const std::string& path, const ConfigNode& given, const ConfigNode& usual,
+                    std::vector<std::string>& paths) {
+  if (ToFlowYaml(given) == ToFlowYaml(usual)) {
+    return;
+  }
+  const auto known = [&](const ConfigNode::Entry& entry) {
+    return usual.Find(entry.key) != nullptr;
+  };
+  if (!given.IsMap() || !usual.IsMap() || !std::ranges::all_of(given.entries, known)) {
+    paths.push_back(path);
+    return;
+  }
+  for (const ConfigNode::Entry& entry : given.entries) {
+    AddDifferences(path + "." + entry.key, entry.value, *usual.Find(entry.key), paths);
+  }
+}
+
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
@@ -235,6 +255,31 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   return faults;
 } catch (const Error& error) {  // of a template that cannot be used; its levels are not known
   return {{"template", error.what()}};
+}
+
+std::vector<std::string> UnusedOptions(const Experiment& experiment) {
+  const FaceSource face = WayToFace(experiment);
+  if (std::holds_alternative<FittedTemplate>(face)) {
+    return {};
+  }
+  const ConfigNode given = ConfigTreeOf(experiment), usual = ConfigTreeOf(Experiment());
+  std::vector<std::string> paths;
+  for (const std::string_view option : {"first_fit", "seeds", "rounds", "fit"}) {
+    AddDifferences(std::string(option), *given.Find(option), *usual.Find(option), paths);
+  }
+  if (std::holds_alternative<PriorThenFit>(face)) {
+    std::erase_if(paths, [](const std::string& path) {
+      return path != "seeds.weight" && path != "first_fit";
+    });
+  }
+  std::vector<std::string> notes;
+  for (const std::string& path : paths) {
+    notes.push_back(fmt::format("{}: `face: {}` does not look at it{}", path, NameOf(face),
+                                path == "seeds.weight" && AsksPrior(face)
+                                    ? "; face.seed_weight of prior_then_fit stands in its place"
+                                    : ""));
+  }
+  return notes;
 }
 
 }  // namespace semblance

@@ -101,6 +101,8 @@ TEST_F(InputCheckTest, WhatRulesAndSitesSayOfAPhantomIsLookedAt) {
   EXPECT_THAT(Look(base + uv + "face: prior\n").faults,
               Contains(HasSubstr("sites.g.uv: `face: prior` has a place of its own")));
   EXPECT_THAT(Look(base + uv).faults, IsEmpty());
+  EXPECT_THAT(Look(base + "face: placed\nrounds: 2\n").warnings,
+              Contains(HasSubstr("rounds: `face: placed` does not look at it")));
 }
 
 TEST_F(InputCheckTest, AKnownDepthIsOneWhereTheTableHasNone) {

@@ -66,6 +66,28 @@ TEST(Experiment, WhatAFaceDoesNotLookAtOfItsUncertaintyIsToldAtItsLine) {
       "a.yaml"));
 }
 
+// A study may compare ways that share their options, so these are no faults.
+TEST(Experiment, WhatAFaceDoesNotLookAtOfSeedsAndFitIsTold) {
+  const auto unused = [](const std::string& text) {
+    return UnusedOptions(ReadConfigText<Experiment>(text, "a.yaml"));
+  };
+  const std::string set =
+      "seeds: {weight: 0.5, level: 1}\nfirst_fit: []\nrounds: 2\n"
+      "fit: {solver: fastest, plan: {schedule: [{level: 0}]}, terms: [points]}\n";
+  EXPECT_THAT(unused("face: placed\n"), ::testing::IsEmpty());
+  EXPECT_THAT(unused("face: fit\n" + set), ::testing::IsEmpty());
+  EXPECT_THAT(
+      unused("face: thin_plate\n" + set),
+      ::testing::UnorderedElementsAre(
+          HasSubstr("seeds.weight: `face: thin_plate` does not look at it"),
+          HasSubstr("seeds.level: "), HasSubstr("first_fit: "), HasSubstr("rounds: "),
+          HasSubstr("fit.solver: "), HasSubstr("fit.plan.schedule: "), HasSubstr("fit.terms: ")));
+  EXPECT_THAT(unused(set), ::testing::UnorderedElementsAre(
+                               HasSubstr("seeds.weight: `face: prior_then_fit` does not look at "
+                                         "it; face.seed_weight"),
+                               HasSubstr("first_fit: ")));
+}
+
 // What a trial would refuse only after its skull was filled.
 TEST(Experiment, APriorThatIsAskedNamesItsFiles) {
   EXPECT_THAT(Faults("prior: hspline\n"), HasSubstr("prior.modes: no file is named"));
