@@ -15,6 +15,7 @@
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
 #include "fitting/solve/auto_weight.h"
+#include "fitting/solve/level_fit.h"
 #include "fitting/solve/space_solve.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/feature.h"

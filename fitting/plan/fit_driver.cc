@@ -7,8 +7,10 @@
 #include <set>
 #include <utility>
 
+#include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/joint_relaxation.h"
 #include "fitting/solve/auto_weight.h"
+#include "fitting/solve/level_fit.h"
 #include "surfaces/hspline_files/feature.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 

@@ -10,6 +10,8 @@
 #include "fitting/plan/fit_options.h"
 #include "fitting/plan/fit_result.h"
 #include "fitting/problem/fit_target.h"
+#include "fitting/relaxation/dowel_mesh.h"
+#include "fitting/terms/level_view.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {

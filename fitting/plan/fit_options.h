@@ -45,10 +45,11 @@ void Fields(Visitor& visit, FitOptions& o) {
   visit(
       FieldInfo{.name = "solver",
                 .doc = "ceres: each solve of any plan is a ceres::Problem whose parameter blocks "
-                       "are the control vertices, in tiles of 3 x 3 where the terms treat x, y and "
-                       "z alike; fastest: one direct factorisation of the same least squares where "
-                       "the terms treat x, y and z alike, else as ceres; the same surface to "
-                       "rounding. The auto plan goes by conjugate gradients; with ceres a last "
+                       "are the control vertices; where the terms treat x, y and z alike, one "
+                       "coordinate of 3 x 3 of them; fastest: one direct factorisation of the same "
+                       "least squares where the terms are linear, or a loss is on terms that treat "
+                       "x, y and z alike; else as ceres. The same surface to rounding. The auto "
+                       "plan goes by conjugate gradients; with ceres a last "
                        "problem over the vertices that it found brings all terms to their minimum"},
       o.solver);
 }

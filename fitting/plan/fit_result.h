@@ -7,7 +7,7 @@
 
 #include "fitting/nested/nested_fit.h"
 #include "fitting/relaxation/relaxation.h"
-#include "fitting/solve/level_fit.h"
+#include "fitting/solve/level_summary.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {

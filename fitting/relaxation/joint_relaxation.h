@@ -5,6 +5,7 @@
 #include <functional>
 #include <span>
 
+#include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxation.h"
 #include "fitting/solve/level_fit.h"
 

@@ -4,6 +4,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxer.h"
 
 namespace semblance {

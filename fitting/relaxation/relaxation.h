@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
-#include "fitting/relaxation/dowel_mesh.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {
+
+class DowelMesh;  // dowel_mesh.h
 
 // How points move in a round, and what stops them; of every mode.
 struct PointMoves {

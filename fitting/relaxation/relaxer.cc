@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/relaxation/relaxer.h"
+#include "fitting/relaxation/dowel_mesh.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxation.h"
 
 namespace semblance {

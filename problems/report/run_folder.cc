@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "fitting/problem/seeding.h"
+#include "fitting/relaxation/dowel_mesh.h"
 #include "problems/bust/bust_files.h"
 #include "problems/metrics/face_metrics_json.h"
 #include "problems/output/manifest.h"

@@ -7,6 +7,9 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "fitting/solve/level_fit.h"
+#include "fitting/space/point_cloud.h"
+#include "fitting/terms/level_view.h"
 #include "surfaces/base/random.h"
 #include "tests/bench/fit_parts.h"
 

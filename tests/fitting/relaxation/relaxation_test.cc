@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/relaxation/relaxation.h"
+#include "fitting/relaxation/dowel_mesh.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -2,6 +2,7 @@
 // Is relaxation worth its time? The generic face's (u,v) are wrong by up to 5 % of the domain.
 #include <gtest/gtest.h>
 
+#include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxation.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/run.h"
