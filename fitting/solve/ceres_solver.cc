@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "fitting/least_squares/qr_compression.h"
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/terms/term_cost.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance {
 namespace {
@@ -79,10 +79,7 @@ std::string TerminationName(ceres::TerminationType type) {
   if (type == ceres::USER_SUCCESS) {
     return "convergence";  // by StopAtRounding
   }
-  std::string text = ceres::TerminationTypeToString(type);
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
+  return LowerCase(ceres::TerminationTypeToString(type));
 }
 
 constexpr int kSide = 3, kTile = kSide * kSide;

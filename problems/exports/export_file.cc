@@ -3,13 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <set>
 
 #include "problems/exports/mesh_export.h"
 #include "problems/exports/run_scene.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
@@ -17,12 +16,6 @@ namespace semblance {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string LowerCase(std::string text) {
-  std::ranges::transform(text, text.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 void RefuseChord(const fs::path& from, const ExportOptions& options) {
   if (options.chord_mm) {

@@ -5,23 +5,16 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <initializer_list>
 #include <optional>
 #include <set>
 
 #include "surfaces/base/csv.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance {
 namespace {
-
-std::string Lower(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
-}
 
 // Which column holds what.
 class Columns {
@@ -31,7 +24,7 @@ class Columns {
   // The column that bears one of the names; nothing if there is none.
   std::optional<std::size_t> Find(std::initializer_list<std::string_view> names) {
     for (std::size_t k = 0; k < table_.Columns().size(); ++k) {
-      if (std::find(names.begin(), names.end(), Lower(table_.Columns()[k])) != names.end()) {
+      if (std::find(names.begin(), names.end(), LowerCase(table_.Columns()[k])) != names.end()) {
         used_.insert(k);
         return k;
       }
@@ -133,7 +126,7 @@ std::optional<std::array<double, 3>> NormalAt(const CsvReader& table, const Layo
 }
 
 Certainty CertaintyAt(const CsvReader& table, std::optional<std::size_t> column) {
-  const std::string word = column ? Lower(table.Cell(*column)) : "";
+  const std::string word = column ? LowerCase(std::string(table.Cell(*column))) : "";
   if (word.empty()) {
     return Certainty::kMedium;
   }

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <set>
 
@@ -20,6 +19,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance {
 namespace {
@@ -72,9 +72,7 @@ constexpr std::array kFormats = {
 };
 
 const Format& FormatOf(const fs::path& path) {
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string name = LowerCase(path.filename().string());
   for (const Format& format : kFormats) {
     if (name.ends_with(format.extension)) {
       return format;

@@ -10,7 +10,7 @@
 
 #include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/srgb.h"
+#include "surfaces/mesh_files/srgb.h"
 
 namespace semblance {
 namespace {

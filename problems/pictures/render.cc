@@ -12,7 +12,7 @@
 #include "problems/pictures/raster.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/base/srgb.h"
+#include "surfaces/mesh_files/srgb.h"
 
 namespace semblance {
 namespace {

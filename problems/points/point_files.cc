@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -22,6 +21,7 @@
 #include "problems/points/plain_points.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/base/npy.h"
 #include "surfaces/mesh_files/ply_header.h"
 #include "surfaces/mesh_files/read_obj.h"
@@ -58,12 +58,6 @@ std::string Unzipped(const std::string& bytes, const std::string& name) {
     throw IoError(fmt::format("{}: it cannot be unpacked ({}); give a file made by gzip", name,
                               archive_error_string(a.get())));
   }
-  return text;
-}
-
-std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return text;
 }
 
@@ -311,7 +305,7 @@ PointTable ParseUnnamed(const std::string& bytes, const std::string& ending,
 
 PointTable Parse(const std::string& bytes, const std::filesystem::path& path,
                  std::span<const std::string> attributes) {
-  const std::string name = path.string(), ending = Lower(path.extension().string());
+  const std::string name = path.string(), ending = LowerCase(path.extension().string());
   if (ending == ".csv" || ending == ".txt" || name == "-") {
     return ParsePointTable(bytes, name == "-" ? "standard input" : name, attributes);
   }
@@ -328,7 +322,7 @@ PointTable Parse(const std::string& bytes, const std::filesystem::path& path,
 }
 
 bool IsCsv(const std::filesystem::path& path) {
-  const std::string ending = Lower(path.extension().string());
+  const std::string ending = LowerCase(path.extension().string());
   return ending == ".csv" || ending == ".txt";
 }
 
@@ -396,7 +390,7 @@ void CheckReach(const PointTable& points) {
 
 // Whether each point is a line, after one with the names of the columns.
 bool IsTable(const std::filesystem::path& path) {
-  return path == "-" || IsCsv(Lower(path.extension().string()) == ".gz" ? path.stem() : path);
+  return path == "-" || IsCsv(LowerCase(path.extension().string()) == ".gz" ? path.stem() : path);
 }
 
 PointFile ReadAnyPointFile(const std::filesystem::path& path,
@@ -404,7 +398,7 @@ PointFile ReadAnyPointFile(const std::filesystem::path& path,
   if (auto plain = IsCsv(path) ? ReadPlainCsv(path, attributes) : std::nullopt) {
     return std::move(*plain);
   }
-  const bool piped = path == "-", zipped = Lower(path.extension().string()) == ".gz";
+  const bool piped = path == "-", zipped = LowerCase(path.extension().string()) == ".gz";
   std::string bytes =
       piped ? std::string(std::istreambuf_iterator<char>(std::cin), {}) : ReadFileBytes(path);
   PointFile file{.points = {}, .sha256 = Sha256OfText(bytes)};

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <map>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/read_parts.h"
 
 namespace semblance {
@@ -23,12 +23,6 @@ namespace {
 
 // Values by their names in lower case; the first of each name.
 using HeaderLines = std::map<std::string, std::string>;
-
-std::string Lower(std::string text) {
-  std::ranges::transform(text, text.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 std::string_view Trimmed(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\r\n";
@@ -49,7 +43,7 @@ HeaderLines LinesOf(std::string_view head, std::string_view sign, std::string_vi
       return lines;
     }
     if (at != line.npos && !line.starts_with('#')) {
-      lines.emplace(Lower(std::string(name)), Trimmed(line.substr(at + sign.size())));
+      lines.emplace(LowerCase(std::string(name)), Trimmed(line.substr(at + sign.size())));
     }
   }
   return lines;
@@ -78,7 +72,7 @@ std::optional<double> MmPer(const std::string& unit) {
       Unit{{"in", "inch", "inches", "\""}, 25.4},
   };
   for (const Unit& known : kUnits) {
-    if (std::ranges::count(known.words, Lower(unit)) > 0) {
+    if (std::ranges::count(known.words, LowerCase(unit)) > 0) {
       return known.mm;
     }
   }
@@ -144,7 +138,7 @@ constexpr std::string_view kSidesInWords =
     "right-anterior-superior (RAS), left-anterior-superior (LAS) or left-posterior-superior (LPS)";
 
 const NrrdSpace& SpaceOf(const std::string& space, const std::string& where) {
-  const std::string lower = Lower(space);
+  const std::string lower = LowerCase(space);
   for (const NrrdSpace& known : kSpaces) {
     if (lower == known.name || lower == known.short_name) {
       return known;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -17,6 +16,7 @@
 #include "problems/volumes/slice_stack.h"
 #include "problems/volumes/voxel_array.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance {
 namespace {
@@ -33,12 +33,7 @@ constexpr std::array kEndings = {
     Ending{".mha", VolumeFormat::kMetaImage}, Ending{".mhd", VolumeFormat::kMetaImage},
 };
 
-std::string LowerCaseName(const fs::path& path) {
-  std::string name = path.filename().string();
-  std::ranges::transform(name, name.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name;
-}
+std::string LowerCaseName(const fs::path& path) { return LowerCase(path.filename().string()); }
 
 // Notes on values that int16 does not hold; throws if they cannot be grey values of a scanner.
 void CheckValues(const VoxelArray& array, const std::string& where,

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <fstream>
 #include <map>
 #include <span>
@@ -24,6 +23,7 @@
 #include "problems/workbench/bench_subject.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
@@ -46,12 +46,7 @@ std::string_view WordOf(Enum value) {
 // What a file is
 // ---------------------------------------------------------------------------------------------
 
-std::string LowerName(const fs::path& path) {
-  std::string name = path.filename().string();
-  std::ranges::transform(name, name.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name;
-}
+std::string LowerName(const fs::path& path) { return LowerCase(path.filename().string()); }
 
 bool EndsWithOneOf(const std::string& name, std::span<const std::string_view> endings) {
   return std::ranges::any_of(endings, [&](std::string_view end) { return name.ends_with(end); });

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <initializer_list>
 
 #include "problems/landmark_files/read_landmarks.h"
@@ -16,6 +15,7 @@
 #include "problems/workbench/bench_actions.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -101,12 +101,7 @@ FileSubject ToFiles(const CtSubject& subject, const fs::path& meshes, BenchState
   return files;
 }
 
-std::string LowerExtension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
+std::string LowerExtension(const fs::path& path) { return LowerCase(path.extension().string()); }
 
 bool IsOneOf(const std::string& extension, std::initializer_list<const char*> extensions) {
   return std::ranges::find(extensions, extension) != extensions.end();

@@ -3,13 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline_files/cad_export.h"
 #include "surfaces/hspline_files/surface_export.h"
@@ -20,12 +19,6 @@
 
 namespace semblance {
 namespace {
-
-std::string LowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 std::string ExactBytes(const HSplineSurface& surface, const std::string& extension) {
   if (extension == ".vtu") {

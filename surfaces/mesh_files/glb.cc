@@ -11,7 +11,7 @@
 #include <optional>
 
 #include "surfaces/base/error.h"
-#include "surfaces/base/srgb.h"
+#include "surfaces/mesh_files/srgb.h"
 
 namespace semblance {
 namespace {

@@ -13,6 +13,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/read_obj.h"
 #include "surfaces/mesh_files/read_off.h"
 #include "surfaces/mesh_files/read_parts.h"
@@ -44,10 +45,7 @@ class QuietOpenMesh {
 };
 
 std::string LowerExtension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return extension;
+  return LowerCase(path.extension().string());
 }
 
 void CheckExtension(const std::string& extension, const std::string& where) {

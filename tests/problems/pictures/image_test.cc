@@ -12,7 +12,7 @@
 #include "problems/pictures/stroke_font.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
-#include "surfaces/base/srgb.h"
+#include "surfaces/mesh_files/srgb.h"
 #include "tests/testing/pixels.h"
 
 namespace semblance {

@@ -14,7 +14,7 @@
 #include "problems/pictures/raster.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "surfaces/base/srgb.h"
+#include "surfaces/mesh_files/srgb.h"
 #include "tests/testing/pixels.h"
 #include "tests/testing/shapes.h"
 #include "tests/testing/signed_volume.h"
