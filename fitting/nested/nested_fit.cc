@@ -243,7 +243,6 @@ class NestedFitter {
 
   // Along one axis, by the median.
   double HeldSd(std::vector<double> squares) const {
-    constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
     if (squares.empty()) {
       return 0;
     }

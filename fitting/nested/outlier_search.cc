@@ -15,9 +15,6 @@ constexpr int kNearest = 8, kWindow = 20, kPasses = 4;
 constexpr double kFar = 6, kAlike = 0.5;
 constexpr double kTells = 4;      // standard deviations of a point that it can tell from none
 constexpr double kMostVotes = 4;  // of a point, in those of most
-// Standard deviation along one axis over the median of the distance, for normal errors along 1, 2
-// and 3 axes.
-constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
 
 class OutlierSearch {
  public:

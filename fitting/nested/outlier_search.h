@@ -2,6 +2,7 @@
 // Outliers: points that disagree with their neighbours.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <span>
@@ -10,6 +11,10 @@
 #include "fitting/nested/leaf_sums.h"
 
 namespace semblance {
+
+// Standard deviation along one axis over the median of the distance, for normal errors along 1, 2
+// and 3 axes.
+inline constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
 
 // Residuals begin .. end - 1 of the points that are looked at, in their order; until the next call.
 using ResidualsBetween =

@@ -284,7 +284,7 @@ void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
   CheckOptions(options, start.shape().max_level);
   CheckFeatures(features, start.shape());
   if (std::holds_alternative<AutoPlan>(options.plan) && !features.empty()) {
-    Fail("the auto plan knows no features; take plan: adaptive");
+    Fail("the auto plan does not protect features; take plan: adaptive");
   }
 }
 

@@ -22,7 +22,7 @@ struct WeightProblem {
 struct WeightChoice {
   double weight = kNaN;              // lambda
   double score = kNaN;               // of generalised cross-validation, units of the misfit
-  double degrees_of_freedom = kNaN;  // trace of the influence matrix, a coordinate
+  double degrees_of_freedom = kNaN;  // trace of the influence matrix, per coordinate
 };
 
 // The lambda that makes misfit(lambda) / (1 - trace / count)^2 least (Craven & Wahba 1979): by

@@ -70,7 +70,7 @@ MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const De
     const std::size_t places = DepthSamples(input.dowels).size();
     if (places < FewestDowels(mean)) {
       throw InputError(fmt::format(
-          "{}: `mean: covariates` finds {} factors, which {} do not tell; place "
+          "{}: `mean: covariates` finds {} factors, for which {} are too few; place "
           "more, or choose `mean: constant`",
           scheme, FewestDowels(mean), places == 1 ? "1 dowel" : fmt::format("{} dowels", places)));
     }

@@ -13,7 +13,7 @@ namespace semblance {
 namespace {
 
 // Defaults, which stand in no source, come first.
-std::tuple<int, int, int> PlaceOf(const ConfigFault& fault) {
+std::tuple<int, int, int> OrderOf(const ConfigFault& fault) {
   const ConfigLocation& at = fault.location;
   return {at.source ? at.source->order : -1, at.line, at.column};
 }
@@ -30,7 +30,7 @@ void ConfigErrors::ThrowIfAny() const {
     return;
   }
   std::vector<ConfigFault> sorted = faults_;
-  std::ranges::stable_sort(sorted, {}, PlaceOf);
+  std::ranges::stable_sort(sorted, {}, OrderOf);
   std::string lines;
   for (const ConfigFault& fault : sorted) {
     lines += fmt::format("{}{}: {}{}{}", lines.empty() ? "" : "\n", ToText(fault.location),

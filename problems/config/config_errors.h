@@ -15,7 +15,7 @@ struct OptionFault {
   std::string path, what;
 };
 
-// One that is told, with its place.
+// One that is told, with its location.
 struct ConfigFault {
   ConfigLocation location;
   std::string path, what;

@@ -23,7 +23,7 @@ class TemplateDistance {
   // face: (u,v) of which the convex hull is the face. The skin must outlive it.
   TemplateDistance(const TriMesh& skin, std::vector<Vec2> face);
 
-  // From each point of the face, 4 by 4 a patch of level 3, to the nearest point of the skin. A
+  // From each point of the face, 4 by 4 per patch of level 3, to the nearest point of the skin. A
   // point nearest to a border of the skin has no counterpart: there the skin has a hole.
   SkinDistance FaceToSkin(const HSplineSurface& surface, int threads) const;
 
@@ -43,7 +43,7 @@ class TemplateDistance {
   std::vector<Vec2> hull_;       // counter-clockwise
 };
 
-// Pairs of neighbours among points of the surface, 2 by 2 a patch of its finest level, whose
+// Pairs of neighbours among points of the surface, 2 by 2 per patch of its finest level, whose
 // normals differ by more than 120 degrees.
 int CountFolds(const HSplineSurface& surface, int threads);
 

@@ -27,7 +27,7 @@ struct LandmarkReading {
 // RAS is turned to LPS, and a note says so. Throws IoError if the file cannot be read or is not of
 // its format; InputError with a line per fault if a name is no site (and may not be left out), a
 // site appears twice, there is no landmark, a coordinate is beyond all reach, or options.axes
-// contradicts the file; ConfigError as ReadLandmarkFile does, for whatever kind of file.
+// contradicts the file; ConfigError as ReadLandmarkFileAsWritten does, for whatever kind of file.
 LandmarkReading ReadLandmarks(const std::filesystem::path& path,
                               const ReadLandmarksOptions& options = {});
 

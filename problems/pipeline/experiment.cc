@@ -142,7 +142,7 @@ void CheckAutoPlan(const Experiment& experiment, std::vector<OptionFault>& fault
       !FeatureVertices(LoadTemplate(experiment.face_template)).empty()) {
     faults.push_back(
         {"fit.plan",
-         "the auto plan knows no features, and the template has some; take `adaptive`, "
+         "the auto plan does not protect features, and the template has some; take `adaptive`, "
          "or a plan of steps"});
   }
 }

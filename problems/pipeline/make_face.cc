@@ -253,14 +253,14 @@ RuleMarks RulesOf(const FaceInput& in, const FacePrior& prior) {
 
 // Random seeds of the faces to draw: first the one that takes the place of the most likely face.
 std::vector<std::uint64_t> DrawsOf(const PriorUse& use, const UncertaintyOptions& options) {
-  std::vector<std::uint64_t> seeds;
+  std::vector<std::uint64_t> random_seeds;
   if (use.draw > 0) {
-    seeds.push_back(use.draw);
+    random_seeds.push_back(use.draw);
   }
   for (int k = 0; k < options.samples; ++k) {
-    seeds.push_back(options.random_seed + k);
+    random_seeds.push_back(options.random_seed + k);
   }
-  return seeds;
+  return random_seeds;
 }
 
 void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made) {

@@ -19,10 +19,10 @@ namespace {
 void NoteEnds(const DepthField& depth, std::vector<std::string>& notes) {
   for (const std::string& words :
        depth.process ? depth.process->at_end : std::vector<std::string>()) {
-    notes.push_back(
-        fmt::format("interp: {}, and the likelihood would go on; the dowels do not tell it. Set "
-                    "length_mm or signal_mm, or a smaller length_prior_spread",
-                    words));
+    notes.push_back(fmt::format(
+        "interp: {}, and the likelihood would go on; the dowels do not determine it. Set "
+        "length_mm or signal_mm, or a smaller length_prior_spread",
+        words));
   }
 }
 

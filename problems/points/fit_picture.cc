@@ -15,6 +15,7 @@
 #include "problems/pictures/pictures.h"
 #include "problems/report/scene_blobs.h"
 #include "problems/report/scene_json.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -61,8 +62,8 @@ Camera FromAbove(const TriMesh& mesh, Vec3 up) {
   Eigen::Index largest = 0;
   up.cwiseAbs().maxCoeff(&largest);
   up = up[largest] < 0 ? Vec3(-up.normalized()) : Vec3(up.normalized());
-  const Vec3 seed = std::abs(up.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
-  const Vec3 right = (seed - seed.dot(up) * up).normalized(), forward = up.cross(right);
+  const Vec3 axis = std::abs(up.x()) < 0.9 ? Vec3::UnitX() : Vec3::UnitY();
+  const Vec3 right = (axis - axis.dot(up) * up).normalized(), forward = up.cross(right);
   const Vec3 towards = std::sin(kRise) * up - std::cos(kRise) * forward;
   Mat3 view;
   view.row(0) = right;
@@ -134,9 +135,7 @@ ColourMap DistanceColours(const FitGrid& grid) {
                        [](double v) { return std::isfinite(v); });
   double high = 0;
   if (!known.empty()) {
-    const auto at = known.begin() + static_cast<long>(0.98 * static_cast<double>(known.size() - 1));
-    std::ranges::nth_element(known, at);
-    high = *at;
+    high = Quantile(known, 0.98);
   }
   return SequentialMap(0, high > 0 ? high : 1);
 }

@@ -32,7 +32,7 @@ std::string Excess(const JoinReport& report) {
   if (report.is_at_limit) {
     return fmt::format(
         "; that is more than {}, and less would need more than {} places: the given edge has too "
-        "much detail for this patch; fit both with a lower fit.plan.finest, or smaller ones",
+        "much detail for this surface; fit both with a lower fit.plan.finest, or smaller ones",
         most, kMostExactPoints);
   }
   return fmt::format(

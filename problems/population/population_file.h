@@ -73,19 +73,21 @@ void CheckValue(Report& report, const PopulationSubject& o) {
   }
 }
 
-// Made-up heads, of seeds that count up from random_seed.
+// Made-up heads, whose random seeds count up from that of `like`.
 struct PhantomCrowd {
   int count = 0;                    // made-up heads
-  PhantomOptions like;              // of the first; the others differ in their seed
+  PhantomOptions like;              // of the first; the others differ in their random seed
   std::optional<PhantomScan> scan;  // none: skull and skin are exact
 };
 template <class Visitor>
 void Fields(Visitor& visit, PhantomCrowd& o) {
   visit(FieldInfo{.name = "count", .min = 0, .max = 100000, .doc = "how many"}, o.count);
-  visit(FieldInfo{.name = "like",
-                  .doc = "the first phantom; the others have the seeds after its own. Their body "
-                         "mass index is made up, from how thick their tissue is"},
-        o.like);
+  visit(
+      FieldInfo{.name = "like",
+                .doc =
+                    "the first phantom; the others have the random seeds after its own. Their body "
+                    "mass index is made up, from how thick their tissue is"},
+      o.like);
   visit(FieldInfo{.name = "scan",
                   .doc = "how coarse a CT they are seen in, to learn what coarse voxels do; null: "
                          "skull and skin as they are"},

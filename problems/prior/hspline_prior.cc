@@ -127,7 +127,7 @@ HSplineModes ModesFrom(const Json& json) {
   return modes;
 }
 
-// A mesh of the template with about 128 quads a side.
+// A mesh of the template with about 128 quads along each side.
 Tessellation MeshOf(const TemplateFace& face) {
   const HSplineShape& shape = face.surface.shape();
   const int patches = std::max(shape.PatchesU(shape.max_level), shape.PatchesV(shape.max_level));

@@ -11,6 +11,7 @@
 #include "problems/prior/prior_target.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -110,8 +111,7 @@ double MedianMove(const FacePrior& before, const FacePrior& after) {
                      PositionOf(before.sites.at(site), before.model.mean, before.model.mean.points))
                         .norm());
   }
-  std::ranges::nth_element(moves, moves.begin() + std::ssize(moves) / 2);
-  return moves[moves.size() / 2];
+  return UpperMedian(moves);
 }
 
 // ---------------------------------------------------------------------------------------------

@@ -176,10 +176,6 @@ void CheckValue(Report& report, const LandmarkFile& file) {
   }
 }
 
-LandmarkFile ReadLandmarkFile(const std::filesystem::path& path) {
-  return InLpsMm(ReadLandmarkFileAsWritten(path));
-}
-
 LandmarkFile ReadLandmarkFileAsWritten(const std::filesystem::path& path) {
   return ReadConfig<LandmarkFile>(path);
 }

@@ -167,17 +167,13 @@ struct UsedLandmarks {
 UsedLandmarks LandmarksInUse(const LandmarkFile& file, const MeshQuery& skull,
                              const PlaceOptions& options);
 
-// The one way to read such a file, as the checks are made here; points and normals come in mm and
-// LPS whatever the file is in. Throws IoError if the file cannot
-// be read; ConfigError, with a line for each fault, if it has no
-// landmark, a site is neither standard nor further (sites.h) or appears twice (also once as
-// absent), a point lacks, or a normal is not of length 1 within 1 %.
-LandmarkFile ReadLandmarkFile(const std::filesystem::path& path);
-
-// The same in the units and axes that the file says.
+// A YAML file, in the units and axes that it says; ReadLandmarks (read_landmarks.h) reads every
+// kind of file. Throws IoError if the file cannot be read; ConfigError, with a line for each fault,
+// if it has no landmark, a site is neither standard nor further (sites.h) or appears twice (also
+// once as absent), a point lacks, or a normal is not of length 1 within 1 %.
 LandmarkFile ReadLandmarkFileAsWritten(const std::filesystem::path& path);
 
-// Checks what other kinds of files say of landmarks as ReadLandmarkFile checks YAML: the ranges of
+// Checks what other kinds of files say of landmarks as that checks YAML: the ranges of
 // depths, the length of normals. file: its name, for messages. Throws ConfigError with a line for
 // each fault, which names the site.
 void CheckLandmarks(std::span<const Landmark> landmarks, const std::string& file);

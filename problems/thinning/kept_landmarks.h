@@ -66,9 +66,11 @@ void Fields(Visitor& visit, KeepRandom& o) {
                   .max = 1000,
                   .doc = "how many are kept; all, where the subject has no more"},
         o.n);
-  visit(FieldInfo{.name = "random_seed",
-                  .doc = "which; of one seed, those of a small n are among those of a larger one"},
-        o.random_seed);
+  visit(
+      FieldInfo{
+          .name = "random_seed",
+          .doc = "which; of one random_seed, those of a small n are among those of a larger one"},
+      o.random_seed);
 }
 
 using LandmarksKept = std::variant<KeepAll, KeepSpread, KeepNames, KeepRandom>;

@@ -91,7 +91,7 @@ std::string TessellationToGlb(const Tessellation& tessellation) {
   const TriMesh& mesh = tessellation.mesh;
   if (mesh.triangles.empty() || tessellation.normals.size() != mesh.points.size()) {
     throw InputError(fmt::format(
-        "glTF: {} triangles, {} points and {} normals; at least one triangle and one normal a "
+        "glTF: {} triangles, {} points and {} normals; at least one triangle and one normal per "
         "point are needed",
         mesh.triangles.size(), mesh.points.size(), tessellation.normals.size()));
   }

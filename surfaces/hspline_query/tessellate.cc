@@ -10,7 +10,7 @@ namespace semblance {
 Tessellation Tessellate(const HSplineSurface& surface, int per_patch) {
   if (per_patch < 1) {
     throw InputError(
-        fmt::format("tessellation: {} quads a patch side; at least 1 is needed", per_patch));
+        fmt::format("tessellation: {} quads along a patch side; at least 1 is needed", per_patch));
   }
   const HSplineShape& shape = surface.shape();
   const int quads_u = per_patch * shape.PatchesU(shape.max_level),

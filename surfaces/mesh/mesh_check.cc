@@ -76,9 +76,9 @@ double OutwardShare(const TriMesh& mesh) {
 
 void CheckHeadSize(double longest_mm, const std::string& name, const std::string& remedy) {
   if (!(longest_mm >= kSmallestHead_mm && longest_mm <= kLargestHead_mm)) {
-    throw InputError(
-        fmt::format("{}: its longest side is {:.4g} mm, which is no head's ({} to {} mm); {}", name,
-                    longest_mm, kSmallestHead_mm, kLargestHead_mm, UnitGuess(longest_mm, remedy)));
+    throw InputError(fmt::format(
+        "{}: its longest side is {:.4g} mm, which is not that of a head ({} to {} mm); {}", name,
+        longest_mm, kSmallestHead_mm, kLargestHead_mm, UnitGuess(longest_mm, remedy)));
   }
 }
 

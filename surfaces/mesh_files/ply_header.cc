@@ -126,7 +126,7 @@ class HeaderReader {
     if (name.empty() || std::any_of(named.begin(), named.end(),
                                     [&](const T& other) { return other.name == name; })) {
       lines_.Fail(
-          fmt::format("'{}' is no name that is free; each element, and each property of "
+          fmt::format("the name '{}' is empty or taken; each element, and each property of "
                       "an element, needs a name of its own",
                       Shown(name)));
     }

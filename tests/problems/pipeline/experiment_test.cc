@@ -146,8 +146,9 @@ TEST(Experiment, ThePlanThatKnowsNoFeaturesIsNotForATemplateThatHasSome) {
   const std::string fit =
       "fit: {plan: auto, terms: [points, {type: smoothness, weight: auto}], relaxation: none}\n";
   for (const char* face : {"fit", "prior_then_fit", "auto"}) {
-    EXPECT_THAT(Faults(fit + "template: ict\nface: " + face + "\n"),
-                HasSubstr("fit.plan: the auto plan knows no features, and the template has some"));
+    EXPECT_THAT(
+        Faults(fit + "template: ict\nface: " + face + "\n"),
+        HasSubstr("fit.plan: the auto plan does not protect features, and the template has some"));
   }
   EXPECT_NO_THROW(ReadConfigText<Experiment>(fit + "template: ict\nface: placed\n", "a.yaml"));
 }

@@ -429,7 +429,7 @@ TEST_F(Trust, ImportedMeshesAreThoseThatARunTakes) {
                                     folder_.Path().string())
                             .c_str()),
             0);
-  ExpectRefused("import-ct large.inv3 --out out --quiet", "which is no head's");
+  ExpectRefused("import-ct large.inv3 --out out --quiet", "which is not that of a head");
 }
 
 }  // namespace

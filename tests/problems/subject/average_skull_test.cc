@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/average_skull.h"
+#include "problems/landmark_files/read_landmarks.h"
 
 #include <gtest/gtest.h>
 
@@ -33,7 +34,7 @@ std::vector<SitePoint> Posed(bool mirrored = false) {
 std::vector<SitePoint> Read(const std::string& name) {
   std::vector<SitePoint> sites;
   const LandmarkFile file =
-      ReadLandmarkFile(SEMBLANCE_SOURCE_DIR "/configs/landmarks/" + name + ".yaml");
+      ReadLandmarks(SEMBLANCE_SOURCE_DIR "/configs/landmarks/" + name + ".yaml").file;
   for (const Landmark& l : file.landmarks) {
     sites.push_back({l.site, {l.point[0], l.point[1], l.point[2]}});
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/jaw_pose.h"
+#include "problems/landmark_files/read_landmarks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -50,8 +51,8 @@ TEST(JawPose, OfRealHeadsThatBiteIsSmall) {
   for (const char* name : {"cthead", "vhm"}) {
     std::vector<SitePoint> sites;
     for (const Landmark& l :
-         ReadLandmarkFile(std::string(SEMBLANCE_SOURCE_DIR "/configs/landmarks/") + name + ".yaml")
-             .landmarks) {
+         ReadLandmarks(std::string(SEMBLANCE_SOURCE_DIR "/configs/landmarks/") + name + ".yaml")
+             .file.landmarks) {
       sites.push_back({l.site, Vec3(l.point.data())});
     }
     EXPECT_LT(std::abs(FindJawPose(sites)->opening_deg), 10) << name;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/landmark_mistakes.h"
+#include "problems/landmark_files/read_landmarks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -44,7 +45,7 @@ Subject PhantomSubject() {
 // The landmarks of a real head, and of its skull a speck of bone at each.
 Subject RealSubject(const std::string& name) {
   Subject subject;
-  subject.file = ReadLandmarkFile(SEMBLANCE_SOURCE_DIR "/configs/landmarks/" + name + ".yaml");
+  subject.file = ReadLandmarks(SEMBLANCE_SOURCE_DIR "/configs/landmarks/" + name + ".yaml").file;
   for (const Landmark& l : subject.file.landmarks) {
     const auto first = static_cast<std::int32_t>(subject.skull.points.size());
     const Vec3 p(l.point[0], l.point[1], l.point[2]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/landmarks.h"
+#include "problems/landmark_files/read_landmarks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -33,7 +34,7 @@ absent:
 )";
 
 std::string Complaints(const std::string& text) {
-  return WordsOf<ConfigError>([&] { ReadLandmarkFile(ScratchFile(text)); });
+  return WordsOf<ConfigError>([&] { ReadLandmarks(ScratchFile(text)); });
 }
 
 LandmarkFile OneAt(const std::array<double, 3>& point) {
@@ -50,7 +51,7 @@ double DegreesBetween(const Vec3& a, const Vec3& b) {
 }
 
 TEST(LandmarkFile, ReadsWhatIsWritten) {
-  const LandmarkFile file = ReadLandmarkFile(ScratchFile(kGood));
+  const LandmarkFile file = ReadLandmarks(ScratchFile(kGood)).file;
   EXPECT_EQ(file.subject, "somebody");
   ASSERT_EQ(file.landmarks.size(), 2u);
   EXPECT_EQ(file.landmarks[0].site, "g");
@@ -71,10 +72,12 @@ TEST(LandmarkFile, RefusesUnknownUnitsAndAxes) {
 }
 
 TEST(LandmarkFile, ComesInMillimetresAndLps) {
-  const LandmarkFile file = ReadLandmarkFile(
-      ScratchFile("units: m\naxes: RAS\n"
-                  "landmarks: [{site: g, point: [0.25, -0.5, 1], normal: [0.6, -0.8, 0], "
-                  "depth_along_normal_mm: 5}]\n"));
+  const LandmarkFile file =
+      ReadLandmarks(
+          ScratchFile("units: m\naxes: RAS\n"
+                      "landmarks: [{site: g, point: [0.25, -0.5, 1], normal: [0.6, -0.8, 0], "
+                      "depth_along_normal_mm: 5}]\n"))
+          .file;
   const Landmark& g = file.landmarks.at(0);
   EXPECT_THAT(g.point, ElementsAre(-250, 500, 1000));
   EXPECT_THAT(*g.normal, ElementsAre(-0.6, 0.8, 0));

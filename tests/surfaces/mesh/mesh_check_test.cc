@@ -28,9 +28,10 @@ TEST(MeshCheck, ASoundHeadHasNoNotes) {
 }
 
 TEST(MeshCheck, AnotherUnitIsNamed) {
-  EXPECT_THAT(ErrorOf(SphereMesh({0, 0, 0}, 0.1, 20)),
-              "skull.ply: its longest side is 0.2 mm, which is no head's (60 to 500 mm); it looks "
-              "like metres; multiply by 1000, or say its unit (subject.units)");
+  EXPECT_THAT(
+      ErrorOf(SphereMesh({0, 0, 0}, 0.1, 20)),
+      "skull.ply: its longest side is 0.2 mm, which is not that of a head (60 to 500 mm); it looks "
+      "like metres; multiply by 1000, or say its unit (subject.units)");
   EXPECT_THAT(ErrorOf(SphereMesh({0, 0, 0}, 10, 20)),
               HasSubstr("it looks like centimetres; multiply by 10,"));
   EXPECT_THAT(ErrorOf(SphereMesh({0, 0, 0}, 4.5, 20)),
