@@ -49,12 +49,10 @@ void TakeMeans(const TissueOptions& options, JointNormal& joint) {
   }
 }
 
-std::vector<std::string> AllSites() {
+std::vector<std::string> AllCodes() {
   std::vector<std::string> sites;
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    for (const Site& site : *list) {
-      sites.push_back(site.code);
-    }
+  for (const Site& site : AllSites()) {
+    sites.push_back(site.code);
   }
   return sites;
 }
@@ -64,7 +62,7 @@ JointNormal JointOf(const TissueOptions& options) {
   const std::filesystem::path& path = given.spread.empty() ? options.table : given.spread;
   const TissueTable table = ReadTissueTable(path);
   JointNormal joint =
-      JointOfTable(table, options.sex, options.build, given.correlation, AllSites());
+      JointOfTable(table, options.sex, options.build, given.correlation, AllCodes());
   if (joint.names.empty()) {
     throw InputError(fmt::format(
         "tissue.given: table '{}' states no standard deviation, so nothing tells how depths vary; "

@@ -197,10 +197,8 @@ Image Marked(const SiteSketch& sketch, const SiteSketch::Seen& seen, const Site&
 }
 
 const Site& KnownSite(std::string_view code) {
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    if (const auto at = std::ranges::find(*list, code, &Site::code); at != list->end()) {
-      return *at;
-    }
+  if (const Site* const site = FindSite(code); site != nullptr) {
+    return *site;
   }
   throw InputError(ComplaintAboutLandmark(code));
 }

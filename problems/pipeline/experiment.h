@@ -159,6 +159,7 @@ struct Experiment {
   BustSource bust;                               // the head that it is put into
   std::vector<Alternative> alternatives;         // other answers, beside this one
   FeatureRules rules;                            // for what bone does not carry
+  // Levels fitted to the dowels alone before seeds are taken.
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedOptions seeds = {.weight = 0.1};  // many as they are, they must not outvote the dowels
   double cut_margin_mm = 5;             // no seeds nearer to where the scan ends

@@ -26,11 +26,9 @@ std::vector<std::string> NamesOf(const std::vector<CountedSubject>& subjects) {
     }
   }
   std::vector<std::string> names;
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    for (const Site& site : *list) {
-      if (measured.contains(site.code)) {
-        names.push_back(site.code);
-      }
+  for (const Site& site : AllSites()) {
+    if (measured.contains(site.code)) {
+      names.push_back(site.code);
     }
   }
   for (const std::string& name : CovariateNames()) {

@@ -16,16 +16,6 @@ using Eigen::Index;
 
 double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
-const Site* SiteOf(const std::string& code) {
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    const auto at = std::ranges::find(*list, code, &Site::code);
-    if (at != list->end()) {
-      return &*at;
-    }
-  }
-  return nullptr;
-}
-
 // Over the subjects that have the site, of a pair one side at least.
 struct SiteMean {
   int n = 0;
@@ -76,7 +66,7 @@ TissueCorrelations CorrelationsOf(const JointSample& sample, const JointNormal& 
                                   .names = joint.names,
                                   .rows = {}};
   for (Index i = 0; i < std::ssize(joint.names); ++i) {
-    if (SiteOf(joint.names[i]) == nullptr) {
+    if (FindSite(joint.names[i]) == nullptr) {
       correlations.covariates.push_back(
           {joint.names[i], Rounded(joint.mean[i]), Rounded(joint.sd[i])});
     }
@@ -104,7 +94,7 @@ TissueTable TableOf(const PopulationFile& file, const JointSample& sample,
       .rows = {},
       .correlations = CorrelationsOf(sample, joint)};
   for (const std::string& name : sample.names) {
-    const Site* const site = SiteOf(name);
+    const Site* const site = FindSite(name);
     const bool there = site == nullptr || std::ranges::find(table.rows, site->landmark,
                                                             &TissueRow::site) != table.rows.end();
     if (!there) {

@@ -18,6 +18,7 @@ struct MandibleOptions {
   std::filesystem::path mesh;         // empty: none
   std::optional<double> opening_deg;  // above 0 opens the mouth further
   std::optional<double> bite_mm;      // instead: so far are pr and id apart
+  // Middles of the condyles, LPS, mm; both, or none: as the average skull has them.
   std::optional<std::array<double, 3>> condyle_left, condyle_right;
 };
 

@@ -50,10 +50,10 @@ void Fields(Visitor&, FittedTemplate&) {}
 
 // What every face that asks the prior has.
 struct PriorUse {
-  ShapeFitOptions estimate;
-  TableDepthOptions table_depths;
-  ImplicitSpreadOptions implicit_spread;
-  int draw = 0;  // 0: the most likely face
+  ShapeFitOptions estimate;               // how the most likely face is found
+  TableDepthOptions table_depths;         // how sure depths of a table are
+  ImplicitSpreadOptions implicit_spread;  // how sure the implicit face is
+  int draw = 0;                           // 0: the most likely face; else one that is drawn
 };
 template <class Visitor>
 void PriorUseFields(Visitor& visit, PriorUse& o) {

@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "interp/dowels/site_code.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -165,10 +166,11 @@ double LeftOfMiddle_mm(const Vec3& p, const Similarity& skull_from_average) {
 // that well known.
 std::string WrongSide(const std::string& code, const Vec3& p, const Similarity& pose) {
   constexpr double kMiddle_mm = 5;
-  const bool left = code.ends_with("_l");
-  if (!left && !code.ends_with("_r")) {
+  const Side side = SideOfSite(code);
+  if (side == Side::kMidline) {
     return "";
   }
+  const bool left = side == Side::kLeft;
   const double left_mm = LeftOfMiddle_mm(p, pose), own_mm = left ? left_mm : -left_mm;
   return own_mm >= -kMiddle_mm
              ? ""

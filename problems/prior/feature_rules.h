@@ -35,12 +35,12 @@ void Fields(Visitor& visit, RuleUse& o) {
 // height and the oral regressions (Stephan & Henneberg 2003, Houlton et al. 2021). Left out as
 // measured worst on skulls: Krogman's rules, mental foramina (Stephan & Murphy 2008).
 struct FeatureRules {
-  std::map<std::string, std::array<double, 3>> points;  // of bone, mm, LPS, by RulePointCodes()
-  RuleUse eye_height = {.sd_mm = 1.6};
-  RuleUse eye_protrusion = {.use = false, .sd_mm = 2.9};
-  RuleUse mouth_width = {.sd_mm = 3.8};
-  RuleUse pronasale = {.use = false, .sd_mm = 3};
-  RuleUse subnasale = {.use = false, .sd_mm = 3.5};
+  std::map<std::string, std::array<double, 3>> points;    // of bone, mm, LPS, by RulePointCodes()
+  RuleUse eye_height = {.sd_mm = 1.6};                    // of the middle of the lids, in the orbit
+  RuleUse eye_protrusion = {.use = false, .sd_mm = 2.9};  // of the lids, out of it
+  RuleUse mouth_width = {.sd_mm = 3.8};                   // between the mouth's corners
+  RuleUse pronasale = {.use = false, .sd_mm = 3};         // the tip of the nose
+  RuleUse subnasale = {.use = false, .sd_mm = 3.5};       // where nose and upper lip meet
 };
 template <class Visitor>
 void Fields(Visitor& visit, FeatureRules& o) {

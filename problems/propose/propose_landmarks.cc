@@ -199,10 +199,6 @@ class Proposer {
     TellAxes();
   }
 
-  static std::string MirrorOf(const std::string& site) {
-    return std::ranges::find(StandardSites(), site, &Site::code)->mirror;
-  }
-
   void TellAxes() {
     constexpr double kMost_deg = 60;
     const Mat3& turned = proposal_.skull_from_average.rotation;

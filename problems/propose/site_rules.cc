@@ -67,7 +67,8 @@ struct Search {
 Search SearchFor(const SiteRule& rule, std::string_view site, const ShellPoint& predicted,
                  const SkullShell& skull, const Mat3& skull_from_average) {
   Vec3 along = rule.direction;
-  if (site.ends_with("_r")) {
+  const Side side = SideOfSite(site);
+  if (side == Side::kRight) {
     along.x() = -along.x();
   }
   return {.skull = skull,
@@ -76,7 +77,7 @@ Search SearchFor(const SiteRule& rule, std::string_view site, const ShellPoint& 
           .along = (skull_from_average * along).normalized(),
           .left = skull_from_average.col(0),
           .reach_mm = rule.reach_mm,
-          .midline = !site.ends_with("_l") && !site.ends_with("_r")};
+          .midline = side == Side::kMidline};
 }
 
 // Its vertex; none where no bone counts.

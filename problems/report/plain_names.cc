@@ -121,15 +121,14 @@ std::string WordsOfMeasure(std::string_view key) {
 }
 
 std::string WordsOfSite(std::string_view site) {
-  for (const std::vector<Site>* sites : {&StandardSites(), &FurtherSites()}) {
-    for (const Site& known : *sites) {
-      if (known.code == site) {
-        const bool left = site.ends_with("_l"), right = site.ends_with("_r");
-        return fmt::format("{}{} ({})", known.name, left ? ", left" : right ? ", right" : "", site);
-      }
-    }
+  const Site* const known = FindSite(site);
+  if (known == nullptr) {
+    return std::string(site);
   }
-  return std::string(site);
+  const std::string_view side = known->side == Side::kLeft    ? ", left"
+                                : known->side == Side::kRight ? ", right"
+                                                              : "";
+  return fmt::format("{}{} ({})", known->name, side, site);
 }
 
 std::string Counted(long long count, std::string_view noun, std::string_view plural) {

@@ -205,10 +205,8 @@ std::string MeshesJson(const BenchSubject& subject) {
 
 std::string SitesJson() {
   Json json = Json::array();
-  for (const std::vector<Site>* sites : {&StandardSites(), &FurtherSites()}) {
-    for (const Site& site : *sites) {
-      json.push_back(SiteJson(site));
-    }
+  for (const Site& site : AllSites()) {
+    json.push_back(SiteJson(site));
   }
   return json.dump();
 }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "fitting/problem/placement.h"
+#include "interp/dowels/site_code.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -131,7 +132,7 @@ Vec3 AverageSite(std::string_view site) {
   if (found == std::end(kAverageSkull)) {
     throw InputError(fmt::format("average skull: {}", ComplaintAboutSite(site)));
   }
-  const bool right = site.ends_with("_r");
+  const bool right = SideOfSite(site) == Side::kRight;
   return {right ? -found->x : found->x, found->y, found->z};
 }
 

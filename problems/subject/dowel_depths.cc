@@ -17,12 +17,10 @@ using Notes = std::vector<std::string>;
 
 void CheckSetSites(const std::map<std::string, double>& set_mm) {
   std::vector<std::string> known;
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    for (const Site& site : *list) {
-      known.push_back(site.code);
-      if (site.side == Side::kLeft) {
-        known.push_back(site.landmark);
-      }
+  for (const Site& site : AllSites()) {
+    known.push_back(site.code);
+    if (site.side == Side::kLeft) {
+      known.push_back(site.landmark);
     }
   }
   for (const auto& [site, depth_mm] : set_mm) {
@@ -220,11 +218,9 @@ void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open,
 // The sites that a code means: a pair's code without side both of them.
 std::vector<std::string> SitesMeant(const std::string& code) {
   std::vector<std::string> sites;
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    for (const Site& site : *list) {
-      if (site.code == code || site.landmark == code) {
-        sites.push_back(site.code);
-      }
+  for (const Site& site : AllSites()) {
+    if (site.code == code || site.landmark == code) {
+      sites.push_back(site.code);
     }
   }
   return sites;

@@ -19,10 +19,10 @@
 namespace semblance {
 
 struct ExtraSite {
-  std::optional<std::array<double, 2>> uv;
-  ConfigNode near;                      // as ReadPlace takes it; null: not given
-  std::optional<AutoOr<double>> depth;  // mm; auto: as interpolated; none: a table's
-  bool hold = false;                    // of the site's (u,v)
+  std::optional<std::array<double, 2>> uv;  // on the generic face; none: as it has it
+  ConfigNode near;                          // as ReadPlace takes it; null: not given
+  std::optional<AutoOr<double>> depth;      // mm; auto: as interpolated; none: a table's
+  bool hold = false;                        // of the site's (u,v)
 };
 
 // By name, in the order of their names.

@@ -32,23 +32,23 @@ struct Landmark {
   std::optional<std::array<double, 3>> normal;       // unit, out of the bone
   std::optional<double> depth_along_normal_mm;       // measured on the subject, > 0
   std::optional<double> depth_closest_mm;            // from bone to the closest skin, > 0
-  Certainty certainty = Certainty::kMedium;
-  std::string note;
+  Certainty certainty = Certainty::kMedium;          // of the position
+  std::string note;                                  // for people
 };
 
 // A site that was looked for and cannot be placed, e.g. because the bone is gone.
 struct AbsentLandmark {
-  std::string site;
-  std::string reason;
+  std::string site;    // as Landmark's
+  std::string reason;  // for people
 };
 
 struct LandmarkFile {
-  std::string subject;
+  std::string subject;       // whose they are, for people
   std::string units = "mm";  // of the points, as EnumNames(LengthUnit); depths are in mm
   std::string axes = "LPS";  // of points and normals, as EnumNames(Axes); "": the file does not say
-  std::vector<Landmark> landmarks;
-  std::vector<AbsentLandmark> absent;
-  bool proposed = false;  // by the program, and no person has confirmed it
+  std::vector<Landmark> landmarks;     // each site once
+  std::vector<AbsentLandmark> absent;  // none of the sites above
+  bool proposed = false;               // by the program, and no person has confirmed it
 };
 
 struct PlaceOptions {

@@ -215,7 +215,7 @@ class Head {
   Vec3 centre_;
 };
 
-std::vector<PhantomSite> AllSites(const Head& head) {
+std::vector<PhantomSite> SitesOn(const Head& head) {
   std::vector<PhantomSite> sites;
   for (const Site& site : StandardSites()) {
     const Vec3 direction = DirectionOf(site);
@@ -273,7 +273,7 @@ Phantom MakePhantom(const PhantomOptions& options) {
     phantom.depth_mm.push_back(p.depth_mm);
     phantom.face.points.push_back(p.base + p.depth_mm * p.normal);
   }
-  phantom.sites = AllSites(head);
+  phantom.sites = SitesOn(head);
   if (!head.IsSmooth()) {
     MeasureDepths(phantom);
   }

@@ -98,12 +98,6 @@ bool IsNamed(const Site& site, const std::string& name) {
   });
 }
 
-std::vector<Site> AllSites() {
-  std::vector<Site> sites = StandardSites();
-  sites.insert(sites.end(), FurtherSites().begin(), FurtherSites().end());
-  return sites;
-}
-
 NamedSite Unknown(std::string_view name) {
   std::vector<std::string> known;
   for (const Site& site : AllSites()) {

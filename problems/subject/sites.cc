@@ -71,12 +71,8 @@ std::vector<Site> MakeSites(std::span<const StandardLandmark> landmarks) {
 }
 
 const Site* FindLandmark(std::string_view landmark) {
-  for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
-    if (const auto it = std::ranges::find(*list, landmark, &Site::landmark); it != list->end()) {
-      return &*it;
-    }
-  }
-  return nullptr;
+  const auto at = std::ranges::find(AllSites(), landmark, &Site::landmark);
+  return at == AllSites().end() ? nullptr : &*at;
 }
 
 bool Stands(const std::vector<Site>& list, std::string_view site) {
@@ -100,6 +96,25 @@ const std::vector<Site>& StandardSites() {
 const std::vector<Site>& FurtherSites() {
   static const std::vector<Site> sites = MakeSites(kFurther);
   return sites;
+}
+
+const std::vector<Site>& AllSites() {
+  static const std::vector<Site> sites = [] {
+    std::vector<Site> all = StandardSites();
+    all.insert(all.end(), FurtherSites().begin(), FurtherSites().end());
+    return all;
+  }();
+  return sites;
+}
+
+const Site* FindSite(std::string_view code) {
+  const auto at = std::ranges::find(AllSites(), code, &Site::code);
+  return at == AllSites().end() ? nullptr : &*at;
+}
+
+std::string MirrorOf(std::string_view code) {
+  const Site* const site = FindSite(code);
+  return site == nullptr ? "" : site->mirror;
 }
 
 bool IsStandardSite(std::string_view site) { return Stands(StandardSites(), site); }

@@ -31,6 +31,15 @@ std::vector<std::string> StandardSiteCodes();
 // face and the average skull have none.
 const std::vector<Site>& FurtherSites();
 
+// The standard ones, then the further ones.
+const std::vector<Site>& AllSites();
+
+// Of all; null for a code that is none of theirs.
+const Site* FindSite(std::string_view code);
+
+// The code of the site on the other side, of all sites; "" for a code that is none of theirs.
+std::string MirrorOf(std::string_view code);
+
 bool IsStandardSite(std::string_view site);
 bool IsFurtherSite(std::string_view site);
 

@@ -50,7 +50,7 @@ struct TissueCell {
   std::optional<double> sd;    // mm
   std::optional<int> n;        // subjects behind them
   CellFlag flag = CellFlag::kOk;
-  std::string note;
+  std::string note;  // for people
 };
 
 struct TissueRow {
@@ -61,35 +61,35 @@ struct TissueRow {
 };
 
 struct TissueMeasurement {
-  DepthMethod method = DepthMethod::kUnspecified;
-  DepthConvention convention = DepthConvention::kUnspecified;
-  DepthPosture posture = DepthPosture::kUnspecified;
+  DepthMethod method = DepthMethod::kUnspecified;              // e.g. needle, ultrasound, CT
+  DepthConvention convention = DepthConvention::kUnspecified;  // along which direction
+  DepthPosture posture = DepthPosture::kUnspecified;           // of the people measured
 };
 
 // What is known of a person beside depths, as a number.
 struct TissueCovariate {
-  std::string name;  // one of CovariateNames()
-  double mean = kNaN, sd = kNaN;
+  std::string name;               // one of CovariateNames()
+  double mean = kNaN, sd = kNaN;  // over people, in its own unit
 };
 
 // How depths go together over people: what one of them tells of the others.
 struct TissueCorrelations {
-  int subjects = 0;      // they were found on
-  double shrinkage = 0;  // part that is not theirs but a model's
-  std::vector<TissueCovariate> covariates;
-  std::vector<std::string> names;         // sites with their side, and covariates
-  std::vector<std::vector<double>> rows;  // row k: with the names 0 .. k-1
+  int subjects = 0;                         // they were found on
+  double shrinkage = 0;                     // part that is not theirs but a model's
+  std::vector<TissueCovariate> covariates;  // that are among the names
+  std::vector<std::string> names;           // sites with their side, and covariates
+  std::vector<std::vector<double>> rows;    // row k: with the names 0 .. k-1
 };
 
 struct TissueTable {
-  std::string id;
-  std::string title;
-  std::string citation;
+  std::string id;                // short, for messages
+  std::string title;             // for people
+  std::string citation;          // where the numbers were published
   std::string population_label;  // as printed
-  std::string units = "mm";
+  std::string units = "mm";      // always
   TissueMeasurement measurement;
-  std::vector<TissueRow> rows;
-  std::optional<TissueCorrelations> correlations;
+  std::vector<TissueRow> rows;                     // one per site
+  std::optional<TissueCorrelations> correlations;  // where they are known
 };
 
 struct TissueDepth {

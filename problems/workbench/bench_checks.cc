@@ -46,11 +46,6 @@ std::optional<MidPlane> PlaneOf(std::span<const SitePoint> sites) {
   }
 }
 
-std::string MirrorOf(const std::string& site) {
-  const auto at = std::ranges::find(StandardSites(), site, &Site::code);
-  return at == StandardSites().end() ? "" : at->mirror;
-}
-
 void MeasureMirrors(std::span<const SitePoint> sites, const MidPlane& plane,
                     LandmarkChecks& checks) {
   for (const SitePoint& site : sites) {

@@ -13,7 +13,7 @@
 namespace semblance {
 
 // Eq. 3.1: (l / d)^k, d the distance from p to T. The surface of a flat plate lies the further out
-// the finer its mesh (REFERENCE B12).
+// the finer its mesh.
 struct ThesisEmitter {
   static constexpr std::string_view kName = "thesis";
   double decay = 6;      // k: more blends less, and follows the bone more

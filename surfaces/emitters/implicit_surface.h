@@ -79,7 +79,7 @@ class ImplicitSurface {
   double MaxDepth_mm() const;
 
   // Triangles on a square of side depth, the mean over the skull's area: what drives the surface of
-  // the thesis's emitters outward (REFERENCE B12). With `thesis`, k = 6: 1.3 l at about 1, 2.2 l at
+  // the thesis's emitters outward. With `thesis`, k = 6: 1.3 l at about 1, 2.2 l at
   // 12, 4.2 l at 200.
   double EmittersPerSquareDepth() const;
 

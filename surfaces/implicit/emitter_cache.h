@@ -16,8 +16,8 @@ namespace semblance {
 // A corner (i, j, k) is kept as (i, j, d): d is the least depth of a node of the octree with a
 // corner in layer k, log2(size) minus the index of the lowest bit of k. Of all layers of one depth
 // a single one bounds the nodes that meet the slice at hand, so one layer per depth is kept, and is
-// replaced when the march comes to the next. Layer 0 has no lowest bit; its depth is 0 (REFERENCE
-// B17), as is that of the root's upper side, so layer 0 is kept apart.
+// replaced when the march comes to the next. Layer 0 has no lowest bit; its depth is 0, as is that
+// of the root's upper side, so layer 0 is kept apart.
 class EmitterCache {
  public:
   // size: cells along the octree's root, a power of 2. Keeps references.

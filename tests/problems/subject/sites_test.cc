@@ -65,5 +65,16 @@ TEST(Sites, AComplaintSaysWhatToWrite) {
   EXPECT_THAT(ComplaintAboutSite("gp_l"), HasSubstr("unknown site 'gp_l'"));
 }
 
+TEST(Sites, EachIsFoundByItsCodeAndIsTheMirrorOfItsMirror) {
+  EXPECT_EQ(AllSites().size(), StandardSites().size() + FurtherSites().size());
+  for (const Site& site : AllSites()) {
+    EXPECT_EQ(FindSite(site.code), &site) << site.code;
+    EXPECT_EQ(MirrorOf(MirrorOf(site.code)), site.code);
+    EXPECT_EQ(MirrorOf(site.code) == site.code, site.side == Side::kMidline) << site.code;
+  }
+  EXPECT_EQ(FindSite("go"), nullptr);
+  EXPECT_EQ(MirrorOf("mine"), "");
+}
+
 }  // namespace
 }  // namespace semblance
