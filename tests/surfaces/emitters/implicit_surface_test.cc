@@ -57,8 +57,7 @@ TEST(FlatEmitter, APlateHasExactlyItsDepthWhateverItsMesh) {
   }
 }
 
-// Height of the surface over a plate, by brute force over exact
-// distances.
+// Height of the surface over a plate, by brute force over exact distances.
 struct PlateCase {
   double depth_mm, edge_mm, k6_t0, k6_t05, k15_t0, k15_t05;
 };
