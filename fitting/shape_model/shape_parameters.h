@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <span>
+#include <vector>
 
 #include "fitting/shape_model/shape_model.h"
 #include "surfaces/base/geometry.h"

@@ -2,6 +2,7 @@
 // A fit's points, in the order of the patches that hold them, whatever the level.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>

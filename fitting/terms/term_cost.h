@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <memory>
 #include <span>
+#include <variant>
 
 #include "fitting/least_squares/linear_cost.h"
 #include "fitting/least_squares/row_sink.h"

@@ -2,7 +2,9 @@
 // How well a scheme predicts dowels that it is not shown.
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 

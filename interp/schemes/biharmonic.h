@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string_view>
+#include <vector>
 
 #include "interp/dowels/depth_input.h"
 #include "interp/on_surface/mesh_spline.h"

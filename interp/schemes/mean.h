@@ -2,6 +2,7 @@
 // One depth for the whole skull: what a scheme must beat.
 #pragma once
 
+#include <span>
 #include <string_view>
 
 #include "interp/dowels/depth_input.h"

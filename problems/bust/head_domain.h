@@ -2,6 +2,7 @@
 // A whole head, ears and all, over one (u,v).
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 

@@ -2,6 +2,7 @@
 // An OBJ file with all that it says of looks, so that it can be written again with other points.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>

@@ -11,9 +11,12 @@
 #include <array>
 #include <map>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "problems/config/config_reader.h"
 #include "problems/config/config_types.h"

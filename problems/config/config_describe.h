@@ -2,7 +2,15 @@
 // The other direction of config_binder.h: values to trees, and types to descriptions.
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <variant>
+#include <vector>
 
 #include "problems/config/config_binder.h"
 

@@ -2,6 +2,7 @@
 // Whether a face is recognised: the rank of the right person in a gallery.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <utility>

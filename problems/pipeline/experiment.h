@@ -3,8 +3,10 @@
 // says, and nothing else, decides the result.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 

@@ -3,6 +3,11 @@
 // compile, so they are instantiated in one place.
 #pragma once
 
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
 #include "problems/config/config.h"
 #include "problems/pipeline/experiment.h"
 

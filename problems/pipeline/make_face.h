@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "fitting/fit.h"
 #include "fitting/problem/seeding.h"

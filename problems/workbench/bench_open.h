@@ -3,6 +3,7 @@
 // landmarks.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <optional>
