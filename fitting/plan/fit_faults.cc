@@ -13,7 +13,7 @@ std::vector<std::string> FaultsIn(const FitResult& fit) {
   }
   if (!std::isfinite(fit.point_rms_mm)) {
     return {
-        "the points' distances from the surface are no finite numbers; look for huge "
+        "the points' distances from the surface are not finite numbers; look for huge "
         "coordinates and weights"};
   }
   std::vector<std::string> faults;

@@ -70,7 +70,7 @@ LayoutMesh HalfedgesOf(const TriMesh& mesh) {
   if (!processing::is_polygon_soup_a_polygon_mesh(corners)) {
     const EdgeReport edges = CheckEdges(mesh);
     FailLayout(
-        fmt::format("it is no consistently oriented manifold ({} edges with more than two "
+        fmt::format("it is not a consistently oriented manifold ({} edges with more than two "
                     "triangles, {} with two that run against each other, or triangles that meet in "
                     "a point alone); repair it first",
                     edges.non_manifold, edges.inconsistent));

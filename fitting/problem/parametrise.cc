@@ -352,7 +352,8 @@ void CheckTorus(const Torus& torus, const std::vector<Vec2>& turns) {
                         gap_v < kMostGap;
   if (!is_torus) {
     Fail(fmt::format(
-        "the points are no torus: the nearest has a ring of radius {:.4g} mm and a tube of {:.4g} "
+        "the points are not a torus: the nearest has a ring of radius {:.4g} mm and a tube of "
+        "{:.4g} "
         "mm, half of the points are more than {:.3g} mm off it, and its widest gaps are {} of a "
         "turn around the axis and {} around the ring; give another axis, or u and v",
         torus.ring_mm, torus.tube_mm, torus.median_off_mm, Percent(gap_u), Percent(gap_v)));

@@ -56,14 +56,14 @@ void Fields(Visitor& visit, CtImportOptions& o) {
                   .min = 0,
                   .max = 50,
                   .doc = "what is thinner than this all along, and is not part of the largest "
-                         "body, is no head: head holder, tubes, sheets; 0 keeps all that touches"},
+                         "body, is not head: head holder, tubes, sheets; 0 keeps all that touches"},
         o.thinnest_head_mm);
   visit(FieldInfo{.name = "widest_opening_mm",
                   .unit = "mm",
                   .min = 0,
                   .max = 50,
                   .doc = "air behind openings narrower than this (nostrils, ears) is inside: its "
-                         "walls are no skin; 0 follows them all"},
+                         "walls are not skin; 0 follows them all"},
         o.widest_opening_mm);
   visit(FieldInfo{.name = "smallest_bone_cm2",
                   .unit = "cm^2",

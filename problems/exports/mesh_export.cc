@@ -57,7 +57,7 @@ std::string EncodeCarriedMesh(const CarriedMesh& carried, const std::string& ext
   }
   if (!kOfMeshes.contains(extension)) {
     throw InputError(
-        fmt::format("export: '{}' is no format for triangles; the file's name must end in .vtp "
+        fmt::format("export: '{}' is not a format for triangles; the file's name must end in .vtp "
                     ".vtu .glb .ply .obj .off or .stl",
                     extension));
   }

@@ -13,7 +13,7 @@ namespace semblance {
 
 struct ReadLandmarksOptions {
   std::optional<Axes> axes;        // of a file that does not say; none: LPS, and a note
-  bool leave_out_unknown = false;  // points whose name is no site, with a note each
+  bool leave_out_unknown = false;  // points whose name is not a site, with a note each
 };
 
 // Landmarks in LPS and mm, and what people should know of how they were read.

@@ -51,7 +51,7 @@ void CheckNames(const CsvReader& csv, std::span<const std::string> attributes) {
     if (std::find(kNames.begin(), kNames.end(), column) == kNames.end() &&
         std::find(attributes.begin(), attributes.end(), column) == attributes.end()) {
       csv.Fail(
-          fmt::format("'{}' is no column; the first line names the columns, which are x, y, z "
+          fmt::format("'{}' is not a column; the first line names the columns, which are x, y, z "
                       "and, if wanted, u, v, weight or sigma, exact, nx, ny, nz, and what the "
                       "option `attributes` names",
                       column));

@@ -148,7 +148,7 @@ double NumberOf(const Json& json) {
 std::string SiteOf(const Json& json) {
   const auto site = json.get<std::string>();
   if (!IsStandardSite(site) && !IsFurtherSite(site)) {
-    throw IoError(fmt::format("a subject's depths: '{}' is no site that is known", site));
+    throw IoError(fmt::format("a subject's depths: '{}' is not a known site", site));
   }
   return site;
 }

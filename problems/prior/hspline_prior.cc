@@ -75,7 +75,7 @@ Json NetJson(const ControlNet& net) {
 ControlNet NetFrom(const Json& json, const HSplineShape& shape, int level) {
   ControlNet net{.columns = shape.Columns(level), .rows = shape.Rows(level), .vertices = {}};
   if (!std::ranges::all_of(json, [](const Json& value) { return value.is_number_integer(); })) {
-    throw InputError("a mode has an entry that is no whole number");
+    throw InputError("a mode has an entry that is not a whole number");
   }
   const auto values = json.get<std::vector<std::int64_t>>();
   if (values.size() != 3 * static_cast<std::size_t>(net.columns) * net.rows) {

@@ -96,7 +96,7 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
             "LPS or RAS: of a file that does not say (.pp, .csv, .txt, .asc) [LPS]",
             a.reading.axes);
   convert.add_flag("--leave-out-unknown", a.reading.leave_out_unknown,
-                   "leave out points whose name is no site, and say which");
+                   "leave out points whose name is not a site, and say which");
   convert.add_flag("--force", a.force, "replace a file of the same name");
 }
 

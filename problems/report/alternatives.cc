@@ -261,7 +261,8 @@ std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const 
     const Alternative& alternative = experiment.alternatives[k];
     AlternativeFaults faults(tree, k, alternative, errors);
     if (!IsName(alternative.name)) {
-      faults.Add("this is no name of a folder; take 1 to 60 letters, digits, '_', '-' and '+'");
+      faults.Add(
+          "this is not the name of a folder; take 1 to 60 letters, digits, '_', '-' and '+'");
     } else if (!names.insert(alternative.name).second) {
       faults.Add("the name appears twice; give each alternative one of its own");
     }

@@ -347,7 +347,7 @@ ReportSection BoneSection(const Json& bone, const OutputFolder& folder) {
       .paragraphs = {fmt::format(
           "Of the shell that carries the tissue {} cm² lie on bone of the scan. Invented are {} "
           "cm² mirrored from the other side (blue) and {} cm² inferred, where temples, orbits "
-          "and gaps are bridged (yellow). What of the face stands on them is no evidence.",
+          "and gaps are bridged (yellow). What of the face stands on them is not evidence.",
           Number(bone.at("observed_cm2"), 0), Number(bone.at("mirrored_cm2"), 0),
           Number(bone.at("inferred_cm2"), 0))},
       .images = {ReportImageFromFile(folder.Root() / "pictures/origin.png", "",

@@ -34,13 +34,14 @@ void Fields(Visitor& visit, ExtraSite& o) {
                   .min = 0,
                   .max = 1,
                   .doc = "where the site lies on the generic face, in its (u,v); of a site that is "
-                         "no landmark also where it stands: the bone under that point"},
+                         "not a landmark also where it stands: the bone under that point"},
         o.uv);
-  visit(FieldInfo{.name = "near",
-                  .doc = "where a site that is no landmark stands: the point of the bone nearest "
-                         "to [x, y, z] in mm (LPS), to a landmark such as go_l, or to the middle "
-                         "of several, as [n, rhi]"},
-        o.near);
+  visit(
+      FieldInfo{.name = "near",
+                .doc = "where a site that is not a landmark stands: the point of the bone nearest "
+                       "to [x, y, z] in mm (LPS), to a landmark such as go_l, or to the middle "
+                       "of several, as [n, rhi]"},
+      o.near);
   visit(FieldInfo{.name = "depth",
                   .unit = "mm",
                   .min = 0.01,

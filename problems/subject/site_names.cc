@@ -107,7 +107,7 @@ NamedSite Unknown(std::string_view name) {
   const std::string near = NearestWord(name, known);
   return {
       .code = "",
-      .fault = fmt::format("'{}' is no site{}; use a code such as g or go_l, a number of the "
+      .fault = fmt::format("'{}' is not a site{}; use a code such as g or go_l, a number of the "
                            "thesis (1 to 21, with l or r) or a name such as 'left gonion'",
                            name, near.empty() ? "" : fmt::format("; did you mean '{}'?", near))};
 }

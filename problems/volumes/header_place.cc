@@ -150,8 +150,8 @@ const NrrdSpace& SpaceOf(const std::string& space, const std::string& where) {
         "mirror image; write {} into its header",
         where, Shown(space), kSidesInWords));
   }
-  throw InputError(fmt::format("{}: '{}' is no space of NRRD; it must be {}", where, Shown(space),
-                               kSidesInWords));
+  throw InputError(fmt::format("{}: '{}' is not a space of NRRD; it must be {}", where,
+                               Shown(space), kSidesInWords));
 }
 
 // The numbers within each pair of brackets, "(1,0,0) none (0,1,0)", the first three of each.

@@ -122,7 +122,7 @@ struct Header {
 Header ParseHeader(const std::string& plist, const std::string& name) {
   pugi::xml_document document;
   if (!document.load_buffer(plist.data(), plist.size())) {
-    throw IoError(fmt::format("{}: main.plist is no property list", name));
+    throw IoError(fmt::format("{}: main.plist is not a property list", name));
   }
   const pugi::xml_node dict = document.child("plist").child("dict");
   const pugi::xml_node matrix = ValueOf(dict, "matrix", name);

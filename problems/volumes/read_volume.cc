@@ -51,7 +51,7 @@ void CheckValues(const VoxelArray& array, const std::string& where,
         fmt::format("{} values beyond 16 bit were set to {} or {}", array.clipped, -32768, 32767));
   }
   if (array.not_finite > 0) {
-    notes.push_back(fmt::format("{} values are no numbers and count as air", array.not_finite));
+    notes.push_back(fmt::format("{} values are not numbers and count as air", array.not_finite));
   }
 }
 

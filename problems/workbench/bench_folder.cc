@@ -123,7 +123,7 @@ void BenchFolder::Write(const BenchHistory& history, const Experiment& experimen
 
 Experiment BenchFolder::ExperimentOf(const BenchState& state) const {
   if (state.start != fs::path(state.start).filename()) {
-    throw IoError(fmt::format("{}: start: '{}' is no file of the folder",
+    throw IoError(fmt::format("{}: start: '{}' is not a file of the folder",
                               (root_ / kHistory).string(), state.start));
   }
   return semblance::ExperimentOf(ReadFileBytes(root_ / state.start), root_, state);

@@ -108,9 +108,10 @@ void AppendRest(std::ifstream& file, const fs::path& path, std::string& bytes) {
     bytes.resize(at + static_cast<std::size_t>(file.gcount()));
   }
   if (bytes.size() - before > kMost) {
-    throw IoError(fmt::format(
-        "{}: more than 256 MB come out of what is no regular file; save them in one and name that",
-        path.string()));
+    throw IoError(
+        fmt::format("{}: more than 256 MB come out of what is not a regular file; save them in one "
+                    "and name that",
+                    path.string()));
   }
 }
 

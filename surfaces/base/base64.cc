@@ -50,7 +50,7 @@ std::string Base64(std::string_view bytes) {
 std::string FromBase64(std::string_view text) {
   static const std::array<int, 256> kValues = DigitValues();
   if (text.size() % 4 != 0) {
-    throw InputError(fmt::format("Base64: {} characters are no multiple of 4", text.size()));
+    throw InputError(fmt::format("Base64: {} characters are not a multiple of 4", text.size()));
   }
   const std::size_t digits = text.size() - Padding(text);
   std::string bytes;
@@ -61,7 +61,7 @@ std::string FromBase64(std::string_view text) {
     for (std::size_t k = 0; k < 4; ++k) {
       const int value = k < count ? kValues[static_cast<unsigned char>(text[i + k])] : 0;
       if (value < 0) {
-        throw InputError(fmt::format("Base64: character {} is no digit of it", i + k + 1));
+        throw InputError(fmt::format("Base64: character {} is not one of its digits", i + k + 1));
       }
       group = (group << 6) | static_cast<std::uint32_t>(value);
     }

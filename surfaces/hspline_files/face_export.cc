@@ -76,10 +76,10 @@ std::string EncodeFace(const HSplineSurface& surface, const std::string& given,
     return ExactBytes(surface, extension);
   }
   if (!triangles.contains(extension)) {
-    throw InputError(
-        fmt::format("export: '{}' is no format; the file's name must end in .vtu .step .stp .iges "
-                    ".igs .glb .vtp .ply .obj .off or .stl",
-                    given));
+    throw InputError(fmt::format(
+        "export: '{}' is not a known format; the file's name must end in .vtu .step .stp .iges "
+        ".igs .glb .vtp .ply .obj .off or .stl",
+        given));
   }
   constexpr double kChord_mm = 0.1;
   return TriangleBytes(surface, extension, chord_mm.value_or(kChord_mm), threads);

@@ -100,10 +100,11 @@ void AddWeighted(const Feature& feature, double weight, Feature& sum) {
 void CheckOffsets(const Feature& blend) {
   for (const auto& [vertex, offset] : blend.offsets) {
     if (!offset.allFinite()) {
-      throw InputError(fmt::format(
-          "feature {}: with these weights the offset of vertex ({}, {}) of level {} is no finite "
-          "number; use weights about 0..1",
-          blend.name, vertex.i, vertex.j, vertex.level));
+      throw InputError(
+          fmt::format("feature {}: with these weights the offset of vertex ({}, {}) of level {} is "
+                      "not a finite "
+                      "number; use weights about 0..1",
+                      blend.name, vertex.i, vertex.j, vertex.level));
     }
   }
 }

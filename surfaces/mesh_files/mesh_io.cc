@@ -51,9 +51,8 @@ std::string LowerExtension(const std::filesystem::path& path) {
 void CheckExtension(const std::string& extension, const std::string& where) {
   static const std::set<std::string> kKnown = {".ply", ".obj", ".stl", ".off"};
   if (!kKnown.contains(extension)) {
-    throw IoError(
-        fmt::format("{}: '{}' is no mesh format that is known; use .ply, .obj, .stl or .off", where,
-                    extension));
+    throw IoError(fmt::format("{}: '{}' is not a known mesh format; use .ply, .obj, .stl or .off",
+                              where, extension));
   }
 }
 

@@ -50,7 +50,7 @@ class HeaderReader {
       ReadProperty();
     } else if (keyword != "end_header") {
       lines_.Fail(
-          fmt::format("'{}' is no keyword; allowed are format, element, property, comment, "
+          fmt::format("'{}' is not a keyword; allowed are format, element, property, comment, "
                       "obj_info and end_header",
                       Shown(keyword)));
     }
@@ -108,7 +108,7 @@ class HeaderReader {
     const auto found = kTypes.find(word);
     if (found == kTypes.end()) {
       lines_.Fail(
-          fmt::format("'{}' is no type of a property; allowed are char, uchar, short, "
+          fmt::format("'{}' is not the type of a property; allowed are char, uchar, short, "
                       "ushort, int, uint, float and double",
                       Shown(word)));
     }

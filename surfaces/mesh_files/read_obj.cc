@@ -37,7 +37,7 @@ class ObjReader {
         ReadFace();
       } else if (std::find(kNotKept.begin(), kNotKept.end(), keyword) == kNotKept.end()) {
         lines_.Fail(
-            fmt::format("'{}' is no keyword of a polygon mesh; vertices begin with 'v', "
+            fmt::format("'{}' is not a keyword of a polygon mesh; vertices begin with 'v', "
                         "faces with 'f', comments with '#'",
                         Shown(keyword)));
       }
@@ -89,8 +89,8 @@ class ObjReader {
     std::int64_t vertex = 0;
     std::string_view rest = word;
     if (!TakeInteger(rest, vertex) || !IsTextureAndNormal(rest)) {
-      lines_.Fail(fmt::format("'{}' is no corner of a face; corners are like 7, 7/1, 7//3 or 7/1/3",
-                              Shown(word)));
+      lines_.Fail(fmt::format(
+          "'{}' is not a corner of a face; corners are like 7, 7/1, 7//3 or 7/1/3", Shown(word)));
     }
     const auto count = static_cast<std::int64_t>(mesh_.points.size());
     const std::int64_t index = vertex > 0 ? vertex - 1 : count + vertex;

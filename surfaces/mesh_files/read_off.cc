@@ -40,7 +40,7 @@ class OffReader {
     const std::string_view word = lines_.NextWord();
     const std::size_t off = word.find("OFF");
     if (off == std::string_view::npos || !TakeExtras(word.substr(0, off))) {
-      lines_.Fail(fmt::format("'{}' is no header that is read; {}", Shown(word), kAllowed));
+      lines_.Fail(fmt::format("'{}' is not a header that is read; {}", Shown(word), kAllowed));
     }
     lines_.StepBack(word.size() - off - 3);  // some files have the counts right behind: OFF8 6 12
   }

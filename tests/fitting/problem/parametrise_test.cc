@@ -209,7 +209,7 @@ TEST(Parametrise, WhatIsNoTorusIsRefused) {
   }
   for (const std::vector<Vec3>& points : {OnSphere(2000), Tin(3000), tube, cloud, half, plane}) {
     EXPECT_THAT(WordsOf({.positions = points}, TorusParameters{}),
-                ::testing::AnyOf(HasSubstr("the points are no torus"),
+                ::testing::AnyOf(HasSubstr("the points are not a torus"),
                                  HasSubstr("the points fold over the torus")));
   }
   EXPECT_THAT(WordsOf({.positions = RingPoints(2000, 0)}, TorusParameters{.axis = {1, 0, 0}}),

@@ -315,12 +315,12 @@ TEST_F(LandmarkReadingTest, OnlyCommasInNumbersAreDecimalCommas) {
 TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
   const std::string table = "site,x,y,z\nF-1,0,0,0\ngonion,0,0,0\ng,0,0,0\nglabella,1,1,1\n";
   EXPECT_THAT(Fault("a.csv", table),
-              ::testing::AllOf(HasSubstr("'F-1' is no site"), HasSubstr("stands on both sides"),
+              ::testing::AllOf(HasSubstr("'F-1' is not a site"), HasSubstr("stands on both sides"),
                                HasSubstr("site g (Glabella) appears twice")));
   const LandmarkReading reading = Read("a.csv", "site,x,y,z\nF-1,0,0,0\ng,0,0,0\n",
                                        {.axes = Axes::kLps, .leave_out_unknown = true});
   EXPECT_EQ(reading.file.landmarks.size(), 1U);
-  EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("left out: 'F-1' is no site")));
+  EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("left out: 'F-1' is not a site")));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z\n"), HasSubstr("there is no landmark"));
   EXPECT_THAT(Fault("a.stl", ""), HasSubstr("no kind of landmark file"));
 }

@@ -80,8 +80,8 @@ TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
     }
     return "";
   };
-  EXPECT_THAT(message(""), HasSubstr("p.csv:1: '' is no column"));
-  EXPECT_THAT(message("1,2,3\n"), HasSubstr("p.csv:1: '1' is no column"));
+  EXPECT_THAT(message(""), HasSubstr("p.csv:1: '' is not a column"));
+  EXPECT_THAT(message("1,2,3\n"), HasSubstr("p.csv:1: '1' is not a column"));
   EXPECT_THAT(message("x,y\n1,2\n"), HasSubstr("no column 'z'"));
   EXPECT_THAT(message("x,y,z,x\n"), HasSubstr("'x' appears twice"));
   EXPECT_THAT(message("x,y,z,u\n"), HasSubstr("'u' stands alone"));

@@ -242,7 +242,7 @@ TEST(HSplinePrior, WhatCannotBeUsedIsNamed) {
   EXPECT_THAT(fault(head + R"("features": [], "modes": [[1, 2]]})"), HasSubstr("has 2 numbers"));
   EXPECT_THAT(fault(head + R"("features": [], "modes": []})"), HasSubstr("no mode"));
   EXPECT_THAT(fault(head + R"("features": [], "modes": [[1.5, 1e300, 0]]})"),
-              HasSubstr("an entry that is no whole number"));
+              HasSubstr("an entry that is not a whole number"));
   for (const std::string wrong : {"4294967300", "4.5", "true", "-4"}) {  // 4 where they are cut
     EXPECT_THAT(fault(R"({"format": "semblance face prior", "version": 1, "patches_u": )" + wrong +
                       R"(, "patches_v": 4, "level": 0, "features": [], "modes": []})"),

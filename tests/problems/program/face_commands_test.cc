@@ -121,7 +121,7 @@ TEST_F(FaceCommands, ExportsToCadOrSaysWhatIsMissing) {
 }
 
 TEST_F(FaceCommands, ExportRefusesWhatItCannotDo) {
-  ExpectRefused("export face.json --to face.docx", "'.docx' is no format");
+  ExpectRefused("export face.json --to face.docx", "'.docx' is not a known format");
   ExpectRefused("export missing.json --to face.glb", "missing.json");
   ExpectRefused("export face.json --to face.vtu --chord_mm 1", "exact surface");
   ExpectRefused("export face.json --to face.glb --chord_mm 0", "above 0");

@@ -263,7 +263,7 @@ TEST_F(FitCommand, FurtherColumnsAreFittedOverTheSurface) {
     EXPECT_TRUE(IsAmong(kPointFitFiles, file.path().filename().string())) << file.path();
   }
   EXPECT_THAT(Call("fit colours.csv --out none --quiet --set attributes=[red]").err,
-              HasSubstr("'green' is no column"));
+              HasSubstr("'green' is not a column"));
   EXPECT_THAT(Call("fit colours.csv --out none --quiet --set attributes=[x]").err,
               HasSubstr("attributes: 'x' has a meaning of its own"));
 }

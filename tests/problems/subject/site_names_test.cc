@@ -47,7 +47,7 @@ TEST(SiteCalled, SaysWhatIsWrong) {
   EXPECT_THAT(SiteCalled("nasoin").fault, HasSubstr("did you mean 'Nasion'?"));
   for (const char* name : {"", " ", "F-1", "22", "0", "l", "left"}) {
     EXPECT_EQ(SiteCalled(name).code, "") << name;
-    EXPECT_THAT(SiteCalled(name).fault, HasSubstr("is no site")) << name;
+    EXPECT_THAT(SiteCalled(name).fault, HasSubstr("is not a site")) << name;
   }
 }
 

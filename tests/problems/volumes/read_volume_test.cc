@@ -327,7 +327,7 @@ TEST_F(ReadVolumeTest, SpacesThatSayNothingOfTheHeadAreTold) {
   EXPECT_THAT(Words("a.nrrd"), AllOf(HasSubstr("mirror image"), HasSubstr("(LAS)")));
   for (const char* none : {"RPS", "LPI", "3DRH"}) {
     WriteNrrd("a.nrrd", fmt::format("space: {}\n{}", none, directions));
-    EXPECT_THAT(Words("a.nrrd"), HasSubstr(fmt::format("'{}' is no space of NRRD", none)));
+    EXPECT_THAT(Words("a.nrrd"), HasSubstr(fmt::format("'{}' is not a space of NRRD", none)));
   }
   WriteNrrd("a.nrrd", "space: LPS\nspace directions: (1,0) (0,1) (1,1)\n");
   EXPECT_THAT(Words("a.nrrd"), HasSubstr("no vectors of three numbers"));

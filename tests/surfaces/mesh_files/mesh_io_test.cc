@@ -129,7 +129,7 @@ TEST_F(MeshIo, EachDefectIsNamed) {
   EXPECT_THAT(ErrorOf(folder_ / "none.ply"), HasSubstr("none.ply: no such file"));
   EXPECT_THAT(ErrorOf(Write("empty.ply", "")), HasSubstr("empty.ply: the file is empty"));
   EXPECT_THAT(ErrorOf(Write("a.xyz", "1 2 3")),
-              HasSubstr("'.xyz' is no mesh format that is known; use .ply, .obj, .stl or .off"));
+              HasSubstr("'.xyz' is not a known mesh format; use .ply, .obj, .stl or .off"));
   EXPECT_THAT(ErrorOf(Write("cut.ply", ply.substr(0, ply.size() - 5))),
               HasSubstr("cut.ply: byte " + std::to_string(ply.size() - 13) +
                         ": a list 'vertex_indices' of 3 items, but there is room for 1; the file "
