@@ -5,10 +5,13 @@
 #include <ceres/problem.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "fitting/least_squares/triangle_sum.h"
+#include "fitting/terms/tangent_points.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
@@ -38,7 +41,19 @@ class ResidualBlocks {
     }
   }
 
+  std::vector<int> Vertices() const {
+    std::vector<double*> parameters;
+    problem_.GetParameterBlocks(&parameters);
+    std::vector<int> vertices;
+    for (const double* const parameter : parameters) {
+      vertices.push_back(VertexOf(parameter));
+    }
+    return vertices;
+  }
+
  private:
+  int VertexOf(const double* parameter) const { return static_cast<int>((parameter - first_) / 3); }
+
   Block At(ceres::ResidualBlockId id) const {
     Block block;
     std::vector<double*> parameters;
@@ -47,7 +62,7 @@ class ResidualBlocks {
     block.slopes.assign(parameters.size(), Matrix(block.residual.size(), 3));
     std::vector<double*> slopes;
     for (std::size_t k = 0; k < parameters.size(); ++k) {
-      block.vertices.push_back(static_cast<int>((parameters[k] - first_) / 3));
+      block.vertices.push_back(VertexOf(parameters[k]));
       slopes.push_back(block.slopes[k].data());
     }
     problem_.EvaluateResidualBlock(id, /*apply_loss_function=*/false, nullptr,
@@ -60,37 +75,100 @@ class ResidualBlocks {
   std::vector<ceres::ResidualBlockId> blocks_;
 };
 
-SparseMatrix NormalMatrix(const ResidualBlocks& blocks, std::size_t vertices) {
-  TriangleSum sum(static_cast<Eigen::Index>(3 * vertices));
-  blocks.ForEach([&](const ResidualBlocks::Block& block) {
-    for (std::size_t a = 0; a < block.vertices.size(); ++a) {
-      for (std::size_t b = 0; b < block.vertices.size(); ++b) {
-        if (block.vertices[a] < block.vertices[b]) {
+// The least squares of the terms over a net: points that slide as they are, all other terms as
+// Ceres has them.
+class CoupledSquares {
+ public:
+  CoupledSquares(std::span<const Term> terms, const LevelView& view, ControlNet& net) : net_(net) {
+    for (const Term& term : terms) {
+      const auto* const sliding = std::get_if<TangentPointTerm>(&term);
+      if (sliding != nullptr && sliding->weight > 0 && !view.observations.empty()) {
+        sliding_.emplace_back(*sliding, view);
+      } else {
+        AddResiduals(std::span(&term, 1), view, net, problem_);
+      }
+    }
+    blocks_.emplace(problem_, net);
+  }
+
+  // Vertices that some term touches.
+  int FreeVertices() const {
+    std::vector<char> touched(net_.vertices.size(), 0);
+    const auto touch = [&](std::span<const int> vertices) {
+      for (const int vertex : vertices) {
+        touched[vertex] = 1;
+      }
+    };
+    touch(blocks_->Vertices());
+    for (const TangentSums& sums : sliding_) {
+      sums.ForEachDof(touch);
+    }
+    return static_cast<int>(std::ranges::count(touched, 1));
+  }
+
+  SparseMatrix NormalMatrix() const {
+    TriangleSum sum(static_cast<Eigen::Index>(3 * net_.vertices.size()));
+    blocks_->ForEach([&](const ResidualBlocks::Block& block) {
+      Add(
+          block.vertices,
+          [&](std::size_t a, std::size_t b) -> Mat3 {
+            return block.slopes[a].transpose() * block.slopes[b];
+          },
+          sum);
+    });
+    for (const TangentSums& sums : sliding_) {
+      sums.ForEachElement([&](std::span<const int> dofs, const Eigen::MatrixXd& normal) {
+        Add(
+            dofs,
+            [&](std::size_t a, std::size_t b) -> Mat3 {
+              return normal.block<3, 3>(static_cast<Eigen::Index>(3 * a),
+                                        static_cast<Eigen::Index>(3 * b));
+            },
+            sum);
+      });
+    }
+    return sum.Take();
+  }
+
+  // Minus the gradient.
+  Eigen::VectorXd Downhill() const {
+    Eigen::VectorXd down =
+        Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * net_.vertices.size()));
+    blocks_->ForEach([&](const ResidualBlocks::Block& block) {
+      for (std::size_t k = 0; k < block.vertices.size(); ++k) {
+        down.segment<3>(3 * block.vertices[k]) -= block.slopes[k].transpose() * block.residual;
+      }
+    });
+    for (const TangentSums& sums : sliding_) {
+      sums.AddDownhill(net_, down);
+    }
+    return down;
+  }
+
+ private:
+  // product(a, b): 3 x 3 of the a-th and the b-th of the vertices.
+  static void Add(std::span<const int> vertices, const auto& product, TriangleSum& sum) {
+    for (std::size_t a = 0; a < vertices.size(); ++a) {
+      for (std::size_t b = 0; b < vertices.size(); ++b) {
+        if (vertices[a] < vertices[b]) {
           continue;
         }
-        const Mat3 product = block.slopes[a].transpose() * block.slopes[b];
+        const Mat3 of_both = product(a, b);
         for (int k = 0; k < 9; ++k) {
-          const int row = 3 * block.vertices[a] + k % 3, column = 3 * block.vertices[b] + k / 3;
+          const int row = 3 * vertices[a] + k % 3, column = 3 * vertices[b] + k / 3;
           if (row >= column) {
-            sum.Add(row, column, product(k % 3, k / 3));
+            sum.Add(row, column, of_both(k % 3, k / 3));
           }
         }
       }
     }
-  });
-  return sum.Take();
-}
+  }
 
-// Minus the gradient.
-Eigen::VectorXd Downhill(const ResidualBlocks& blocks, std::size_t vertices) {
-  Eigen::VectorXd down = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * vertices));
-  blocks.ForEach([&](const ResidualBlocks::Block& block) {
-    for (std::size_t k = 0; k < block.vertices.size(); ++k) {
-      down.segment<3>(3 * block.vertices[k]) -= block.slopes[k].transpose() * block.residual;
-    }
-  });
-  return down;
-}
+  const ControlNet& net_;
+  ceres::Problem problem_;
+  std::optional<ResidualBlocks> blocks_;
+  std::vector<TangentSums> sliding_;
+};
 
 // Weakly held vertices take several steps to come to rest; rounding may keep them from it.
 bool AtRest(double move, double last_move) {
@@ -107,15 +185,13 @@ bool Diverges(double length, double first_length, double move) {
 }  // namespace
 
 SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
-  ceres::Problem problem;
-  AddResiduals(terms, view, net, problem);
-  SolverOutcome outcome{.free_vertices = problem.NumParameterBlocks()};
+  const CoupledSquares squares(terms, view, net);
+  SolverOutcome outcome{.free_vertices = squares.FreeVertices()};
   if (outcome.free_vertices == 0) {
     return outcome;
   }
   const std::size_t vertices = net.vertices.size();
-  const ResidualBlocks blocks(problem, net);
-  const SparseFactor factor(NormalMatrix(blocks, vertices), ProximalShift(terms, vertices));
+  const SparseFactor factor(squares.NormalMatrix(), ProximalShift(terms, vertices));
   const ControlNet before = net;
   Eigen::Map<Eigen::VectorXd> x(net.vertices.front().data(),
                                 static_cast<Eigen::Index>(3 * vertices));
@@ -123,7 +199,7 @@ SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, C
   outcome.termination = outcome.usable ? "no_convergence" : "failure";
   double move = 1e300, first_length = 1e300;
   while (outcome.usable && outcome.iterations < kMostSteps) {
-    const Eigen::VectorXd step = factor.Solve(Downhill(blocks, vertices));
+    const Eigen::VectorXd step = factor.Solve(squares.Downhill());
     x += step;
     ++outcome.iterations;
     const double length = step.norm();
