@@ -102,7 +102,20 @@ std::string Shortened(std::string_view message) {
                             : text;
 }
 
+namespace {
+
+[[noreturn]] void EndIn(const char* words) {
+  std::fprintf(stderr, "semblance: %s\n", words);
+  std::_Exit(kNotUsable);
+}
+
+}  // namespace
+
 void EndInWords() noexcept {
+  thread_local bool ending = false;
+  if (std::exchange(ending, true)) {
+    EndIn(kNoMemory);  // for an exception of what is below: the runtime calls this again
+  }
   std::string words;  // none: not even memory for them
   try {
     if (const std::exception_ptr thrown = std::current_exception()) {
@@ -113,8 +126,7 @@ void EndInWords() noexcept {
   } catch (...) {
     words.clear();
   }
-  std::fprintf(stderr, "semblance: %s\n", words.empty() ? kNoMemory : words.c_str());
-  std::_Exit(kNotUsable);
+  EndIn(words.empty() ? kNoMemory : words.c_str());
 }
 
 }  // namespace semblance

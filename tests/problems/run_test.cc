@@ -143,8 +143,10 @@ TEST(Run, EditsChangeTheFacesDrawnBesideAsTheDrawItself) {
   const RunResult plain = run({"uncertainty.samples=1"}),
                   edited = run({"uncertainty.samples=1", edits}),
                   drawn = run({"face.draw=1", edits});
-  EXPECT_EQ(edited.uncertainty->samples[0].Offsets(), drawn.fit.surface.Offsets());
-  EXPECT_NE(edited.uncertainty->samples[0].Offsets(), plain.uncertainty->samples[0].Offsets());
+  const HSplineSurface& sample = edited.uncertainty->samples[0];
+  EXPECT_EQ(sample.Offsets(), drawn.fit.surface.Offsets());
+  EXPECT_EQ(sample.Net(0).vertices, drawn.fit.surface.Net(0).vertices);
+  EXPECT_NE(sample.Net(0).vertices, plain.uncertainty->samples[0].Net(0).vertices);
 }
 
 TEST(Run, ASampleIsTheFaceOfTheDrawOfItsNumber) {

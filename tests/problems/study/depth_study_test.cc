@@ -166,7 +166,7 @@ TEST(DepthStudy, TheDirectionTurnsTheEndsAndTheTruthAlongIt) {
     }
     EXPECT_GT(both, 500) << direction;
     EXPECT_GT(other, 0.9 * both) << direction;
-    EXPECT_GT(std::abs(turned.tips.rms_mm - normal.tips.rms_mm), 1e-3) << direction;
+    EXPECT_GT(std::abs(turned.tips.rms_mm - normal.tips.rms_mm), 1e-6) << direction;
   }
 }
 

@@ -103,7 +103,7 @@ TEST(Invesalius, EachFaultIsNamed) {
               HasSubstr("only int16 is read"));
   EXPECT_THAT(words({{"main.plist", Plist("int16", "<integer>4</integer>")}}),
               HasSubstr("'shape' has 1 numbers"));
-  EXPECT_THAT(words({{"main.plist", "<plist"}}), HasSubstr("no property list"));
+  EXPECT_THAT(words({{"main.plist", "<plist"}}), HasSubstr("not a property list"));
   std::ofstream(folder / "y.inv3") << "not an archive";
   EXPECT_THAT(WordsOf<IoError>([&] { ReadInvesalius(folder / "y.inv3"); }),
               HasSubstr("no InVesalius project"));
