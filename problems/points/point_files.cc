@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/points/point_files.h"
 
-#include <archive.h>
-#include <archive_entry.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,13 +10,15 @@
 #include <fstream>
 #include <iostream>
 #include <iterator>
-#include <memory>
+#include <numeric>
 #include <optional>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "problems/output/manifest.h"
 #include "problems/points/plain_points.h"
+#include "problems/volumes/gzip_bytes.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
@@ -34,31 +34,14 @@
 namespace semblance {
 namespace {
 
-struct ArchiveCloser {
-  void operator()(archive* a) const { archive_read_free(a); }
-};
+constexpr std::string_view kGzip = "\x1f\x8b";
 
 std::string Unzipped(const std::string& bytes, const std::string& name) {
-  if (!bytes.starts_with("\x1f\x8b")) {
+  if (!bytes.starts_with(kGzip)) {
     throw IoError(
         fmt::format("{}: it is not what gzip makes; compress it, or take .gz off its name", name));
   }
-  const std::unique_ptr<archive, ArchiveCloser> a(archive_read_new());
-  archive_read_support_filter_gzip(a.get());
-  archive_read_support_format_raw(a.get());
-  archive_entry* entry = nullptr;
-  std::string text;
-  std::array<char, 1 << 16> block;
-  la_ssize_t got = archive_read_open_memory(a.get(), bytes.data(), bytes.size());
-  got = got == ARCHIVE_OK ? archive_read_next_header(a.get(), &entry) : got;
-  while (got >= 0 && (got = archive_read_data(a.get(), block.data(), block.size())) > 0) {
-    text.append(block.data(), static_cast<std::size_t>(got));
-  }
-  if (got < 0) {
-    throw IoError(fmt::format("{}: it cannot be unpacked ({}); give a file made by gzip", name,
-                              archive_error_string(a.get())));
-  }
-  return text;
+  return Unpacked(bytes, name);
 }
 
 PointTable NonEmpty(PointTable table, const std::string& name) {
@@ -163,7 +146,7 @@ void TakeWeights(const PlyHeader& header, std::string_view bytes, const std::str
     double& number = table.weights[k];
     const bool positive = number > 0;
     number = sigma ? 1 / (number * number) : number;
-    if (!positive || !std::isfinite(number)) {
+    if (!positive || !std::isfinite(number) || number == 0) {
       throw InputError(fmt::format("{}: the {} of point {} is not positive and finite", name,
                                    sigma ? "sigma" : "weight", k + 1));
     }
@@ -303,6 +286,40 @@ PointTable ParseUnnamed(const std::string& bytes, const std::string& ending,
                   name));
 }
 
+// Triangles that each have corners of their own, as some programs write them, make one mesh, as
+// those of an STL do: corners in one place are one point. Not where points carry more than a place.
+void WeldCorners(PointTable& table) {
+  const std::vector<Vec3>& points = table.positions;
+  if (table.triangles.empty() || points.size() != 3 * table.triangles.size() || !table.uv.empty() ||
+      !table.weights.empty() || !table.exact.empty() || !table.attributes.empty()) {
+    return;
+  }
+  const auto place = [&](std::uint32_t k) {
+    return std::tuple(points[k].x(), points[k].y(), points[k].z());
+  };
+  std::vector<std::uint32_t> order(points.size()), first(points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::stable_sort(order, {}, place);
+  for (std::size_t n = 0; n < order.size(); ++n) {
+    const bool again = n > 0 && place(order[n]) == place(order[n - 1]);
+    first[order[n]] = again ? first[order[n - 1]] : order[n];
+  }
+  std::vector<Vec3> kept;
+  std::vector<std::int32_t> number(points.size());
+  for (std::uint32_t k = 0; k < points.size(); ++k) {
+    number[k] = first[k] == k ? static_cast<std::int32_t>(kept.size()) : number[first[k]];
+    if (first[k] == k) {
+      kept.push_back(points[k]);
+    }
+  }
+  for (Triangle& triangle : table.triangles) {
+    for (std::int32_t& corner : triangle) {
+      corner = number[corner];
+    }
+  }
+  table.positions = std::move(kept);
+}
+
 PointTable Parse(const std::string& bytes, const std::filesystem::path& path,
                  std::span<const std::string> attributes) {
   const std::string name = path.string(), ending = LowerCase(path.extension().string());
@@ -393,6 +410,19 @@ bool IsTable(const std::filesystem::path& path) {
   return path == "-" || IsCsv(LowerCase(path.extension().string()) == ".gz" ? path.stem() : path);
 }
 
+// gzip of a CSV too; what is no text comes with a name, whose end says what it is.
+std::string PipedText(std::string bytes) {
+  if (bytes.starts_with(kGzip)) {
+    bytes = Unpacked(bytes, "standard input");
+  }
+  constexpr std::size_t kLooked = 4096;
+  if (bytes.starts_with("ply") ||
+      std::string_view(bytes).substr(0, kLooked).find('\0') != std::string_view::npos) {
+    throw IoError("standard input: it is not a CSV; give the file's name in place of -");
+  }
+  return bytes;
+}
+
 PointFile ReadAnyPointFile(const std::filesystem::path& path,
                            std::span<const std::string> attributes) {
   if (auto plain = IsCsv(path) ? ReadPlainCsv(path, attributes) : std::nullopt) {
@@ -404,6 +434,8 @@ PointFile ReadAnyPointFile(const std::filesystem::path& path,
   PointFile file{.points = {}, .sha256 = Sha256OfText(bytes)};
   if (zipped) {
     bytes = Unzipped(bytes, path.string());
+  } else if (piped) {
+    bytes = PipedText(std::move(bytes));
   }
   file.points = Parse(bytes, zipped ? path.parent_path() / path.stem() : path, attributes);
   return file;
@@ -417,6 +449,7 @@ PointFile ReadPointFile(const std::filesystem::path& path,
   file.points.file = path == "-" ? "standard input" : path.string();
   file.points.first_line = IsTable(path) ? 2 : 0;
   CheckReach(file.points);
+  WeldCorners(file.points);
   return file;
 }
 

@@ -160,6 +160,33 @@ TEST_F(PointFiles, WhatIsCompressedIsTheSameFile) {
   EXPECT_THAT(Refusal("broken.csv.gz", "this is no gzip"), HasSubstr("broken.csv.gz"));
 }
 
+// Each byte of what gzip checks by, and each length that the file may be cut to.
+TEST_F(PointFiles, DamagedCompressedFilesAreRefused) {
+  WriteFileAtomically(folder_ / "a.csv", Csv());
+  ASSERT_EQ(std::system(("gzip -kf '" + (folder_ / "a.csv").string() + "'").c_str()), 0);
+  const std::string whole = ReadFileBytes(folder_ / "a.csv.gz");
+  for (std::size_t k = whole.size() - 8; k < whole.size(); ++k) {
+    std::string damaged = whole;
+    damaged[k] = static_cast<char>(damaged[k] ^ 1);
+    EXPECT_THAT(Refusal("b.csv.gz", damaged), HasSubstr("b.csv.gz: the file is cut short or"));
+  }
+  for (std::size_t size = 2; size < whole.size(); ++size) {
+    EXPECT_THAT(Refusal("b.csv.gz", whole.substr(0, size)), HasSubstr("b.csv.gz: the file is cut"))
+        << size;
+  }
+  EXPECT_EQ(Read("b.csv.gz", whole + "behind the last member").positions.size(), kCount);
+}
+
+// A square of two triangles, as programs write it that know no shared corners.
+TEST_F(PointFiles, CornersInOnePlaceAreOnePoint) {
+  const std::string soup =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n";
+  const PointTable table = Read("soup.obj", soup);
+  EXPECT_THAT(table.positions,
+              ::testing::ElementsAre(Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0), Vec3(0, 1, 0)));
+  EXPECT_THAT(table.triangles, ::testing::ElementsAre(Triangle{0, 1, 2}, Triangle{0, 2, 3}));
+}
+
 TEST_F(PointFiles, ParametersComeWithTheKindsThatHaveThem) {
   const auto both = [](int k) { return fmt::format("{} {}", UvAt(k).x(), UvAt(k).y()); };
   for (const auto& [name, bytes] :
