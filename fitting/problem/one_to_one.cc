@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/problem/one_to_one.h"
-#include "surfaces/base/quantile.h"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -11,6 +10,8 @@
 #include <limits>
 #include <utility>
 #include <vector>
+
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -198,8 +199,10 @@ class Prober {
     });
   }
 
-  // By the second moments of those that are nearest in space.
+  // By the second moments of those that are nearest in space. Those on a line of a scanner, with
+  // noise across it, say nothing.
   bool IsCollapsed(const Neighbourhood& probe) const {
+    constexpr double kOnLine = 0.08;  // of the largest variance of two, the other
     const Sample& own = samples_[probe.in_space[0]];
     Eigen::Matrix2d on_map = Eigen::Matrix2d::Zero();
     Mat3 in_space = Mat3::Zero();
@@ -211,7 +214,8 @@ class Prober {
     }
     const double trace = in_space.trace(),
                  square = (trace * trace - (in_space * in_space).trace()) / 2;  // of an area
-    return on_map.determinant() < kLeastArea * kLeastArea * square;
+    return square > kOnLine * trace * trace &&
+           on_map.determinant() < kLeastArea * kLeastArea * square;
   }
 
   // Which samples of a neighbourhood are connected in space; numbered from that of the sample.
@@ -311,8 +315,8 @@ MapFaults FaultsOfPoints(const PlaneMap& map) {
     return fine;
   }
   const MapFaults coarse = Prober(Averaged(map), map.period_mm, kProbes).Run();
-  return {.folded = std::max(fine.folded, coarse.folded),
-          .collapsed = std::max(fine.collapsed, coarse.collapsed)};
+  // Points of a scanner's line are closer together than its noise: alone they stand like a wall.
+  return {.folded = std::max(fine.folded, coarse.folded), .collapsed = coarse.collapsed};
 }
 
 MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> triangles) {

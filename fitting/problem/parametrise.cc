@@ -6,11 +6,13 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <utility>
 
 #include "fitting/problem/torus.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
@@ -291,6 +293,47 @@ double MeanRadius(const CylinderAxis& axis, std::span<const Vec3> positions) {
   return sum / static_cast<double>(positions.size());
 }
 
+// Medians of the distances from the axis: of the hundredth of the points at either end, and of all.
+struct CylinderRadii {
+  double narrower_end_mm = kNaN, all_mm = kNaN;
+};
+
+CylinderRadii RadiiOf(const CylinderAxis& axis, std::span<const Vec3> positions) {
+  std::vector<std::pair<double, double>> along;  // and the distance
+  std::vector<double> distances;
+  for (const Vec3& p : positions) {
+    const Vec3 x = p - axis.centre;
+    distances.push_back(std::hypot(x.dot(axis.third), x.dot(axis.across)));
+    along.emplace_back(x.dot(axis.direction), distances.back());
+  }
+  constexpr std::size_t kFewest = 8;
+  const std::size_t count = std::min(positions.size(), std::max(positions.size() / 100, kFewest));
+  const auto end_of = [&](const auto& before) {
+    std::ranges::nth_element(along, along.begin() + static_cast<std::ptrdiff_t>(count) - 1, before);
+    std::vector<double> at_end;
+    for (std::size_t k = 0; k < count; ++k) {
+      at_end.push_back(along[k].second);
+    }
+    return UpperMedian(at_end);
+  };
+  const double low = end_of(std::less()), high = end_of(std::greater());
+  return {std::min(low, high), UpperMedian(distances)};
+}
+
+// A ball has areas on its cylinder as any tube has, but at its poles no angle.
+void CheckEnds(const CylinderAxis& axis, std::span<const Vec3> positions) {
+  constexpr double kLeast = 0.2;
+  const CylinderRadii radii = RadiiOf(axis, positions);
+  if (radii.narrower_end_mm < kLeast * radii.all_mm) {
+    Fail(
+        fmt::format("the points close at an end of the cylinder, where their angle is not known: "
+                    "half of the last hundredth are within {:.3g} mm of the axis, of all points "
+                    "within {:.3g} mm; cut off what closes the ends, or give u and v; or write "
+                    "folds: accept",
+                    radii.narrower_end_mm, radii.all_mm));
+  }
+}
+
 Candidate OnCylinder(const CylinderAxis& axis, std::span<const Vec3> positions) {
   const double period_mm = 2 * std::numbers::pi * MeanRadius(axis, positions);
   Candidate cylinder{.how = fmt::format("the cylinder along [{:.3g}, {:.3g}, {:.3g}]",
@@ -315,6 +358,9 @@ Parametrisation ParametersOf(const Scan& points, const CylinderParameters& cylin
         "{}; give another axis, cut off what closes the ends, or give u and v; or write folds: "
         "accept",
         FaultsText(cylinders)));
+  }
+  if (cylinder.folds != FoldRule::kAccept) {
+    CheckEnds(axes[best.number], points.positions);
   }
   Parametrisation result{.uv = AroundAxis(axes[best.number], points.positions),
                          .source = ParameterSource::kCylinder,
@@ -353,10 +399,11 @@ void CheckTorus(const Torus& torus, const std::vector<Vec2>& turns) {
   if (!is_torus) {
     Fail(fmt::format(
         "the points are not a torus: the nearest has a ring of radius {:.4g} mm and a tube of "
-        "{:.4g} "
-        "mm, half of the points are more than {:.3g} mm off it, and its widest gaps are {} of a "
+        "{:.4g} mm, half of the points are more than {:.3g} mm off it, and its widest gaps are {} "
+        "of a "
         "turn around the axis and {} around the ring; give another axis, or u and v",
-        torus.ring_mm, torus.tube_mm, torus.median_off_mm, Percent(gap_u), Percent(gap_v)));
+        std::abs(torus.ring_mm), std::abs(torus.tube_mm), torus.median_off_mm, Percent(gap_u),
+        Percent(gap_v)));
   }
 }
 
