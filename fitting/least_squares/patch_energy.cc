@@ -2,6 +2,7 @@
 #include "fitting/least_squares/patch_energy.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 
 namespace semblance {
@@ -121,10 +122,21 @@ double StiffnessEnergy(const ElementStiffness& form, const PatchGrid& grid, cons
   return energy;
 }
 
+// Far from the origin the squares leave nothing of differences; there, about its first vertex.
 Vec2 MeanLengths(const PatchGrid& grid, const ControlNet& net) {
+  constexpr double kFar = 1e4;  // extents
+  const Vec3& first = net.vertices.front();
+  double extent = 0;
+  for (const Vec3& vertex : net.vertices) {
+    extent = std::max(extent, (vertex - first).norm());
+  }
+  ControlNet near = net;
+  for (Vec3& vertex : near.vertices) {
+    vertex -= first.norm() > kFar * extent ? first : Vec3(Vec3::Zero());
+  }
   const double size_u = 1.0 / grid.patches_u, size_v = 1.0 / grid.patches_v;
-  return {std::sqrt(StiffnessEnergy(DerivativeStiffness(1, 0, size_u, size_v), grid, net)),
-          std::sqrt(StiffnessEnergy(DerivativeStiffness(0, 1, size_u, size_v), grid, net))};
+  return {std::sqrt(StiffnessEnergy(DerivativeStiffness(1, 0, size_u, size_v), grid, near)),
+          std::sqrt(StiffnessEnergy(DerivativeStiffness(0, 1, size_u, size_v), grid, near))};
 }
 
 Vec2 MeanLengths(const HSplineSurface& surface) {

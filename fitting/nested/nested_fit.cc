@@ -38,6 +38,14 @@ constexpr double kRounding = 1e-8;
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("fit: plan auto: " + what); }
 
+constexpr std::size_t kFewestPoints = 16;
+[[noreturn]] void FailForFew(std::size_t count, const char* of_kind) {
+  Fail(
+      fmt::format("{} points{} are too few to leave some out; give at least {}, or take another "
+                  "plan",
+                  count, of_kind, kFewestPoints));
+}
+
 // One in ten, by its place along the curve.
 bool IsHeld(std::uint32_t k) {
   const std::uint64_t bits = (k + 1) * 0xD1B54A32D192ED03u;
@@ -341,7 +349,7 @@ class NestedFitter {
   void Measure(NestedFitResult& result) {
     constexpr std::size_t kAtOnce = 1 << 14;
     double sum = 0, weights = 0;
-    result.residual_mm.resize(points_.size());
+    result.residual_mm.resize(points_.GivenSize());
     NestedResiduals residuals(solve_);
     PairCorrelation neighbours;
     std::optional<Residual> last;
@@ -361,6 +369,11 @@ class NestedFitter {
           last = scaled;
         }
       }
+    }
+    for (const RepeatedPoint& copy : points_.repeated) {
+      const double distance = result.residual_mm[copy.given] = result.residual_mm[copy.first];
+      sum += copy.weight * distance * distance;
+      weights += copy.weight;
     }
     result.rms_mm = std::sqrt(sum / weights);
     report_.neighbour_correlation = neighbours.Value();
@@ -408,6 +421,21 @@ class NestedFitter {
       }
     }
     std::sort(report_.outliers.begin(), report_.outliers.end());
+    ReportRepeated();
+  }
+
+  // A copy of an outlier is one too.
+  void ReportRepeated() {
+    std::vector<std::uint32_t> copies;
+    for (const RepeatedPoint& copy : points_.repeated) {
+      report_.repeated.push_back(copy.given);
+      if (std::ranges::binary_search(report_.outliers, copy.first)) {
+        copies.push_back(copy.given);
+      }
+    }
+    report_.outliers.insert(report_.outliers.end(), copies.begin(), copies.end());
+    std::sort(report_.outliers.begin(), report_.outliers.end());
+    std::sort(report_.repeated.begin(), report_.repeated.end());
   }
 
   Vec3 InSpace(const GridValues& values, int i, int j) const {
@@ -496,11 +524,8 @@ void CheckNested(const HSplineSurface& start, const ScatteredPoints& points) {
   if (!start.Offsets().empty()) {
     Fail("the start has detail of finer levels; start from one without, or take plan adaptive");
   }
-  if (points.size() < 16) {
-    Fail(
-        fmt::format("{} points are too few to leave some out; give at least 16, or take another "
-                    "plan",
-                    points.size()));
+  if (points.size() < kFewestPoints) {
+    FailForFew(points.size(), "");
   }
   CheckWeights(points);
   const Vec2 lengths_mm = MeanLengths(start);
@@ -547,6 +572,9 @@ void TellOf(const HSplineSurface& surface, const ScatteredPoints& points,
 
 NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
                           const RunContext& context) {
+  if (points.size() < kFewestPoints) {
+    FailForFew(points.size(), points.repeated.empty() ? "" : " that differ");
+  }
   return NestedFitter(start, std::move(points), plan, context).Run();
 }
 

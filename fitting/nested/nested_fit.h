@@ -43,6 +43,7 @@ struct AutoReport {
   bool met_to_rounding = false;         // held out to 1e-8 of the extent: nothing to refine for
   bool limited_by_density = false;      // finer vertices would have fewer points than they need
   std::vector<std::uint32_t> outliers;  // indices as given, ascending; they have no weight
+  std::vector<std::uint32_t> repeated;  // likewise, of copies of other points; those count once
 };
 
 struct NestedFitResult {

@@ -74,6 +74,32 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> AxesOf(const NestedPoints& points, doub
   return all.rightCols(channels);
 }
 
+// Copies stand next to each other on the curve.
+void TakeRepeatedApart(NestedPoints& points) {
+  const auto is_copy = [&](std::size_t a, std::size_t b) {
+    return points.uv[a] == points.uv[b] && points.value[a] == points.value[b] &&
+           points.Weight(a) == points.Weight(b);
+  };
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (k > 0 && is_copy(k, kept - 1)) {
+      points.repeated.push_back({points.given[k], points.given[kept - 1], points.Weight(k)});
+      continue;
+    }
+    points.uv[kept] = points.uv[k];
+    points.value[kept] = points.value[k];
+    points.given[kept] = points.given[k];
+    if (!points.weight.empty()) {
+      points.weight[kept] = points.weight[k];
+    }
+    ++kept;
+  }
+  points.uv.resize(kept);
+  points.value.resize(kept);
+  points.given.resize(kept);
+  points.weight.resize(points.weight.empty() ? 0 : kept);
+}
+
 // From along x, y and z to along the axes.
 void TurnToAxes(NestedPoints& points) {
   for (Vec3& value : points.value) {
@@ -121,6 +147,7 @@ NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, i
   for (std::size_t k = 0; k < given.weights.size(); ++k) {
     points.weight.push_back(given.weights[points.given[k]]);
   }
+  TakeRepeatedApart(points);
   points.TakeMeanWeight({});
   points.weighted =
       std::ranges::any_of(points.weight, [&](double weight) { return weight != points.weight[0]; });
@@ -143,12 +170,17 @@ NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoint
 std::vector<Vec2> UvAsGiven(NestedPoints points) {
   points.value = std::vector<Vec3>();  // frees it, which {} would not
   points.weight = std::vector<double>();
-  std::vector<double> column(points.size());
+  const std::size_t kept = points.size();
+  std::vector<double> column(points.GivenSize());
+  points.uv.resize(column.size());
   for (const int c : {0, 1}) {
-    for (std::size_t k = 0; k < points.size(); ++k) {
+    for (std::size_t k = 0; k < kept; ++k) {
       column[points.given[k]] = points.uv[k][c];
     }
-    for (std::size_t k = 0; k < points.size(); ++k) {
+    for (const RepeatedPoint& copy : points.repeated) {
+      column[copy.given] = column[copy.first];
+    }
+    for (std::size_t k = 0; k < column.size(); ++k) {
       points.uv[k][c] = column[k];
     }
   }

@@ -24,10 +24,17 @@ struct OwnedPoints {
   ScatteredPoints View() const { return {positions, uv, weights}; }
 };
 
+// A point that was given before: at the same (u,v), in the same place and with the same weight.
+struct RepeatedPoint {
+  std::uint32_t given = 0;  // its index
+  std::uint32_t first = 0;  // of the one that stands for it
+  double weight = 1;
+};
+
 // Sorted along a Z-curve, so that points that follow each other are neighbours; their order as
 // given has no effect. Only directions in which some point is off the start are channels: a height
-// field over its plane has one. All that a point takes is its (u,v), its displacement and an index:
-// 44 bytes.
+// field over its plane has one. A point that was given several times is here once, for copies tell
+// nothing of noise. All that a point takes is its (u,v), its displacement and an index: 44 bytes.
 struct NestedPoints {
   std::vector<Vec2> uv;        // in [0,1] x [0,1], as given
   Vec2 patches = {1, 1};       // of level 0
@@ -38,10 +45,12 @@ struct NestedPoints {
   bool weighted = false;       // some weigh more than others
   std::vector<Vec3> value;     // displacement along each channel's axis, mm; zero beyond those
   std::vector<std::uint32_t> given;
+  std::vector<RepeatedPoint> repeated;  // that are not among these
   int channels = 0;
   Eigen::Matrix<double, 3, Eigen::Dynamic> axes{3, 0};  // orthonormal, a column per channel
 
   std::size_t size() const { return uv.size(); }
+  std::size_t GivenSize() const { return uv.size() + repeated.size(); }
   // Where it is, in patches of level 0: to the bit what PatchPointAt makes of (u,v).
   double X(std::size_t k) const {
     return periodic_u && uv[k].x() == 1 ? 0 : uv[k].x() * patches.x();

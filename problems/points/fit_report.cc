@@ -65,6 +65,7 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"limited_by_density", r.limited_by_density},
                {"verdict", Verdict(r)},
                {"chosen_round", r.chosen_round},
+               {"repeated_count", r.repeated.size()},
                {"outlier_count", r.outliers.size()},
                {"outliers", r.outliers},
                {"rounds", Json::array()}};
@@ -84,6 +85,11 @@ std::string AutoText(const AutoReport& r) {
     text += fmt::format("; held out {:.3g}", r.held_out_rms_mm);
   }
   text += '\n';
+  if (!r.repeated.empty()) {
+    text += fmt::format(
+        "{} given before, at the same place: each counts once\n",
+        r.repeated.size() == 1 ? "1 point was" : fmt::format("{} points were", r.repeated.size()));
+  }
   if (!r.outliers.empty()) {
     text += fmt::format("{} left out; residuals and result.json list {}\n",
                         Counted(std::ssize(r.outliers), "outlier"),

@@ -243,17 +243,24 @@ std::vector<PointAttribute> AttributesAsked(PointTable& table, const PointFitOpt
   return asked;
 }
 
+// By the auto plan: outliers, and copies of other points.
+std::vector<std::uint32_t> LeftOut(const std::optional<AutoReport>& report) {
+  std::vector<std::uint32_t> left_out;
+  if (report) {
+    std::ranges::set_union(report->outliers, report->repeated, std::back_inserter(left_out));
+  }
+  return left_out;
+}
+
 AttributeFit AttributesOver(const PointFit& result, std::span<const double> weights,
                             const RunContext& context) {
   std::vector<std::span<const double>> values;
   for (const PointAttribute& attribute : result.attributes) {
     values.emplace_back(attribute.values);
   }
-  const std::vector<std::uint32_t> outliers =
-      result.fit.automatic ? result.fit.automatic->outliers : std::vector<std::uint32_t>();
   return FitAttributes(result.fit.surface,
-                       {.uv = result.fit.uv, .weights = weights, .columns = values}, outliers,
-                       context.threads);
+                       {.uv = result.fit.uv, .weights = weights, .columns = values},
+                       LeftOut(result.fit.automatic), context.threads);
 }
 
 Box3 BoxOf(std::span<const Vec3> points) {
@@ -294,7 +301,7 @@ std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const Give
                              .met = given.met};
   return std::make_shared<const SurfaceSigma>(
       result.fit.surface, AttributeColumns{.uv = result.fit.uv, .weights = weights, .columns = {}},
-      report.outliers, options);
+      LeftOut(report), options);
 }
 
 // By the noise of a point of mean weight, weights being 1 / sigma^2 of points that are no outliers.
@@ -492,7 +499,8 @@ std::vector<std::string> PointFit::Faults() const {
   if (faults.empty() && reach > kMostReach) {
     faults.push_back(
         fmt::format("the surface goes {:.3g} times the points' extent beyond them, where no point "
-                    "holds it; give the smoothness more weight, or take coarser levels",
+                    "holds it; fit pieces that lie apart each by itself, or take coarser levels "
+                    "(fit.plan.finest), or, with plan: adaptive, a smoothness with more weight",
                     reach));
   }
   constexpr double kMostOff = 0.1;
