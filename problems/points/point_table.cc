@@ -142,10 +142,10 @@ class PointReader {
   double WeightOf(PointColumn column) const {
     const double number = csv_.Number(*IndexOf(indices_, column));
     const double weight = column == PointColumn::kWeight ? number : 1 / (number * number);
-    if (!(number > 0) || !std::isfinite(weight)) {
+    if (!(number > 0) || !std::isfinite(weight) || weight == 0) {
       csv_.Fail(fmt::format("the {} is {}; it must be positive{}",
                             kNames[static_cast<std::size_t>(column)], number,
-                            number > 0 ? ", and 1 / sigma^2 a finite number" : ""));
+                            number > 0 ? ", and 1 / sigma^2 a finite number above 0" : ""));
     }
     return weight;
   }

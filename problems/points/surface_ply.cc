@@ -78,6 +78,18 @@ std::uint8_t AsColour(double value) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
 }
 
+// Whether values given as red, green and blue are of 0..255; of 0..1 and of 0..65535 they are not.
+bool AreOfBytes(std::span<const PointAttribute> attributes,
+                const std::array<std::ptrdiff_t, 3>& rgb) {
+  double least = 0, most = 0;
+  for (const std::ptrdiff_t k : rgb) {
+    const auto [low, high] = std::ranges::minmax(attributes[k].values);
+    least = std::min(least, low);
+    most = std::max(most, high);
+  }
+  return least >= 0 && most > 1 && most <= 255;
+}
+
 // Columns red, green and blue, 0..255, as colours; all others as scalars of their names.
 MeshAttributes AttributesOf(const PointFit& result, std::span<const Vec2> uv, int threads) {
   const std::vector<std::vector<double>> values = result.attribute_fit.At(uv, threads);
@@ -87,7 +99,8 @@ MeshAttributes AttributesOf(const PointFit& result, std::span<const Vec2> uv, in
            result.attributes.begin();
   };
   const std::array<std::ptrdiff_t, 3> rgb = {find("red"), find("green"), find("blue")};
-  const bool coloured = *std::max_element(rgb.begin(), rgb.end()) < std::ssize(values);
+  const bool coloured = *std::max_element(rgb.begin(), rgb.end()) < std::ssize(values) &&
+                        AreOfBytes(result.attributes, rgb);
   MeshAttributes attributes;
   for (std::ptrdiff_t k = 0; k < std::ssize(values); ++k) {
     if (!coloured || std::find(rgb.begin(), rgb.end(), k) == rgb.end()) {

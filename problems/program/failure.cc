@@ -11,7 +11,9 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
 #include <system_error>
+#include <utility>
 
 #include "problems/command_line/exit_code.h"
 #include "problems/config/terminal_text.h"

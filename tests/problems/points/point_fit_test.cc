@@ -278,6 +278,73 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("sigma: true\nfit: {plan: adaptive}\n"), HasSubstr("sigma: it follows"));
 }
 
+// Some points once more, one of them twice: nothing is learned from them, of noise least of all.
+TEST(PointFit, CopiesOfPointsCountOnce) {
+  PointFitOptions options;
+  options.sigma = true;
+  PointTable once = ParsePointTable(UvCsv(Scattered(FrankePoint, 1500, 2e-3, 1)), "test");
+  once.positions[7].z() += 1;
+  PointTable again = once;
+  for (const std::size_t k : {0, 1, 2, 7, 7, 300}) {
+    again.positions.push_back(once.positions[k]);
+    again.uv.push_back(once.uv[k]);
+  }
+  const PointFit plain = FitPoints(once, options, {}), more = FitPoints(again, options, {});
+  EXPECT_EQ(more.fit.surface.Net(0).vertices, plain.fit.surface.Net(0).vertices);
+  EXPECT_EQ(more.fit.surface.Offsets(), plain.fit.surface.Offsets());
+  EXPECT_EQ(more.fit.automatic->noise_mm, plain.fit.automatic->noise_mm);
+  EXPECT_THAT(plain.fit.automatic->repeated, ::testing::IsEmpty());
+  EXPECT_THAT(more.fit.automatic->repeated, ::testing::SizeIs(6));
+  EXPECT_THAT(plain.fit.automatic->outliers, ::testing::ElementsAre(7));
+  EXPECT_THAT(more.fit.automatic->outliers, ::testing::ElementsAre(7, 1503, 1504));
+  ASSERT_EQ(more.fit.residual_mm.size(), 1506u);
+  EXPECT_EQ(more.fit.residual_mm[1505], plain.fit.residual_mm[300]);
+  EXPECT_EQ(more.fit.uv[1505], once.uv[300]);
+  EXPECT_EQ(more.sigma_mm[1505], plain.sigma_mm[300]);
+  EXPECT_THAT(AutoText(*more.fit.automatic), HasSubstr("6 points were given before"));
+}
+
+// Lines of a scanner, close together along themselves and far apart: a height field, and no wall.
+TEST(PointFit, LinesOfAScannerAreASheet) {
+  for (const auto& [lines, along] : {std::pair(20, 500), std::pair(10, 150), std::pair(40, 400)}) {
+    Random random(3);
+    PointTable table;
+    for (int j = 0; j < lines; ++j) {
+      for (int i = 0; i < along; ++i) {
+        const Vec2 uv(i / (along - 1.0), j / (lines - 1.0));
+        table.positions.push_back(FrankePoint(uv) + Vec3(0, 0, 2e-3 * random.Normal()));
+      }
+    }
+    const PointFit fit = FitPoints(table, {}, {});
+    EXPECT_EQ(fit.parameters, "plane");
+    EXPECT_LT(fit.map_faults.Sum(), 0.02) << lines;
+    EXPECT_LT(fit.fit.point_rms_mm, 2.5e-3) << lines;
+  }
+}
+
+// A ball has the areas of its cylinder, and no angle at its poles.
+TEST(PointFit, ABallIsNoTube) {
+  Random random(3);
+  PointTable table;
+  for (int k = 0; k < 5000; ++k) {
+    table.positions.push_back(Vec3(random.Normal(), random.Normal(), random.Normal()).normalized());
+  }
+  PointFitOptions options;
+  options.closure = Closure::kPeriodicU;
+  EXPECT_THAT(testing::WordsOf<InputError>([&] { FitPoints(table, options, {}); }),
+              HasSubstr("the points close at an end of the cylinder"));
+}
+
+// At a hundred million mm, digits of a hundredth of a micrometre are left.
+TEST(PointFit, PointsFarFromTheOriginHaveAnExtent) {
+  PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 500, 1e-3, 1)), "test");
+  const PointFit near = FitPoints(table, {}, {});
+  for (Vec3& p : table.positions) {
+    p += Vec3(1e8, -1e8, 1e8);
+  }
+  EXPECT_NEAR(FitPoints(table, {}, {}).fit.point_rms_mm, near.fit.point_rms_mm, 1e-4);
+}
+
 TEST(PointFit, OutliersAreCountedInEnglish) {
   AutoReport report;
   report.noise_mm = 1;

@@ -178,6 +178,37 @@ TEST_F(FitCommand, PointsOfEachKindOfFileAreTheSame) {
 }
 
 // Larger than what is read at once; with a blank somewhere it goes by the general reader.
+TEST_F(FitCommand, WhatComesByAPipeIsATableOrIsRefused) {
+  Write("a.csv", UvCsv(Scattered(FrankePoint, 500, 1e-3, 1)));
+  ASSERT_EQ(Call("fit a.csv --out plain --quiet").code, 0);
+  ASSERT_EQ(std::system(("gzip -kf '" + (folder_ / "a.csv").string() + "'").c_str()), 0);
+  const auto outcome = Call("fit - --out piped --quiet < a.csv.gz");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(ReadFileBytes(folder_ / "piped/surface.hspline.json"),
+            ReadFileBytes(folder_ / "plain/surface.hspline.json"));
+  Write("a.npy", std::string("\x93NUMPY\x01\x00\x10\x00", 10));
+  for (const std::string other : {"a.npy", "plain/surface.ply"}) {
+    EXPECT_THAT(Call("fit - --out other --quiet < " + other).err,
+                HasSubstr("standard input: it is not a CSV; give the file's name in place of -\n"));
+  }
+}
+
+// Colours of 0..1 would be black as bytes.
+TEST_F(FitCommand, OnlyBytesAreColours) {
+  std::string csv = "x,y,z,u,v,red,green,blue\n";
+  for (const FitPoint& p : Scattered(FrankePoint, 500, 1e-3, 1).points) {
+    csv += fmt::format("{},{},{},{},{},{},{},0\n", p.position.x(), p.position.y(), p.position.z(),
+                       p.uv.x(), p.uv.y(), p.uv.x(), p.uv.y());
+  }
+  Write("shares.csv", csv);
+  const auto outcome = Call("fit shares.csv --out out --quiet --set attributes=[red,green,blue]");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const MeshAttributes carried =
+      ReadPlyAttributes(ReadFileBytes(folder_ / "out/surface.ply"), "surface.ply");
+  EXPECT_TRUE(carried.colors.empty());
+  EXPECT_EQ(carried.scalars.size(), 3u);
+}
+
 TEST_F(FitCommand, ALargeTableIsReadAsASmallOne) {
   std::string text = UvCsv(Scattered(FrankePoint, 60000, 1e-3, 1));
   ASSERT_GT(text.size(), 4u << 20);
