@@ -319,6 +319,7 @@ TEST(PointFit, LinesOfAScannerAreASheet) {
     EXPECT_EQ(fit.parameters, "plane");
     EXPECT_LT(fit.map_faults.Sum(), 0.02) << lines;
     EXPECT_LT(fit.fit.point_rms_mm, 2.5e-3) << lines;
+    EXPECT_NEAR(fit.fit.automatic->neighbour_noise_mm, 2e-3, 5e-4) << lines;
   }
 }
 
