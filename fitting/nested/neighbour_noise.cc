@@ -61,12 +61,8 @@ double LeftOver(const NestedPoints& points, const std::vector<std::uint32_t>& ne
       values(r, c) = as_sure * points.value[k][c];
     }
   }
-  // Across a line of a scanner (u,v) are noise, which would fit the noise.
-  constexpr double kLeastSpread = 1e-4;
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(rows);
-  factor.setThreshold(kLeastSpread);
-  const Eigen::MatrixXd left = values - rows * factor.solve(values);
-  return left.squaredNorm() / static_cast<double>((count - factor.rank()) * points.channels);
+  const Eigen::MatrixXd left = values - rows * rows.colPivHouseholderQr().solve(values);
+  return left.squaredNorm() / static_cast<double>((count - terms) * points.channels);
 }
 
 }  // namespace

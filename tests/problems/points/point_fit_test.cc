@@ -325,7 +325,7 @@ TEST(PointFit, LinesOfAScannerAreASheet) {
     EXPECT_EQ(fit.parameters, "plane");
     EXPECT_LT(fit.map_faults.Sum(), 0.02);
     EXPECT_LT(fit.fit.point_rms_mm, 2.5e-3);
-    EXPECT_NEAR(fit.fit.automatic->neighbour_noise_mm, 2e-3, 5e-4);
+    EXPECT_NEAR(fit.fit.automatic->noise_mm, 2e-3, 2e-4);
   }
 }
 
