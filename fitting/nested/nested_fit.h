@@ -60,7 +60,8 @@ struct NestedFitResult {
 // one that predicts the points held out best, or within a tenth of a per cent the coarsest, is
 // fitted again to all points. With many points the first rounds look at some of them.
 //   start: without detail; what it leaves of the points is smoothed, not the surface itself.
-// Throws InputError for a start with detail, without extent, or fewer than 16 points; Cancelled.
+// Copies of a point count once. Throws InputError for a start with detail, without extent, or fewer
+// than 16 points that differ; Cancelled.
 NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,
                           const AutoPlan& plan, const RunContext& context);
 

@@ -152,8 +152,9 @@ Parametrisation TakeGiven(std::vector<Vec2> given_uv, const GivenParameters& giv
 // where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are
 // any. Throws InputError for no points, `given` without given_uv, a number of given_uv that is not
 // that of the points, an empty range, given_uv outside of it, points that span no plane or have no
-// extent along the axis, points that are no torus or fold over every plane, cylinder or torus that
-// may be taken, `mesh` without triangles, a corner that is no point, and as LayOut.
+// extent along the axis, points that are no torus, close at an end of the cylinder, or fold over
+// every plane, cylinder or torus that may be taken, `mesh` without triangles, a corner that is no
+// point, and as LayOut.
 Parametrisation Parametrise(const Scan& scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},
