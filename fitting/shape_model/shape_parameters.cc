@@ -8,12 +8,6 @@
 namespace semblance {
 namespace {
 
-Mat3 CrossMatrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 Mat3 RotationOf(const Vec3& omega) {
   const double angle = omega.norm();
   return angle == 0 ? Mat3(Mat3::Identity())
@@ -41,6 +35,12 @@ std::span<const double> SpanOf(const Eigen::VectorXd& v) {
 }
 
 }  // namespace
+
+Mat3 CrossMatrix(const Vec3& v) {
+  Mat3 m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
 
 ShapeFrame StartFrame(const ShapeModel& model, const Similarity& subject_from_model) {
   return {subject_from_model.rotation, MeanOf(model.mean.points)};

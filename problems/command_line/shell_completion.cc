@@ -6,6 +6,8 @@
 
 #include <functional>
 
+#include "problems/config/terminal_text.h"
+
 namespace semblance {
 namespace {
 
@@ -16,15 +18,6 @@ void ForEachCommand(const CommandNode& node, const std::string& path,
   for (const CommandNode& below : node.commands) {
     ForEachCommand(below, path.empty() ? below.name : path + " " + below.name, use);
   }
-}
-
-// In single quotes.
-std::string Quoted(const std::string& text) {
-  std::string quoted = "'";
-  for (const char c : text) {
-    quoted += c == '\'' ? "'\\''" : std::string(1, c);
-  }
-  return quoted + "'";
 }
 
 // A word that may follow, and what it is.
@@ -52,14 +45,14 @@ std::string BashList(const std::vector<NextWord>& words) {
   for (const NextWord& next : words) {
     list += (list.empty() ? "" : " ") + next.word;
   }
-  return Quoted(list);
+  return QuotedForShell(list);
 }
 
 // Of `word:what it is`.
 std::string ZshList(const std::vector<NextWord>& words) {
   std::string list = "(";
   for (const NextWord& next : words) {
-    list += (list.size() == 1 ? "" : " ") + Quoted(next.word + ":" + next.purpose);
+    list += (list.size() == 1 ? "" : " ") + QuotedForShell(next.word + ":" + next.purpose);
   }
   return list + ")";
 }
@@ -75,10 +68,11 @@ struct Cases {
 void AddValues(const CommandNode& node, const std::string& path, std::string& values) {
   for (const OptionText& option : node.options) {
     for (std::size_t k = 0; !option.value.empty() && k < option.names.size(); ++k) {
-      values += fmt::format("    {}) value={} ;;\n", Quoted(path + ":" + option.names[k]),
-                            option.choices.empty()
-                                ? std::string("files")
-                                : Quoted(fmt::format("{}", fmt::join(option.choices, " "))));
+      values +=
+          fmt::format("    {}) value={} ;;\n", QuotedForShell(path + ":" + option.names[k]),
+                      option.choices.empty()
+                          ? std::string("files")
+                          : QuotedForShell(fmt::format("{}", fmt::join(option.choices, " "))));
     }
   }
 }
@@ -87,10 +81,12 @@ Cases CasesOf(const CommandNode& program,
               const std::function<std::string(const std::vector<NextWord>&)>& list) {
   Cases cases;
   ForEachCommand(program, "", [&](const CommandNode& node, const std::string& path) {
-    cases.words += fmt::format("    {}) next={} ;;\n", Quoted(path), list(WordsAfter(node)));
+    cases.words +=
+        fmt::format("    {}) next={} ;;\n", QuotedForShell(path), list(WordsAfter(node)));
     for (const CommandNode& below : node.commands) {
-      cases.steps += fmt::format("      {}) at={} ;;\n", Quoted(path + ":" + below.name),
-                                 Quoted(path.empty() ? below.name : path + " " + below.name));
+      cases.steps +=
+          fmt::format("      {}) at={} ;;\n", QuotedForShell(path + ":" + below.name),
+                      QuotedForShell(path.empty() ? below.name : path + " " + below.name));
     }
     AddValues(node, path, cases.values);
   });
@@ -104,7 +100,7 @@ std::string FishOption(const OptionText& option) {
     text += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
   }
   if (!option.choices.empty()) {
-    return text + " -x -a " + Quoted(fmt::format("{}", fmt::join(option.choices, " ")));
+    return text + " -x -a " + QuotedForShell(fmt::format("{}", fmt::join(option.choices, " ")));
   }
   return text + (option.value.empty() ? "" : " -r");
 }
@@ -177,20 +173,22 @@ fi
 std::string FishCompletion(const CommandNode& program) {
   std::string steps, lines;
   ForEachCommand(program, "", [&](const CommandNode& node, const std::string& path) {
-    const std::string add = fmt::format("complete -c {0} -n {1}", program.name,
-                                        Quoted(fmt::format("__{}_at '{}'", program.name, path)));
+    const std::string add =
+        fmt::format("complete -c {0} -n {1}", program.name,
+                    QuotedForShell(fmt::format("__{}_at '{}'", program.name, path)));
     for (const CommandNode& below : node.commands) {
       const std::string next = path.empty() ? below.name : path + " " + below.name;
-      steps +=
-          fmt::format("      case {}; set at {}\n", Quoted(path + ":" + below.name), Quoted(next));
-      lines += fmt::format("{} -f -a {} -d {}\n", add, below.name, Quoted(below.purpose));
+      steps += fmt::format("      case {}; set at {}\n", QuotedForShell(path + ":" + below.name),
+                           QuotedForShell(next));
+      lines += fmt::format("{} -f -a {} -d {}\n", add, below.name, QuotedForShell(below.purpose));
     }
     for (const OptionText& option : node.options) {
       if (!option.positional) {
-        lines += fmt::format("{}{} -d {}\n", add, FishOption(option), Quoted(option.purpose));
+        lines +=
+            fmt::format("{}{} -d {}\n", add, FishOption(option), QuotedForShell(option.purpose));
       } else if (!option.choices.empty()) {
         lines += fmt::format("{} -f -a {}\n", add,
-                             Quoted(fmt::format("{}", fmt::join(option.choices, " "))));
+                             QuotedForShell(fmt::format("{}", fmt::join(option.choices, " "))));
       }
     }
   });

@@ -17,4 +17,12 @@ std::string ForTerminal(std::string_view text) {
   return result;
 }
 
+std::string QuotedForShell(std::string_view text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  }
+  return quoted + "'";
+}
+
 }  // namespace semblance

@@ -57,6 +57,13 @@ void RefuseToReplace(const fs::path& out, std::span<const fs::path> given) {
   }
 }
 
+void RefuseExisting(const fs::path& out, bool force) {
+  if (!force && fs::exists(out)) {
+    throw IoError(fmt::format("{}: it exists; name another file, or add --force to replace it",
+                              out.string()));
+  }
+}
+
 void RefuseToReplace(const fs::path& folder, const GivenFiles& given) {
   const fs::path root = Canonical(folder);
   for (const fs::path& file : given.files) {

@@ -28,6 +28,9 @@ bool IsOneOf(std::span<const std::filesystem::path> given, const std::filesystem
 void RefuseToReplace(const std::filesystem::path& out,
                      std::span<const std::filesystem::path> given);
 
+// Throws IoError if there is a file or folder of that name and no `force` to replace it.
+void RefuseExisting(const std::filesystem::path& out, bool force);
+
 // Throws InputError if one of the outputs in `folder` is one of the files.
 void RefuseToReplace(const std::filesystem::path& folder, const GivenFiles& given);
 

@@ -45,10 +45,7 @@ struct FaceArguments {
 // given: what the command reads.
 void CheckFree(const fs::path& path, const FaceArguments& a, std::span<const fs::path> given) {
   RefuseToReplace(path, given);
-  if (!a.force && fs::exists(path)) {
-    throw IoError(fmt::format("{}: it exists; name another file, or add --force to replace it",
-                              path.string()));
-  }
+  RefuseExisting(path, a.force);
 }
 
 // Two outputs of one name: one would be lost.

@@ -45,16 +45,9 @@ void TellEach(const std::vector<std::string>& lines, const char* what) {
   }
 }
 
-void CheckFree(const std::string& out, bool force) {
-  if (!force && fs::exists(out)) {
-    throw IoError(
-        fmt::format("{}: it exists; name another file, or add --force to replace it", out));
-  }
-}
-
 int Convert(const LandmarkArguments& a) {
   RefuseToReplace(a.out, std::array<fs::path, 1>{a.in});
-  CheckFree(a.out, a.force);
+  RefuseExisting(a.out, a.force);
   const LandmarkReading reading = ReadLandmarks(a.in, a.reading);
   const std::string bytes = EncodeLandmarks(reading.file, a.out);
   TellEach(reading.notes, "note");
@@ -135,7 +128,7 @@ void WriteProposal(const ProposeArguments& a, const std::string& out, const Land
   if (const fs::path folder = fs::path(out).parent_path(); !folder.empty()) {
     fs::create_directories(folder);
   }
-  CheckFree(out, a.force);
+  RefuseExisting(out, a.force);
   WriteFileAtomically(out, bytes);
   fmt::print(
       "{}: {} sites proposed, {} absent, mm, {}. Look at each on the skull and correct it; then "
@@ -158,7 +151,7 @@ int Propose(const ProposeArguments& a) {
   const bool writes = a.compare.empty() || !a.out.empty();
   if (writes) {
     RefuseToReplace(out, GivenTo(a));
-    CheckFree(out, a.force);
+    RefuseExisting(out, a.force);
   }
   RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
   if (!a.quiet) {

@@ -12,6 +12,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "fitting/shape_model/shape_parameters.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/vertex_clusters.h"
 
@@ -83,12 +84,6 @@ double Misfit_mm(const std::vector<ShellMatch>& matches) {
   return distances_mm.empty() ? kNaN
                               : std::accumulate(distances_mm.begin(), distances_mm.end(), 0.0) /
                                     static_cast<double>(distances_mm.size());
-}
-
-Mat3 CrossMatrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
 }
 
 struct Candidate {

@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 
+#include "problems/config/terminal_text.h"
 #include "problems/output/files.h"
 #include "surfaces/base/error.h"
 
@@ -13,24 +14,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// For a POSIX shell, whatever is in it.
-std::string Quoted(const std::string& text) {
-  std::string quoted = "'";
-  for (const char c : text) {
-    quoted += c == '\'' ? "'\\''" : std::string(1, c);
-  }
-  return quoted + "'";
-}
-
-std::string QuotedPath(const fs::path& path) { return Quoted(fs::absolute(path).string()); }
+std::string QuotedPath(const fs::path& path) { return QuotedForShell(fs::absolute(path).string()); }
 
 }  // namespace
 
 std::string SubmitScript(const SubmitOptions& o) {
-  const std::string name = Quoted("semblance-" + o.study.stem().string());
+  const std::string name = QuotedForShell("semblance-" + o.study.stem().string());
   std::string extra;
   for (const std::string& option : o.sbatch) {
-    extra += fmt::format(" {}", Quoted(option));
+    extra += fmt::format(" {}", QuotedForShell(option));
   }
   // The number of shards is fixed here: Slurm's own count is smaller when only some elements of the
   // array are run again.
@@ -49,8 +41,9 @@ std::string SubmitScript(const SubmitOptions& o) {
       "merge=$(sbatch --parsable --requeue --job-name={} --dependency=afterany:\"${{array%%;*}}\" "
       "--output={}{} \\\n  --wrap={})\n"
       "echo \"shards: job $array; merge: job $merge\"\n",
-      name, o.shards - 1, o.jobs, Quoted(log + "/slurm-shard-%a.log"), extra, Quoted(shard), name,
-      Quoted(log + "/slurm-merge.log"), extra, Quoted(merge));
+      name, o.shards - 1, o.jobs, QuotedForShell(log + "/slurm-shard-%a.log"), extra,
+      QuotedForShell(shard), name, QuotedForShell(log + "/slurm-merge.log"), extra,
+      QuotedForShell(merge));
 }
 
 fs::path SubmitStudy(const SubmitOptions& options) {
