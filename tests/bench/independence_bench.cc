@@ -2,8 +2,13 @@
 // How far the implicit surface depends on the skull's mesh: 10, 40 and 160 thousand triangles of
 // one skull, each emitter, over the whole skull and where the coarser skull itself is the finer
 // one.
+#include <array>
 #include <map>
+#include <span>
+#include <string>
+#include <vector>
 
+#include "surfaces/base/quantile.h"
 #include "surfaces/emitters/implicit_surface.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/bench/entry.h"
@@ -15,12 +20,15 @@ namespace {
 using bench::Head;
 
 constexpr std::size_t kEach = 701;  // every so many vertices are looked at
+// For quantiles: an RMS of a hundred places hangs on which they are, where two skulls differ at a
+// crack of the bone.
+constexpr std::size_t kEachDense = 53;
 
-// Where the outermost surface lies over some vertices of a skull, along their normals.
-std::vector<double> Heights(const ImplicitSurface& surface, const Head& from) {
+// Where the outermost surface lies over every so many vertices of a skull, along their normals.
+std::vector<double> Heights(const ImplicitSurface& surface, const Head& from, std::size_t each) {
   const std::vector<Vec3> normals = VertexNormals(from.skull);
   std::vector<double> heights;
-  for (std::size_t v = 0; v < normals.size(); v += kEach) {
+  for (std::size_t v = 0; v < normals.size(); v += each) {
     const double step = 0.25 * from.depth_mm[v];
     const auto inside = [&](double h) {
       return surface.Value(from.skull.points[v] + h * normals[v]) > 0;
@@ -78,6 +86,19 @@ Difference Compare(const std::vector<double>& a, const std::vector<double>& b,
   return difference;
 }
 
+// The quantiles of how far apart two heights are.
+std::vector<double> Apart(const std::vector<double>& a, const std::vector<double>& b,
+                          std::span<const double> shares) {
+  std::vector<double> apart, quantiles;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    apart.push_back(std::abs(a[n] - b[n]));
+  }
+  for (const double share : shares) {
+    quantiles.push_back(Quantile(apart, share));
+  }
+  return quantiles;
+}
+
 void Print(const std::string& name, double ours, double goal, const char* unit) {
   bench::Print({"implicit." + name, ours, kNaN, kNaN, goal, unit, true},
                "build/tests/bench/independence_bench");
@@ -96,10 +117,10 @@ void Independence(const std::string& subject, const std::vector<Head>& coarse_to
     const Head& coarse = coarse_to_fine[n];
     const std::vector<double> skull_mm = SkullDistances(finest, coarse.skull);
     for (const auto& [emitter_name, emitter] : emitters) {
-      const auto heights = [&](const Head& head) {
-        return Heights(ImplicitSurface(head.skull, head.depth_mm, {emitter, 1e-3}), finest);
-      };
-      const std::vector<double> here = heights(coarse), reference = heights(finest);
+      const ImplicitSurface coarse_surface(coarse.skull, coarse.depth_mm, {emitter, 1e-3}),
+          finest_surface(finest.skull, finest.depth_mm, {emitter, 1e-3});
+      const std::vector<double> here = Heights(coarse_surface, finest, kEach),
+                                reference = Heights(finest_surface, finest, kEach);
       const std::string name =
           fmt::format("{}_{}_rms_from_{}_to_{}", subject, emitter_name,
                       coarse.skull.triangles.size(), finest.skull.triangles.size());
@@ -110,6 +131,13 @@ void Independence(const std::string& subject, const std::vector<Head>& coarse_to
       Print(name + "_where_skulls_agree", agreed.rms_mm,
             emitter_name.starts_with("flat") ? 0.15 : kNaN, "mm");
       Print(name + "_skulls_agree", double(agreed.count) / double(all.count), kNaN, "share");
+      if (emitter_name.starts_with("flat")) {
+        const std::vector<double> apart =
+            Apart(Heights(coarse_surface, finest, kEachDense),
+                  Heights(finest_surface, finest, kEachDense), std::array{0.5, 0.95});
+        Print(name + "_dense_median", apart[0], kNaN, "mm");
+        Print(name + "_dense_p95", apart[1], kNaN, "mm");
+      }
     }
   }
 }
