@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "problems/face_template/template_placement.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
@@ -29,6 +30,14 @@ constexpr int kVersion = 1;
 // What a template must be
 // ---------------------------------------------------------------------------------------------
 
+std::vector<SkinLandmark> SitesOnSurface(const TemplateFace& face) {
+  std::vector<SkinLandmark> sites;
+  for (const std::string& code : StandardSiteCodes()) {
+    sites.push_back({code, face.surface.Point(face.site_uv.at(code))});
+  }
+  return sites;
+}
+
 void CheckSites(const TemplateFace& face) {
   for (const std::string& code : StandardSiteCodes()) {
     if (!face.site_uv.contains(code)) {
@@ -42,6 +51,7 @@ void CheckSites(const TemplateFace& face) {
                                    uv.x(), uv.y()));
     }
   }
+  CheckSides(SitesOnSurface(face));
 }
 
 void CheckVertex(const TemplateFeature& feature, const VertexId& id, const HSplineShape& shape) {

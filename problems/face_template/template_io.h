@@ -42,8 +42,9 @@ FileTemplate WriteTemplate(const std::filesystem::path& folder, const TemplateFa
 
 // Throws IoError if a file cannot be read or a table is none, InputError in one line that starts
 // with the file and says what is wrong: no file named, an entry that is missing or of the wrong
-// kind, one of the 32 sites missing or standing twice, a (u,v) outside [0,1] x [0,1], a feature's
-// vertex outside the surface's levels, a radius that is not positive. Sites beyond the 32 are kept.
+// kind, one of the 32 sites missing or standing twice, a (u,v) outside [0,1] x [0,1], sites whose
+// left and right have changed places, a feature's vertex outside the surface's levels, a radius
+// that is not positive. Sites beyond the 32 are kept.
 TemplateFace ReadTemplate(const FileTemplate& files);
 
 // What the files say.

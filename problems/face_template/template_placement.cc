@@ -127,17 +127,34 @@ double MisfitOf(const Correspondence& pairs) {
   return std::sqrt(sum) / head_from_generic.scale;
 }
 
-void CheckHandedness(const Correspondence& pairs, const std::string& name) {
+void CheckHandedness(const Correspondence& pairs) {
   Correspondence mirrored = pairs;
   for (Vec3& p : mirrored.generic) {
     p.x() = -p.x();
   }
   if (MisfitOf(mirrored) < MisfitOf(pairs)) {
     throw InputError(
-        fmt::format("{}: a mirror image of the generic head meets the landmarks better than the "
-                    "head itself: left and right have changed places, or mesh and landmarks are "
-                    "not LPS; swap _l and _r, or mirror both",
-                    name));
+        "a mirror image of the generic head meets the landmarks better than the head itself: left "
+        "and right have changed places, or mesh and landmarks are not LPS; swap _l and _r, or "
+        "mirror both");
+  }
+}
+
+// One pair that has changed places leaves the handedness of all as it is.
+void CheckEachPair(const std::vector<SkinLandmark>& points, const Vec3& leftward) {
+  std::map<std::string, Vec3> at;
+  for (const SkinLandmark& landmark : points) {
+    at.emplace(landmark.code, landmark.point);
+  }
+  for (const auto& [code, point] : at) {
+    const auto mirrored =
+        SideOfSite(code) == Side::kLeft ? at.find(WithoutSide(code) + "_r") : at.end();
+    if (mirrored != at.end() && !((point - mirrored->second).dot(leftward) > 0)) {
+      throw InputError(
+          fmt::format("'{}' lies {:.0f} mm to the right of '{}': the two have changed places; "
+                      "exchange their points",
+                      code, (mirrored->second - point).dot(leftward), mirrored->first));
+    }
   }
 }
 
@@ -209,9 +226,9 @@ HSplineSurface Warped(const HSplineSurface& surface, const Map& map) {
 }
 
 // Of where the landmarks place the generic head. What they leave open names the head too.
-void CheckPlace(const Correspondence& pairs, const std::string& name) try {
-  CheckHandedness(pairs, name);
-  CheckScale(pairs.HeadFromGeneric().scale, name);
+void CheckPlace(const std::vector<SkinLandmark>& points, const std::string& name) try {
+  CheckSides(points);
+  CheckScale(Correspondence(points).HeadFromGeneric().scale, name);
 } catch (const InputError& error) {
   const std::string words = error.what();
   throw InputError(words.starts_with(name) ? words
@@ -220,13 +237,19 @@ void CheckPlace(const Correspondence& pairs, const std::string& name) try {
 
 }  // namespace
 
+void CheckSides(const std::vector<SkinLandmark>& points) {
+  const Correspondence pairs(points);
+  CheckHandedness(pairs);
+  CheckEachPair(points, pairs.HeadFromGeneric().rotation * Vec3::UnitX());
+}
+
 OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const std::string& name,
                       const RunContext& context) {
   CheckOneHead(head, name);  // first, as two are too large for one
   OuterHead outer{.skin = {}, .points = {}, .notes = CheckHeadMesh(head, name)};
   std::ranges::copy(landmarks.notes, std::back_inserter(outer.notes));
   CheckEnough(landmarks.points, name);
-  CheckPlace(Correspondence(landmarks.points), name);
+  CheckPlace(landmarks.points, name);
   context.Report("skin", "what is seen from outside");
   outer.skin = Submesh(head, SeenFromOutside(head, context.threads));
   outer.points = OnSkin(landmarks.points, outer.skin, name);

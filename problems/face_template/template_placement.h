@@ -19,12 +19,17 @@ struct OuterHead {
   std::vector<std::string> notes;    // lesser defects of the mesh, landmarks that were left out
 };
 
+// Throws InputError, without a name of the head, where left and right have changed places: of all
+// landmarks (the generic head's mirror image meets them better) or of one pair. It takes landmarks
+// that place the generic head, see PrepareHead.
+void CheckSides(const std::vector<SkinLandmark>& points);
+
 // Drops the walls of cavities (outer_surface.h), and brings each landmark to the nearest skin.
 // Throws InputError, naming the mesh, where no head can be made of it: what CheckHeadMesh refuses;
 // two pieces of head's size side by side; fewer than 3 landmarks in the midline or 2 pairs, naming
-// the sites that are missing; landmarks whose best similarity with the generic head is a
-// reflection (mirrored, or left and right changed places) or has a scale outside 0.75 to 1.35
-// (another unit); a landmark more than 10 mm from the skin.
+// the sites that are missing; what CheckSides refuses; landmarks whose best similarity with the
+// generic head has a scale outside 0.75 to 1.35 (another unit); a landmark more than 10 mm from the
+// skin.
 OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const std::string& name,
                       const RunContext& context);
 

@@ -51,10 +51,16 @@ Experiment Read(const std::string& text, const Alternative& alternative, const f
                 ConfigErrors& errors) {
   ConfigNode tree = LoadConfigTextTree(text, "alternative " + alternative.name, alternative.set,
                                        ConfigTreeOf(Experiment{}), errors);
-  StartPathsAt(fs::absolute(folder), tree);
+  StartPathsAt(fs::current_path() / folder, tree);
   auto experiment = ReadConfigTree<Experiment>(tree, errors);
   experiment.title += " (" + alternative.name + ")";
   return experiment;
+}
+
+bool OfOneSkull(const Experiment& a, const Experiment& b) {
+  Experiment with_other_subject = a;
+  with_other_subject.subject = b.subject;
+  return WriteConfig(with_other_subject) == WriteConfig(a);
 }
 
 // Faults of one alternative are told where the configuration has it.
@@ -271,6 +277,11 @@ std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const 
     faults.Add(of_settings);
     if (!result.back().experiment.alternatives.empty()) {
       faults.Add("it sets alternatives of its own; set them beside it");
+    }
+    if (of_settings.faults().empty() && !OfOneSkull(own, result.back().experiment)) {
+      faults.Add(
+          "it sets another `subject`, and alternatives are of one skull; take a study to compare "
+          "skulls");
     }
   }
   errors.ThrowIfAny();

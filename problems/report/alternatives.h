@@ -19,9 +19,10 @@ struct NamedExperiment {
   Experiment experiment;  // without alternatives of its own
 };
 
-// folder: of the configuration; relative paths in what alternatives set start there. tree: what the
-// experiment was read from, for the lines of faults. Throws ConfigError with a line for each fault
-// of each alternative: a name that appears twice or is no name of a folder, a setting that is none.
+// folder: of the configuration, empty for the working folder; relative paths in what alternatives
+// set start there. tree: what the experiment was read from, for the lines of faults. Throws
+// ConfigError with a line for each fault of each alternative: a name that appears twice or is no
+// name of a folder, a setting that is none, another skull.
 std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment,
                                             const std::filesystem::path& folder,
                                             const ConfigNode& tree);

@@ -190,6 +190,13 @@ TEST(TemplateFit, WhatCannotBecomeATemplateIsSaidInOneLine) {
   }
   EXPECT_THAT(FaultOf(Head(), swapped), AllOf(HasSubstr("head.ply"), HasSubstr("mirror image")));
 
+  SkinLandmarks pair = good;
+  for (SkinLandmark& l : pair.points) {
+    l.code = l.code == "zy_l" ? "zy_r" : l.code == "zy_r" ? "zy_l" : l.code;
+  }
+  EXPECT_THAT(FaultOf(Head(), pair),
+              AllOf(HasSubstr("head.ply: its landmarks: 'zy_l' lies"), HasSubstr("'zy_r'")));
+
   TriMesh two = Head();
   Append(two, Head(), {260, 0, 0}, /*turned_over=*/false);
   EXPECT_THAT(FaultOf(two, good), HasSubstr("two pieces of a head's size"));

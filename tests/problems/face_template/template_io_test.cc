@@ -7,10 +7,12 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -116,6 +118,25 @@ TEST_F(TemplateIo, NamesASiteThatIsMissingOrTwiceOrOutsideTheDomain) {
               AllOf(HasSubstr("site 'g'"), HasSubstr("(1.5, "), HasSubstr("[0, 1]")));
   EXPECT_THAT(MessageAfterSites("\ng,0.5,", "\ng,here,"), HasSubstr("here"));
   EXPECT_THAT(MessageAfterSites("site,u,v", "site,u,w"), HasSubstr("'v'"));
+}
+
+TEST_F(TemplateIo, RefusesLeftAndRightThatHaveChangedPlaces) {
+  const auto message_with = [this](const std::vector<std::string>& exchanged) {
+    TemplateFace face = Face();
+    for (const std::string& pair : exchanged) {
+      std::swap(face.site_uv.at(pair + "_l"), face.site_uv.at(pair + "_r"));
+    }
+    return testing::WordsOf<InputError>([&] { Written(face); });
+  };
+  std::vector<std::string> pairs;
+  for (const auto& [code, uv] : Face().site_uv) {
+    if (code.ends_with("_l")) {
+      pairs.push_back(code.substr(0, code.size() - 2));
+      EXPECT_THAT(message_with({pairs.back()}),
+                  AllOf(HasSubstr(code), HasSubstr("the two have changed places")));
+    }
+  }
+  EXPECT_THAT(message_with(pairs), HasSubstr("mirror image"));
 }
 
 TEST_F(TemplateIo, NamesAVertexThatTheSurfaceDoesNotHave) {

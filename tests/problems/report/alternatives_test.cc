@@ -73,6 +73,14 @@ TEST(Alternatives, NameFilesFromTheConfigurationsFolder) {
             kConfigs / "tables/t_table_2023.yaml");
 }
 
+// As `semblance run mine.yaml` gives it.
+TEST(Alternatives, OfAConfigurationInTheWorkingFolderStartThere) {
+  const Experiment experiment =
+      SmallPhantom({"alternatives=[{name: other, set: [\"tissue.table=mine.yaml\"]}]"});
+  EXPECT_EQ(AlternativesOf(experiment, "", {})[0].experiment.tissue.table,
+            fs::current_path() / "mine.yaml");
+}
+
 TEST(Alternatives, AreCheckedBeforeAnythingRuns) {
   const auto of = [](const char* alternatives) {
     AlternativesOf(SmallPhantom({std::string("alternatives=") + alternatives}), kConfigs, {});
@@ -82,6 +90,8 @@ TEST(Alternatives, AreCheckedBeforeAnythingRuns) {
   EXPECT_THAT([&] { of("[{name: ../a}]"); }, ThrowsMessage<ConfigError>(HasSubstr("'../a'")));
   EXPECT_THAT([&] { of("[{name: a}, {name: a}]"); },
               ThrowsMessage<ConfigError>(HasSubstr("appears twice")));
+  EXPECT_THAT([&] { of("[{name: a, set: [\"subject.random_seed=3\"]}]"); },
+              ThrowsMessage<ConfigError>(HasSubstr("another `subject`")));
 }
 
 TEST(Alternatives, AllTheirFaultsAreToldAtOnceEachAtItsLine) {
