@@ -14,7 +14,7 @@ const BumpOnSkull kBumps[] = {
     {{52, 58, -60}, {28.3, 12.7, 14.1}, -3},  // masseteric fossa
     {{36, 34, -92}, {12.7, 21.2, 8.5}, -3},   // beside the lower teeth
     {{28, 10, -44}, {7.8, 21.2, 7.1}, -3},    // canine fossa
-    {{34, 10, -9}, {12, 21.2, 10.6}, -2, 2},  // orbit
+    {{34, 10, -9}, {12, 21.2, 10.6}, 4, 2},   // orbit, filled as the shell of a head fills it
     {{0, -4, -42}, {7.8, 21.2, 9.2}, -4, 2},  // nasal opening
     {{0, -5, -64}, {15.6, 21.2, 8.5}, -3},    // over the upper teeth
     {{0, -1, -96}, {15.6, 21.2, 5.7}, -3},    // between teeth and chin
