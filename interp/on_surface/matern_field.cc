@@ -14,6 +14,11 @@ constexpr double kStep = 2e-3;                // of kappa^2's logarithm
 
 }  // namespace
 
+MaternDomain WithLengths(MaternDomain domain, const Eigen::VectorXd& share) {
+  domain.laplacian.area_mm2.array() /= share.array().square();
+  return domain;
+}
+
 double MaternKappa(int alpha, double length_mm) {
   return alpha == 1 ? 1 / length_mm : std::sqrt(2.0 * (alpha - 1)) / length_mm;
 }

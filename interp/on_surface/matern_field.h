@@ -18,6 +18,12 @@ struct MaternDomain {
   MeshLaplacian laplacian;
 };
 
+// The domain whose fields have, at vertex i, share[i] times the length that they are asked for: as
+// on the surface under a metric that is 1 / share^2 times its own, where areas grow by that and the
+// stiffness, which is conformally invariant in two dimensions, stays (Lindgren, Rue & Lindstrom
+// 2011, section 3.2). share: one per vertex, > 0.
+MaternDomain WithLengths(MaternDomain domain, const Eigen::VectorXd& share);
+
 // kappa, 1/mm, of a length as kriging's: sqrt(2 nu) / length with nu = alpha - 1, by which the
 // Matern correlation of a plane is that of Rasmussen & Williams (2006, eq. 4.14). For alpha = 1,
 // where nu is 0: 1 / length.

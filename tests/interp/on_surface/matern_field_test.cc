@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "interp/on_surface/reduced_matern.h"
 #include "tests/testing/dowel_scenes.h"
@@ -131,6 +132,36 @@ TEST(MaternField, FarFromABorderIsThePlanesMaternCovariance) {
       for (const Vec3& way : {Vec3(1, 0, 0), Vec3(0, -1, 0)}) {
         const int at = NearestVertex(plate, Vec3(80, 80, 0) + r * way);
         EXPECT_NEAR(column[at] / variance, matern, 0.01) << alpha << " " << r;
+      }
+    }
+  }
+}
+
+// Left of a bend in the length the field is as with the one, right of it as with the other.
+TEST(MaternField, WhereTheLengthIsHalfTheCorrelationIsThatOfHalfTheLength) {
+  const TriMesh plate = Plate(160, 160);
+  const double length_mm = 16;
+  Eigen::VectorXd share(std::ssize(plate.points));
+  for (Eigen::Index i = 0; i < share.size(); ++i) {
+    share[i] = plate.points[static_cast<std::size_t>(i)].x() < 80 ? 1 : 0.5;
+  }
+  for (const int alpha : {2, 3}) {
+    const double nu = alpha - 1;
+    const MaternDomain domain = WithLengths(DomainOf(plate), share);
+    const MaternField field(domain, alpha, MaternKappa(alpha, length_mm));
+    const int left = NearestVertex(plate, {40, 80, 0}), right = NearestVertex(plate, {120, 80, 0});
+    const Eigen::MatrixXd columns =
+        field.Covariances(UnitColumns(std::ssize(plate.points), {left, right}), {});
+    for (const auto& [column, center, length] :
+         {std::tuple(0, left, length_mm), std::tuple(1, right, 0.5 * length_mm)}) {
+      for (double r = 3; r <= 15; r += 3) {
+        const double x = std::sqrt(2 * nu) / length * r;
+        const double matern =
+            std::pow(x, nu) * std::cyl_bessel_k(nu, x) / (std::pow(2.0, nu - 1) * std::tgamma(nu));
+        const int at =
+            NearestVertex(plate, plate.points[static_cast<std::size_t>(center)] + Vec3(0, r, 0));
+        EXPECT_NEAR(columns(at, column) / columns(center, column), matern, 0.03)
+            << alpha << " " << length << " " << r;
       }
     }
   }
