@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "surfaces/base/atomic_file.h"
@@ -18,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<double, 3> kSkinColour = {0.85, 0.65, 0.54};
+constexpr std::array<double, 3> kWhite = {1, 1, 1};  // under colours of points
 
 // One colour or texture of the bust.
 struct Piece {
@@ -26,7 +29,8 @@ struct Piece {
   fs::path texture;                            // empty without
   double roughness = 0.6;
   std::vector<Vec3> points, normals;
-  std::vector<Vec2> uv;  // one per point, or none; v upwards
+  std::vector<Vec2> uv;                                   // one per point, or none; v upwards
+  std::vector<std::array<std::uint8_t, 3>> colours = {};  // sRGB, one per point, or none
   std::vector<Triangle> triangles;
 };
 
@@ -39,6 +43,38 @@ Piece PieceOf(const EyePart& part) {
           .normals = VertexNormals(part.mesh),
           .uv = {},
           .triangles = part.mesh.triangles};
+}
+
+std::array<std::uint8_t, 3> BytesOf(const Vec3& colour) {
+  std::array<std::uint8_t, 3> bytes{};
+  for (int c = 0; c < 3; ++c) {
+    bytes[c] = static_cast<std::uint8_t>(std::lround(255 * colour[c]));
+  }
+  return bytes;
+}
+
+// Of faces whose material no library describes.
+std::array<double, 3> PlainColour(const ObjText& obj) {
+  return obj.colours.empty() ? kSkinColour : kWhite;
+}
+
+std::string MaterialName(const std::string& material) {
+  return material.empty() ? "skin" : material;
+}
+
+// Of its material, or the colours of its points.
+void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
+  piece.name = MaterialName(material);
+  piece.colour = PlainColour(obj);
+  if (const auto found = obj.materials.find(material); found != obj.materials.end()) {
+    const Vec3& c = found->second.colour;
+    piece.colour = {c.x(), c.y(), c.z()};
+    piece.texture = found->second.texture;
+    piece.colours.clear();
+  }
+  if (obj.texture.empty()) {
+    piece.uv.clear();
+  }
 }
 
 // The faces of an OBJ by material; a point with two texture coordinates becomes two.
@@ -57,6 +93,9 @@ std::vector<Piece> TexturedPieces(const TriMesh& skin, const ObjText& obj) {
         piece.points.push_back(skin.points[corner.point]);
         piece.normals.push_back(normals[corner.point]);
         piece.uv.push_back(corner.texture < 0 ? Vec2(0, 0) : obj.texture[corner.texture]);
+        if (!obj.colours.empty()) {
+          piece.colours.push_back(BytesOf(obj.colours[corner.point]));
+        }
       }
       corners.push_back(it->second);
     }
@@ -66,15 +105,7 @@ std::vector<Piece> TexturedPieces(const TriMesh& skin, const ObjText& obj) {
   }
   std::vector<Piece> result;
   for (auto& [name, piece] : pieces) {
-    piece.name = name.empty() ? "skin" : name;
-    if (const auto found = obj.materials.find(name); found != obj.materials.end()) {
-      const Vec3& c = found->second.colour;
-      piece.colour = {c.x(), c.y(), c.z()};
-      piece.texture = found->second.texture;
-    }
-    if (obj.texture.empty()) {
-      piece.uv.clear();
-    }
+    GiveLooks(name, obj, piece);
     result.push_back(std::move(piece));
   }
   return result;
@@ -130,6 +161,7 @@ GlbPart PartOf(const Piece& piece) {
           .points = piece.points,
           .normals = piece.normals,
           .uv = piece.uv,
+          .colours = piece.colours,
           .triangles = piece.triangles};
 }
 
@@ -164,12 +196,30 @@ void AppendMtl(const std::string& name, const std::array<double, 3>& colour, dou
                       colour[2], gloss, gloss, gloss);
 }
 
+// Of an OBJ whose materials nothing describes.
+void AppendPlainMtl(const ObjText& obj, std::string& mtl) {
+  std::set<std::string> names;
+  for (const ObjFace& face : obj.faces) {
+    names.insert(MaterialName(face.material));
+  }
+  for (const std::string& name : names) {
+    AppendMtl(name, PlainColour(obj), 0.1, mtl);
+  }
+}
+
 std::pair<std::string, std::string> ObjAndMtl(const Bust& bust, const BustModel& model) {
-  std::string mtl = model.obj ? FlatMtl(*model.obj) : "";
+  std::string mtl = model.obj ? MtlOf(*model.obj) : "";
   std::string obj;
   std::size_t points = bust.skin.points.size();
   if (model.obj) {
-    obj = ObjWithPoints(*model.obj, bust.skin.points, mtl.empty() ? "" : "bust.mtl");
+    const bool is_plain = model.obj->materials.empty();
+    if (is_plain) {
+      AppendPlainMtl(*model.obj, mtl);
+    }
+    const bool starts_without = is_plain && model.obj->faces.front().material.empty();
+    obj = ObjWithPoints(
+        *model.obj, bust.skin.points,
+        {.library = "bust.mtl", .first_material = starts_without ? MaterialName("") : ""});
   } else {
     obj = "# mm, LPS: +x subject left, +y posterior, +z up\nmtllib bust.mtl\n";
     AppendObj("skin", bust.skin, 0, obj);
@@ -189,12 +239,10 @@ std::vector<NamedBytes> BustToFiles(const Bust& bust, const BustModel& model) {
   std::vector<NamedBytes> files = {{"bust.glb", BustGlb(bust, model)}};
   auto [obj, mtl] = ObjAndMtl(bust, model);
   files.push_back({"bust.obj", std::move(obj)});
-  if (!mtl.empty()) {
-    files.push_back({"bust.mtl", std::move(mtl)});
-  }
+  files.push_back({"bust.mtl", std::move(mtl)});
   if (model.obj) {
-    for (const fs::path& texture : model.obj->textures) {
-      files.push_back({texture.filename().string(), ReadFileBytes(texture)});
+    for (const ObjTexture& texture : model.obj->textures) {
+      files.push_back({texture.name, ReadFileBytes(texture.file)});
     }
   }
   return files;

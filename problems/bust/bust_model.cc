@@ -14,6 +14,7 @@
 #include "problems/face_template/template_placement.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -68,7 +69,7 @@ std::optional<BustModel> Load(const HSplineBust& source, const TemplateSource& f
                               const RunContext&) {
   constexpr double kFarthest_mm = 3;
   if (source.file.empty()) {
-    throw InputError("bust: it names no file; `semblance template --bust` writes one");
+    throw InputError("it names no file; `semblance template --bust` writes one");
   }
   const std::string name = source.file.string();
   BustModel bust = OfHead(WholeHeadFromJson(ReadFileBytes(source.file), name),
@@ -103,7 +104,7 @@ void CheckOnePiece(const TriMesh& mesh, const std::string& name) {
 std::optional<BustModel> Load(const MeshBust& source, const TemplateSource&,
                               const RunContext& context) {
   if (source.mesh.empty() || source.landmarks.empty()) {
-    throw InputError(fmt::format("bust: it names no {}; both a mesh and its landmarks are needed",
+    throw InputError(fmt::format("it names no {}; both a mesh and its landmarks are needed",
                                  source.mesh.empty() ? "mesh" : "landmarks"));
   }
   BustModel bust{.name = source.mesh.filename().string(),
@@ -119,7 +120,7 @@ std::optional<BustModel> Load(const MeshBust& source, const TemplateSource&,
   for (const SkinLandmark& landmark : outer.points) {
     bust.sites[landmark.code] = landmark.point;
   }
-  if (fs::path(source.mesh).extension() == ".obj") {
+  if (LowerCase(source.mesh.extension().string()) == ".obj") {
     bust.obj = ReadObjText(source.mesh);
   }
   return bust;

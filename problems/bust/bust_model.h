@@ -29,7 +29,7 @@ struct BustModel {
 // The bust that `source` comes to beside this template; none if there is to be none. Throws IoError
 // or InputError in one line: a file that cannot be read, a mesh that is not one piece, holds two
 // heads or is no head in mm, landmarks that are too few, mirrored or off the mesh (PrepareHead), a
-// file of another template's head.
+// file of another template's head, materials and textures that cannot be used (ReadObjText).
 std::optional<BustModel> LoadBust(const BustSource& source, const TemplateSource& face_template,
                                   const RunContext& context);
 

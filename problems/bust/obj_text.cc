@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <charconv>
 #include <sstream>
+#include <system_error>
+#include <utility>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
+#include "surfaces/mesh_files/glb.h"
 
 namespace semblance {
 namespace {
@@ -57,14 +61,33 @@ std::string Rest(const std::string& line) {
   return line.substr(begin, line.find_last_not_of(" \t") + 1 - begin);
 }
 
-double NumberOf(const std::string& word, const std::string& name, std::size_t line) {
+std::optional<double> FiniteNumber(const std::string& word) {
   double value = kNaN;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
+  const bool whole = error == std::errc() && end == word.data() + word.size();
+  return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
+double NumberOf(const std::string& word, const std::string& name, std::size_t line) {
+  const std::optional<double> value = FiniteNumber(word);
+  if (!value) {
     throw InputError(
         fmt::format("{}: line {}: '{}' is not a number", name, line, word.substr(0, 40)));
   }
-  return value;
+  return *value;
+}
+
+// `v x y z r g b`, with or without a weight before the colour.
+std::optional<Vec3> ColourOf(const std::vector<std::string>& words) {
+  if (words.size() < 7) {
+    return std::nullopt;
+  }
+  Vec3 colour;
+  for (int c = 0; c < 3; ++c) {
+    colour[c] = FiniteNumber(words[words.size() - 3 + c]).value_or(kNaN);
+  }
+  const bool within = (colour.array() >= 0).all() && (colour.array() <= 1).all();
+  return within ? std::optional(colour) : std::nullopt;
 }
 
 // A file that another one names: only below the folder of both, so that no mesh can have foreign
@@ -78,12 +101,52 @@ fs::path Beside(const fs::path& folder, std::string name, const std::string& who
                     "put it there and correct the name",
                     who, name));
   }
-  return folder / path;
+  return (folder / path).lexically_normal();
+}
+
+bool IsFile(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
 }
 
 bool IsMap(const std::string& word) {
   return word.starts_with("map_") || word == "bump" || word == "disp" || word == "decal" ||
          word == "norm" || word == "refl";
+}
+
+// How many words after an option of a `map_` line belong to it at most; -1: it is no option.
+int ArgumentsOf(const std::string& option) {
+  static const std::map<std::string, int> kArguments = {
+      {"-blendu", 1}, {"-blendv", 1},  {"-bm", 1},  {"-boost", 1}, {"-cc", 1},
+      {"-clamp", 1},  {"-imfchan", 1}, {"-mm", 2},  {"-o", 3},     {"-s", 3},
+      {"-t", 3},      {"-texres", 1},  {"-type", 1}};
+  const auto found = kArguments.find(option);
+  return found == kArguments.end() ? -1 : found->second;
+}
+
+// The number of words before the name in `map_Kd -s 2 2 my skin.png`. The name is at least one.
+std::size_t WordsBeforeName(const std::vector<std::string>& words) {
+  std::size_t k = 1;
+  for (int most; k + 1 < words.size() && (most = ArgumentsOf(words[k])) >= 0;) {
+    ++k;
+    for (int n = 0; n < most && k + 1 < words.size(); ++n) {
+      if (most == 3 && n > 0 && !FiniteNumber(words[k])) {
+        break;  // the second and third of -o, -s and -t may be left out
+      }
+      ++k;
+    }
+  }
+  return k;
+}
+
+std::string WithoutComment(const std::string& line) {
+  std::size_t end = line.size();
+  for (std::size_t k = 1; k < end; ++k) {
+    if (line[k] == '#' && (line[k - 1] == ' ' || line[k - 1] == '\t')) {
+      end = k;
+    }
+  }
+  return line.substr(0, line.find_last_not_of(" \t", end - 1) + 1);
 }
 
 class ObjReader {
@@ -97,21 +160,31 @@ class ObjReader {
         continue;
       }
       if (words[0] == "v") {
-        ++points_;
+        Point(words);
       } else if (words[0] == "vt") {
         Texture(words, k + 1);
       } else if (words[0] == "usemtl") {
         material = Rest(obj_.lines[k]);
       } else if (words[0] == "mtllib") {
-        Library(Rest(obj_.lines[k]));
+        Libraries(obj_.lines[k]);
       } else if (words[0] == "f") {
         Face(words, material, k + 1);
       }
+    }
+    if (obj_.colours.size() != points_) {
+      obj_.colours.clear();
     }
   }
   ObjText Take() { return std::move(obj_); }
 
  private:
+  void Point(const std::vector<std::string>& words) {
+    ++points_;
+    if (const std::optional<Vec3> colour = ColourOf(words)) {
+      obj_.colours.push_back(*colour);
+    }
+  }
+
   void Texture(const std::vector<std::string>& words, std::size_t line) {
     const auto at = [&](std::size_t k) {
       return k < words.size() ? NumberOf(words[k], name_, line) : 0.0;
@@ -144,41 +217,103 @@ class ObjReader {
     obj_.faces.push_back(std::move(face));
   }
 
-  void Library(const std::string& name) {
-    const fs::path path = Beside(path_.parent_path(), name, name_);
-    const std::string text = ReadFileBytes(path);
-    obj_.mtl += text;
-    if (!text.empty() && text.back() != '\n') {
-      obj_.mtl += '\n';
+  // One name with spaces, or several names.
+  void Libraries(const std::string& line) {
+    const fs::path folder = path_.parent_path();
+    const auto is_there = [&](const std::string& name) {
+      return IsFile(Beside(folder, name, name_));
+    };
+    const std::string rest = Rest(line);
+    std::vector<std::string> names = Words(rest);
+    if (is_there(rest) || std::ranges::none_of(names, is_there)) {
+      names = {rest};
     }
+    for (const std::string& name : names) {
+      Library(Beside(folder, name, name_));
+    }
+  }
+
+  void Library(const fs::path& path) {
     std::string material;
-    for (const std::string& line : Lines(text)) {
+    for (const std::string& line : Lines(ReadFileBytes(path))) {
       const std::vector<std::string> words = Words(line);
-      if (words.size() < 2) {
+      if (words.size() >= 2 && IsMap(words[0])) {
+        Map(line, path, material);
         continue;
       }
-      if (words[0] == "newmtl") {
+      obj_.mtl.push_back({line, std::nullopt});
+      if (words.size() >= 2 && words[0] == "newmtl") {
         material = Rest(line);
         obj_.materials[material] = {};
-      } else if (words[0] == "Kd" && words.size() >= 4) {
+      } else if (words.size() >= 4 && words[0] == "Kd") {
         for (int c = 0; c < 3; ++c) {
           obj_.materials[material].colour[c] =
               std::clamp(NumberOf(words[c + 1], path.string(), 0), 0.0, 1.0);
         }
-      } else if (IsMap(words[0])) {
-        const fs::path texture = Beside(path.parent_path(), words.back(), path.string());
-        if (!fs::is_regular_file(texture)) {
-          throw IoError(
-              fmt::format("{}: the texture '{}' is not there", path.string(), texture.string()));
-        }
-        if (words[0] == "map_Kd") {
-          obj_.materials[material].texture = texture;
-        }
-        if (std::ranges::find(obj_.textures, texture) == obj_.textures.end()) {
-          obj_.textures.push_back(texture);
-        }
       }
     }
+  }
+
+  // The name is what follows the options. Where no such file is there, it is the last word, for
+  // options that are not known here.
+  void Map(const std::string& given, const fs::path& library, const std::string& material) {
+    const std::string line = WithoutComment(given);
+    const std::vector<std::string> words = Words(line);
+    std::string name = line;
+    for (std::size_t k = WordsBeforeName(words); k > 0; --k) {
+      name = Rest(name);
+    }
+    const auto file_of = [&](const std::string& file) {
+      return Beside(library.parent_path(), file, library.string());
+    };
+    if (!IsFile(file_of(name)) && IsFile(file_of(words.back()))) {
+      name = words.back();
+    }
+    const fs::path file = file_of(name);
+    if (!IsFile(file)) {
+      throw IoError(
+          fmt::format("{}: the texture '{}' is not there", library.string(), file.string()));
+    }
+    if (words[0] == "map_Kd") {
+      CheckPicture(file, library);
+      obj_.materials[material].texture = file;
+    }
+    obj_.mtl.push_back({line.substr(0, line.size() - name.size()), TextureNumber(file)});
+  }
+
+  // The GLB takes no other.
+  static void CheckPicture(const fs::path& file, const fs::path& library) {
+    if (!IsGlbPicture(ReadFileBytes(file))) {
+      throw InputError(
+          fmt::format("{}: the texture '{}' is neither a PNG nor a JPEG picture; save it as PNG or "
+                      "JPEG, and name that file in the material",
+                      library.string(), file.string()));
+    }
+  }
+
+  int TextureNumber(const fs::path& file) {
+    const auto known = std::ranges::find(obj_.textures, file, &ObjTexture::file);
+    const auto number = static_cast<int>(known - obj_.textures.begin());
+    if (known == obj_.textures.end()) {
+      obj_.textures.push_back({file, TextureName(file)});
+    }
+    return number;
+  }
+
+  // Without spaces, at which other programs would cut it; and unlike the others where case does not
+  // count too.
+  std::string TextureName(const fs::path& file) const {
+    std::string stem = file.stem().string(), ending = file.extension().string();
+    std::ranges::replace(stem, ' ', '_');
+    std::ranges::replace(ending, ' ', '_');
+    std::string name = fmt::format("bust_textures/{}{}", stem, ending);
+    const auto is_same = [&](const ObjTexture& texture) {
+      return LowerCase(texture.name) == LowerCase(name);
+    };
+    for (int number = 2; std::ranges::any_of(obj_.textures, is_same); ++number) {
+      name = fmt::format("bust_textures/{}_{}{}", stem, number, ending);
+    }
+    return name;
   }
 
   const fs::path path_;
@@ -201,15 +336,22 @@ std::string FaceWithoutNormals(const std::vector<std::string>& words) {
   return line;
 }
 
+bool NamesLibrary(const std::string& line) {
+  constexpr std::string_view kKey = "mtllib";
+  return line.find(kKey) != std::string::npos && line.find_first_not_of(" \t") == line.find(kKey) &&
+         Words(line)[0] == kKey;
+}
+
 }  // namespace
 
 ObjText ReadObjText(const fs::path& path) { return ObjReader(path).Take(); }
 
 std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
-                          const std::string& library) {
-  std::string text;
+                          const ObjLooks& looks) {
+  bool named = std::ranges::none_of(obj.lines, NamesLibrary);
+  std::string text = named ? fmt::format("mtllib {}\n", looks.library) : "";
+  std::string first_material = looks.first_material;
   std::size_t next = 0;
-  bool named = false;
   for (const std::string& line : obj.lines) {
     const std::vector<std::string> words = Words(line);
     const std::string key = words.empty() ? "" : words[0];
@@ -219,12 +361,15 @@ std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
       for (std::size_t k = 4; k < words.size(); ++k) {
         text += ' ' + words[k];
       }
-    } else if (key == "vn" || (key == "mtllib" && (library.empty() || named))) {
+    } else if (key == "vn" || (key == "mtllib" && named)) {
       continue;
     } else if (key == "mtllib") {
-      text += "mtllib " + library;
+      text += "mtllib " + looks.library;
       named = true;
     } else if (key == "f") {
+      if (!first_material.empty()) {
+        text += fmt::format("usemtl {}\n", std::exchange(first_material, ""));
+      }
       text += FaceWithoutNormals(words);
     } else {
       text += line;
@@ -234,22 +379,10 @@ std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
   return text;
 }
 
-std::string FlatMtl(const ObjText& obj) {
+std::string MtlOf(const ObjText& obj) {
   std::string text;
-  for (const std::string& line : Lines(obj.mtl)) {
-    std::vector<std::string> words = Words(line);
-    if (words.size() < 2 || !IsMap(words[0])) {
-      text += line + '\n';
-      continue;
-    }
-    std::string file = words.back();
-    std::ranges::replace(file, '\\', '/');
-    words.back() = fs::path(file).filename().string();
-    std::string flat;
-    for (const std::string& word : words) {
-      flat += (flat.empty() ? "" : " ") + word;
-    }
-    text += flat + '\n';
+  for (const MtlLine& line : obj.mtl) {
+    text += line.text + (line.texture ? obj.textures[*line.texture].name : "") + '\n';
   }
   return text;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,26 +29,43 @@ struct ObjFace {
   std::string material;  // empty before the first `usemtl`
 };
 
+// A picture that a material names.
+struct ObjTexture {
+  std::filesystem::path file;
+  std::string name;  // in the folder of a run: bust_textures/ and a name of its own
+};
+
+struct MtlLine {
+  std::string text;            // whole, or up to the name of the texture
+  std::optional<int> texture;  // of ObjText::textures
+};
+
 struct ObjText {
   std::vector<std::string> lines;  // continued ones joined
   std::vector<Vec2> texture;       // as written: v upwards
+  std::vector<Vec3> colours;       // sRGB, 0..1, one per point; empty unless all points have one
   std::vector<ObjFace> faces;
   std::map<std::string, ObjMaterial> materials;
-  std::string mtl;                              // the text of the material library; may be empty
-  std::vector<std::filesystem::path> textures;  // the files that it names
+  std::vector<MtlLine> mtl;          // the lines of the material libraries
+  std::vector<ObjTexture> textures;  // each file once
 };
 
-// A file that ReadMesh has taken. Throws IoError for a material library or texture that cannot be
-// read, InputError for one outside the folder of the OBJ, or a texture coordinate that is not
+// A file that ReadMesh has taken. A name that `mtllib` or a `map_` gives may have spaces. Throws
+// IoError for a material library or texture that cannot be read, InputError for one outside the
+// folder of the OBJ, a `map_Kd` that is neither PNG nor JPEG, or a texture coordinate that is not
 // there.
 ObjText ReadObjText(const std::filesystem::path& path);
 
-// The same lines with these points, without normals; `mtllib` names `library`, which is left out if
-// empty. points: as many as the file has.
-std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
-                          const std::string& library);
+struct ObjLooks {
+  std::string library;         // what `mtllib` names
+  std::string first_material;  // of faces before the first `usemtl`; empty: they stay without
+};
 
-// The material library, whose textures lie beside it.
-std::string FlatMtl(const ObjText& obj);
+// The same lines with these points, without normals. points: as many as the file has.
+std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
+                          const ObjLooks& looks);
+
+// The material libraries as one, with the textures' names in the folder of a run.
+std::string MtlOf(const ObjText& obj);
 
 }  // namespace semblance

@@ -33,7 +33,7 @@ struct Bust {
 
 // Places the model by a similarity (a bust that does not rest on the face's template also by a
 // thin plate through the sites), then lets its skin follow the face, and the scalp what is over the
-// skull (soft_deformation.h), in three rounds. The face's border is left gradually; the lids of a
+// skull (soft_deformation.h), in two rounds. The face's border is left gradually; the lids of a
 // model with eyeballs keep much of their shape, and the eyeballs go with them. No byte depends on
 // context.threads. Throws Cancelled, and InputError where the model has fewer than four sites of
 // the face.

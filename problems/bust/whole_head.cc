@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "problems/bust/eyeball.h"
 #include "problems/bust/head_samples.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_files/json_parts.h"
 
@@ -107,6 +109,27 @@ int ColumnsAt(const WholeHead& head, int row, int below, int rows) {
                                                                                          : below;
 }
 
+std::vector<Vec3> RingAt(const WholeHead& head, double v, int columns) {
+  std::vector<Vec3> ring;
+  for (int i = 0; i < columns; ++i) {
+    ring.push_back(head.surface.Point({double(i) / columns, v}));
+  }
+  return ring;
+}
+
+// As close to the crown, where all u meet: besides wide gaps there are points that all but
+// coincide, and the triangles between them would fold over.
+bool IsCrowded(const std::vector<Vec3>& ring) {
+  constexpr double kLongest_mm = 60, kLeastOfMean = 0.3;
+  double round = 0, shortest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const double edge = (ring[(i + 1) % ring.size()] - ring[i]).norm();
+    round += edge;
+    shortest = std::min(shortest, edge);
+  }
+  return round < kLongest_mm && shortest < kLeastOfMean * round / static_cast<double>(ring.size());
+}
+
 // Between rings of as many points, or of half as many in the upper one.
 void JoinRings(int lower, int n, int upper, int m, TriMesh& mesh) {
   for (int i = 0; i < m; ++i) {
@@ -178,17 +201,24 @@ WholeHead WholeHeadFromJson(std::string_view text, const std::string& name) try 
   return {std::move(surface), std::move(eyeballs)};
 } catch (const IoError& error) {
   throw IoError(fmt::format("{}: {}", name, error.what()));
+} catch (const Json::exception& error) {
+  throw IoError(fmt::format(
+      "{}: not a head that can be read: {}; write it again with `semblance template --bust`", name,
+      JsonFault(error)));
 }
 
 TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows) {
   TriMesh mesh;
   std::vector<int> first, count;  // of each ring
   for (int j = 0; j < rows; ++j) {
-    first.push_back(static_cast<int>(mesh.points.size()));
-    count.push_back(ColumnsAt(head, j, j == 0 ? columns : count.back(), rows));
-    for (int i = 0; i < count.back(); ++i) {
-      mesh.points.push_back(head.surface.Point({double(i) / count.back(), double(j) / rows}));
+    const int around = ColumnsAt(head, j, j == 0 ? columns : count.back(), rows);
+    const std::vector<Vec3> ring = RingAt(head, double(j) / rows, around);
+    if (j > rows / 2 && IsCrowded(ring)) {
+      break;
     }
+    first.push_back(static_cast<int>(mesh.points.size()));
+    count.push_back(around);
+    mesh.points.insert(mesh.points.end(), ring.begin(), ring.end());
   }
   Vec3 crown = Vec3::Zero();
   for (int i = 0; i < columns; ++i) {
@@ -196,7 +226,7 @@ TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows) {
   }
   const auto top = static_cast<std::int32_t>(mesh.points.size());
   mesh.points.push_back(crown);
-  for (int j = 0; j + 1 < rows; ++j) {
+  for (std::size_t j = 0; j + 1 < first.size(); ++j) {
     JoinRings(first[j], count[j], first[j + 1], count[j + 1], mesh);
   }
   for (int i = 0; i < count.back(); ++i) {

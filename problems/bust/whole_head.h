@@ -31,12 +31,13 @@ struct WholeHeadFit {
 WholeHeadFit FitWholeHead(const TriMesh& mesh, const std::string& name, const RunContext& context);
 
 // {"format": "semblance-head", "version": 1, "eyeballs": [[x, y, z, radius], ...], "surface": the
-// H-spline as in hspline_json.h}. name: what errors call the text. WholeHeadFromJson throws IoError
-// for anything else.
+// H-spline as in hspline_json.h}. name: what errors call the text. WholeHeadFromJson throws
+// IoError, which begins with it, for anything else.
 std::string WholeHeadToJson(const WholeHead& head);
 WholeHead WholeHeadFromJson(std::string_view text, const std::string& name);
 
-// The head as triangles, `columns` round and `rows` high, closed at the crown.
+// The head as triangles, `columns` round and `rows` high, closed at the crown. Near it rings have
+// fewer points, and a fan takes the place of the last ones, whose points crowd together.
 TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows);
 
 }  // namespace semblance

@@ -17,6 +17,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance {
 namespace {
@@ -117,7 +118,7 @@ void CheckOnce(const SkinLandmarks& landmarks) {
 SkinLandmarks ReadSkinLandmarks(std::span<const fs::path> files) {
   SkinLandmarks landmarks;
   for (const fs::path& file : files) {
-    if (file.extension() == ".csv") {
+    if (LowerCase(file.extension().string()) == ".csv") {
       ReadCsv(file, landmarks);
     } else {
       ReadOfSkull(file, landmarks);

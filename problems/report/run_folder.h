@@ -14,11 +14,11 @@
 namespace semblance {
 
 // What a run may write, its alternatives among it (given_files.h).
-inline constexpr std::array<std::string_view, 18> kRunFiles = {
-    "resolved.yaml", "result.json",       "dowels.csv",      "seeds.csv",   "face.hspline.json",
-    "face.ply",      "implicit.ply",      "sample_*.ply",    "bust.*",      "depth.ply",
-    "pictures/*",    "scene.json",        "provenance.json", "report.html", "timing.json",
-    "manifest.json", "alternatives.json", "alternatives/*"};
+inline constexpr std::array<std::string_view, 19> kRunFiles = {
+    "resolved.yaml", "result.json",   "dowels.csv",        "seeds.csv",       "face.hspline.json",
+    "face.ply",      "implicit.ply",  "sample_*.ply",      "bust.*",          "bust_textures/*",
+    "depth.ply",     "pictures/*",    "scene.json",        "provenance.json", "report.html",
+    "timing.json",   "manifest.json", "alternatives.json", "alternatives/*"};
 
 // Writes resolved.yaml, result.json, timing.json, face.hspline.json, face.ply, implicit.ply,
 // depth.ply, dowels.csv, pictures/*.png, scene.json (for the report's 3-D view), provenance.json,

@@ -9,6 +9,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/srgb.h"
@@ -44,6 +45,8 @@ std::uint16_t LinearShort(std::uint8_t srgb) {
   return static_cast<std::uint16_t>(std::lround(65535 * LinearFromSrgb(srgb / 255.0)));
 }
 
+bool IsPng(std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
+
 void CheckPart(const GlbPart& part) {
   const auto fits = [&](std::size_t size) { return size == 0 || size == part.points.size(); };
   if (part.triangles.empty() || part.normals.size() != part.points.size() ||
@@ -53,6 +56,11 @@ void CheckPart(const GlbPart& part) {
         "triangle and one normal per point are needed, and uv and colours of all points or none",
         part.material.name, part.triangles.size(), part.points.size(), part.normals.size(),
         part.uv.size(), part.colours.size()));
+  }
+  if (!part.material.texture.empty() && !IsGlbPicture(part.material.texture)) {
+    throw InputError(fmt::format(
+        "glTF '{}': its texture is neither a PNG nor a JPEG picture; save it as one of them",
+        part.material.name));
   }
 }
 
@@ -183,9 +191,8 @@ class GlbWriter {
   std::size_t Texture(const std::string& bytes) {
     const auto [known, is_new] = textures_.try_emplace(bytes, textures_.size());
     if (is_new) {
-      const bool png = bytes.starts_with("\x89PNG");
       json_["images"].push_back({{"bufferView", View(bytes, std::nullopt)},
-                                 {"mimeType", png ? "image/png" : "image/jpeg"}});
+                                 {"mimeType", IsPng(bytes) ? "image/png" : "image/jpeg"}});
       json_["textures"].push_back({{"source", json_["images"].size() - 1}});
     }
     return known->second;
@@ -230,6 +237,10 @@ class GlbWriter {
 };
 
 }  // namespace
+
+bool IsGlbPicture(std::string_view bytes) {
+  return IsPng(bytes) || bytes.starts_with("\xff\xd8\xff");
+}
 
 std::string EncodeGlb(std::span<const GlbNode> nodes) { return GlbWriter().Write(nodes); }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "surfaces/mesh/tri_mesh.h"
@@ -35,10 +36,14 @@ struct GlbNode {
   std::vector<GlbNode> children = {};
 };
 
+// Whether a texture may be these bytes: by its first ones, a PNG or JPEG.
+bool IsGlbPicture(std::string_view bytes);
+
 // One scene of these nodes: in metres, +y up, the face towards +z, subject left +x; single
 // precision. Materials and textures that are equal are written once. Surfaces are seen from both
 // sides. A normal of zero is written as (0, 0, 1), for glTF allows none. Throws InputError for a
-// part without triangles, or with another number of normals, uv or colours than points.
+// part without triangles, with another number of normals, uv or colours than points, or
+// with a texture that is neither PNG nor JPEG.
 std::string EncodeGlb(std::span<const GlbNode> nodes);
 
 }  // namespace semblance

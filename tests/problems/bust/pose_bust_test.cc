@@ -8,10 +8,13 @@
 #include <bit>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "fitting/problem/placement.h"
@@ -224,20 +227,53 @@ TEST(BustFiles, ReadBackTheSame) {
   }
 }
 
-TEST(BustFiles, AnObjKeepsItsLinesMaterialsAndTextures) {
-  const testing::ScratchFolder folder;
-  std::ofstream(folder / "head.mtl") << "newmtl face\nKd 0.5 0.25 1\nmap_Kd maps/skin.png\n";
-  std::filesystem::create_directories(folder / "maps");
-  std::ofstream(folder / "maps/skin.png") << "png";
-  std::ofstream(folder / "head.obj")
-      << "mtllib head.mtl\no head\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
-         "vn 0 0 1\nusemtl face\nf 1/1/1 2/2/1 3/3/1 4/1/1\n";
-  BustModel model{.name = "quad",
-                  .mesh = ReadMesh(folder / "head.obj"),
-                  .eyeballs = {},
-                  .rest = std::nullopt,
-                  .sites = {},
-                  .obj = ReadObjText(folder / "head.obj")};
+// An OBJ of one quad with its materials and textures.
+class ObjBust : public ::testing::Test {
+ protected:
+  static constexpr const char* kPng = "\x89PNG\r\n\x1a\npixels";
+  static constexpr const char* kJpeg = "\xff\xd8\xff pixels";
+
+  void Write(const std::filesystem::path& name, const std::string& text) const {
+    std::filesystem::create_directories((folder_ / name).parent_path());
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+  }
+  // colour: more numbers of each point.
+  void WriteObj(const std::string& beginning, const std::string& faces = "usemtl face\nf 1 2 3 4\n",
+                const std::string& colour = "") const {
+    Write("head.obj", beginning + "v 0 0 0" + colour + "\nv 1 0 0" + colour + "\nv 1 1 0" + colour +
+                          "\nv 0 1 0" + colour + "\n" + faces);
+  }
+  ObjText Read() const { return ReadObjText(folder_ / "head.obj"); }
+  BustModel Model() const {
+    return {.name = "quad",
+            .mesh = ReadMesh(folder_ / "head.obj"),
+            .eyeballs = {},
+            .rest = std::nullopt,
+            .sites = {},
+            .obj = Read()};
+  }
+  std::map<std::string, std::string> Files() const {
+    const BustModel model = Model();
+    std::map<std::string, std::string> files;
+    for (const NamedBytes& file :
+         BustToFiles({.skin = model.mesh, .eyes = {}, .subject_from_model = {}}, model)) {
+      EXPECT_TRUE(files.emplace(file.name, file.bytes).second) << file.name;
+    }
+    return files;
+  }
+  // Of the GLB.
+  static nlohmann::json JsonOf(const std::string& glb) {
+    return nlohmann::json::parse(glb.substr(20, Word(glb, 12)));
+  }
+  const testing::ScratchFolder folder_;
+};
+
+TEST_F(ObjBust, KeepsItsLinesMaterialsAndTextures) {
+  Write("head.mtl", "newmtl face\nKd 0.5 0.25 1\nmap_Kd maps/skin.png\n");
+  Write("maps/skin.png", kPng);
+  WriteObj("mtllib head.mtl\no head\n",
+           "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nusemtl face\nf 1/1/1 2/2/1 3/3/1 4/1/1\n");
+  const BustModel model = Model();
   Bust bust{.skin = model.mesh, .eyes = {}, .subject_from_model = {}};
   bust.skin.points[2] = {2, 3, 0.5};
   const auto files = BustToFiles(bust, model);
@@ -245,16 +281,109 @@ TEST(BustFiles, AnObjKeepsItsLinesMaterialsAndTextures) {
   EXPECT_EQ(files[1].bytes,
             "mtllib bust.mtl\no head\nv 0 0 0\nv 1 0 0\nv 2 3 0.5\nv 0 1 0\nvt 0 0\nvt 1 0\n"
             "vt 1 1\nusemtl face\nf 1/1 2/2 3/3 4/1\n");
-  EXPECT_EQ(files[2].bytes, "newmtl face\nKd 0.5 0.25 1\nmap_Kd skin.png\n");
-  EXPECT_EQ(files[3].name, "skin.png");
+  EXPECT_EQ(files[2].bytes, "newmtl face\nKd 0.5 0.25 1\nmap_Kd bust_textures/skin.png\n");
+  EXPECT_EQ(files[3].name, "bust_textures/skin.png");
+  EXPECT_EQ(files[3].bytes, kPng);
   EXPECT_THAT(files[0].bytes, HasSubstr("baseColorTexture"));
-  std::ofstream(folder / "head.mtl") << "newmtl face\nmap_Kd ../../secret.png\n";
-  EXPECT_THAT([&] { ReadObjText(folder / "head.obj"); },
-              ThrowsMessage<InputError>(HasSubstr("not below its own folder")));
+  Write("head.mtl", "newmtl face\nmap_Kd ../../secret.png\n");
+  EXPECT_THAT([&] { Read(); }, ThrowsMessage<InputError>(HasSubstr("not below its own folder")));
+}
+
+// Nor does one replace another one.
+TEST_F(ObjBust, NoTextureReplacesAResultOfTheRun) {
+  Write("head.mtl",
+        "newmtl face\nmap_Kd face.ply\nnewmtl a\nmap_Kd skin/diffuse.png\nmap_Ks ./face.ply\n"
+        "newmtl b\nmap_Kd scalp\\Diffuse.png\nmap_bump scalp/Diffuse.png\n");
+  Write("face.ply", std::string(kPng) + " of the face");
+  Write("skin/diffuse.png", std::string(kPng) + " of the skin");
+  Write("scalp/Diffuse.png", std::string(kPng) + " of the scalp");
+  WriteObj("mtllib head.mtl\n");
+  const auto files = Files();
+  ASSERT_EQ(files.size(), 6u);
+  EXPECT_FALSE(files.contains("face.ply"));
+  EXPECT_THAT(files.at("bust_textures/face.ply"), HasSubstr("of the face"));
+  EXPECT_THAT(files.at("bust_textures/diffuse.png"), HasSubstr("of the skin"));
+  EXPECT_THAT(files.at("bust_textures/Diffuse_2.png"), HasSubstr("of the scalp"));
+  EXPECT_EQ(files.at("bust.mtl"),
+            "newmtl face\nmap_Kd bust_textures/face.ply\n"
+            "newmtl a\nmap_Kd bust_textures/diffuse.png\nmap_Ks bust_textures/face.ply\n"
+            "newmtl b\nmap_Kd bust_textures/Diffuse_2.png\nmap_bump bust_textures/Diffuse_2.png\n");
+}
+
+TEST_F(ObjBust, ATextureMayHaveSpacesAndOptions) {
+  Write("my skin.png", kPng);
+  Write("skin.png", kPng);
+  WriteObj("mtllib head.mtl\n");
+  const auto written = [&](const std::string& line) {
+    Write("head.mtl", "newmtl face\n" + line + "\n");
+    return Files().at("bust.mtl").substr(12);
+  };
+  EXPECT_EQ(written("map_Kd my skin.png"), "map_Kd bust_textures/my_skin.png\n");
+  EXPECT_EQ(written("\tmap_Kd  my skin.png # of me"), "\tmap_Kd  bust_textures/my_skin.png\n");
+  EXPECT_EQ(written("map_Kd -s 1 1 1 skin.png"), "map_Kd -s 1 1 1 bust_textures/skin.png\n");
+  EXPECT_EQ(written("map_Kd -clamp on -o 0.5 my skin.png"),
+            "map_Kd -clamp on -o 0.5 bust_textures/my_skin.png\n");
+  EXPECT_EQ(written("map_Kd -shiny 1 2 skin.png"), "map_Kd -shiny 1 2 bust_textures/skin.png\n");
+  EXPECT_THAT([&] { written("map_Kd your face.png"); },
+              ThrowsMessage<IoError>(HasSubstr("your face.png' is not there")));
+}
+
+TEST_F(ObjBust, MayNameSeveralLibrariesOnALine) {
+  Write("one.mtl", "newmtl face\nKd 1 0 0");
+  Write("two.mtl", "newmtl hair\nKd 0 1 0\n");
+  WriteObj("mtllib one.mtl two.mtl # both\n");
+  EXPECT_EQ(Files().at("bust.mtl"), "newmtl face\nKd 1 0 0\nnewmtl hair\nKd 0 1 0\n");
+  Write("one.mtl two.mtl", "newmtl face\nKd 0 0 1\n");
+  WriteObj("mtllib one.mtl two.mtl\n");
+  EXPECT_EQ(Files().at("bust.mtl"), "newmtl face\nKd 0 0 1\n");
+  WriteObj("mtllib my head.mtl\n");
+  EXPECT_THAT([&] { Read(); }, ThrowsMessage<IoError>(HasSubstr("my head.mtl")));
+}
+
+TEST_F(ObjBust, ATextureIsAPngOrAJpeg) {
+  Write("head.mtl", "newmtl face\nmap_Kd skin.png\n");
+  WriteObj("mtllib head.mtl\n");
+  for (const char* good : {kPng, kJpeg}) {
+    Write("skin.png", good);
+    EXPECT_EQ(JsonOf(Files().at("bust.glb"))["images"][0]["mimeType"],
+              good == kPng ? "image/png" : "image/jpeg");
+  }
+  for (const char* bad : {"", "not a png", "\x89PNG", "\xff\xd8", "GIF89a pixels"}) {
+    Write("skin.png", bad);
+    EXPECT_THAT([&] { Read(); },
+                ThrowsMessage<InputError>(HasSubstr("skin.png' is neither a PNG nor a JPEG")))
+        << bad;
+  }
+}
+
+TEST_F(ObjBust, WithoutMaterialsHasASkin) {
+  WriteObj("# mine\n", "f 1 2 3 4\n", " 1 0.5 0");
+  const auto files = Files();
+  EXPECT_THAT(files.at("bust.obj"),
+              ::testing::StartsWith("mtllib bust.mtl\n# mine\nv 0 0 0 1 0.5"));
+  EXPECT_THAT(files.at("bust.obj"), ::testing::EndsWith("usemtl skin\nf 1 2 3 4\n"));
+  EXPECT_THAT(files.at("bust.mtl"), ::testing::StartsWith("newmtl skin\nKd 1 1 1\n"));
+  const auto json = JsonOf(files.at("bust.glb"));
+  EXPECT_EQ(json["materials"][0]["name"], "skin");
+  const auto& part = json["meshes"][0]["primitives"][0];
+  ASSERT_TRUE(part["attributes"].contains("COLOR_0"));
+  const int colour = part["attributes"]["COLOR_0"];
+  EXPECT_EQ(json["accessors"][colour]["count"], 4);
+  const std::string& glb = files.at("bust.glb");
+  const int view = json["accessors"][colour]["bufferView"];
+  const std::size_t at = 28 + Word(glb, 12) + json["bufferViews"][view]["byteOffset"].get<int>();
+  EXPECT_EQ(Word(glb, at) & 0xffff, 65535u);  // red is full, green 128 of 255 of sRGB
+  EXPECT_NEAR((Word(glb, at) >> 16) / 65535.0, 0.2158605, 1e-5);
+  // Without colours it is of the colour of skin; a name of a material stays.
+  WriteObj("", "f 1 2 3\nusemtl hair\nf 1 3 4\n");
+  EXPECT_THAT(Files().at("bust.obj"), HasSubstr("usemtl skin\nf 1 2 3\nusemtl hair\nf 1 3 4\n"));
+  EXPECT_THAT(Files().at("bust.mtl"), HasSubstr("newmtl hair\nKd 0.85"));
+  EXPECT_THAT(Files().at("bust.mtl"), HasSubstr("newmtl skin\nKd 0.85"));
+  EXPECT_THAT(Files().at("bust.glb"), ::testing::Not(HasSubstr("COLOR_0")));
 }
 
 // ------------------------------------------------------------------------------------------------
-// Busts that cannot be used
+// Busts of a mesh with landmarks
 // ------------------------------------------------------------------------------------------------
 
 class BadBust : public ::testing::Test {
@@ -298,6 +427,22 @@ TEST_F(BadBust, IsRefusedInOneLine) {
   pieces.points.insert(pieces.points.end(), {{0, 0, 0}, {9, 0, 0}, {0, 9, 0}});
   pieces.triangles.push_back({n, n + 1, n + 2});
   EXPECT_THAT(Complaint(Written(pieces)), HasSubstr("a bust is one piece, and this mesh has 2"));
+  EXPECT_THAT(Complaint({}), ::testing::StartsWith("it names no mesh;"));
+  EXPECT_THAT(Complaint({.mesh = "bust.ply", .landmarks = {}}),
+              ::testing::StartsWith("it names no landmarks;"));
+  EXPECT_THAT([] { LoadBust(HSplineBust{}, IctTemplate{}, {}); },
+              ThrowsMessage<InputError>(::testing::StartsWith("it names no file;")));
+}
+
+TEST_F(BadBust, AnEndingInCapitalsMakesNone) {
+  MeshBust bust = Written(SmallBust().mesh);
+  bust.mesh = folder_ / "BUST.OBJ";
+  std::ofstream(bust.mesh, std::ios::binary) << EncodeMesh(SmallBust().mesh, ".obj");
+  std::filesystem::rename(bust.landmarks, folder_ / "SITES.CSV");
+  bust.landmarks = folder_ / "SITES.CSV";
+  const auto model = LoadBust(bust, IctTemplate{}, {});
+  ASSERT_TRUE(model && model->obj);
+  EXPECT_EQ(model->obj->faces.size(), model->mesh.triangles.size());
 }
 
 // ------------------------------------------------------------------------------------------------
@@ -315,8 +460,13 @@ TEST(WholeHead, RoundTripsThroughItsFile) {
   const WholeHead head = WholeHeadFromJson(IctHead(), "the ICT head");
   EXPECT_EQ(WholeHeadToJson(head), std::string(IctHead()));
   EXPECT_EQ(head.eyeballs.size(), 2u);
-  EXPECT_THAT([] { WholeHeadFromJson("{}", "bust.json"); },
-              ThrowsMessage<IoError>(HasSubstr("bust.json: ")));
+  const std::string_view whole = IctHead();
+  for (const std::string_view bad :
+       {std::string_view("{}"), std::string_view(), std::string_view("no JSON"),
+        whole.substr(0, whole.size() / 2), whole.substr(0, whole.size() - 3)}) {
+    EXPECT_THAT([&] { WholeHeadFromJson(bad, "bust.json"); },
+                ThrowsMessage<IoError>(::testing::StartsWith("bust.json: ")));
+  }
   const HSplineSurface torus = testing::SmoothSurface({.closure = Closure::kPeriodicUv}, 1);
   EXPECT_THAT(
       [&] {
@@ -332,6 +482,40 @@ TEST(WholeHead, ItsMeshIsOnePieceOpenAtTheNeckAlone) {
   EXPECT_EQ(edges.non_manifold, 0);
   EXPECT_EQ(edges.inconsistent, 0);
   EXPECT_EQ(ConnectedComponents(mesh).count, 1);
+}
+
+// Where all u meet.
+TEST(WholeHead, ItsMeshFoldsNowhereAtTheCrown) {
+  const WholeHead head = WholeHeadFromJson(IctHead(), "the ICT head");
+  for (const auto& [columns, rows] : {std::pair(272, 204), {96, 72}, {300, 150}}) {
+    const TriMesh mesh = WholeHeadMesh(head, columns, rows);
+    const Vec3 crown = mesh.points.back();
+    std::map<MeshEdge, Vec3> normals;  // of the first triangle at an edge
+    int folds = 0, seen = 0;
+    for (const Triangle& t : mesh.triangles) {
+      const Vec3 normal = TriangleAreaVector(mesh, t).normalized();
+      if ((TriangleCentroid(mesh, t) - crown).norm() > 25) {
+        continue;
+      }
+      EXPECT_GT(normal.z(), 0);
+      for (int k = 0; k < 3; ++k) {
+        const auto [a, b] = std::minmax(t[k], t[(k + 1) % 3]);
+        const auto [first, is_new] = normals.try_emplace({a, b}, normal);
+        seen += !is_new;
+        folds += !is_new && first->second.dot(normal) < -0.5;  // 120 degrees
+      }
+    }
+    EXPECT_GT(seen, 50);
+    EXPECT_EQ(folds, 0) << columns << " x " << rows;
+  }
+  // And the fan is the surface.
+  const TriMesh mesh = WholeHeadMesh(head, 272, 204);
+  const MeshQuery query(mesh);
+  for (int i = 0; i < 40; ++i) {
+    for (const double v : {0.945, 0.96, 0.975, 0.99}) {
+      EXPECT_LT(query.Closest(head.surface.Point({i / 40.0, v})).distance_mm, 0.25);
+    }
+  }
 }
 
 // In the domain every triangle keeps its side; a hole becomes a pocket.

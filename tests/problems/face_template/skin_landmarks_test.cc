@@ -54,6 +54,12 @@ TEST_F(SkinLandmarkFiles, ATableOfSitesIsReadByTheNamesOfItsColumns) {
   EXPECT_THAT(read.notes, IsEmpty());
 }
 
+TEST_F(SkinLandmarkFiles, ATablesEndingMayBeInCapitals) {
+  const SkinLandmarks read = Read({File("68.CSV", "i_multipie,x,y,z\n31,1,2,3\n")});
+  ASSERT_EQ(read.points.size(), 1);
+  EXPECT_EQ(read.points[0].code, "prn");
+}
+
 TEST_F(SkinLandmarkFiles, OfThe68PointsThoseWithAPlaceOnTheGenericHeadAreTaken) {
   const SkinLandmarks read =
       Read({File("68.csv", "i_multipie,x,y,z\n1,9,9,9\n31,1,2,3\n49,4,5,6\n")});

@@ -97,6 +97,15 @@ TEST(Glb, ColoursAreLinear) {
   EXPECT_NEAR(shorts[4] / 65535.0, 10 / 255.0 / 12.92, 1e-5);
 }
 
+TEST(Glb, ATextureSaysWhatItIs) {
+  GlbNode node{.name = "n", .parts = {Triangle1("png"), Triangle1("jpeg")}};
+  node.parts[0].material.texture = "\x89PNG\r\n\x1a\npixels";
+  node.parts[1].material.texture = "\xff\xd8\xffpixels";
+  const Json images = Parse(EncodeGlb({&node, 1})).json["images"];
+  EXPECT_EQ(images[0]["mimeType"], "image/png");
+  EXPECT_EQ(images[1]["mimeType"], "image/jpeg");
+}
+
 TEST(Glb, WhatGlTfCannotHoldIsRefused) {
   const auto refuses = [](GlbPart part) {
     const GlbNode node{.name = "n", .parts = {std::move(part)}};
@@ -111,6 +120,11 @@ TEST(Glb, WhatGlTfCannotHoldIsRefused) {
   part = Triangle1("m");
   part.colours = {{1, 2, 3}};
   refuses(part);
+  for (const char* texture : {"not a picture", "\x89PNG", "\xff\xd8", "RIFF    WEBP"}) {
+    part = Triangle1("m");
+    part.material.texture = texture;
+    refuses(part);
+  }
 }
 
 }  // namespace
