@@ -163,7 +163,7 @@ std::optional<Bust> BustOf(const BustModel* model, const BustSource& source, con
   });
 }
 
-void NoteFace(const Experiment& experiment, Case& subject) {
+void NoteFace(const Experiment& experiment, const LoadedPrior* prior, Case& subject) {
   std::ranges::move(UnusedOptions(experiment), std::back_inserter(subject.notes));
   const FaceSource way = WayToFace(experiment);
   const PriorUse* const use = PriorUseOf(way);
@@ -173,6 +173,9 @@ void NoteFace(const Experiment& experiment, Case& subject) {
                     "bone and depths leave possible",
                     use->draw));
   }
+  std::ranges::move(NotesOnRules(experiment.rules, subject.points, subject.basis.sites.has_value(),
+                                 prior != nullptr ? &prior->face : nullptr),
+                    std::back_inserter(subject.notes));
 }
 
 // Where a template's features hide how far a face is off; none of a prior's, which knows of nose,
@@ -249,7 +252,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   MadeFace made = step("fit", [&] {
     return MakeFace({experiment, *faces.generic, prior, subject, seedable, bone.shell}, context);
   });
-  NoteFace(experiment, subject);
+  NoteFace(experiment, prior, subject);
   auto before_edits = EditByHand(experiment, made, subject);
   CheckFinite(made.fitted.fit.surface);
   Tessellation face =

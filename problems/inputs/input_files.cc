@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/inputs/input_files.h"
 
+#include <algorithm>
+#include <iterator>
+
+#include "problems/prior/hspline_prior.h"
+
 namespace semblance {
 
 std::vector<NamedFile> NamedInputsOf(const Experiment& experiment) {
@@ -24,6 +29,8 @@ GivenFiles GivenTo(const Experiment& experiment, const std::filesystem::path& co
                    std::span<const std::string_view> outputs) {
   GivenFiles given{.files = InputFilesOf(experiment), .outputs = outputs};
   given.files.push_back(config);
+  // Modes may be a folder, of which each mesh is read.
+  std::ranges::copy(PriorFiles(experiment.prior), std::back_inserter(given.files));
   return given;
 }
 

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <system_error>
 
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/base/npy.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -17,9 +19,15 @@
 namespace semblance {
 namespace {
 
-constexpr double kFarthestSiteMm = 5;
+namespace fs = std::filesystem;
 
-const std::filesystem::path& Named(const std::filesystem::path& path, const char* option) {
+constexpr double kFarthestMm = 5;                // of sites and landmarks from the mean
+constexpr int kFirstUsed = 28, kLandmarks = 68;  // Multi-PIE; before: outline and brows
+// RMS of the largest mode. Faces have some mm; the bounds are a factor of 1000 apart, so that no
+// model is within them in two units of m, mm and um.
+constexpr double kLeastModeMm = 0.05, kMostModeMm = 50;
+
+const fs::path& Named(const fs::path& path, const char* option) {
   if (path.empty()) {
     throw InputError(fmt::format(
         "prior.{}: no file is named; a prior of type modes needs mean, modes, sites and features",
@@ -28,13 +36,29 @@ const std::filesystem::path& Named(const std::filesystem::path& path, const char
   return path;
 }
 
+TriMesh ReadMean(const fs::path& path) {
+  if (LowerCase(path.extension().string()) == ".stl") {
+    throw InputError(fmt::format(
+        "{}: an STL has no order of points, and modes move the mean's points in their order; save "
+        "the mean as PLY, OBJ or OFF",
+        path.string()));
+  }
+  return ReadMesh(path);
+}
+
 // The array as the model has it: a column per mode.
-Eigen::MatrixXd ReadModes(const ModesPrior& source, std::size_t points) {
-  const NpyArray array = ReadNpy(Named(source.modes, "modes"));
+Eigen::MatrixXd ModesOfArray(const ModesPrior& source, std::size_t points) {
+  const NpyArray array = ReadNpy(source.modes);
   const std::string name = source.modes.string();
-  if (array.shape.size() != 3 || array.shape[2] != 3 || array.shape[0] == 0) {
+  if (array.shape.size() != 3 || array.shape[2] != 3) {
     throw InputError(fmt::format("{}: an array of shape ({}); modes are k x n x 3", name,
                                  fmt::join(array.shape, ", ")));
+  }
+  if (array.shape[0] == 0) {
+    throw InputError(
+        fmt::format("{}: there is no mode in an array of shape ({}); save k x n x 3 "
+                    "numbers, k at least 1",
+                    name, fmt::join(array.shape, ", ")));
   }
   if (array.shape[1] != points) {
     throw InputError(fmt::format(
@@ -44,6 +68,155 @@ Eigen::MatrixXd ReadModes(const ModesPrior& source, std::size_t points) {
   const auto rows = static_cast<Eigen::Index>(3 * points);
   const Eigen::Index columns = std::min<Eigen::Index>(source.count, array.shape[0]);
   return source.scale * Eigen::Map<const Eigen::MatrixXd>(array.values.data(), rows, columns);
+}
+
+bool IsFolder(const fs::path& path) {
+  std::error_code ignored;  // what cannot be read is told by who reads it
+  return fs::is_directory(path, ignored);
+}
+
+std::vector<fs::path> RegularFilesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  try {
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (entry.is_regular_file()) {
+        files.push_back(entry.path());
+      }
+    }
+  } catch (const fs::filesystem_error& error) {
+    throw IoError(fmt::format("{}: {}", folder.string(), error.code().message()));
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+// The first `count`, by name. Files that are no mesh, such as the materials of an OBJ, are no
+// modes; hidden ones neither.
+std::vector<fs::path> MeshesIn(const fs::path& folder, int count) {
+  std::vector<fs::path> meshes;
+  for (const fs::path& file : RegularFilesIn(folder)) {
+    const std::string ending = LowerCase(file.extension().string());
+    const bool hidden = file.filename().string().starts_with('.');
+    if (ending == ".stl" && !hidden) {
+      throw InputError(fmt::format(
+          "{}: an STL has no order of points, so it can be no mode; save it as PLY, OBJ or OFF",
+          file.string()));
+    }
+    if ((ending == ".ply" || ending == ".obj" || ending == ".off") && !hidden) {
+      meshes.push_back(file);
+    }
+  }
+  if (meshes.empty()) {
+    throw InputError(
+        fmt::format("{}: there is no mesh (.ply, .obj, .off) in this folder of modes; "
+                    "put one per mode there",
+                    folder.string()));
+  }
+  meshes.resize(std::min(meshes.size(), static_cast<std::size_t>(count)));
+  return meshes;
+}
+
+void CheckOfMean(const TriMesh& mesh, const fs::path& file, const TriMesh& mean,
+                 const fs::path& mean_file) {
+  if (mesh.points.size() != mean.points.size()) {
+    throw InputError(
+        fmt::format("{}: a mesh of {} points, and {} has {}; a mode is the mean's own "
+                    "mesh with its points moved",
+                    file.string(), mesh.points.size(), mean_file.string(), mean.points.size()));
+  }
+  if (mesh.triangles != mean.triangles) {
+    throw InputError(
+        fmt::format("{}: its triangles are not those of {}, in their order; a mode is "
+                    "the mean's own mesh with its points moved",
+                    file.string(), mean_file.string()));
+  }
+}
+
+double RmsMm(const Eigen::VectorXd& mode) {
+  return mode.stableNorm() / std::sqrt(static_cast<double>(mode.size()) / 3);
+}
+
+Eigen::VectorXd ModeOfMesh(const fs::path& file, const TriMesh& mean, const fs::path& mean_file) {
+  constexpr double kRoundingMm = 0.001;  // of a text file with three digits
+  const TriMesh mesh = ReadMesh(file);
+  CheckOfMean(mesh, file, mean, mean_file);
+  Eigen::VectorXd mode(3 * std::ssize(mean.points));
+  for (std::size_t v = 0; v < mean.points.size(); ++v) {
+    mode.segment<3>(3 * static_cast<Eigen::Index>(v)) = mesh.points[v] - mean.points[v];
+  }
+  if (RmsMm(mode) <= kRoundingMm) {
+    throw InputError(fmt::format("{}: it is the mean, and so no mode; take it out of the folder",
+                                 file.string()));
+  }
+  return mode;
+}
+
+Eigen::MatrixXd ModesOfFolder(const ModesPrior& source, const TriMesh& mean) {
+  if (source.scale != 1) {
+    throw InputError(
+        fmt::format("{}: the modes are a folder of meshes, which are in mm, and the scale is "
+                    "{:.6g}; leave it out",
+                    source.modes.string(), source.scale));
+  }
+  const std::vector<fs::path> meshes = MeshesIn(source.modes, source.count);
+  Eigen::MatrixXd modes(3 * std::ssize(mean.points), std::ssize(meshes));
+  for (std::size_t k = 0; k < meshes.size(); ++k) {
+    modes.col(static_cast<Eigen::Index>(k)) = ModeOfMesh(meshes[k], mean, source.mean);
+  }
+  return modes;
+}
+
+Eigen::MatrixXd ReadModes(const ModesPrior& source, const TriMesh& mean) {
+  return IsFolder(Named(source.modes, "modes")) ? ModesOfFolder(source, mean)
+                                                : ModesOfArray(source, mean.points.size());
+}
+
+bool IsSizeOfMode(double rms_mm) { return rms_mm >= kLeastModeMm && rms_mm <= kMostModeMm; }
+
+// The scale that would bring the largest mode into range, where a unit was mistaken.
+std::string ScaleRemedy(const ModesPrior& source, double rms_mm) {
+  if (IsFolder(source.modes)) {
+    return "its meshes must be in mm and in the frame of the mean";
+  }
+  if (rms_mm == 0) {
+    return "give modes that move points";
+  }
+  for (const double factor : {0.001, 1000.0}) {
+    if (IsSizeOfMode(factor * rms_mm)) {
+      return fmt::format("a scale of {:.6g} would make it {:.3g} mm", factor * source.scale,
+                         factor * rms_mm);
+    }
+  }
+  return fmt::format("correct the scale, which is {:.6g}, or the modes", source.scale);
+}
+
+// The largest mode of a population of faces is of some millimetres.
+void CheckSize(const ModesPrior& source, const Eigen::MatrixXd& modes) {
+  Eigen::Index largest = 0;
+  double rms_mm = 0;
+  for (Eigen::Index k = 0; k < modes.cols(); ++k) {
+    if (const double rms = RmsMm(modes.col(k)); rms > rms_mm) {
+      rms_mm = rms;
+      largest = k;
+    }
+  }
+  if (!IsSizeOfMode(rms_mm)) {
+    throw InputError(fmt::format(
+        "{}: the largest mode, number {}, moves the points by {:.3g} mm (RMS), and {} to {} mm are "
+        "allowed; {}",
+        source.modes.string(), largest + 1, rms_mm, kLeastModeMm, kMostModeMm,
+        ScaleRemedy(source, rms_mm)));
+  }
+}
+
+void CheckNear(const CsvReader& table, const std::string& what, double distance_mm,
+               const fs::path& mean) {
+  if (!(distance_mm <= kFarthestMm)) {
+    table.Fail(
+        fmt::format("{} lies {:.1f} mm from {}, and at most {} mm are allowed; both must be "
+                    "of one frame, in mm",
+                    what, distance_mm, mean.string(), kFarthestMm));
+  }
 }
 
 std::map<std::string, ModelPoint> ReadSites(const ModesPrior& source, const TriMesh& mean) {
@@ -59,12 +232,7 @@ std::map<std::string, ModelPoint> ReadSites(const ModesPrior& source, const TriM
       table.Fail(complaint);
     }
     const MeshPoint at = query.Closest({table.Number(x), table.Number(y), table.Number(z)});
-    if (at.distance_mm > kFarthestSiteMm) {
-      table.Fail(
-          fmt::format("site '{}' lies {:.1f} mm from {}, and at most {} mm are allowed; both "
-                      "must be of one frame, in mm",
-                      code, at.distance_mm, source.mean.string(), kFarthestSiteMm));
-    }
+    CheckNear(table, fmt::format("site '{}'", code), at.distance_mm, source.mean);
     if (!sites.emplace(code, ModelPoint{at.triangle, at.weights}).second) {
       table.Fail(fmt::format("site '{}' appears twice", code));
     }
@@ -72,24 +240,65 @@ std::map<std::string, ModelPoint> ReadSites(const ModesPrior& source, const TriM
   return sites;
 }
 
-// How far from its landmarks a feature reaches; 0 for landmarks of the outline and the brows.
-double ClearanceOf(int multipie) {
-  return multipie < 28 ? 0 : multipie <= 36 ? 14 : multipie <= 48 ? 15 : 16;
+// How far from its landmarks a feature reaches: nose, eyes, mouth.
+double ClearanceOf(int multipie) { return multipie <= 36 ? 14 : multipie <= 48 ? 15 : 16; }
+
+int MultiPieOf(const CsvReader& table, std::size_t column) {
+  const double value = table.Number(column);
+  if (!(value >= 1 && value <= kLandmarks && value == std::round(value))) {
+    table.Fail(
+        fmt::format("landmark {} is none of the 68; i_multipie is a whole number from 1 to "
+                    "68",
+                    table.Cell(column)));
+  }
+  return static_cast<int>(value);
 }
 
-std::vector<ShapeFeature> ReadFeatures(const ModesPrior& source) {
+// Rules find the features by their number, so all must be there.
+void RequireUsed(const std::map<int, Vec3>& landmarks, const std::string& name) {
+  std::vector<int> missing;
+  for (int n = kFirstUsed; n <= kLandmarks; ++n) {
+    if (!landmarks.contains(n)) {
+      missing.push_back(n);
+    }
+  }
+  if (!missing.empty()) {
+    const bool all = missing.size() == kLandmarks - kFirstUsed + 1;
+    throw InputError(fmt::format(
+        "{}: a prior needs the landmarks {} to {} of Multi-PIE (nose, eyes, mouth), and {} {} "
+        "missing; add a row for each",
+        name, kFirstUsed, kLandmarks, all ? "all" : fmt::format("{}", fmt::join(missing, ", ")),
+        missing.size() == 1 ? "is" : "are"));
+  }
+}
+
+std::map<int, Vec3> ReadMultiPie(const ModesPrior& source, const TriMesh& mean) {
   const std::string text = ReadFileBytes(Named(source.features, "features"));
   CsvReader table(text, source.features.string());
   const std::size_t number = table.ColumnOf("i_multipie"), x = table.ColumnOf("x"),
                     y = table.ColumnOf("y"), z = table.ColumnOf("z");
-  std::vector<ShapeFeature> features;
+  const MeshQuery query(mean);
+  std::map<int, Vec3> landmarks;
   while (table.NextRow()) {
-    const double value = table.Number(number);
-    if (value < 1 || value > 68 || value != std::round(value)) {
-      table.Fail(fmt::format("landmark {} is none of the 68", table.Cell(number)));
+    const int n = MultiPieOf(table, number);
+    const Vec3 at(table.Number(x), table.Number(y), table.Number(z));
+    if (!landmarks.emplace(n, at).second) {
+      table.Fail(fmt::format("landmark {} appears twice; keep one of the two", n));
     }
-    if (const double clearance = ClearanceOf(static_cast<int>(value)); clearance > 0) {
-      features.push_back({{table.Number(x), table.Number(y), table.Number(z)}, clearance});
+    if (n >= kFirstUsed) {
+      CheckNear(table, fmt::format("landmark {}", n), query.Closest(at).distance_mm, source.mean);
+    }
+  }
+  RequireUsed(landmarks, source.features.string());
+  return landmarks;
+}
+
+// By number, whatever the order of the rows.
+std::vector<ShapeFeature> ReadFeatures(const ModesPrior& source, const TriMesh& mean) {
+  std::vector<ShapeFeature> features;
+  for (const auto& [number, position] : ReadMultiPie(source, mean)) {
+    if (number >= kFirstUsed) {
+      features.push_back({position, ClearanceOf(number)});
     }
   }
   return features;
@@ -99,12 +308,21 @@ std::vector<ShapeFeature> ReadFeatures(const ModesPrior& source) {
 
 FacePrior LoadPrior(const ModesPrior& source) {
   FacePrior prior;
-  prior.model.mean = ReadMesh(Named(source.mean, "mean"));
-  prior.model.modes = ReadModes(source, prior.model.mean.points.size());
+  prior.model.mean = ReadMean(Named(source.mean, "mean"));
+  prior.model.modes = ReadModes(source, prior.model.mean);
   CheckShapeModel(prior.model, source.mean.string());
+  CheckSize(source, prior.model.modes);
   prior.sites = ReadSites(source, prior.model.mean);
-  prior.features = ReadFeatures(source);
+  prior.features = ReadFeatures(source, prior.model.mean);
   return prior;
+}
+
+std::vector<fs::path> ModesPriorFiles(const ModesPrior& source) {
+  std::vector<fs::path> files = {source.mean, source.sites, source.features};
+  const std::vector<fs::path> modes =
+      IsFolder(source.modes) ? MeshesIn(source.modes, source.count) : std::vector{source.modes};
+  files.insert(files.begin() + 1, modes.begin(), modes.end());
+  return files;
 }
 
 }  // namespace semblance

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -182,6 +183,77 @@ std::string WrongSide(const std::string& code, const Vec3& p, const Similarity& 
 
 bool HasMultiPie(const FacePrior& prior) { return prior.features.size() == kFeatures; }
 
+struct RuleEntry {
+  const char* name;
+  const RuleUse& use;
+  void (RuleBook::*apply)(const RuleUse&);
+  std::vector<std::string> points;     // of bone that it needs
+  std::vector<std::string> or_points;  // of the other side, where it applies to each by itself
+};
+
+std::vector<RuleEntry> EntriesOf(const FeatureRules& rules) {
+  return {
+      {"eye_height",
+       rules.eye_height,
+       &RuleBook::EyeHeight,
+       {"mso_r", "mio_r"},
+       {"mso_l", "mio_l"}},
+      {"eye_protrusion", rules.eye_protrusion, &RuleBook::EyeProtrusion, {"dlom_r"}, {"dlom_l"}},
+      {"mouth_width", rules.mouth_width, &RuleBook::MouthWidth, {"uc_l", "uc_r"}, {}},
+      {"pronasale", rules.pronasale, &RuleBook::Pronasale, {"n", "pr", "rhi", "ans", "ss"}, {}},
+      {"subnasale", rules.subnasale, &RuleBook::Subnasale, {"ss"}, {}}};
+}
+
+bool IsOn(const RuleUse& rule) { return rule.use.value_or(/*default_value=*/true); }
+bool IsAskedFor(const RuleUse& rule) { return rule.use.value_or(/*default_value=*/false); }
+
+bool IsRulePoint(const std::string& code) {
+  return std::ranges::find(RulePointCodes(), code) != RulePointCodes().end();
+}
+
+// Those of `needed` that are neither among the landmarks nor under rules.points.
+std::vector<std::string> Lacking(const std::vector<std::string>& needed, const FeatureRules& rules,
+                                 const std::map<std::string, Vec3>& landmarks) {
+  std::vector<std::string> lacking;
+  std::ranges::copy_if(needed, std::back_inserter(lacking), [&](const std::string& code) {
+    return !landmarks.contains(code) && !rules.points.contains(code);
+  });
+  return lacking;
+}
+
+// Which points are missing, and where they are to be given.
+std::string InWords(std::vector<std::string> lacking) {
+  const auto marked = std::ranges::stable_partition(lacking, &IsRulePoint);
+  const std::span<const std::string> given(lacking.begin(), marked.begin());
+  std::vector<std::string> words;
+  if (!given.empty()) {
+    words.push_back(fmt::format("{} under rules.points", fmt::join(given, ", ")));
+  }
+  if (!marked.empty()) {
+    words.push_back(fmt::format("{} among the landmarks", fmt::join(marked, ", ")));
+  }
+  return fmt::format("{}", fmt::join(words, " and "));
+}
+
+// Why a rule does not apply, or not on both sides; empty where it does.
+std::string Hindrance(const RuleEntry& rule, const FeatureRules& rules,
+                      const std::map<std::string, Vec3>& landmarks) {
+  std::vector<std::string> lacking = Lacking(rule.points, rules, landmarks);
+  const std::vector<std::string> other = Lacking(rule.or_points, rules, landmarks);
+  const bool applies = lacking.empty() || (!rule.or_points.empty() && other.empty());
+  lacking.insert(lacking.end(), other.begin(), other.end());
+  return lacking.empty() ? ""
+                         : fmt::format("it lacks {}: it {}", InWords(std::move(lacking)),
+                                       applies ? "applies to one side alone" : "does not apply");
+}
+
+std::string NoteOnPrior(const FacePrior& prior) {
+  return fmt::format(
+      "rules: the prior has {} landmarks, and rules need {}, nose, eyes and mouth of Multi-PIE (28 "
+      "to 68): none applies; make the prior anew with all of them",
+      prior.features.size(), kFeatures);
+}
+
 }  // namespace
 
 const std::vector<std::string>& RulePointCodes() {
@@ -229,18 +301,33 @@ RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> la
     landmarks[code] = {p[0], p[1], p[2]};
   }
   RuleBook book(std::move(landmarks), skull_from_average, prior);
-  const std::pair<const RuleUse*, void (RuleBook::*)(const RuleUse&)> all[] = {
-      {&rules.eye_height, &RuleBook::EyeHeight},
-      {&rules.eye_protrusion, &RuleBook::EyeProtrusion},
-      {&rules.mouth_width, &RuleBook::MouthWidth},
-      {&rules.pronasale, &RuleBook::Pronasale},
-      {&rules.subnasale, &RuleBook::Subnasale}};
-  for (const auto& [rule, apply] : all) {
-    if (rule->use) {
-      (book.*apply)(*rule);
+  for (const RuleEntry& rule : EntriesOf(rules)) {
+    if (IsOn(rule.use)) {
+      (book.*rule.apply)(rule.use);
     }
   }
   return book.Take();
+}
+
+std::vector<std::string> NotesOnRules(const FeatureRules& rules,
+                                      const std::map<std::string, Vec3>& landmarks, bool is_posed,
+                                      const FacePrior* prior) {
+  const std::vector<RuleEntry> entries = EntriesOf(rules);
+  if (prior != nullptr && !HasMultiPie(*prior)) {
+    const bool any = std::ranges::any_of(entries, [](const RuleEntry& r) { return IsOn(r.use); });
+    return any ? std::vector{NoteOnPrior(*prior)} : std::vector<std::string>();
+  }
+  const std::string apart = prior == nullptr ? "the face asks no prior: it does not apply"
+                            : !is_posed      ? "the skull's pose is not known: it does not apply"
+                                             : "";
+  std::vector<std::string> notes;
+  for (const RuleEntry& rule : entries) {
+    const std::string why = apart.empty() ? Hindrance(rule, rules, landmarks) : apart;
+    if (IsAskedFor(rule.use) && !why.empty()) {
+      notes.push_back(fmt::format("rules.{} is on, and {}", rule.name, why));
+    }
+  }
+  return notes;
 }
 
 }  // namespace semblance

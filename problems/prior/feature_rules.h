@@ -5,6 +5,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,12 +18,16 @@
 namespace semblance {
 
 struct RuleUse {
-  bool use = true;      // false leaves it out
+  // true: asked for; false: left out; none: on where its points are there.
+  std::optional<bool> use = std::nullopt;
   double sd_mm = kNaN;  // of what the rule predicts
 };
 template <class Visitor>
 void Fields(Visitor& visit, RuleUse& o) {
-  visit(FieldInfo{.name = "use", .doc = "false leaves the rule out"}, o.use);
+  visit(FieldInfo{.name = "use",
+                  .doc = "true asks for the rule, and a note says what it lacks where it cannot "
+                         "apply; false leaves it out; null: it is on where its points are there"},
+        o.use);
   visit(FieldInfo{.name = "sd_mm",
                   .unit = "mm",
                   .min = 0.01,
@@ -115,9 +120,16 @@ struct RuleMarks {
 
 // The rules that are on and whose points are there. landmarks: of the skull, by site, mm.
 // skull_from_average: the pose of the skull (average_skull.h), whose axes are up, front and side.
-// None where the prior does not have the 41 landmarks of nose, eyes and mouth in the order of
-// Multi-PIE (28 to 68).
+// None where the prior does not have 41 landmarks: those of nose, eyes and mouth by their number in
+// Multi-PIE (28 to 68), which LoadPrior sees to for modes on a mesh, and `semblance prior` keeps.
 RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> landmarks,
                        const Similarity& skull_from_average, const FacePrior& prior);
+
+// What keeps rules that are asked for (use: true) from applying, a line each; and what keeps all
+// from it where the prior lacks landmarks. is_posed: whether the pose of the skull is known. prior:
+// null where the face asks none.
+std::vector<std::string> NotesOnRules(const FeatureRules& rules,
+                                      const std::map<std::string, Vec3>& landmarks, bool is_posed,
+                                      const FacePrior* prior);
 
 }  // namespace semblance

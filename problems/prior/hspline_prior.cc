@@ -156,7 +156,7 @@ FacePrior Load(const HSplinePrior& source, const TemplateFace& face) {
 std::vector<std::filesystem::path> FilesOfSource(const NoPrior&) { return {}; }
 std::vector<std::filesystem::path> FilesOfSource(const IctPrior&) { return {}; }
 std::vector<std::filesystem::path> FilesOfSource(const ModesPrior& source) {
-  return {source.mean, source.modes, source.sites, source.features};
+  return ModesPriorFiles(source);
 }
 std::vector<std::filesystem::path> FilesOfSource(const HSplinePrior& source) {
   return {source.modes};

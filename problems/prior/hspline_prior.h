@@ -48,7 +48,7 @@ FacePrior PriorOf(const HSplineModes& modes, const TemplateFace& face, int count
 // Of any source. face: the template. Throws as LoadPrior, ReadFileBytes and the functions above.
 FacePrior LoadPrior(const PriorSource& source, const TemplateFace& face);
 
-// The files that LoadPrior reads, for the manifest.
+// The files that LoadPrior reads, for the manifest. Throws as ModesPriorFiles.
 std::vector<std::filesystem::path> PriorFiles(const PriorSource& source);
 
 }  // namespace semblance

@@ -174,9 +174,9 @@ FileTemplate TemplateIn(const fs::path& folder) {
 
 int PriorCommand(const FaceArguments& a) {
   const FileTemplate files = TemplateIn(a.template_folder);
-  CheckFree(a.out, a,
-            std::array<fs::path, 7>{a.prior.mean, a.prior.modes, a.prior.sites, a.prior.features,
-                                    files.surface, files.sites, files.features});
+  std::vector<fs::path> given = ModesPriorFiles(a.prior);
+  given.insert(given.end(), {files.surface, files.sites, files.features});
+  CheckFree(a.out, a, given);
   const TemplateFace face = ReadTemplate(files);
   const FacePrior prior = LoadPrior(a.prior);
   RunContext context;
@@ -279,10 +279,25 @@ void DeclareList(CLI::App& list, CommandLine& line) {
   list.add_option("LIBRARY", a.library, "folder")->required();
 }
 
+// The range of prior.scale. CLI::Range would call its lower end 0.000000, which is not allowed.
+CLI::Validator AsPriorScale() {
+  return {[](std::string& text) -> std::string {
+            double scale = 0;
+            return CLI::detail::lexical_cast(text, scale) && !(scale >= 1e-9 && scale <= 1e9)
+                       ? fmt::format("'{}' is not a number from 1e-9 to 1e9", text)
+                       : "";
+          },
+          "1e-9 to 1e9"};
+}
+
 void DeclarePrior(CLI::App& prior, CommandLine& line) {
   FaceArguments& a = *Bind(prior, line, &PriorCommand);
   prior.add_option("MEAN", a.prior.mean, "mesh of the mean face")->required();
-  prior.add_option("MODES", a.prior.modes, "its modes, k x n x 3 (.npy)")->required();
+  prior
+      .add_option("MODES", a.prior.modes,
+                  "its modes: k x n x 3 (.npy), or a folder of meshes, each the mean moved by one "
+                  "standard deviation of one mode")
+      ->required();
   prior.add_option("--sites", a.prior.sites, "sites on the mean (.csv: site,x_mm,y_mm,z_mm)")
       ->required();
   prior
@@ -292,7 +307,8 @@ void DeclarePrior(CLI::App& prior, CommandLine& line) {
   prior.add_option("--template", a.template_folder, "what `semblance template MEAN` has written")
       ->required();
   prior.add_option("--out", a.out, "file for the modes (.json)")->required();
-  prior.add_option("--scale", a.prior.scale, "mm per unit of the modes [1]")->check(Finite());
+  prior.add_option("--scale", a.prior.scale, "mm per unit of an array of modes [1]")
+      ->check(AsPriorScale());
   prior.add_option("--modes", a.prior.count, "how many, at most [60]")->check(CLI::Range(1, 10000));
   prior.add_option("--level", a.level, "of the B-splines that hold them [2]")
       ->check(CLI::Range(0, 8));

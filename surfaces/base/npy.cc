@@ -124,16 +124,18 @@ std::vector<double> ValuesOf(std::string_view type, std::string_view data,
       std::vector<double> (*)(std::string_view, const std::vector<std::size_t>&, std::string_view);
   constexpr std::pair<std::string_view, Read> kTypes[] = {
       {"<f8", &ValuesOf<double>},       {"<f4", &ValuesOf<float>},
-      {"<i4", &ValuesOf<std::int32_t>}, {"<i2", &ValuesOf<std::int16_t>},
-      {"|i1", &ValuesOf<std::int8_t>},  {"|u1", &ValuesOf<std::uint8_t>}};
+      {"<i8", &ValuesOf<std::int64_t>}, {"<i4", &ValuesOf<std::int32_t>},
+      {"<i2", &ValuesOf<std::int16_t>}, {"|i1", &ValuesOf<std::int8_t>},
+      {"|u1", &ValuesOf<std::uint8_t>}};
   for (const auto& [code, read] : kTypes) {
     if (type == code) {
       return read(data, shape, name);
     }
   }
-  Fail(name, fmt::format("its values are of type '{}'; save them as float64, float32, int32, int16 "
-                         "or int8, little-endian",
-                         type));
+  Fail(name,
+       fmt::format("its values are of type '{}'; save them as float64, float32, int64, int32, "
+                   "int16 or int8, little-endian",
+                   type));
 }
 
 // From Fortran's order, the first index fastest.

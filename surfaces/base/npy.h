@@ -15,10 +15,10 @@ struct NpyArray {
   std::vector<double> values;  // as many as the product of shape, the last index fastest
 };
 
-// name: of the file, for messages. Little-endian whole numbers of 1, 2 and 4 bytes and floating
-// numbers of 4 and 8 bytes are read. Throws InputError "name: what" for what is no .npy file,
-// another kind of number (pickled objects among them), a shape that does not fit the bytes that are
-// there, or a value that is not finite.
+// name: of the file, for messages. Little-endian whole numbers of 1, 2, 4 and 8 bytes and floating
+// numbers of 4 and 8 bytes are read; whole numbers beyond 2^53 are rounded to doubles. Throws
+// InputError "name: what" for what is no .npy file, another kind of number (pickled objects among
+// them), a shape that does not fit the bytes that are there, or a value that is not finite.
 NpyArray ParseNpy(std::string_view bytes, std::string_view name);
 
 // Throws IoError if the file cannot be read, InputError as ParseNpy.

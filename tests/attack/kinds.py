@@ -267,7 +267,8 @@ def priors(world):
     modes = seeds.npy([[draw.gauss(0, 1) for _ in range(3)] for _ in range(2 * count)], 3)
     modes = modes.replace(f"({2 * count}, 3)".encode(), f"(2,{count}, 3)".encode()[:len(f"({2 * count}, 3)")].ljust(len(f"({2 * count}, 3)")))
     sites = world.good("landmarks.csv")
-    features = ("i_multipie,x,y,z\n" + "".join(f"{k},{k},{-80},{k % 7}\n" for k in range(1, 69))).encode()
+    places = [row.split(",")[1:4] for row in sites.decode().splitlines()[1:]]
+    features = ("i_multipie,x,y,z\n" + "".join(f"{k},{','.join(places[k % len(places)])}\n" for k in range(1, 69))).encode()
     while True:
         parts = {"mean.ply": mean, "modes.npy": modes, "sites.csv": sites, "features.csv": features}
         hostile = draw.choice(list(parts))

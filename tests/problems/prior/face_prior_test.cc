@@ -2,6 +2,7 @@
 // A prior whose mean is the built-in template, so that all can be compared with it.
 #include "problems/prior/face_prior.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,6 +17,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_file.h"
@@ -25,6 +27,8 @@ namespace semblance {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::ScratchFolder;
 
@@ -50,7 +54,10 @@ std::string ModesFile(const TriMesh& mean, int modes) {
          std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
 }
 
-// The files of a prior with two modes.
+// Where the landmark of Multi-PIE is, each at a place of its own.
+Vec3 LandmarkPoint(int n) { return Face().surface.Point({0.4 + 0.005 * (n - 28), 0.5}); }
+
+// The files of a prior with two modes; its landmarks are in reverse order.
 ModesPrior WritePrior(const fs::path& folder) {
   const TriMesh mean = Tessellate(Face().surface, 2).mesh;
   CsvWriter sites({"site", "x_mm", "y_mm", "z_mm"}), features({"i_multipie", "x", "y", "z"});
@@ -58,9 +65,11 @@ ModesPrior WritePrior(const fs::path& folder) {
     const Vec3 p = Face().surface.Point(uv);
     sites.Row(site, p.x(), p.y(), p.z());
   }
-  features.Row(5, 0, 0, 0);
-  features.Row(31, 0, -30, -36);
-  features.Row(50, 0, -15, -74);
+  features.Row(5, 0, 0, 0);  // of the outline: not used
+  for (int n = 68; n >= 28; --n) {
+    const Vec3 p = LandmarkPoint(n);
+    features.Row(n, p.x(), p.y(), p.z());
+  }
   const ModesPrior prior{.mean = folder / "mean.ply",
                          .modes = folder / "modes.npy",
                          .sites = folder / "sites.csv",
@@ -80,23 +89,28 @@ TEST(FacePrior, ItsFilesAreRead) {
   const Vec3& p = prior.model.mean.points[700];
   EXPECT_NEAR(prior.model.modes(2100, 1), 3 * std::sin(0.04 * p.z()), 1e-3);
   EXPECT_EQ(prior.sites.size(), 32u);
-  EXPECT_EQ(prior.features.size(), 2u);  // a landmark of the outline is none
+  EXPECT_EQ(prior.features.size(), 41u);  // a landmark of the outline is none
   ModesPrior first = WritePrior(folder.Path());
   first.count = 1;
   EXPECT_EQ(LoadPrior(first).model.Modes(), 1);
 }
 
+// What LoadPrior says of a prior that is spoilt, "none" if nothing.
+std::string FaultOf(const fs::path& folder, const std::function<void(ModesPrior&)>& spoil) {
+  ModesPrior prior = WritePrior(folder);
+  spoil(prior);
+  try {
+    LoadPrior(prior);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "none";
+}
+
 TEST(FacePrior, WhatCannotBeUsedIsNamed) {
   const ScratchFolder folder;
-  const auto fault = [&](const std::function<void(ModesPrior&)>& spoil) -> std::string {
-    ModesPrior prior = WritePrior(folder.Path());
-    spoil(prior);
-    try {
-      LoadPrior(prior);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "none";
+  const auto fault = [&](const std::function<void(ModesPrior&)>& spoil) {
+    return FaultOf(folder.Path(), spoil);
   };
   EXPECT_EQ(fault([](ModesPrior&) {}), "none");
   EXPECT_THAT(fault([](ModesPrior& p) { p.sites.clear(); }), HasSubstr("prior.sites"));
@@ -113,9 +127,170 @@ TEST(FacePrior, WhatCannotBeUsedIsNamed) {
                 WriteFileAtomically(p.sites, "site,x_mm,y_mm,z_mm\nglab,0,0,0\n");
               }),
               HasSubstr("glab"));
+}
+
+TEST(FacePrior, LandmarksAreThoseOfTheirNumbersWhateverTheirOrder) {
+  const ScratchFolder folder;
+  const std::vector<ShapeFeature> features = LoadPrior(WritePrior(folder.Path())).features;
+  ASSERT_EQ(features.size(), 41u);
+  for (int n = 28; n <= 68; ++n) {
+    EXPECT_LT((features[n - 28].position - LandmarkPoint(n)).norm(), 1e-9) << n;
+  }
+  EXPECT_EQ(features[8].clearance_mm, 14);  // 36, of the nose
+  EXPECT_EQ(features[9].clearance_mm, 15);
+  EXPECT_EQ(features[21].clearance_mm, 16);
+}
+
+TEST(FacePrior, LandmarksThatAreMissingTwiceThereOrElsewhereAreNamed) {
+  const ScratchFolder folder;
+  const auto fault = [&](const std::function<void(std::string&)>& spoil) {
+    return FaultOf(folder.Path(), [&](ModesPrior& p) {
+      std::string text = ReadFileBytes(p.features);
+      spoil(text);
+      WriteFileAtomically(p.features, text);
+    });
+  };
+  const auto line_of = [](const std::string& text, const std::string& number) {
+    const std::size_t at = text.find("\n" + number + ",") + 1;
+    return text.substr(at, text.find('\n', at) + 1 - at);
+  };
+  const auto erase = [&](std::string& text, const std::string& number) {
+    const std::string line = line_of(text, number);
+    text.erase(text.find(line), line.size());
+  };
+  EXPECT_EQ(fault([&](std::string& text) { erase(text, "5"); }), "none");
   EXPECT_THAT(
-      fault([](ModesPrior& p) { WriteFileAtomically(p.features, "i_multipie,x,y,z\n70,0,0,0\n"); }),
-      HasSubstr("none of the 68"));
+      fault([&](std::string& text) { erase(text, "41"); }),
+      HasSubstr("features.csv: a prior needs the landmarks 28 to 68 of Multi-PIE (nose, eyes, "
+                "mouth), and 41 is missing"));
+  EXPECT_THAT(fault([&](std::string& text) {
+                erase(text, "61");
+                erase(text, "68");
+              }),
+              HasSubstr("and 61, 68 are missing"));
+  EXPECT_THAT(fault([](std::string& text) { text.resize(text.find('\n') + 1); }),
+              HasSubstr("and all are missing"));
+  EXPECT_THAT(fault([&](std::string& text) { text += line_of(text, "31"); }),
+              HasSubstr("features.csv:44: landmark 31 appears twice"));
+  EXPECT_THAT(fault([&](std::string& text) { text += line_of(text, "5"); }),
+              HasSubstr("landmark 5 appears twice"));
+  for (const char* wrong : {"70", "0", "-3", "30.5"}) {
+    EXPECT_THAT(fault([&](std::string& text) { text += std::string(wrong) + ",0,0,0\n"; }),
+                HasSubstr(std::string("landmark ") + wrong + " is none of the 68"));
+  }
+  EXPECT_THAT(fault([&](std::string& text) {
+                erase(text, "31");
+                text += "31,1000,2000,3000\n";
+              }),
+              AllOf(HasSubstr("features.csv:43: landmark 31 lies"), HasSubstr("at most 5 mm")));
+}
+
+TEST(FacePrior, ModesOfAnotherUnitAreRefusedWithTheScaleThatMendsThem) {
+  const ScratchFolder folder;
+  const auto fault = [&](double factor) {
+    return FaultOf(folder.Path(), [&](ModesPrior& p) { p.scale *= factor; });
+  };
+  EXPECT_EQ(fault(0.1), "none");
+  EXPECT_EQ(fault(10), "none");
+  EXPECT_THAT(fault(1000), AllOf(HasSubstr("modes.npy: the largest mode, number "),
+                                 HasSubstr("0.05 to 50 mm are allowed; a scale of 0.01 would")));
+  EXPECT_THAT(fault(0.001), HasSubstr("a scale of 0.01 would make it"));
+  EXPECT_THAT(fault(1e-9), HasSubstr("correct the scale, which is 1e-11"));
+  EXPECT_THAT(fault(1e200), HasSubstr("e+200 mm (RMS)"));  // the square of which is none
+  EXPECT_THAT(
+      fault(0),
+      HasSubstr("moves the points by 0 mm (RMS), and 0.05 to 50 mm are allowed; give modes"));
+}
+
+TEST(FacePrior, AnArrayWithoutAModeAndAMeanWithoutAnOrderAreNamed) {
+  const ScratchFolder folder;
+  EXPECT_THAT(
+      FaultOf(folder.Path(),
+              [](ModesPrior& p) { WriteFileAtomically(p.modes, ModesFile(ReadMesh(p.mean), 0)); }),
+      HasSubstr("modes.npy: there is no mode in an array of shape (0, "));
+  for (const char* name : {"mean.stl", "mean.STL"}) {
+    EXPECT_THAT(FaultOf(folder.Path(),
+                        [&](ModesPrior& p) {
+                          const TriMesh mean = ReadMesh(p.mean);
+                          p.mean = folder / name;
+                          WriteFileAtomically(p.mean, EncodeMesh(mean, ".stl"));
+                        }),
+                HasSubstr(std::string(name) + ": an STL has no order of points"));
+  }
+}
+
+// The modes of WritePrior as meshes, of every kind, beside files that are none.
+ModesPrior WithFolder(ModesPrior prior) {
+  const FacePrior array = LoadPrior(prior);
+  prior.modes.replace_filename("faces");
+  prior.scale = 1;
+  fs::remove_all(prior.modes);
+  fs::create_directories(prior.modes / "others");
+  const auto write = [&](const char* name, Eigen::Index mode) {
+    TriMesh mesh = array.model.mean;
+    mesh.points = ShapeAt(array.model, Eigen::Vector2d::Unit(mode));
+    WriteFileAtomically(prior.modes / name,
+                        EncodeMesh(mesh, LowerCase(fs::path(name).extension().string())));
+  };
+  write("2.OBJ", 1);
+  write("1.ply", 0);
+  WriteFileAtomically(prior.modes / "0.mtl", "newmtl none\n");
+  WriteFileAtomically(prior.modes / ".0.ply", "hidden");
+  return prior;
+}
+
+TEST(FacePrior, AFolderOfMeshesIsAsGoodAsAnArray) {
+  const ScratchFolder folder;
+  const ModesPrior array = WritePrior(folder.Path());
+  ModesPrior faces = WithFolder(array);
+  const Eigen::MatrixXd modes = LoadPrior(faces).model.modes;
+  ASSERT_EQ(modes.cols(), 2);
+  EXPECT_LT((modes - LoadPrior(array).model.modes).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_THAT(ModesPriorFiles(faces),
+              ElementsAre(faces.mean, faces.modes / "1.ply", faces.modes / "2.OBJ", faces.sites,
+                          faces.features));
+  EXPECT_THAT(PriorFiles(array), ElementsAre(array.mean, array.modes, array.sites, array.features));
+  faces.count = 1;
+  EXPECT_EQ(LoadPrior(faces).model.Modes(), 1);
+  EXPECT_EQ(ModesPriorFiles(faces).size(), 4u);
+}
+
+TEST(FacePrior, AFolderThatHoldsNoModesIsNamed) {
+  const ScratchFolder folder;
+  const auto fault = [&](const std::function<void(const TriMesh&, ModesPrior&)>& spoil) {
+    return FaultOf(folder.Path(), [&](ModesPrior& p) {
+      p = WithFolder(p);
+      spoil(ReadMesh(p.mean), p);
+    });
+  };
+  const auto with = [&](const char* name, const std::function<void(TriMesh&)>& change) {
+    return fault([&](TriMesh mesh, const ModesPrior& p) {
+      change(mesh);
+      WriteFileAtomically(p.modes / name, EncodeMesh(mesh, fs::path(name).extension().string()));
+    });
+  };
+  EXPECT_EQ(fault([](const TriMesh&, ModesPrior&) {}), "none");
+  EXPECT_THAT(with("mean.ply", [](TriMesh&) {}), HasSubstr("mean.ply: it is the mean"));
+  EXPECT_THAT(with("3.ply", [](TriMesh& mesh) { mesh.points.emplace_back(0, 0, 0); }),
+              HasSubstr("3.ply: a mesh of"));
+  EXPECT_THAT(with("3.off", [](TriMesh& mesh) { std::swap(mesh.triangles[0], mesh.triangles[1]); }),
+              HasSubstr("3.off: its triangles are not those of"));
+  EXPECT_THAT(with("3.stl", [](TriMesh&) {}), HasSubstr("3.stl: an STL has no order of points"));
+  EXPECT_THAT(with("3.ply",
+                   [](TriMesh& mesh) {
+                     for (Vec3& p : mesh.points) {
+                       p.z() += 60;
+                     }
+                   }),
+              AllOf(HasSubstr("faces: the largest mode, number 3, moves the points by 60 mm"),
+                    HasSubstr("in mm and in the frame of the mean")));
+  EXPECT_THAT(fault([](const TriMesh&, ModesPrior& p) { p.scale = 0.001; }),
+              HasSubstr("in mm, and the scale is 0.001; leave it out"));
+  EXPECT_THAT(fault([](const TriMesh&, ModesPrior& p) {
+                fs::remove(p.modes / "1.ply");
+                fs::remove(p.modes / "2.OBJ");
+              }),
+              HasSubstr("faces: there is no mesh (.ply, .obj, .off)"));
 }
 
 TEST(DomainGrid, SurfaceThroughItsOwnSamplesIsTheSurface) {
@@ -179,12 +354,12 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
   }
   EXPECT_NEAR(area, Area(Tessellate(surface, 2).mesh), 0.01 * area);
   const std::vector<Sphere> features = FeaturesOn(estimate, prior);
-  ASSERT_EQ(features.size(), 2u);
+  ASSERT_EQ(features.size(), 41u);
   EXPECT_EQ(features[0].radius_mm, prior.features[0].clearance_mm);
-  const Vec3 nose(0, -30, -36);
+  const Vec3 nose = LandmarkPoint(28);
   const double s = std::sin(0.02 * nose.z()) - std::sin(0.04 * nose.z());
   const Vec3 moved = estimate.subject_from_model * Vec3(nose + Vec3(3 * s, 0, 2 * s));
-  EXPECT_LT((features[0].center - moved).norm(), 8);
+  EXPECT_LT((features[0].center - moved).norm(), 1);
 }
 
 // The program carries what configs/faces/ict has.
@@ -214,11 +389,13 @@ TEST(HSplinePrior, ModesOnTheTemplateMoveItAsTheMeshsModesDo) {
       ModesOnTemplate(on_mesh, LayOnTemplate(on_mesh, Face(), {}), Face(), 2, 2, &misfit);
   EXPECT_LT(misfit.rms_mm, 0.05);
   const HSplineModes again = HSplineModesFromJson(HSplineModesToJson(modes), "modes.json");
-  EXPECT_EQ(again.features.size(), 2u);
+  EXPECT_EQ(again.features.size(), 41u);
   const FacePrior prior = PriorOf(again, Face(), 100);
   EXPECT_EQ(prior.model.Modes(), 2);
   EXPECT_EQ(prior.sites.size(), 32u);
-  EXPECT_LT((prior.features[0].position - Vec3(0, -30, -36)).norm(), 8);  // near the nose's skin
+  for (int n = 28; n <= 68; ++n) {
+    EXPECT_LT((prior.features[n - 28].position - LandmarkPoint(n)).norm(), 2) << n;
+  }
   for (std::size_t v = 0; v < prior.model.mean.points.size(); v += 313) {
     const double s = std::sin(0.04 * prior.model.mean.points[v].z());
     const Vec3 move = prior.model.modes.block<3, 1>(3 * static_cast<Eigen::Index>(v), 1);

@@ -145,6 +145,76 @@ TEST(FeatureRules, AnEstimateFollowsAMark) {
   EXPECT_THROW(EstimateShape(Ict().model, target, options, {}), InputError);
 }
 
+TEST(FeatureRules, ARuleThatIsAskedForSaysWhatItLacks) {
+  FeatureRules rules;
+  EXPECT_THAT(NotesOnRules(rules, {}, /*is_posed=*/true, &Ict()),
+              IsEmpty());  // nobody asked for these
+  rules.pronasale.use = rules.mouth_width.use = true;
+  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &Ict()),
+              ElementsAre("rules.mouth_width is on, and it lacks uc_l, uc_r under rules.points: it "
+                          "does not apply",
+                          "rules.pronasale is on, and it lacks ans, ss under rules.points: it does "
+                          "not apply"));
+  rules.mouth_width.use = false;
+  rules.points = AllRules().points;
+  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &Ict()), IsEmpty());
+  rules.points.erase("ss");
+  EXPECT_THAT(NotesOnRules(rules, {}, /*is_posed=*/true, &Ict()),
+              ElementsAre(HasSubstr("it lacks ss under rules.points and n, pr, rhi among the "
+                                    "landmarks: it does not apply")));
+  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/false, &Ict()),
+              ElementsAre(HasSubstr("rules.pronasale is on, and the skull's pose is not known")));
+  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, nullptr),
+              ElementsAre(HasSubstr("rules.pronasale is on, and the face asks no prior")));
+}
+
+TEST(FeatureRules, APriorWithoutTheirLandmarksIsNoted) {
+  FacePrior few = Ict();
+  few.features.resize(33);
+  FeatureRules rules;
+  EXPECT_TRUE(MarksOfRules(rules, AverageLandmarks(), {}, few).marks.empty());
+  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &few),
+              ElementsAre(HasSubstr("the prior has 33 landmarks, and rules need 41")));
+  rules.eye_height.use = rules.eye_protrusion.use = rules.mouth_width.use = false;
+  rules.pronasale.use = rules.subnasale.use = false;
+  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &few), IsEmpty());
+}
+
+// Whatever point is missing, a rule is noted as idle if it is, and as half at work if it is.
+TEST(FeatureRules, NotesSayWhatRulesDo) {
+  FeatureRules all = AllRules();
+  all.eye_height.use = all.mouth_width.use = true;
+  const std::vector<std::string> whole = Names(MarksOfRules(all, AverageLandmarks(), {}, Ict()));
+  const auto expect_told = [&](const FeatureRules& rules, const std::map<std::string, Vec3>& bone) {
+    const std::vector<std::string> names = Names(MarksOfRules(rules, bone, {}, Ict()));
+    const std::vector<std::string> notes = NotesOnRules(rules, bone, /*is_posed=*/true, &Ict());
+    for (const std::string rule :
+         {"eye_height", "eye_protrusion", "mouth_width", "pronasale", "subnasale"}) {
+      const auto of_rule = [&](const std::string& name) { return name.starts_with(rule + " "); };
+      const auto at_work = std::ranges::count_if(names, of_rule),
+                 at_most = std::ranges::count_if(whole, of_rule);
+      const auto note = std::ranges::find_if(notes, [&](const std::string& words) {
+        return words.starts_with("rules." + rule + " is on");
+      });
+      ASSERT_EQ(note == notes.end(), at_work == at_most) << rule;
+      if (note != notes.end()) {
+        EXPECT_THAT(*note, HasSubstr(at_work == 0 ? "does not apply" : "to one side alone"));
+      }
+    }
+  };
+  expect_told(all, AverageLandmarks());
+  for (const auto& [code, at] : all.points) {
+    FeatureRules without = all;
+    without.points.erase(code);
+    expect_told(without, AverageLandmarks());
+  }
+  for (const auto& [code, at] : AverageLandmarks()) {
+    std::map<std::string, Vec3> without = AverageLandmarks();
+    without.erase(code);
+    expect_told(all, without);
+  }
+}
+
 TEST(FeatureRules, AnUnknownPointIsAFault) {
   FeatureRules rules;
   rules.points["acanthion"] = {0, 0, 0};

@@ -130,6 +130,16 @@ TEST_F(FaceCommands, ExportRefusesWhatItCannotDo) {
   ExpectDone("export face.json --to face.glb --force");
 }
 
+TEST_F(FaceCommands, AScaleOfModesIsAboveZeroAndBelowABillion) {
+  for (const char* wrong : {"-1", "0", "1e-10", "2e9", "nan"}) {
+    ExpectRefused(
+        "prior m.ply m.npy --sites s.csv --features f.csv --template t --out o.json "
+        "--scale " +
+            std::string(wrong),
+        fmt::format("--scale: '{}' is not a number from 1e-9 to 1e9", wrong));
+  }
+}
+
 TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
   const std::string words = ": it is read here, and what is read is never replaced";
   WriteFileAtomically(folder_ / "script.yaml", "edits: []\n");

@@ -47,6 +47,8 @@ TEST(Npy, EveryKindOfNumberIsReadAsItStands) {
               ElementsAre(0.1, -3));
   EXPECT_THAT(ParseNpy(Npy("'<f4'", "(2,)", Raw<float>({0.5, -3})), "a").values,
               ElementsAre(0.5, -3));
+  EXPECT_THAT(ParseNpy(Npy("'<i8'", "(2,)", Raw<std::int64_t>({5000000000, -3})), "a").values,
+              ElementsAre(5000000000, -3));
   EXPECT_THAT(ParseNpy(Npy("'<i4'", "(2,)", Raw<std::int32_t>({70000, -3})), "a").values,
               ElementsAre(70000, -3));
   EXPECT_THAT(ParseNpy(Npy("'<i2'", "(2,)", Raw<std::int16_t>({300, -3})), "a").values,
