@@ -198,7 +198,8 @@ std::vector<SkinLandmark> OnSkin(const std::vector<SkinLandmark>& points, const 
 // ---------------------------------------------------------------------------------------------
 
 TemplateFace GenericHead(int max_level) {
-  TemplateFace face = MakeTemplateFace({.max_level = kFormulaLevel});
+  static const TemplateFace formula = MakeTemplateFace({.max_level = kFormulaLevel});
+  TemplateFace face = formula;
   HSplineShape shape = face.surface.shape();
   shape.max_level = max_level;
   HSplineSurface finer(shape, face.surface.Net(0));

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -71,16 +72,43 @@ Forecasts ForecastsOf(const TissueTable& table, const PopulationSubject& person,
   return forecasts;
 }
 
+// Whether the table has columns of sex and build, and the person's are not all known.
+bool IsAssumed(const TissueTable& table, const PopulationSubject& person) {
+  const bool is_pooled =
+      !table.rows.empty() && table.rows.front().values.contains("adult");  // tissue_table.h
+  return !is_pooled && !(person.sex && person.build);
+}
+
+struct NamedTable {
+  std::string name;
+  TissueTable table;
+};
+
+// The id, with a number behind it where another way has it.
+std::string NameFor(const std::string& id, const std::vector<NamedTable>& before) {
+  constexpr std::array kOwn = {"mean", "person", "known", "person_known"};
+  std::string name = id;
+  for (int number = 2; std::ranges::find(kOwn, name) != kOwn.end() ||
+                       std::ranges::find(before, name, &NamedTable::name) != before.end();
+       ++number) {
+    name = fmt::format("{} ({})", id, number);
+  }
+  return name;
+}
+
 class Judge {
  public:
   Judge(const PopulationFile& file, const std::vector<CountedSubject>& subjects,
         const JointSample& sample)
       : file_(file), subjects_(subjects), sample_(sample) {
     for (const std::filesystem::path& path : file.tables) {
-      tables_.push_back(ReadTissueTable(path));
+      TissueTable table = ReadTissueTable(path);
+      const std::string name = NameFor(table.id, tables_);
+      tables_.push_back({name, std::move(table)});
     }
     for (const std::string& name : Varying(sample).names) {  // else it would be the mean again
       has_person_ = has_person_ || !IsSite(name);
+      has_known_ = has_known_ || (IsSite(name) && IsKnownSite(file, name));
     }
   }
 
@@ -97,14 +125,26 @@ class Judge {
     if (has_person_) {
       add("person", true, false);
     }
-    add("known", false, true);
-    if (has_person_) {
+    if (has_known_) {
+      add("known", false, true);
+    }
+    if (has_person_ && has_known_) {
       add("person_known", true, true);
     }
-    for (const TissueTable& table : tables_) {
-      ways.emplace_back(table.id, ForecastsOf(table, subjects_[subject].person, sample_));
+    for (const auto& [name, table] : tables_) {
+      ways.emplace_back(name, ForecastsOf(table, subjects_[subject].person, sample_));
     }
     return ways;
+  }
+
+  // Of a way that is a table: the subjects whose sex or build it has to assume.
+  int CountAssumed(const std::string& way) const {
+    const auto at = std::ranges::find(tables_, way, &NamedTable::name);
+    return at == tables_.end()
+               ? 0
+               : static_cast<int>(std::ranges::count_if(subjects_, [&](const auto& subject) {
+                   return IsAssumed(at->table, subject.person);
+                 }));
   }
 
   // Whether all ways predict the site and the subject has it.
@@ -120,8 +160,8 @@ class Judge {
   const PopulationFile& file_;
   const std::vector<CountedSubject>& subjects_;
   const JointSample& sample_;
-  std::vector<TissueTable> tables_;
-  bool has_person_ = false;
+  std::vector<NamedTable> tables_;
+  bool has_person_ = false, has_known_ = false;
 };
 
 void Score(int subjects, Foresight& way) {
@@ -180,6 +220,7 @@ std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
     }
   }
   for (Foresight& way : result) {
+    way.assumed = judge.CountAssumed(way.name);
     Score(static_cast<int>(sample.values.rows()), way);
   }
   CompareWithMean(result);

@@ -14,7 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t kFewest = 8;
 constexpr double kNormalFactor = 1.4826;  // of the median absolute deviation
 
 // (value - median) / robust deviation of the finite ones; NaN elsewhere, and for too few.
@@ -26,7 +25,7 @@ std::vector<double> RobustZ(const std::vector<double>& values, double least_devi
     }
   }
   std::vector<double> z(values.size(), kNaN);
-  if (there.size() < kFewest) {
+  if (std::ssize(there) < kFewestForOutliers) {
     return z;
   }
   const double median = Quantile(there, 0.5);

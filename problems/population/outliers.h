@@ -10,6 +10,10 @@
 
 namespace semblance {
 
+// Subjects with a depth at a site for outliers to be looked for there: a median of fewer says
+// nothing.
+inline constexpr int kFewestForOutliers = 8;
+
 struct Outlier {
   int subject = -1;           // row of the sample
   std::string site;           // empty: the subject as a whole
@@ -22,8 +26,7 @@ struct Outlier {
 // distribution; covariates count too), z = (e - median) / s over the subjects that have the site, s
 // 1.4826 times the median absolute deviation and at least 0.2 mm. A subject: likewise the logarithm
 // of the root mean square over its sites of (depth - median) / s, s at least 0.1. Nothing where
-// fewer than eight subjects have a site: a median of so few says nothing. Sites first, in the order
-// of the subjects.
+// fewer than kFewestForOutliers subjects have a site. Sites first, in the order of the subjects.
 std::vector<Outlier> FindOutliers(const JointSample& sample, const JointNormal& joint,
                                   const OutlierOptions& options);
 

@@ -10,6 +10,7 @@
 #include "problems/output/file_hashes.h"
 #include "problems/output/manifest.h"
 #include "problems/population/population_folder.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -98,9 +99,21 @@ bool HasLandmarks(const PopulationSubject& subject) {
 
 }  // namespace
 
+std::string ComplaintAboutCodes(const std::vector<std::string>& codes) {
+  for (const std::string& code : codes) {
+    const bool is_known = std::ranges::any_of(
+        AllSites(), [&](const Site& site) { return site.code == code || site.landmark == code; });
+    if (!is_known) {
+      return ComplaintAboutLandmark(code);
+    }
+  }
+  return "";
+}
+
 PopulationPlan ReadPopulation(const fs::path& path) {
   PopulationPlan plan;
-  plan.file = fs::is_directory(path) ? FolderPopulation(path) : ReadConfig<PopulationFile>(path);
+  plan.file = fs::is_directory(path) ? FolderPopulation(path, plan.notes)
+                                     : ReadConfig<PopulationFile>(path);
   std::vector<PopulationSubject> subjects;
   for (const PopulationSubject& subject : plan.file.subjects) {
     if (subject.optional && IsMissing(subject)) {

@@ -34,6 +34,10 @@ void Fields(Visitor& visit, PhantomScan& o) {
         o.import);
 }
 
+// Empty where each code is a site's (sites.h), or a pair's without side; else what is wrong with
+// the first that is none.
+std::string ComplaintAboutCodes(const std::vector<std::string>& codes);
+
 struct PopulationSubject {
   std::string name;                           // each once
   Subject subject;                            // without landmarks: they are proposed
@@ -71,6 +75,9 @@ template <class Report>
 void CheckValue(Report& report, const PopulationSubject& o) {
   if (o.scan && !std::holds_alternative<PhantomOptions>(o.subject)) {
     report("scan", "is for phantoms; a subject of files or of a CT is as it is");
+  }
+  if (const std::string complaint = ComplaintAboutCodes(o.exclude); !complaint.empty()) {
+    report("exclude", complaint);
   }
 }
 
@@ -235,10 +242,17 @@ void Fields(Visitor& visit, PopulationFile& o) {
         o.shrinkage);
   visit(FieldInfo{.name = "known",
                   .doc = "sites that are taken as measured where the scores ask what a few "
-                         "measured depths tell of the others"},
+                         "measured depths tell of the others; a pair's code without side means "
+                         "both sides; none: that is not asked"},
         o.known);
   visit(FieldInfo{.name = "tables", .doc = "published tables to score beside the population's own"},
         o.tables);
+}
+template <class Report>
+void CheckValue(Report& report, const PopulationFile& o) {
+  if (const std::string complaint = ComplaintAboutCodes(o.known); !complaint.empty()) {
+    report("known", complaint);
+  }
 }
 
 // One subject of a population as it is measured.
@@ -251,17 +265,18 @@ struct PopulationEntry {
 struct PopulationPlan {
   PopulationFile file;
   std::vector<PopulationEntry> entries;  // the subjects that are there, then the phantoms
-  std::vector<std::string> notes;        // subjects that were left out
+  std::vector<std::string> notes;        // subjects that were left out, folders passed over
 };
 
 // `path`: a YAML file, or a folder with a folder for each subject:
 //   skull.* and skin.* (PLY, OBJ, STL or OFF), or a volume (volume.nii.gz, a folder ct/ or dicom/
 //   of DICOM, whatever ReadVolume takes); landmarks.* (whatever ReadLandmarks takes) if there are
 //   any;
-// beside them subjects.csv with the columns name, sex, build, age_years and bmi, as far as they are
-// known, and population.yaml with options, if they are there. Throws IoError or ConfigError for
-// what cannot be read; InputError for a name that appears twice or is not plain, and where there is
-// no subject.
+// in capitals or not. Other folders are passed over, with a note each. Beside them subjects.csv
+// with the columns name, sex, build, age_years and bmi, as far as they are known, and
+// population.yaml with options, if they are there. Throws IoError or ConfigError for what cannot be
+// read, and for a row of subjects.csv that is nobody's, a second one of a person, or out of range;
+// InputError for a name that appears twice or is not plain, and where there is no subject.
 PopulationPlan ReadPopulation(const std::filesystem::path& path);
 
 // The files that must be there: those of subjects that are not optional, tables and references.

@@ -37,13 +37,13 @@ std::string DepthsCsv(const PopulationResult& result) {
   return csv.Text();
 }
 
-std::string SubjectsCsv(const PopulationResult& result) {
+std::string SubjectsCsv(const std::vector<MeasuredSubject>& subjects) {
   std::vector<std::string> columns = {"subject", "id", "status", "reason", "sites", "cells"};
   for (const std::string& name : CovariateNames()) {
     columns.push_back(name);
   }
   CsvWriter csv(columns);
-  for (const MeasuredSubject& subject : result.subjects) {
+  for (const MeasuredSubject& subject : subjects) {
     const auto sites = std::ranges::count_if(
         subject.depths.sites, [](const SiteDepth& site) { return std::isfinite(site.depth_mm); });
     const auto cells = std::ranges::count_if(subject.depths.dense.depth_mm,
@@ -121,6 +121,7 @@ Json ScoresJson(const Foresight& way) {
 
 Json SummaryJson(const PopulationResult& result) {
   Json json = {{"title", result.file.title},
+               {"id", result.file.id},
                {"version", SEMBLANCE_VERSION},
                {"subjects",
                 {{"all", result.subjects.size()},
@@ -161,7 +162,7 @@ void WritePopulation(const PopulationResult& result, OutputFolder& folder) {
   const std::vector<std::pair<const char*, std::string>> files = {
       {"table.yaml", "# SPDX-License-Identifier: GPL-3.0-or-later\n" + WriteConfig(result.table)},
       {"depths.csv", DepthsCsv(result)},
-      {"subjects.csv", SubjectsCsv(result)},
+      {"subjects.csv", SubjectsCsv(result.subjects)},
       {"outliers.csv", OutliersCsv(result)},
       {"leave_one_out.csv", LeaveOneOutCsv(result)},
       {"dense.csv", DenseCsv(result.dense)},
@@ -171,6 +172,10 @@ void WritePopulation(const PopulationResult& result, OutputFolder& folder) {
   for (const auto& [name, bytes] : files) {
     folder.Write(name, bytes);
   }
+}
+
+void WriteSubjects(const std::vector<MeasuredSubject>& subjects, OutputFolder& folder) {
+  folder.Write("subjects.csv", SubjectsCsv(subjects));
 }
 
 }  // namespace semblance

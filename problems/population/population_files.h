@@ -19,4 +19,7 @@ inline constexpr std::array<std::string_view, 9> kPopulationFiles = {
 // population.json and report.html; the same bytes for the same result.
 void WritePopulation(const PopulationResult& result, OutputFolder& folder);
 
+// subjects.csv alone, where there is no table: who was measured, and why the others were not.
+void WriteSubjects(const std::vector<MeasuredSubject>& subjects, OutputFolder& folder);
+
 }  // namespace semblance

@@ -3,12 +3,15 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "problems/population/population_file.h"
 
 namespace semblance {
 
-// As ReadPopulation says of folders. Throws as it.
-PopulationFile FolderPopulation(const std::filesystem::path& folder);
+// As ReadPopulation says of folders. Adds a note for each folder that is passed over. Throws as it.
+PopulationFile FolderPopulation(const std::filesystem::path& folder,
+                                std::vector<std::string>& notes);
 
 }  // namespace semblance

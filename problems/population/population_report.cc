@@ -41,11 +41,13 @@ std::vector<ReportTile> Tiles(const PopulationResult& result) {
       {"subjects", std::to_string(result.counted.size()), "",
        fmt::format("{} failed, {} missing", result.Count("failed"), result.Count("missing"))},
       {"sites", std::to_string(result.table.rows.size()), "", ""},
-      {"outliers", std::to_string(result.outliers.size()), "",
-       result.file.outliers.leave_out ? "left out" : "listed, not left out"},
+      {"outliers", result.LooksForOutliers() ? std::to_string(result.outliers.size()) : "-", "",
+       !result.LooksForOutliers()       ? "not looked for"
+       : result.file.outliers.leave_out ? "left out"
+                                        : "listed, not left out"},
       {"correlations", fmt::format("{:.0f}", 100 * (1 - result.joint.shrinkage)), "%",
        "the subjects' own; the rest is a model's"}};
-  if (!result.foresights.empty()) {
+  if (!result.foresights.empty() && result.foresights[0].scores.points > 0) {
     tiles.push_back({"a subject left out",
                      fmt::format("{:.2f}", result.foresights[0].scores.mae_mm), "mm",
                      "mean absolute error of the others' mean"});
@@ -71,7 +73,8 @@ ReportTable ForesightTable(const PopulationResult& result) {
          TableNumber(s.coverage_90), TableNumber(s.coverage_95), TableNumber(s.mean_sd_mm),
          std::isfinite(d.mean_95.low)
              ? fmt::format("{:+.3f} ({:+.3f} to {:+.3f})", d.mean, d.mean_95.low, d.mean_95.high)
-             : fmt::format("{:+.3f}", d.mean)});
+         : std::isfinite(d.mean) ? fmt::format("{:+.3f}", d.mean)
+                                 : ""});
   }
   return table;
 }
@@ -110,10 +113,11 @@ ReportSection ForesightSection(const PopulationResult& result) {
   ReportSection section{.heading = "How well a person is predicted"};
   section.paragraphs = {fmt::format(
       "Each subject is left out, the table is found from the others, and the subject's depths are "
-      "compared with it, at the sites that every way predicts. The few measured depths are those "
-      "at "
-      "{}, which with their other sides are in no score.",
-      fmt::join(result.file.known, ", "))};
+      "compared with it, at the sites that every way predicts.{}",
+      result.file.known.empty() ? ""
+                                : fmt::format(" The few measured depths are those at {}, which "
+                                              "with their other sides are in no score.",
+                                              fmt::join(result.file.known, ", ")))};
   section.tables = {ForesightTable(result)};
   section.images = {{BoxPlotSvg(ErrorRows(result), "mean absolute error of a subject, mm"),
                      "One dot per subject.", "box plot of each subject's mean absolute error"}};
@@ -165,7 +169,11 @@ ReportSection OutlierSection(const PopulationResult& result) {
   }
   ReportSection section{.heading = "Outliers"};
   if (table.rows.empty()) {
-    section.paragraphs = {"None was found."};
+    section.paragraphs = {result.LooksForOutliers()
+                              ? std::string("None was found.")
+                              : fmt::format("They are looked for from {} subjects on: a median of "
+                                            "fewer says nothing.",
+                                            kFewestForOutliers)};
     return section;
   }
   section.paragraphs = {

@@ -26,9 +26,13 @@ struct PopulationResult {
   std::vector<std::string> notes;
 
   int Count(const std::string& status) const;  // subjects of that status
+  bool LooksForOutliers() const;               // else so few are measured that none can be told
 };
 
-// Throws InputError if fewer than three subjects are measured, or no two sites vary; Cancelled.
+// Empty where enough subjects are measured for a table, three or more; else what is lacking.
+std::string WhyNoTable(const PopulationPlan& plan, const std::vector<MeasuredSubject>& subjects);
+
+// Throws InputError as WhyNoTable says, or if no two sites vary; Cancelled.
 PopulationResult AnalysePopulation(const PopulationPlan& plan,
                                    std::vector<MeasuredSubject> subjects);
 

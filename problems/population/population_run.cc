@@ -9,6 +9,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <system_error>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -61,6 +62,69 @@ std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id,
 void WriteSubject(const fs::path& folder, const Json& json, Durability durability) {
   WriteFileAtomically(FileOf(folder, json.at("id").get<std::string>()), json.dump() + "\n",
                       durability);
+}
+
+std::vector<fs::path> EntriesOf(const fs::path& folder) {
+  std::error_code error;  // what cannot be read is told by whoever writes there
+  std::vector<fs::path> entries;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    entries.push_back(at->path());
+  }
+  return entries;
+}
+
+// The subjects that were measured there, whatever their files hold.
+std::vector<std::string> IdsIn(const fs::path& folder) {
+  std::vector<std::string> ids;
+  for (const fs::path& file : EntriesOf(folder / "subjects")) {
+    if (file.extension() == ".json") {
+      ids.push_back(file.stem().string());
+    }
+  }
+  return ids;
+}
+
+// Files that are being written, or were when a process was killed, do not count, nor does the
+// folder for subjects before the first is measured: another shard may just have begun.
+bool HoldsAnything(const fs::path& folder) {
+  const auto counts = [](const fs::path& entry) {
+    const std::string name = entry.filename().string();
+    return !(name.starts_with('.') && name.ends_with(".tmp"));
+  };
+  for (const fs::path& entry : EntriesOf(folder)) {
+    const bool begun =
+        entry.filename() == "subjects" && std::ranges::none_of(EntriesOf(entry), counts);
+    if (counts(entry) && !begun) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// What the results of another population are called; empty where there are none, or this one's.
+// Those of an older version do not tell the id.
+std::string OtherResultsIn(const fs::path& folder, const PopulationFile& file) try {
+  const fs::path summary = folder / "population.json";
+  if (!fs::exists(summary)) {
+    return "";
+  }
+  const Json json = ParseJson(ReadFileBytes(summary), summary.string());
+  const auto title = json.at("title").get<std::string>();
+  const auto id = json.value("id", file.id);
+  return title == file.title && id == file.id ? "" : fmt::format("'{}' (id {})", title, id);
+} catch (const Json::exception&) {
+  return "";
+} catch (const IoError&) {
+  return "";
+}
+
+void RequireSubjectsIn(const fs::path& folder) {
+  if (!fs::is_directory(folder / "subjects")) {
+    throw IoError(fmt::format(
+        "{}: {}; --from takes folders that semblance population has measured subjects into",
+        folder.string(),
+        fs::is_directory(folder) ? "there is no subjects/ in it" : "there is no such folder"));
+  }
 }
 
 class PopulationRunner {
@@ -176,22 +240,49 @@ std::vector<MeasuredSubject> ReadMeasured(const PopulationPlan& plan, const fs::
   return measured;
 }
 
-int GatherSubjects(const PopulationPlan& plan, const fs::path& folder,
-                   const std::vector<fs::path>& others) {
-  int taken = 0;
+std::vector<GatheredFrom> GatherSubjects(const PopulationPlan& plan, const fs::path& folder,
+                                         const std::vector<fs::path>& others) {
+  std::vector<GatheredFrom> gathered;
+  for (const fs::path& other : others) {
+    RequireSubjectsIn(other);
+    gathered.push_back({.folder = other});
+  }
   fs::create_directories(folder / "subjects");
-  for (const PopulationEntry& entry : plan.entries) {
-    for (const fs::path& other : others) {
-      if (ReadSubject(folder, entry.id, plan)) {
-        break;
-      }
-      if (const auto json = ReadSubject(other, entry.id, plan)) {
+  for (GatheredFrom& from : gathered) {
+    for (const PopulationEntry& entry : plan.entries) {
+      const auto json = ReadSubject(from.folder, entry.id, plan);
+      from.held += json ? 1 : 0;
+      if (json && !ReadSubject(folder, entry.id, plan)) {
         WriteSubject(folder, *json, Durability::kSynced);
-        ++taken;
+        ++from.taken;
       }
     }
   }
-  return taken;
+  return gathered;
+}
+
+void RefuseOtherFolder(const PopulationPlan& plan, const fs::path& folder) {
+  const auto refuse = [&](const std::string& what) {
+    throw IoError(
+        fmt::format("{}: {}; name another --out, or add --force to replace files of the same name",
+                    folder.string(), what));
+  };
+  const std::vector<std::string> there = IdsIn(folder);
+  if (there.empty() && HoldsAnything(folder)) {
+    refuse("the folder is not empty, and holds no population");
+  }
+  const bool shares = std::ranges::any_of(plan.entries, [&](const PopulationEntry& entry) {
+    return std::ranges::find(there, entry.id) != there.end();
+  });
+  if (!there.empty() && !shares) {
+    refuse(
+        "the folder holds another population: none of its subjects is one of this, of the same "
+        "files and measured in the same way");
+  }
+  if (const std::string other = OtherResultsIn(folder, plan.file); !other.empty()) {
+    refuse(fmt::format("the folder holds another population, {}; this is '{}' (id {})", other,
+                       plan.file.title, plan.file.id));
+  }
 }
 
 }  // namespace semblance

@@ -48,9 +48,23 @@ struct MeasuredSubject {
 std::vector<MeasuredSubject> ReadMeasured(const PopulationPlan& plan,
                                           const std::filesystem::path& folder);
 
-// Copies the files of subjects of the plan that `folder` lacks from other folders. Returns how
-// many. Throws IoError.
-int GatherSubjects(const PopulationPlan& plan, const std::filesystem::path& folder,
-                   const std::vector<std::filesystem::path>& others);
+// What another folder gave.
+struct GatheredFrom {
+  std::filesystem::path folder;
+  int held = 0;   // subjects of the plan that it has
+  int taken = 0;  // of these, those that were lacking
+};
+
+// Copies the files of subjects of the plan that `folder` lacks from other folders, the first that
+// has one. Throws IoError, before anything is copied, for one that is not there or has no
+// subjects/.
+std::vector<GatheredFrom> GatherSubjects(const PopulationPlan& plan,
+                                         const std::filesystem::path& folder,
+                                         const std::vector<std::filesystem::path>& others);
+
+// Throws IoError if the folder holds anything but this population: files and no measured subject;
+// subjects of which none is in the plan; or the results of a population of another title or id. One
+// that is empty or not there holds nothing.
+void RefuseOtherFolder(const PopulationPlan& plan, const std::filesystem::path& folder);
 
 }  // namespace semblance

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "problems/phantom/phantom_ct.h"
@@ -30,6 +31,7 @@ double ConfidenceOf(Certainty certainty) {
 struct Marked {
   LandmarkFile file;
   std::map<std::string, double> confidence;
+  std::vector<SiteDepth> dropped;  // without a depth
 };
 
 Marked Propose(const SubjectData& data, const std::string& name,
@@ -45,7 +47,7 @@ Marked Propose(const SubjectData& data, const std::string& name,
     throw InputError(fmt::format("{}: its skull looks as if it were in {}; write `axes: {}` there",
                                  name, proposal.axes, proposal.axes));
   }
-  Marked marked{ProposalFile(proposal, name), {}};
+  Marked marked{ProposalFile(proposal, name), {}, {}};
   for (const ProposedSite& site : proposal.sites) {
     marked.confidence[site.site] = site.confidence;
   }
@@ -53,11 +55,49 @@ Marked Propose(const SubjectData& data, const std::string& name,
 }
 
 Marked AsRead(LandmarkFile file) {
-  Marked marked{std::move(file), {}};
+  Marked marked{std::move(file), {}, {}};
   for (const Landmark& landmark : marked.file.landmarks) {
     marked.confidence[landmark.site] = marked.file.proposed ? ConfidenceOf(landmark.certainty) : 1;
   }
   return marked;
+}
+
+Vec3 PointOf(const Landmark& landmark) {
+  return {landmark.point[0], landmark.point[1], landmark.point[2]};
+}
+
+// Nearer ones are a mistake (landmark_mistakes.h).
+double SamePoint_mm(const std::vector<Landmark>& landmarks) {
+  Box3 box;
+  for (const Landmark& landmark : landmarks) {
+    box.extend(PointOf(landmark));
+  }
+  return std::min(0.5, 0.002 * box.diagonal().norm());
+}
+
+// Of proposed landmarks on one point the surest stays: no person has placed them, so that no person
+// has mistaken anything, and the other sites are as good as they were.
+void DropClashing(Marked& marked) {
+  const double same_mm = SamePoint_mm(marked.file.landmarks);
+  std::vector<Landmark> by_confidence = marked.file.landmarks, kept;
+  std::ranges::stable_sort(by_confidence, std::ranges::greater{},
+                           [&](const Landmark& l) { return marked.confidence.at(l.site); });
+  for (const Landmark& landmark : by_confidence) {
+    const auto surer = std::ranges::find_if(kept, [&](const Landmark& other) {
+      return (PointOf(other) - PointOf(landmark)).norm() <= same_mm;
+    });
+    if (surer == kept.end()) {
+      kept.push_back(landmark);
+      continue;
+    }
+    marked.dropped.push_back(
+        {.site = landmark.site,
+         .confidence = marked.confidence.at(landmark.site),
+         .why_not =
+             fmt::format("proposed on the point of {}; a person has to place it", surer->site)});
+    std::erase_if(marked.file.landmarks,
+                  [&](const Landmark& other) { return other.site == landmark.site; });
+  }
 }
 
 bool IsExcluded(const PopulationSubject& subject, const std::string& site) {
@@ -173,8 +213,11 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
     throw InputError(fmt::format("{}: it has no skin; a depth needs one", subject.name));
   }
   const bool open = data.landmarks.landmarks.empty();
-  const Marked marked =
+  Marked marked =
       open ? Propose(data, subject.name, references, context) : AsRead(std::move(data.landmarks));
+  if (marked.file.proposed) {
+    DropClashing(marked);
+  }
   data.landmarks = marked.file;
   SubjectDepths depths{.name = subject.name,
                        .proposed = marked.file.proposed,
@@ -195,6 +238,10 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
   context.ThrowIfStopped();
   const std::vector<Dowel> dowels = PlaceDowels(marked.file, data.skull, options.landmarks);
   depths.sites = DepthsAtSites(subject, marked, dowels, skin, options, context);
+  for (const SiteDepth& dropped : marked.dropped) {
+    depths.notes.push_back(fmt::format("{}: {}", dropped.site, dropped.why_not));
+    depths.sites.push_back(dropped);
+  }
   depths.dense = DepthsOverSkull(marked.file, skull, skin, options, context);
   return depths;
 }

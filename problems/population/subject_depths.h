@@ -38,8 +38,9 @@ struct SubjectDepths {
 
 // Measures a subject: its landmarks (or proposed ones) are laid on the bone, and the depth there is
 // taken to the skin that is seen from outside. references: not empty if the subject has no
-// landmarks. Throws InputError as LoadSubject, CheckSubject and ProposeLandmarks, and for a subject
-// without a skin; Cancelled.
+// landmarks. Of proposed landmarks on one point (landmark_mistakes.h) the surest counts; the others
+// are sites without a depth. Throws InputError as LoadSubject, CheckSubject and ProposeLandmarks,
+// and for a subject without a skin; Cancelled.
 SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOptions& options,
                              std::span<const ReferenceHead> references, const RunContext& context);
 

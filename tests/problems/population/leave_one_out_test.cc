@@ -84,6 +84,35 @@ TEST(LeaveOneOut, WhatNoTwoDifferInIsNoWay) {
   EXPECT_EQ(LeaveOneOut({}, people, SampleOf(people, 0)).size(), 4u);
 }
 
+// A way that knows nothing would be the mean again.
+TEST(LeaveOneOut, WithoutKnownSitesThereIsNoWayOfThem) {
+  const auto people = People(5);
+  PopulationFile file;
+  file.known.clear();
+  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  ASSERT_EQ(ways.size(), 2u);
+  EXPECT_EQ(ways[0].name, "mean");
+  EXPECT_EQ(ways[1].name, "person");
+  EXPECT_EQ(ways[0].scores.points, 5 * 32);
+}
+
+TEST(LeaveOneOut, TablesHaveNamesOfTheirOwnAndSayWhatTheyAssume) {
+  auto people = People(5);
+  people[0].person.sex = people[1].person.sex = Sex::kFemale;
+  people[0].person.build = Build::kNormal;
+  PopulationFile file;
+  const std::string tables = SEMBLANCE_SOURCE_DIR "/configs/tables/";
+  file.tables = {tables + "t_table_2023.yaml", tables + "t_table_2023.yaml",
+                 tables + "rhine_caucasoid.yaml"};
+  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  ASSERT_EQ(ways.size(), 7u);
+  EXPECT_EQ(ways[4].name, "t_table_2023");
+  EXPECT_EQ(ways[5].name, "t_table_2023 (2)");
+  EXPECT_EQ(ways[5].assumed, 0);  // it is pooled
+  EXPECT_EQ(ways[6].assumed, 4);
+  EXPECT_EQ(ways[0].assumed, 0);
+}
+
 TEST(LeaveOneOut, ScoresAPublishedTableBesideThem) {
   const auto people = People(12);
   PopulationFile file;
