@@ -18,6 +18,7 @@ namespace {
 using Notes = std::vector<std::string>;
 
 constexpr double kThinnest_mm = 0.5;
+constexpr double kFarthest_sds = 4;  // from the mean: beyond these no subject says how it goes on
 
 std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
   std::map<std::string, double> known;
@@ -102,6 +103,21 @@ std::vector<KnownValue> Telling(const TissueGiven& given, const JointNormal& joi
   return known;
 }
 
+// What is known that no subject of the table comes near.
+void NoteFarValues(const JointNormal& joint, const std::vector<KnownValue>& known, Notes& notes) {
+  for (const KnownValue& value : known) {
+    const int at = *joint.Find(value.name);
+    const double mean = joint.mean[at], sd = joint.sd[at];
+    const double sds = std::abs(value.value - mean) / std::hypot(sd, value.error_sd);
+    if (sds > kFarthest_sds) {
+      notes.push_back(fmt::format(
+          "tissue.given: {} {:.4g} is {:.0f} standard deviations from the table's {:.4g} "
+          "± {:.2g}, so the depths given it are extrapolated; check the number",
+          value.name, value.value, sds, mean, sd));
+    }
+  }
+}
+
 // The depth of one dowel; false if the table does not say how it varies.
 bool Give(const TissueOptions& options, const JointNormal& joint, const ConditionalNormal& expected,
           Dowel& dowel) {
@@ -156,7 +172,7 @@ JointNormal JointOfTable(const TissueTable& table, Sex sex, Build build,
   joint.shrinkage = stated.shrinkage;
   joint.mean = Eigen::Map<const Eigen::VectorXd>(mean.data(), std::ssize(mean));
   joint.sd = Eigen::Map<const Eigen::VectorXd>(sd.data(), std::ssize(sd));
-  joint.correlation = ModelledCorrelation(model, joint.names);
+  joint.model = joint.correlation = ModelledCorrelation(model, joint.names);
   for (std::size_t i = 0; i < stated.rows.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       const auto a = static_cast<Eigen::Index>(i), b = static_cast<Eigen::Index>(j);
@@ -175,6 +191,7 @@ std::vector<std::string> ConditionDepths(const TissueOptions& options,
   const JointNormal joint = JointOf(options);
   const std::map<std::string, double> depths = KnownDepths(options.given, landmarks);
   const std::vector<KnownValue> known = Telling(options.given, joint, depths, notes);
+  NoteFarValues(joint, known, notes);
   const ConditionalNormal expected = Condition(joint, known);
   std::vector<std::string> kept;
   for (Dowel& dowel : dowels) {

@@ -176,7 +176,8 @@ JointNormal FitJointNormal(const JointSample& sample, const MatrixXd& target,
                     .sd = {},
                     .correlation = {},
                     .sample = z.counts,
-                    .shrinkage = shrinkage ? *shrinkage : ShrinkageOf(z.values, target)};
+                    .shrinkage = shrinkage ? *shrinkage : ShrinkageOf(z.values, target),
+                    .model = target};
   const Moments moments = MomentsOf(z.values, target, joint.shrinkage);
   const VectorXd sd = moments.covariance.diagonal().cwiseSqrt();
   const VectorXd inverse = sd.cwiseInverse();

@@ -47,15 +47,30 @@ double StudentFactor(double freedom) {
          boost::math::quantile(boost::math::normal(), kUpper);
 }
 
+// What a forecast from known numbers owes to the sample behind its factors.
+struct OfSample {
+  double counted = 0;           // numbers that the sample was asked for
+  double squared_distance = 0;  // of what is known from the mean: q of the header
+};
+
 // By which a deviation grows, as means, deviations and correlations come from `sample` subjects.
-double Widening(int sample, double counted, double squared_distance, double shrinkage) {
+double Widening(int sample, const OfSample& of, double shrinkage) {
   if (sample < 2) {
     return 1;
   }
-  const double n = sample, freedom = std::max(1.0, n - 1 - counted);
+  const double n = sample, freedom = std::max(1.0, n - 1 - of.counted);
   const double variance =
-      (n - 1) / freedom * (1 + 1 / n + (1 - shrinkage) * squared_distance / (n - 1));
+      (n - 1) / freedom * (1 + 1 / n + (1 - shrinkage) * of.squared_distance / (n - 1));
   return std::sqrt(variance) * StudentFactor(freedom);
+}
+
+Eigen::MatrixXd Scaled(const JointNormal& joint, const Eigen::MatrixXd& correlation) {
+  return joint.sd.asDiagonal() * correlation * joint.sd.asDiagonal();
+}
+
+// Of the covariance S, the part that is the sample's own: without the model's.
+Eigen::MatrixXd OfSubjects(const JointNormal& joint, const Eigen::MatrixXd& s) {
+  return s - joint.shrinkage * (joint.model.size() > 0 ? Scaled(joint, joint.model) : s);
 }
 
 }  // namespace
@@ -68,9 +83,10 @@ std::optional<int> JointNormal::Find(const std::string& name) const {
 ConditionalNormal Condition(const JointNormal& joint, std::span<const KnownValue> known) {
   const std::vector<Index> at = IndicesOf(joint, known);
   const auto count = static_cast<Index>(known.size());
-  Eigen::MatrixXd s = joint.sd.asDiagonal() * joint.correlation * joint.sd.asDiagonal();
+  const Eigen::MatrixXd s = Scaled(joint, joint.correlation);
   ConditionalNormal result{joint.mean, {}, s};
-  double squared_distance = 0;
+  Eigen::VectorXd of_errors = Eigen::VectorXd::Zero(joint.mean.size());
+  OfSample of;
   if (count > 0) {
     Eigen::VectorXd off(count), errors(count);
     for (Index k = 0; k < count; ++k) {
@@ -81,19 +97,24 @@ ConditionalNormal Condition(const JointNormal& joint, std::span<const KnownValue
     Eigen::MatrixXd v = s(at, at);
     v.diagonal() += errors;
     const Eigen::LLT<Eigen::MatrixXd> factor(v);
-    squared_distance = off.dot(factor.solve(off));
-    result.mean += with * factor.solve(off);
-    result.covariance -= with * factor.solve(with.transpose());
+    const Eigen::VectorXd weights = factor.solve(off);
+    const Eigen::MatrixXd factors = factor.solve(with.transpose());  // B'
+    result.mean += with * weights;
+    result.covariance -= with * factors;
+    of_errors = factors.cwiseAbs2().transpose() * errors;
+    of.squared_distance = off.dot(weights) - errors.dot(weights.cwiseAbs2());
+    of.counted = std::max(0.0, factor.solve(OfSubjects(joint, s)(at, at)).trace());
   }
-  const double counted = static_cast<double>(count) * (1 - joint.shrinkage);
-  result.sd = result.covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  for (Index i = 0; i < result.sd.size(); ++i) {
-    result.sd[i] *= Widening(joint.sample[i], counted, squared_distance, joint.shrinkage);
+  const Eigen::VectorXd open = (result.covariance.diagonal() - of_errors).cwiseMax(0).cwiseSqrt();
+  result.sd.resize(open.size());
+  for (Index i = 0; i < open.size(); ++i) {
+    result.sd[i] = std::hypot(std::sqrt(of_errors[i]),
+                              open[i] * Widening(joint.sample[i], of, joint.shrinkage));
   }
   for (Index k = 0; k < count; ++k) {
+    result.sd[at[k]] = std::min(result.sd[at[k]], known[k].error_sd);
     if (known[k].error_sd == 0) {
       result.mean[at[k]] = known[k].value;
-      result.sd[at[k]] = 0;
     }
   }
   return result;

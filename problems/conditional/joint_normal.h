@@ -17,6 +17,7 @@ struct JointNormal {
   Eigen::MatrixXd correlation;     // n x n, positive definite
   std::vector<int> sample;         // n: subjects behind each mean and sd; 0: taken as exact
   double shrinkage = 0;            // 0..1: part of the correlations that is a model's
+  Eigen::MatrixXd model = {};      // n x n: that model's; empty: as `correlation`
 
   std::optional<int> Find(const std::string& name) const;
 };
@@ -34,16 +35,20 @@ struct ConditionalNormal {
 };
 
 // The distribution of a person's numbers given some of them: with S the covariance, G the known
-// ones, E the variances of their errors and V = S_GG + E,
-//   mean = m + S_.G V^-1 (x - m_G),   covariance = S - S_.G V^-1 S_G. .
-// Where means and deviations come from n subjects, sd is widened as the prediction of a regression
-// is: with k known numbers, of which the part 1 - shrinkage rests on the sample, v = n - 1 - k (1 -
-// shrinkage) and q = (x - m_G)' V^-1 (x - m_G),
-//   sd^2 = covariance (n - 1) / v (1 + 1 / n + (1 - shrinkage) q / (n - 1)),
-// and by Student's quantile at 95 % for v over that of the normal distribution: so the 90 %
-// interval is the exact one for a complete sample without shrinkage (Seber & Lee 2003, 5.3). v is
-// at least 1. Throws InputError if a known name is not among the names, appears twice, or is not
-// finite.
+// ones, E the variances of their errors, V = S_GG + E and B = S_.G V^-1,
+//   mean = m + B (x - m_G),   covariance = S - B S_G. .
+// Of the covariance's diagonal the part N = diag(B E B') is what the errors bring; their variance
+// is given. The rest is what the regression on the numbers themselves leaves open. Where means and
+// deviations come from n subjects, the rest is widened as the prediction of a regression is: with
+// q = w' S_GG w, w = V^-1 (x - m_G), and v = n - 1 - k,
+//   sd^2 = N + (covariance - N) (n - 1) / v (1 + 1 / n + (1 - shrinkage) q / (n - 1)) t^2,
+// t Student's quantile at 95 % for v over that of the normal distribution. k counts the numbers
+// that the sample was asked for as ridge regression does: the trace of V^-1 (S_GG - M_GG), M the
+// shrinkage times the model's covariance (Hastie, Tibshirani & Friedman 2009, 3.4.1). A number that
+// is known exactly counts 1 without shrinkage, one with a huge error 0. So the 90 % interval is the
+// exact one for a complete sample without shrinkage or errors (Seber & Lee 2003, 5.3), and what
+// tells nothing changes nothing. v is at least 1. No known number's sd is above its error's. Throws
+// InputError if a known name is not among the names, appears twice, or is not finite.
 ConditionalNormal Condition(const JointNormal& joint, std::span<const KnownValue> known);
 
 }  // namespace semblance

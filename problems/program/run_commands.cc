@@ -141,6 +141,7 @@ int DepthCommand(const Arguments& arguments) {
   const DepthResult result = MeasureDepth(experiment, context);
   WriteDepth(experiment, result, folder.Files(), context);
   folder.Publish();
+  PrintNotes(result.stage->subject.notes);
   fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
   return TellFaults(result.Faults());
 }

@@ -20,6 +20,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::ScratchFile;
 using testing::WordsOf;
 
@@ -167,6 +168,39 @@ TEST(ConditionDepths, TakesAPopulationsCorrelations) {
   options.given.age_years = 40;
   EXPECT_THAT(WordsOf<InputError>([&] { ConditionDepths(options, {}, dowels); }),
               HasSubstr("age_years"));
+}
+
+TEST(ConditionDepths, SaysWhatLiesFarFromAllSubjects) {
+  TissueOptions options;
+  options.table = ScratchFile(kPopulation);
+  std::vector<Dowel> dowels = Dowels({"g", "pg"});
+  options.given.bmi = 40.5;  // 3.9 standard deviations
+  EXPECT_THAT(ConditionDepths(options, {}, dowels), Not(Contains(HasSubstr("extrapolated"))));
+  options.given.bmi = 99;
+  EXPECT_THAT(
+      ConditionDepths(options, {}, dowels),
+      Contains(HasSubstr("tissue.given: bmi 99 is 18 standard deviations from the table's 25 "
+                         "± 4, so the depths given it are extrapolated")));
+  options.given.bmi.reset();
+  options.given.depths_mm = {{"g", 12.0}};
+  EXPECT_THAT(ConditionDepths(options, {}, dowels), Contains(HasSubstr("g 12 is 6 standard")));
+  options.given.error_mm = 5;  // which may be no more than that
+  EXPECT_THAT(ConditionDepths(options, {}, dowels), Not(Contains(HasSubstr("extrapolated"))));
+}
+
+// What a table states of its people goes on as it is: nothing is given of this one.
+TEST(ConditionDepths, AFewSubjectsWidenOnlyWhatIsGiven) {
+  std::string text = kPopulation;
+  text.replace(text.find("subjects: 0"), 11, "subjects: 6");
+  for (std::size_t at = 0; (at = text.find("n: 50")) != text.npos;) {
+    text.replace(at, 5, "n: 6");
+  }
+  TissueOptions options;
+  options.table = ScratchFile(text);
+  EXPECT_EQ(At(Fill(options), "g").sd_mm, 1);
+  options.given.depths_mm = {{"pg", 11.0}};
+  options.given.error_mm = 50;  // tells nothing
+  EXPECT_NEAR(At(Fill(options), "g").sd_mm, std::sqrt(1 + 1 / 6.) * 2.015 / 1.645, 0.01);
 }
 
 TEST(TissueCorrelations, ThatNoDepthsCanHaveAreRefused) {

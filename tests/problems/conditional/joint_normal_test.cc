@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "problems/conditional/fit_joint_normal.h"
 #include "problems/conditional/site_correlation.h"
@@ -105,13 +106,114 @@ TEST(Condition, ErrorsOfWhatIsKnownCount) {
   EXPECT_GT(std::abs(Condition(joint, exact).mean[at] - joint.mean[at]), 1);
 }
 
+// What so many people of another world tell, with the rest from the model.
+JointNormal Population(int people) {
+  JointNormal truth = Sites();
+  truth.correlation =
+      ModelledCorrelation({.common = 0.1, .twins = 0.1, .own = 0.2, .length_mm = 30}, truth.names);
+  Random random(11);
+  return FitJointNormal({truth.names, Draw(truth, people, random)},
+                        ModelledCorrelation({}, truth.names));
+}
+
+std::vector<KnownValue> AtTheirMeans(const JointNormal& joint,
+                                     const std::vector<std::string>& names, double error_mm) {
+  std::vector<KnownValue> known;
+  for (const std::string& name : names) {
+    known.push_back({name, joint.mean[*joint.Find(name)], error_mm});
+  }
+  return known;
+}
+
+// Whether none, few or many people are behind a distribution, and whether some sites are known or
+// all.
+class KnownWithErrors : public ::testing::TestWithParam<std::tuple<int, bool>> {
+ protected:
+  const int people_ = std::get<0>(GetParam());
+  const JointNormal joint_ = people_ > 0 ? Population(people_) : Sites();
+  const std::vector<std::string> names_ =
+      std::get<1>(GetParam()) ? joint_.names
+                              : std::vector<std::string>{"g", "pg", "zy_l", "zy_r", "go_l"};
+  const std::vector<double> errors_mm_ = {0.02, 0.1, 0.2, 0.5, 1, 2, 5, 50};
+
+  ConditionalNormal Given(double error_mm) const {
+    return Condition(joint_, AtTheirMeans(joint_, names_, error_mm));
+  }
+};
+
+TEST_P(KnownWithErrors, AreAtLeastAsSureAsTheirErrorAndTheLessTheLargerItIs) {
+  Eigen::VectorXd last = Given(0).sd;
+  for (const double error_mm : errors_mm_) {
+    const Eigen::VectorXd sd = Given(error_mm).sd;
+    for (const std::string& name : names_) {
+      EXPECT_LE(sd[*joint_.Find(name)], error_mm) << name;
+      EXPECT_GE(sd[*joint_.Find(name)], last[*joint_.Find(name)]) << name << ", " << error_mm;
+    }
+    last = sd;
+  }
+}
+
+// A sample of six that is asked for less tells a tenth surer what it tells, one of forty a
+// hundredth.
+TEST_P(KnownWithErrors, TellTheOthersLessTheLargerTheErrorIs) {
+  const double least = people_ == 6 ? 0.9 : people_ == 40 ? 0.99 : 1 - 1e-9;
+  Eigen::VectorXd last = Given(0).sd;
+  for (const double error_mm : errors_mm_) {
+    const Eigen::VectorXd sd = Given(error_mm).sd;
+    EXPECT_GE((sd - least * last).minCoeff(), 0) << error_mm;
+    last = sd;
+  }
+}
+
+TEST_P(KnownWithErrors, AreAsNothingKnownWhereTheErrorIsHuge) {
+  const ConditionalNormal nothing = Condition(joint_, {}), given = Given(1e6);
+  EXPECT_LT((given.sd - nothing.sd).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT((given.mean - nothing.mean).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(People, KnownWithErrors,
+                         ::testing::Values(std::tuple(0, false), std::tuple(0, true),
+                                           std::tuple(6, false), std::tuple(40, false),
+                                           std::tuple(40, true)));
+
+// Where a sample is asked for more than it has subjects, its forecasts are as wide as they are
+// wild; but a measurement stays as sure as it is, and one that tells nothing costs nothing.
+TEST(Condition, SixPeopleAreNotMadeLessSureByWhatTellsNothing) {
+  const JointNormal joint = Population(6);
+  const ConditionalNormal nothing = Condition(joint, {});
+  for (const double error_mm : {0.05, 0.5, 5.0}) {
+    const auto known = AtTheirMeans(joint, joint.names, error_mm);
+    EXPECT_LE(Condition(joint, known).sd.maxCoeff(), error_mm);
+  }
+  const ConditionalNormal given = Condition(joint, AtTheirMeans(joint, joint.names, 1e6));
+  EXPECT_LT((given.sd - nothing.sd).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+// Thirty known numbers are not thirty for a sample of forty of which a part is the model's.
+TEST(Condition, CountsWhatTheSampleWasAskedFor) {
+  const JointNormal joint = Population(40);
+  JointNormal exact = joint;
+  exact.sample.assign(exact.sample.size(), 0);
+  std::vector<std::string> names = joint.names;
+  names.pop_back();
+  const auto known = AtTheirMeans(joint, names, 0);
+  const Index last = std::ssize(names);
+  const double widening = Condition(joint, known).sd[last] / Condition(exact, known).sd[last];
+  EXPECT_GT(widening, 1.1);
+  EXPECT_LT(widening, 2);
+}
+
+// random: of the errors of what is known, in standard deviations; null: none.
 double ShareWithin(const JointNormal& joint, const Eigen::MatrixXd& people,
-                   const std::vector<std::string>& names, long& counted) {
+                   const std::vector<std::string>& names, long& counted, double errors = 0,
+                   Random* random = nullptr) {
   double within = 0;
   for (const auto person : people.rowwise()) {
     std::vector<KnownValue> known;
     for (const std::string& name : names) {
-      known.push_back({name, person[*joint.Find(name)]});
+      const double error_mm = errors * joint.sd[*joint.Find(name)];
+      const double off_mm = random == nullptr ? 0 : error_mm * random->Normal();
+      known.push_back({name, person[*joint.Find(name)] + off_mm, error_mm});
     }
     const ConditionalNormal given = Condition(joint, known);
     for (Index j = 0; j < person.size(); ++j) {
@@ -135,7 +237,6 @@ TEST(Condition, NinetyPercentHoldWhereTheCovarianceIsKnown) {
 // Few people, and no model to lean on: the widening is what makes the interval hold. Without it
 // some 76 % would.
 TEST(Condition, NinetyPercentHoldWhereFewPeopleAreBehindIt) {
-  Random random(7);
   JointNormal truth = Sites();
   const std::vector<Index> some = {0, 1, 5, 9, 12};
   truth.names = {"sg", "g", "pr", "me", "mso_l"};
@@ -143,14 +244,18 @@ TEST(Condition, NinetyPercentHoldWhereFewPeopleAreBehindIt) {
   truth.sd = Eigen::VectorXd(truth.sd(some));
   truth.correlation = Eigen::MatrixXd(truth.correlation(some, some));
   truth.sample.assign(5, 0);
-  double within = 0;
-  long counted = 0;
-  for (int round = 0; round < 2000; ++round) {
-    const JointSample sample{truth.names, Draw(truth, 12, random)};
-    const JointNormal joint = FitJointNormal(sample, Eigen::MatrixXd::Identity(5, 5), 0.0);
-    within += ShareWithin(joint, Draw(truth, 1, random), {"sg", "g", "pr"}, counted);
+  for (const double errors : {0.0, 0.5, 2.0}) {
+    Random random(7);
+    double within = 0;
+    long counted = 0;
+    for (int round = 0; round < 2000; ++round) {
+      const JointSample sample{truth.names, Draw(truth, 12, random)};
+      const JointNormal joint = FitJointNormal(sample, Eigen::MatrixXd::Identity(5, 5), 0.0);
+      within += ShareWithin(joint, Draw(truth, 1, random), {"sg", "g", "pr"}, counted, errors,
+                            errors > 0 ? &random : nullptr);
+    }
+    EXPECT_NEAR(within / static_cast<double>(counted), 0.9, 0.015) << errors;
   }
-  EXPECT_NEAR(within / static_cast<double>(counted), 0.9, 0.015);
 }
 
 TEST(Condition, RefusesWhatItCannotUse) {

@@ -128,6 +128,12 @@ TEST_F(CommandLine, DepthSaysHowFarTheSchemeIsFromTheTruthAndFromLeftOutDowels) 
   EXPECT_THAT(outcome.out, AllOf(HasSubstr("along the direction"), HasSubstr("cheeks"),
                                  HasSubstr("  k_fold"), HasSubstr("landmark left out")));
   EXPECT_TRUE(fs::exists(folder_ / "depth" / "depth.ply"));
+  const Outcome given = Call("depth " + kConfigs +
+                             "/phantom.yaml --out given --quiet --set subject.rings=30 "
+                             "--set 'tissue={depths: table, table: " +
+                             kConfigs + "/tables/t_table_2023.yaml, given: {measured: [g]}}'");
+  EXPECT_EQ(given.code, 0) << given.err;
+  EXPECT_THAT(given.out, HasSubstr("note: tissue depths are those to be expected given g"));
   ExpectRefused("depth " + kConfigs +
                     "/phantom.yaml --out map --quiet --set subject.rings=30 "
                     "--set interp=depth_map",
