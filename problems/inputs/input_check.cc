@@ -133,7 +133,7 @@ void LookAtMap(const DepthMap& map) {
 
 bool NamesAFile(const Experiment& experiment) {
   return !NamedFiles(experiment.face_template).empty() || !NamedFiles(experiment.prior).empty() ||
-         !NamedFiles(experiment.bust).empty();
+         !NamedFiles(experiment.bust).empty() || !NamedFiles(experiment.face).empty();
 }
 
 }  // namespace
@@ -206,6 +206,9 @@ CheckFindings InputCheck::LookAtFace(const Experiment& experiment) {
       Try(found, [&] { LoadBust(experiment.bust, experiment.face_template, context_); });
       const TemplateFace generic = LoadTemplate(experiment.face_template);
       GivenPrior(experiment, generic, loaded_, context_);
+      if (const auto* const reference = std::get_if<ReferenceFace>(&experiment.face)) {
+        ReadLandmarks(reference->landmarks);
+      }
     }));
   }
   if (const auto* map = std::get_if<DepthMap>(&experiment.interp)) {

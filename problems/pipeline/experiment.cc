@@ -83,19 +83,35 @@ FaceSource WayToFace(const Experiment& experiment) {
 
 namespace {
 
+// The options that ask for the table's mean.
+std::vector<std::string> TableMeans(const DepthScheme& scheme) {
+  const auto* const mixture = std::get_if<AutoScheme>(&scheme);
+  if (mixture == nullptr) {
+    return NeedsExpected(scheme) ? std::vector<std::string>{"interp.mean"}
+                                 : std::vector<std::string>();
+  }
+  std::vector<std::string> options;
+  for (std::size_t k = 0; k < mixture->schemes.size(); ++k) {
+    if (SingleNeedsExpected(mixture->schemes[k])) {
+      options.push_back(fmt::format("interp.schemes[{}].mean", k));
+    }
+  }
+  return options;
+}
+
 // A mean that is the table's tells nothing of the table's own depths.
 void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& faults) {
-  if (!NeedsExpected(experiment.interp)) {
-    return;
-  }
-  if (experiment.tissue.depths == DepthSource::kTable) {
-    faults.push_back({"interp.mean",
-                      "the depths are the table's own (tissue.depths: table), of which its mean "
-                      "tells nothing more; measure depths, or take `mean: constant`"});
-  } else if (experiment.tissue.table.empty()) {
-    faults.push_back({"interp.mean",
-                      "`table` takes the mean depths of tissue.table, and none is named; name one, "
-                      "e.g. configs/tables/t_table_2023.yaml, or take `mean: constant`"});
+  for (const std::string& option : TableMeans(experiment.interp)) {
+    if (experiment.tissue.depths == DepthSource::kTable) {
+      faults.push_back({option,
+                        "the depths are the table's own (tissue.depths: table), of which its mean "
+                        "tells nothing more; measure depths, or take `mean: constant`"});
+    } else if (experiment.tissue.table.empty()) {
+      faults.push_back(
+          {option,
+           "`table` takes the mean depths of tissue.table, and none is named; name one, "
+           "e.g. configs/tables/t_table_2023.yaml, or take `mean: constant`"});
+    }
   }
 }
 
@@ -147,6 +163,23 @@ void CheckAutoPlan(const Experiment& experiment, std::vector<OptionFault>& fault
   }
 }
 
+void CheckReference(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  const auto* const reference = std::get_if<ReferenceFace>(&experiment.face);
+  if (reference == nullptr) {
+    return;
+  }
+  if (reference->landmarks.empty()) {
+    faults.push_back({"face.landmarks",
+                      "no file is named; give the landmarks of the skull under the template's "
+                      "skin"});
+  }
+  if (!std::holds_alternative<FileTemplate>(experiment.face_template)) {
+    faults.push_back({"face",
+                      "`reference` takes a reference head's own skin as the template; make it by "
+                      "`semblance template` and name it by `template: {type: file, ...}`"});
+  }
+}
+
 // Terms and priors that only some ways to a face look at.
 void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faults) {
   const FaceSource face = WayToFace(experiment);
@@ -160,6 +193,7 @@ void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faul
   if (asks) {
     CheckPriorFiles(experiment.prior, faults);
   }
+  CheckReference(experiment, faults);
   if (asks && std::holds_alternative<NoPrior>(experiment.prior)) {
     faults.push_back({"face",
                       "it asks a prior, and there is none; name one under `prior`, or take "

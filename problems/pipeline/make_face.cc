@@ -5,15 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <map>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 
 #include "problems/conditional/condition_depths.h"
+#include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/dowel_target.h"
 #include "problems/pipeline/stage_key.h"
 #include "problems/prior/hspline_prior.h"
 #include "problems/prior/prior_target.h"
+#include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/hspline_project.h"
@@ -162,14 +167,45 @@ FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {
   return unfitted;
 }
 
-HSplineSurface UnderThinPlate(const HSplineSurface& surface, const FitTarget& dowels,
-                              double stiffness_mm) {
-  std::vector<Vec3> from, to, samples;
+struct PointPairs {
+  std::vector<Vec3> from, to;
+};
+
+PointPairs FromSitesToTips(const HSplineSurface& surface, const FitTarget& dowels) {
+  PointPairs pairs;
   for (const FitPoint& point : dowels.points) {
-    from.push_back(surface.Point(point.uv));
-    to.push_back(point.position);
+    pairs.from.push_back(surface.Point(point.uv));
+    pairs.to.push_back(point.position);
   }
-  const ThinPlate plate = FitThinPlate(from, to, {}, {.stiffness_mm = stiffness_mm});
+  return pairs;
+}
+
+// Of the landmarks that both skulls have.
+PointPairs FromSkullToSkull(const std::filesystem::path& reference,
+                            const Similarity& face_from_template,
+                            const std::map<std::string, Vec3>& subject) {
+  constexpr std::size_t kFewest = 4;
+  PointPairs pairs;
+  for (const Landmark& landmark : InLpsMm(ReadLandmarks(reference).file).landmarks) {
+    if (const auto same = subject.find(landmark.site); same != subject.end()) {
+      const auto& [x, y, z] = landmark.point;
+      pairs.from.push_back(face_from_template * Vec3(x, y, z));
+      pairs.to.push_back(same->second);
+    }
+  }
+  if (pairs.from.size() < kFewest) {
+    throw InputError(
+        fmt::format("{}: it shares {} landmarks with the subject, and from skull to skull at least "
+                    "{} are needed",
+                    reference.string(), pairs.from.size(), kFewest));
+  }
+  return pairs;
+}
+
+HSplineSurface UnderThinPlate(const HSplineSurface& surface, const PointPairs& pairs,
+                              double stiffness_mm) {
+  std::vector<Vec3> samples;
+  const ThinPlate plate = FitThinPlate(pairs.from, pairs.to, {}, {.stiffness_mm = stiffness_mm});
   const DomainGrid grid = GridOf(surface.shape());
   for (std::size_t k = 0; k < grid.size(); ++k) {
     samples.push_back(plate(surface.Point(grid.UvAt(k))));
@@ -330,8 +366,18 @@ MadeFace MakeFace(const PlacedFace&, PlacedTemplate placed, const FaceInput&, co
 
 MadeFace MakeFace(const ThinPlateFace& o, PlacedTemplate placed, const FaceInput&,
                   const RunContext&) {
+  const PointPairs pairs = FromSitesToTips(placed.face.surface, placed.dowels);
   FaceFit unfitted =
-      Unfitted(UnderThinPlate(placed.face.surface, placed.dowels, o.stiffness_mm), placed.dowels);
+      Unfitted(UnderThinPlate(placed.face.surface, pairs, o.stiffness_mm), placed.dowels);
+  return {std::move(placed), std::move(unfitted), {}};
+}
+
+MadeFace MakeFace(const ReferenceFace& o, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext&) {
+  const PointPairs pairs =
+      FromSkullToSkull(o.landmarks, placed.face_from_template, in.subject.points);
+  FaceFit unfitted =
+      Unfitted(UnderThinPlate(placed.face.surface, pairs, o.stiffness_mm), placed.dowels);
   return {std::move(placed), std::move(unfitted), {}};
 }
 

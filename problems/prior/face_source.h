@@ -2,6 +2,7 @@
 // The ways to a subject's face, once depth and implicit face are there.
 #pragma once
 
+#include <filesystem>
 #include <string_view>
 #include <variant>
 
@@ -38,6 +39,28 @@ void Fields(Visitor& visit, ThinPlateFace& o) {
                   .min = 0,
                   .max = 1e6,
                   .doc = "weight of bending against the tips' misfit; 0 meets all tips"},
+        o.stiffness_mm);
+}
+
+// The template, a reference head's skin, under the thin plate that brings the landmarks of that
+// head's skull to the subject's (thesis 5.3, its volumetric deformation). No depth has a say.
+struct ReferenceFace {
+  static constexpr std::string_view kName = "reference";
+  std::filesystem::path landmarks;  // of the reference's skull, in the template's frame
+  double stiffness_mm = 1;          // 0 meets all landmarks
+};
+template <class Visitor>
+void Fields(Visitor& visit, ReferenceFace& o) {
+  visit(FieldInfo{.name = "landmarks",
+                  .doc = "landmarks on the skull of the head that `template: {type: file, ...}` "
+                         "was made from, in the frame of that head; those are taken that the "
+                         "subject has too"},
+        o.landmarks);
+  visit(FieldInfo{.name = "stiffness_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 1e6,
+                  .doc = "weight of bending against the landmarks' misfit; 0 meets all of them"},
         o.stiffness_mm);
 }
 
@@ -116,8 +139,8 @@ void Fields(Visitor& visit, PriorThenFit& o) {
   PriorUseFields(visit, o.use);
 }
 
-using FaceSource =
-    std::variant<AutoFace, FittedTemplate, PlacedFace, ThinPlateFace, PriorFace, PriorThenFit>;
+using FaceSource = std::variant<AutoFace, FittedTemplate, PlacedFace, ThinPlateFace, ReferenceFace,
+                                PriorFace, PriorThenFit>;
 
 // Null for a face that does not ask the prior.
 inline const PriorUse* PriorUseOf(const FaceSource& face) {

@@ -74,6 +74,7 @@ def experiment_space(schema, folder):
             "landmarks.keep[spread].n": [8, 30], "implicit.resolution": [12, 24], ".decay": [3, 12],
         },
         beside={
+            ("face", "reference"): [("template", "file")],
             ("face", "prior"): [("template", "ict")],
             ("face", "prior_then_fit"): [("template", "ict")],
             ("bust", "ict"): [("template", "ict")],
@@ -86,6 +87,7 @@ def experiment_space(schema, folder):
             ("subject", "files"): {("subject", "skull"): str(folder["first"] / "depth.ply"),
                                    ("subject", "skin"): str(folder["first"] / "face.ply"),
                                    ("subject", "landmarks"): str(folder["first"] / "landmarks.csv")},
+            ("face", "reference"): {("face", "landmarks"): str(folder["first"] / "landmarks.csv")},
             ("landmarks.keep", "names"): {("landmarks", "keep", "sites"): ["g", "n", "rhi", "go_l", "go_r", "zy_l", "zy_r"]},
             ("template", "file"): {("template", "surface"): str(folder["first"] / "face.hspline.json")},
             ("fit.plan", "until"): FEW_PASSES,

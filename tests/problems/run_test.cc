@@ -95,12 +95,52 @@ TEST(Run, TheThinPlateNearsTheTipsAndThePlacedTemplateStays) {
   EXPECT_FALSE(placed.uncertainty);
 }
 
+std::string TemplateOfIctFiles() {
+  return fmt::format(
+      "template={{type: file, surface: {0}head.hspline.json, sites: {0}sites.csv, features: "
+      "{0}features.json}}",
+      (kConfigs / "faces/ict/").string());
+}
+
+// A reference whose skull is the subject's under an affine map: the plate undoes just that.
+TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
+  const std::string files = TemplateOfIctFiles();
+  const RunResult placed = semblance::Run(SmallPhantom({files, "face=placed"}), {});
+  const Similarity& face_from_template = placed.face_from_template;
+  const auto widened = [](const Vec3& p) { return Vec3(1.1 * p.x() + 0.2 * p.z(), p.y(), p.z()); };
+  std::string csv = "site,x,y,z\n";
+  for (const auto& [site, point] : placed.subject.points) {
+    const Vec3 p = face_from_template.rotation.transpose() *
+                   (widened(point) - face_from_template.translation) / face_from_template.scale;
+    csv += fmt::format("{},{},{},{}\n", site, p.x(), p.y(), p.z());
+  }
+  const testing::ScratchFolder folder;
+  WriteFileAtomically(folder.Path() / "skull.csv", csv);
+  const std::string face =
+      fmt::format("face={{type: reference, landmarks: {}/skull.csv}}", folder.Path().string());
+  const RunResult carried = semblance::Run(SmallPhantom({files, face}), {});
+  for (const Vec2& uv : {Vec2(0.5, 0.5), Vec2(0.3, 0.7), Vec2(0.8, 0.2)}) {
+    EXPECT_LT((widened(carried.fit.surface.Point(uv)) - placed.fit.surface.Point(uv)).norm(), 1e-6);
+  }
+  EXPECT_TRUE(carried.usable());
+
+  WriteFileAtomically(folder.Path() / "skull.csv", csv.substr(0, csv.find("\n", 60) + 1));
+  EXPECT_THAT(WordsOf<InputError>([&] {
+                semblance::Run(SmallPhantom({files, face}), {});
+              }),
+              HasSubstr("landmarks with the subject"));
+}
+
+TEST(Run, AReferenceNamesItsLandmarksAndItsSkin) {
+  EXPECT_THAT(WordsOf<ConfigError>([] { SmallPhantom({"face=reference"}); }),
+              AllOf(HasSubstr("face.landmarks: no file is named"),
+                    HasSubstr("takes a reference head's own skin")));
+}
+
 Experiment PhantomWithPrior(const std::vector<std::string>& more) {
   const std::string ict = (kConfigs / "faces/ict/").string();
   std::vector<std::string> overrides = {
-      fmt::format("template={{type: file, surface: {0}head.hspline.json, sites: {0}sites.csv, "
-                  "features: {0}features.json}}",
-                  ict),
+      TemplateOfIctFiles(),
       fmt::format("prior={{type: hspline, modes: {}modes.json, count: 20}}", ict), "face=prior"};
   overrides.insert(overrides.end(), more.begin(), more.end());
   return SmallPhantom(overrides);

@@ -249,6 +249,8 @@ TEST(Experiment, AMeanOfATableIsForDepthsThatAreNotTheTables) {
     const std::string both = interp + "tissue: {depths: measured, table: a.yaml}\n";
     EXPECT_NO_THROW(ReadConfigText<Experiment>(both, "a.yaml"));
   }
+  EXPECT_THAT(Faults("interp: {type: auto, schemes: [mean, {type: kriging, mean: table}]}\n"),
+              HasSubstr("interp.schemes[1].mean: the depths are the table's own"));
 }
 
 TEST(Experiment, TheLevelsOfATemplateFromFilesAreThoseOfItsSurface) {
