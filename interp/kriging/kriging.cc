@@ -139,7 +139,7 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
   const Eigen::MatrixXd regressors = mean.AtVertices(run);
   const KrigingHyper hyper = HyperFor(options, scene, run);
   KrigingProcess process(options.covariance, scene.data, hyper);
-  if (options.state_sd) {
+  if (options.state_sd && KnowsSignal(options.signal_mm, scene.data.regressors)) {
     process.PrepareSd();
   }
   DepthField field =

@@ -68,7 +68,8 @@ DepthProcess FitKriging(const Kriging& options, const DepthInput& input, const R
 // Of the depths at some points, given the dowels, the model and the uncertain mean.
 struct DepthPosterior {
   Eigen::VectorXd mean_mm;     // without `clamp`
-  Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is the square of the sd_mm below
+  Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is the square of the sd_mm below,
+                               // but with too few dowels, which state none, of the least signal
 };
 
 // By straight distances, also where `options` says along the bone. Throws InputError as
@@ -78,11 +79,13 @@ DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
 
 // Far from all dowels the depth is the process's mean there. sd_mm is that of the process at the
 // vertex, given the dowels, the model and the uncertain mean; it does not hold the nugget of a
-// further measurement there, nor the uncertainty of length and signal. kNotFacing as
-// AssignWhereFacing; kOutside where no dowel is reached along the bone. There the smoother
-// covariances are not always definite; then the field smooths, and may miss certain dowels. It
-// keeps 8 bytes per vertex and dowel. Throws InputError as CheckDepthInput, or if the skull has no
-// triangle to go along.
+// further measurement there, nor the uncertainty of length and signal. It is NaN where none is
+// known: everywhere if the dowels are no more than the mean has factors and signal_mm is not given,
+// and where the variance along the bone comes out below 0, but at a dowel that the field goes
+// through. kNotFacing as AssignWhereFacing; kOutside where no dowel is reached along the bone.
+// There the smoother covariances are not always definite; then the field smooths, and may miss
+// certain dowels. It keeps 8 bytes per vertex and dowel. Throws InputError as CheckDepthInput, or
+// if the skull has no triangle to go along.
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
 
 }  // namespace semblance

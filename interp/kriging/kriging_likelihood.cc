@@ -64,6 +64,10 @@ Eigen::VectorXd FindLogs(SearchRange& bounds, const SmoothCost& cost,
   return cost(wider, nullptr) < cost(logs, nullptr) ? wider : logs;
 }
 
+bool KnowsSignal(const std::optional<double>& signal_mm, const Eigen::MatrixXd& regressors) {
+  return signal_mm.has_value() || regressors.rows() > regressors.cols();
+}
+
 double DepthSpread(const Eigen::VectorXd& depth_mm) {
   const double mean = depth_mm.mean();
   return std::max(std::sqrt((depth_mm.array() - mean).square().mean()), kFlatDepths_mm);

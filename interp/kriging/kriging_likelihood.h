@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -29,6 +30,11 @@ std::vector<std::string> EndsInWords(std::span<const std::string_view> names,
 // `bounds`.
 Eigen::VectorXd FindLogs(SearchRange& bounds, const SmoothCost& cost,
                          const std::function<double(double)>& misfit_mm2, const RunContext& run);
+
+// Whether a process's signal is known: it is given, or depths tell it. As many depths as the mean
+// has factors (regressors: n x q) tell nothing but the mean: the restricted likelihood has n - q
+// degrees of freedom. Without a signal there is no sd to state.
+bool KnowsSignal(const std::optional<double>& signal_mm, const Eigen::MatrixXd& regressors);
 
 // The rms distance of depths from their mean, mm; at least 1e-3.
 double DepthSpread(const Eigen::VectorXd& depth_mm);

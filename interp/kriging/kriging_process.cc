@@ -6,6 +6,12 @@
 #include <numbers>
 
 namespace semblance {
+namespace {
+
+constexpr double kRounding = 1e-6;   // of the variance: what is left of a definite process's 0
+constexpr double kMissed_mm = 1e-2;  // further off a field does not go through a dowel
+
+}  // namespace
 
 CorrelationValue CorrelationAt(Covariance covariance, double distance_mm, double length_mm) {
   if (!std::isfinite(distance_mm)) {
@@ -35,6 +41,7 @@ KrigingProcess::KrigingProcess(Covariance covariance, const KrigingData& data,
     : covariance_(covariance),
       hyper_(hyper),
       variance_mm2_(hyper.signal_mm * hyper.signal_mm),
+      dowel_depth_mm_(data.depth_mm),
       regression_(Regression(data)) {
   by_log_signal_.diagonal().array() += 2 * regression_.added();
   FindWeights(data);
@@ -97,6 +104,13 @@ Eigen::MatrixXd KrigingProcess::CovarianceAt(const Eigen::MatrixXd& distance_mm)
   });
 }
 
+bool KrigingProcess::IsThroughDowel(const Eigen::Ref<const Eigen::VectorXd>& distance_mm,
+                                    double depth_mm) const {
+  Eigen::Index nearest = 0;
+  return distance_mm.minCoeff(&nearest) == 0 &&
+         std::abs(depth_mm - dowel_depth_mm_[nearest]) < kMissed_mm;
+}
+
 DepthValue KrigingProcess::ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm,
                                    const Eigen::VectorXd& regressors) const {
   const Eigen::VectorXd with = CovarianceAt(distance_mm);
@@ -105,7 +119,9 @@ DepthValue KrigingProcess::ValueAt(const Eigen::Ref<const Eigen::VectorXd>& dist
     return {depth_mm, kNaN};
   }
   const double variance = regression_.Variance(with, regressors, variance_mm2_);
-  return {depth_mm, std::sqrt(std::max(variance, 0.0))};
+  const bool is_known =
+      variance > -kRounding * variance_mm2_ || IsThroughDowel(distance_mm, depth_mm);
+  return {depth_mm, is_known ? std::sqrt(std::max(variance, 0.0)) : kNaN};
 }
 
 DepthPosterior KrigingProcess::Posterior(const Eigen::MatrixXd& to_dowels_mm,

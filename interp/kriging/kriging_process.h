@@ -52,7 +52,9 @@ class KrigingProcess {
 
   // Before the first ValueAt with an sd; costs the cube of n.
   void PrepareSd();
-  // distance_mm: n, from each dowel to the point; regressors: q, at the point.
+  // distance_mm: n, from each dowel to the point; regressors: q, at the point. The sd is NaN where
+  // distances along a surface make the variance negative; at a dowel that the field goes through it
+  // is then 0.
   DepthValue ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm,
                      const Eigen::VectorXd& regressors) const;
   // Of m points together. to_dowels_mm: n x m; between_mm: m x m, symmetric; regressors: q x m.
@@ -62,11 +64,13 @@ class KrigingProcess {
  private:
   GaussianRegression Regression(const KrigingData& data);
   void FindWeights(const KrigingData& data);
+  bool IsThroughDowel(const Eigen::Ref<const Eigen::VectorXd>& distance_mm, double depth_mm) const;
   Eigen::MatrixXd CovarianceAt(const Eigen::MatrixXd& distance_mm) const;
 
   Covariance covariance_;
   KrigingHyper hyper_;
   double variance_mm2_;
+  Eigen::VectorXd dowel_depth_mm_;
   Eigen::MatrixXd by_log_length_, by_log_signal_;  // of V
   GaussianRegression regression_;
   Eigen::VectorXd weights_;  // of the dowels' covariances with a point

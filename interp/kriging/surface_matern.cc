@@ -3,13 +3,16 @@
 
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "interp/kriging/gaussian_regression.h"
 #include "interp/kriging/kriging_likelihood.h"
 #include "interp/kriging/surface_matern_likelihood.h"
+#include "interp/on_surface/bone_relief.h"
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -40,12 +43,26 @@ std::vector<CornerWeights> LocateSamples(const TriMesh& skull, const CoarseSurfa
   return located;
 }
 
+// 1 where the bone is smooth.
+Eigen::VectorXd LengthShares(const TriMesh& bone, double half_at_relief_mm) {
+  constexpr std::array kScale_mm = {40.0};
+  const Eigen::ArrayXd relief_mm = BoneRelief(bone, kScale_mm).row(0).transpose().array().abs();
+  return (1 + relief_mm / half_at_relief_mm).inverse();
+}
+
+MaternDomain DomainOf(const SurfaceMatern& options, const TriMesh& bone) {
+  MaternDomain domain = {bone.points, BuildLaplacian(bone)};
+  return options.half_at_relief_mm
+             ? WithLengths(std::move(domain), LengthShares(bone, *options.half_at_relief_mm))
+             : domain;
+}
+
 SurfaceScene SceneOf(const SurfaceMatern& options, const DepthInput& input,
                      const std::vector<DepthSample>& samples, const MeanRegressors& mean,
                      const RunContext& run) {
   const auto n = static_cast<Eigen::Index>(samples.size());
   SurfaceScene scene{CoarseSurface(input.skull, options.edge_mm, run), {}, {}, {}, {}};
-  scene.domain = {scene.surface.mesh().points, BuildLaplacian(scene.surface.mesh())};
+  scene.domain = DomainOf(options, scene.surface.mesh());
   scene.data = {Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd()};
   for (const DepthSample& sample : samples) {
     const auto i = static_cast<Eigen::Index>(scene.bases.size());
@@ -90,7 +107,7 @@ class SurfaceProcess {
  public:
   SurfaceProcess(const SurfaceMatern& options, const SurfaceScene& scene,
                  const SurfaceMaternHyper& hyper, const RunContext& run)
-      : with_sd_(options.state_sd),
+      : with_sd_(options.state_sd && KnowsSignal(options.signal_mm, scene.data.regressors)),
         signal_mm_(hyper.signal_mm),
         regression_(Regression(options, scene, hyper, run)) {
     if (with_sd_) {

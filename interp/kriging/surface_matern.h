@@ -19,13 +19,14 @@ struct SurfaceMatern {
   std::optional<double> length_mm = std::nullopt;  // none: by maximum likelihood
   double length_prior_mm = 60;                     // median; dowels alone do not fix a length
   double length_prior_spread = 0.5;                // sd of the logarithm
-  std::optional<double> signal_mm = std::nullopt;  // none: by maximum likelihood
-  double nugget_share = 1;                         // of a dowel's sd_mm; 0 honours every dowel
-  bool fit_nugget = false;                         // one more nugget, by maximum likelihood
-  double edge_mm = 3;                              // of the mesh that the process is found on
-  bool clamp = true;                               // to the dowels' range
-  bool state_sd = true;                            // sd_mm per vertex
-  double max_angle_deg = 90;                       // further turned bone gets no depth
+  std::optional<double> half_at_relief_mm = std::nullopt;  // none: one length everywhere
+  std::optional<double> signal_mm = std::nullopt;          // none: by maximum likelihood
+  double nugget_share = 1;    // of a dowel's sd_mm; 0 honours every dowel
+  bool fit_nugget = false;    // one more nugget, by maximum likelihood
+  double edge_mm = 3;         // of the mesh that the process is found on
+  bool clamp = true;          // to the dowels' range
+  bool state_sd = true;       // sd_mm per vertex
+  double max_angle_deg = 90;  // further turned bone gets no depth
 };
 template <class Visitor>
 void Fields(Visitor& visit, SurfaceMatern& o) {
@@ -46,6 +47,15 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
                          "kriging's; none: by maximum likelihood with the prior below"},
         o.length_mm);
   LengthPriorFields(visit, o.length_prior_mm, o.length_prior_spread);
+  visit(FieldInfo{.name = "half_at_relief_mm",
+                  .unit = "mm",
+                  .min = 0.1,
+                  .max = 1000,
+                  .doc = "a length that varies: at a place that lies x mm below or above the bone "
+                         "smoothed over 40 mm it is 1 / (1 + x / this) of length_mm, so shorter "
+                         "in hollows and on ridges than on a smooth vault; none: one length "
+                         "everywhere"},
+        o.half_at_relief_mm);
   SignalField(visit, o.signal_mm);
   NuggetShareField(visit, o.nugget_share);
   visit(FieldInfo{.name = "fit_nugget",
@@ -70,14 +80,16 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
 // The Gaussian field of on_surface/matern_field.h, divided by its own standard deviation and times
 // the signal: as uncertain at a rim, on a crest and on a small loose piece as elsewhere, for the
 // equation alone would have the variance grow there; so kernels are positive definite on any
-// surface, which those of geodesic distances are not. Far from all dowels, and on pieces of the
+// surface, which those of geodesic distances are not. With half_at_relief_mm that is the field of a
+// length which varies (WithLengths). Far from all dowels, and on pieces of the
 // skull without one, the depth is the mean there. sd_mm is that of the process at the vertex, given
 // the dowels, the model and the uncertain mean; it does not hold the nugget of a further
-// measurement there, nor the uncertainty of length and signal. These two, where they are not given,
-// are the maximum of the restricted likelihood times the length's prior, within a factor of 12 of
-// the prior's median (surface_matern_likelihood.h); of more than 60 dowels it uses 60 that lie far
-// apart. kNotFacing as AssignWhereFacing. Throws InputError as CheckDepthInput and MeanRegressors,
-// or if the skull has no triangle.
+// measurement there, nor the uncertainty of length and signal. It is NaN if the dowels are no more
+// than the mean has factors and signal_mm is not given. Length and signal, where they are not
+// given, are the maximum of the restricted likelihood times the length's prior, within a factor of
+// 12 of the prior's median (surface_matern_likelihood.h); of more than 60 dowels it uses 60 that
+// lie far apart. kNotFacing as AssignWhereFacing. Throws InputError as CheckDepthInput and
+// MeanRegressors, or if the skull has no triangle.
 DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& input,
                             const RunContext& run);
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <type_traits>
 
 #include "interp/dowels/dowel_samples.h"
 #include "interp/schemes/outside_rule.h"
@@ -160,14 +161,53 @@ Mixture Choose(const AutoScheme& options, const DepthInput& input, const RunCont
   return mixture;
 }
 
-// Name and weight of each scheme, numbered where one stands there twice.
+// What a scheme's options are, a few words each: `matern_5_2`, `power 4`, `no clamp`.
+struct OptionsInWords {
+  std::vector<std::string> words;
+
+  template <class T>
+  void operator()(const FieldInfo& info, const T& value) {
+    if constexpr (std::is_enum_v<T>) {
+      words.emplace_back(EnumNames(value)[static_cast<std::size_t>(value)]);
+    } else if constexpr (std::is_same_v<T, bool>) {
+      words.push_back(fmt::format("{}{}", value ? "" : "no ", info.name));
+    } else if constexpr (requires { value.has_value(); }) {
+      words.push_back(value ? fmt::format("{} {}", info.name, *value)
+                            : fmt::format("no {}", info.name));
+    } else {
+      words.push_back(fmt::format("{} {}", info.name, value));
+    }
+  }
+};
+
+// Name and those options that are not the defaults.
+std::string NameWithOptions(const SingleScheme& scheme) {
+  return std::visit(
+      []<class Scheme>(Scheme options) {
+        Scheme defaults;
+        OptionsInWords own, usual;
+        Fields(own, options);
+        Fields(usual, defaults);
+        std::string name(Scheme::kName);
+        for (std::size_t k = 0; k < own.words.size(); ++k) {
+          name += own.words[k] == usual.words[k] ? "" : " " + own.words[k];
+        }
+        return name;
+      },
+      scheme);
+}
+
+// Name and weight of each scheme, with its options where one stands there twice. A twin in these,
+// too, is numbered.
 std::vector<SchemeShare> SharesOf(const Mixture& mixture) {
-  std::map<std::string_view, int> uses;
+  std::map<std::string, int> uses;
   std::vector<SchemeShare> shares;
   for (std::size_t k = 0; k < mixture.schemes.size(); ++k) {
-    const std::string_view name = NameOf(mixture.schemes[k]);
+    const std::string_view plain = NameOf(mixture.schemes[k]);
+    const bool is_alone = std::ranges::count(mixture.schemes, plain, NameOf) == 1;
+    const std::string name = is_alone ? std::string(plain) : NameWithOptions(mixture.schemes[k]);
     const int use = ++uses[name];
-    shares.push_back({use == 1 ? std::string(name) : fmt::format("{} {}", name, use),
+    shares.push_back({use == 1 ? name : fmt::format("{} {}", name, use),
                       mixture.weights[static_cast<Eigen::Index>(k)]});
   }
   return shares;

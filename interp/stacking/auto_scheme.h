@@ -51,7 +51,8 @@ void Fields(Visitor& visit, AutoScheme& o) {
 // it is, with its own sd. Otherwise sd_mm is sd_by_distance.h's from the mixture's errors at
 // left-out dowels, with weights of the other dowels. A scheme is passed over that cannot be
 // judged: one on the network where there is no area, one of which a left-out fold leaves too few
-// dowels for its mean's factors. `shares` of the field name the schemes and their weights. Throws
+// dowels for its mean's factors. `shares` of the field name the schemes and their weights: of
+// schemes of one name, also by the options that are not the defaults (`kriging matern_5_2`). Throws
 // as the schemes do.
 DepthField InterpolateDepth(const AutoScheme& options, const DepthInput& input,
                             const RunContext& run);

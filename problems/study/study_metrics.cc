@@ -143,11 +143,10 @@ bool IsOfOneSubject(const std::string& metric, const std::set<std::string>& name
          (metric.starts_with("cross_validation.") && has(".regions."));
 }
 
-// "depth.shares.kriging 2", where a scheme stands there twice.
-bool IsNumberedShare(const std::string& metric, const std::set<std::string>& names) {
-  const std::size_t blank = metric.rfind(' ');
+// "depth.shares.kriging matern_5_2", of a scheme that stands there with several options.
+bool IsShareWithOptions(const std::string& metric, const std::set<std::string>& names) {
+  const std::size_t blank = metric.find(' ');
   return metric.starts_with("depth.shares.") && blank != metric.npos && blank + 1 < metric.size() &&
-         metric.find_first_not_of("0123456789", blank + 1) == metric.npos &&
          names.contains(metric.substr(0, blank));
 }
 
@@ -175,7 +174,7 @@ std::set<std::string> MetricsOf(StudyJob job) {
 
 std::string ComplaintAboutMetric(const std::string& metric, StudyJob job) {
   const std::set<std::string> names = MetricsOf(job);
-  if (names.contains(metric) || IsNumberedShare(metric, names)) {
+  if (names.contains(metric) || IsShareWithOptions(metric, names)) {
     return "";
   }
   if (IsOfOneSubject(metric, names)) {

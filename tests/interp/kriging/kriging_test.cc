@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "interp/kriging/kriging_process.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
@@ -113,6 +116,47 @@ TEST(Kriging, WithoutStateSdGivesTheSameDepthsAndNone) {
   EXPECT_TRUE(std::isnan(without.sd_mm[0]));
 }
 
+int StatedSds(const DepthField& field) {
+  return static_cast<int>(
+      std::ranges::count_if(field.sd_mm, [](double sd) { return std::isfinite(sd); }));
+}
+
+// Its signal is then the least that is searched, and an sd of it some nanometres.
+TEST(Kriging, StatesNoSdWhereTheDowelsTellTheMeanAlone) {
+  DowelScene one = FlatScene();
+  one.dowels.resize(1);
+  one.dowels[0].sd_mm = kNaN;
+  const DepthField field = FieldAt({}, one, {{20, 10, 0}});
+  EXPECT_EQ(field.depth_mm[0], 4);
+  EXPECT_EQ(StatedSds(field), 0);
+  EXPECT_EQ(StatedSds(FieldAt({.signal_mm = 2}, one, {{20, 10, 0}})), 1);
+  DowelScene two = FlatScene();
+  two.dowels.resize(2);
+  EXPECT_EQ(StatedSds(FieldAt({}, two, {{20, 10, 0}})), 1);
+  const Kriging relief{.mean = DepthMean::kCovariates};
+  EXPECT_EQ(StatedSds(InterpolateDepth(relief, ScatteredScene(3).Input(), {})), 0);
+  EXPECT_GT(StatedSds(InterpolateDepth(relief, ScatteredScene(4).Input(), {})), 0);
+}
+
+// Ways that no space has: near to three dowels that are far from each other.
+TEST(KrigingProcess, StatesNoSdWhereTheVarianceIsNegative) {
+  KrigingData data{1000 * (Eigen::Matrix3d::Ones() - Eigen::Matrix3d::Identity()),
+                   Eigen::Vector3d(4, 5, 6), Eigen::Vector3d::Zero(), Eigen::MatrixXd::Ones(3, 1)};
+  KrigingProcess process(Covariance::kSquaredExponential, data, {.length_mm = 30, .signal_mm = 2});
+  process.PrepareSd();
+  const Eigen::VectorXd one = Eigen::VectorXd::Ones(1);
+  const DepthValue near_all = process.ValueAt(Eigen::Vector3d(10, 10, 10), one);
+  EXPECT_TRUE(std::isfinite(near_all.mm));
+  EXPECT_TRUE(std::isnan(near_all.sd_mm));
+  EXPECT_GT(process.ValueAt(Eigen::Vector3d(10, 1000, 1000), one).sd_mm, 0.1);
+  // At a dowel, of which only one that the field goes through is certain.
+  EXPECT_TRUE(std::isnan(process.ValueAt(Eigen::Vector3d(0, 10, 10), one).sd_mm));
+  data.depth_mm.setConstant(5);
+  KrigingProcess through(Covariance::kSquaredExponential, data, {.length_mm = 30, .signal_mm = 2});
+  through.PrepareSd();
+  EXPECT_EQ(through.ValueAt(Eigen::Vector3d(0, 10, 10), one).sd_mm, 0);
+}
+
 KrigingData DataOf(const DowelScene& scene) {
   const auto n = static_cast<Eigen::Index>(scene.dowels.size());
   KrigingData data{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd::Zero(n),
@@ -146,6 +190,20 @@ TEST_P(EveryCovariance, GradientOfTheDevianceEqualsItsNumericTwin) {
     const Vec2 step = kStep * Vec2::Unit(k);
     const double numeric = (deviance(logs + step) - deviance(logs - step)) / (2 * kStep);
     EXPECT_NEAR(exact[k], numeric, 1e-5 * (1 + std::abs(numeric)));
+  }
+}
+
+// A long length makes the covariances as good as singular: what rounds below 0 is still 0.
+TEST_P(EveryCovariance, StatesAnSdEverywhereByStraightWays) {
+  DowelScene scene = ScatteredScene(120);
+  scene.network.areas.clear();
+  for (const double length_mm : {20.0, 200.0, 2000.0}) {
+    const Kriging kriging{.covariance = static_cast<Covariance>(GetParam()),
+                          .length_mm = length_mm,
+                          .signal_mm = 2,
+                          .max_angle_deg = 180};
+    const DepthField field = InterpolateDepth(kriging, scene.Input(), {});
+    EXPECT_EQ(StatedSds(field), std::ssize(field.sd_mm)) << length_mm;
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <array>
 
 #include "interp/interpolate_depth.h"
 #include "interp/kriging/gaussian_regression.h"
@@ -50,11 +51,14 @@ std::vector<Eigen::Index> VerticesOf(const DowelScene& scene) {
   return vertices;
 }
 
-// Correlations of all vertices from the definition.
-Eigen::MatrixXd DenseCorrelations(const TriMesh& mesh, int alpha, double length_mm) {
+// Correlations of all vertices from the definition; half_at_mm: as the option, 1e300 for none.
+Eigen::MatrixXd DenseCorrelations(const TriMesh& mesh, int alpha, double length_mm,
+                                  double half_at_mm = 1e300) {
   const MeshLaplacian laplacian = BuildLaplacian(mesh);
   const double kappa = MaternKappa(alpha, length_mm);
-  const Eigen::MatrixXd area = laplacian.area_mm2.asDiagonal();
+  const Eigen::ArrayXd relief = BoneRelief(mesh, std::array{40.0}).row(0).transpose().array();
+  const Eigen::MatrixXd area =
+      (laplacian.area_mm2.array() * (1 + relief.abs() / half_at_mm).square()).matrix().asDiagonal();
   const Eigen::MatrixXd k = kappa * kappa * area + Eigen::MatrixXd(laplacian.stiffness);
   Eigen::MatrixXd precision = k;
   for (int power = 1; power < alpha; ++power) {
@@ -69,18 +73,10 @@ class EveryAlpha : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(SurfaceMatern, EveryAlpha, ::testing::Values(1, 2, 3));
 
 // The mean as one more Gaussian unknown of a variance without bounds, conditioned densely.
-TEST_P(EveryAlpha, DepthAndSdAreThePosteriorOfDenseMatrices) {
-  const DowelScene scene = SmallScene();
-  const SurfaceMatern options{.alpha = GetParam(),
-                              .length_mm = 40,
-                              .signal_mm = 1.5,
-                              .edge_mm = 0,
-                              .clamp = false,
-                              .max_angle_deg = 180};
-  const DepthField field = InterpolateDepth(options, scene.Input(), RunContext{});
+void ExpectPosterior(const DepthField& field, const DowelScene& scene,
+                     const Eigen::MatrixXd& correlations) {
   constexpr double kVague = 1e4;
-  const Eigen::MatrixXd prior =
-      1.5 * 1.5 * DenseCorrelations(scene.skull, GetParam(), 40).array() + kVague;
+  const Eigen::MatrixXd prior = 1.5 * 1.5 * correlations.array() + kVague;
   const std::vector<Eigen::Index> at = VerticesOf(scene);
   Eigen::MatrixXd of_dowels = prior(at, at);
   of_dowels(2, 2) += 0.49;
@@ -96,6 +92,21 @@ TEST_P(EveryAlpha, DepthAndSdAreThePosteriorOfDenseMatrices) {
     const double sd = field.sd_mm[static_cast<std::size_t>(v)];
     ASSERT_NEAR(sd * sd, posterior(v, v), 1e-3);
   }
+}
+
+TEST_P(EveryAlpha, DepthAndSdAreThePosteriorOfDenseMatrices) {
+  DowelScene scene = SmallScene();
+  SurfaceMatern options{.alpha = GetParam(),
+                        .length_mm = 40,
+                        .signal_mm = 1.5,
+                        .edge_mm = 0,
+                        .clamp = false,
+                        .max_angle_deg = 180};
+  ExpectPosterior(InterpolateDepth(options, scene.Input(), RunContext{}), scene,
+                  DenseCorrelations(scene.skull, GetParam(), 40));
+  options.half_at_relief_mm = 12;
+  ExpectPosterior(InterpolateDepth(options, scene.Input(), RunContext{}), scene,
+                  DenseCorrelations(scene.skull, GetParam(), 40, 12));
 }
 
 SurfaceMaternData DataOf(const DowelScene& scene) {
@@ -233,6 +244,20 @@ TEST(SurfaceMatern, OnAPieceWithoutADowelIsTheMeanWithTheFullSd) {
   EXPECT_NEAR(field.depth_mm.back(), field.process->mean_mm, 1e-9);
   EXPECT_GT(field.sd_mm.back(), 1.5);
   EXPECT_LT(field.sd_mm.back(), 2);
+}
+
+TEST(SurfaceMatern, StatesNoSdWhereTheDowelsTellTheMeanAlone) {
+  const auto states = [](const SurfaceMatern& options, std::size_t dowels) {
+    DowelScene scene = SmallScene();
+    scene.dowels.resize(dowels);
+    return std::ranges::any_of(InterpolateDepth(options, scene.Input(), {}).sd_mm,
+                               [](double sd) { return std::isfinite(sd); });
+  };
+  EXPECT_FALSE(states({}, 1));
+  EXPECT_TRUE(states({.signal_mm = 2}, 1));
+  EXPECT_TRUE(states({}, 2));
+  EXPECT_FALSE(states({.mean = DepthMean::kCovariates}, 3));
+  EXPECT_TRUE(states({.mean = DepthMean::kCovariates}, 4));
 }
 
 TEST(SurfaceMatern, ACoarserMeshChangesLittle) {

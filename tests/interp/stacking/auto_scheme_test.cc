@@ -16,6 +16,7 @@ namespace {
 using testing::Count;
 using testing::DomeScene;
 using testing::DowelScene;
+using ::testing::ElementsAre;
 using testing::SameBytes;
 using testing::ScatteredScene;
 
@@ -74,13 +75,26 @@ TEST(AutoScheme, TakesTheOneThatPredictsLeftOutDowelsBest) {
   }
 }
 
-TEST(AutoScheme, NumbersASchemeThatStandsThereTwice) {
-  const DepthField field =
-      InterpolateDepth(AutoScheme{.schemes = {InverseDistance{}, InverseDistance{.power = 4}}},
-                       ScatteredScene(20).Input(), {});
-  ASSERT_EQ(field.shares.size(), 2u);
-  EXPECT_EQ(field.shares[0].scheme, "inverse_distance");
-  EXPECT_EQ(field.shares[1].scheme, "inverse_distance 2");
+std::vector<std::string> NamesOfShares(const std::vector<SingleScheme>& schemes) {
+  const DowelScene scene = ScatteredScene(12);
+  std::vector<std::string> names;
+  for (const SchemeShare& share :
+       InterpolateDepth(AutoScheme{.schemes = schemes}, scene.Input(), {}).shares) {
+    names.push_back(share.scheme);
+  }
+  return names;
+}
+
+TEST(AutoScheme, NamesASchemeThatStandsThereTwiceByItsOptions) {
+  EXPECT_THAT(NamesOfShares(AutoScheme{}.schemes),
+              ElementsAre("radial_basis", "kriging", "kriging matern_5_2"));
+  EXPECT_THAT(
+      NamesOfShares({InverseDistance{}, InverseDistance{.power = 4}, InverseDistance{.power = 4}}),
+      ElementsAre("inverse_distance", "inverse_distance power 4", "inverse_distance power 4 2"));
+  EXPECT_THAT(NamesOfShares({Kriging{.length_mm = 30, .clamp = false}, RadialBasis{}}),
+              ElementsAre("kriging", "radial_basis"));
+  EXPECT_THAT(NamesOfShares({Kriging{.length_mm = 30, .clamp = false}, Kriging{}}),
+              ElementsAre("kriging length_mm 30 no clamp", "kriging"));
 }
 
 TEST(AutoScheme, PassesOverSchemesOnANetworkThatIsNotThere) {

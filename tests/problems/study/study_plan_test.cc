@@ -198,11 +198,13 @@ TEST_F(StudyPlanTest, AMetricMustBeOneThatTheJobAndTheSubjectsHave) {
   EXPECT_THAT(Faults("metric: cross_validation.foo.sites.g\njob: depth\n"),
               HasSubstr("no trial of job: depth"));
   for (const char* metric : {"depth.process.length_mm", "depth.shares.kriging",
-                             "\"depth.shares.kriging 2\"", "depth.shares.radial_basis"}) {
+                             "\"depth.shares.kriging matern_5_2\"", "depth.shares.radial_basis"}) {
     EXPECT_NO_THROW(Plan(fmt::format("metric: {}\njob: depth\n", metric))) << metric;
   }
   EXPECT_THAT(Faults("metric: depth.shares.krigin\njob: depth\n"),
               HasSubstr("did you mean 'depth.shares.kriging'?"));
+  EXPECT_THAT(Faults("metric: depth.shares.krigin matern_5_2\njob: depth\n"),
+              HasSubstr("no trial of job: depth"));
   EXPECT_NO_THROW(Plan("metric: identify.surface.rank\njob: identify\n"));
   WriteFileAtomically(folder_ / "skull.ply", "");
   WriteFileAtomically(folder_ / "marks.yaml", "");
