@@ -165,7 +165,7 @@ TrueDepths TrueDepthsAt(const std::vector<Phantom>& phantoms, const std::string&
 // Errors that all heads share do not average out, so that each site is looked at alone: chords of
 // a mesh this coarse are off by 0.1 mm where bone and skin are bent most (me), alike in all heads.
 TEST(AnalysePopulation, OfManyPhantomsHasTheMeansAndDeviationsOfWhatTheyAreMadeOf) {
-  constexpr int kMany = 100;  // a third of a second each, nearly all of it for the generic head
+  constexpr int kMany = 100;  // small ones: some 50 ms each
   constexpr double kChord_mm = 0.12, kScatter_mm = 0.03, kShare = 0.02;
   const ScratchFolder folder;
   WriteFileAtomically(folder / "many.yaml",
