@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "interp/kriging/kriging.h"
+#include "interp/on_surface/bone_geometry.h"
 #include "interp/on_surface/bone_relief.h"
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/base/error.h"
@@ -31,16 +32,29 @@ Eigen::MatrixXd ExpectedAt(std::span<const Vec3> points, std::span<const Dowel> 
 }  // namespace
 
 std::size_t FewestDowels(DepthMean mean) {
-  return mean == DepthMean::kCovariates ? 1 + kReliefScales_mm.size() : 1;
+  const std::size_t relief = LooksAtBone(mean) ? kReliefScales_mm.size() : 0,
+                    geometry = mean == DepthMean::kGeometry ? kBoneGeometry : 0;
+  return 1 + relief + geometry;
 }
 
-struct MeanRegressors::Relief {
-  Relief(const TriMesh& skull, const RunContext& run)
-      : surface(skull, kReliefEdge_mm, run),
-        query(skull),
-        of_vertices(BoneRelief(surface.mesh(), kReliefScales_mm)) {}
+struct MeanRegressors::Bone {
+  Bone(DepthMean mean, const DepthInput& input, const RunContext& run)
+      : surface(input.skull, kReliefEdge_mm, run),
+        query(input.skull),
+        of_vertices(OfVertices(mean, surface.mesh(), input.dowels)) {}
 
-  // 1 and the relief at p, which is near a vertex of the skull.
+  static Eigen::MatrixXd OfVertices(DepthMean mean, const TriMesh& mesh,
+                                    std::span<const Dowel> dowels) {
+    const Eigen::MatrixXd relief = BoneRelief(mesh, kReliefScales_mm);
+    if (mean != DepthMean::kGeometry) {
+      return relief;
+    }
+    Eigen::MatrixXd both(relief.rows() + kBoneGeometry, relief.cols());
+    both << relief, BoneGeometry(mesh, FrameOfHead(dowels));
+    return both;
+  }
+
+  // 1 and what is known of p, which is near a vertex of the skull.
   Eigen::VectorXd At(const Vec3& p, int skull_vertex) const {
     const CornerWeights at = surface.Locate(p, skull_vertex);
     Eigen::VectorXd regressors = Eigen::VectorXd::Zero(1 + of_vertices.rows());
@@ -65,16 +79,17 @@ MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const De
         "none; name tissue.table and measured depths, or choose `mean: constant`",
         scheme));
   }
-  if (mean == DepthMean::kCovariates) {
+  if (LooksAtBone(mean)) {
     CheckSurface(scheme, input.skull);
     const std::size_t places = DepthSamples(input.dowels).size();
     if (places < FewestDowels(mean)) {
       throw InputError(fmt::format(
-          "{}: `mean: covariates` finds {} factors, for which {} are too few; place "
-          "more, or choose `mean: constant`",
-          scheme, FewestDowels(mean), places == 1 ? "1 dowel" : fmt::format("{} dowels", places)));
+          "{}: `mean: {}` finds {} factors, for which {} are too few; place more, or choose `mean: "
+          "constant`",
+          scheme, EnumNames(mean)[static_cast<std::size_t>(mean)], FewestDowels(mean),
+          places == 1 ? "1 dowel" : fmt::format("{} dowels", places)));
     }
-    relief_ = std::make_unique<Relief>(input.skull, run);
+    bone_ = std::make_unique<Bone>(mean, input, run);
   }
 }
 
@@ -88,23 +103,23 @@ Eigen::MatrixXd MeanRegressors::At(std::span<const Vec3> points, const RunContex
   if (mean_ == DepthMean::kTable) {
     return ExpectedAt(points, input_.expected, run);
   }
-  Eigen::MatrixXd regressors(1 + relief_->of_vertices.rows(), count);
+  Eigen::MatrixXd regressors(1 + bone_->of_vertices.rows(), count);
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const MeshPoint on = relief_->query.Closest(points[k]);
+    const MeshPoint on = bone_->query.Closest(points[k]);
     regressors.col(static_cast<Eigen::Index>(k)) =
-        relief_->At(on.position, NearestCorner(input_.skull, on));
+        bone_->At(on.position, NearestCorner(input_.skull, on));
   }
   return regressors;
 }
 
 Eigen::MatrixXd MeanRegressors::AtVertices(const RunContext& run) const {
-  if (mean_ != DepthMean::kCovariates) {
+  if (!LooksAtBone(mean_)) {
     return At(input_.skull.points, run);
   }
-  Eigen::MatrixXd regressors(1 + relief_->of_vertices.rows(), std::ssize(input_.skull.points));
+  Eigen::MatrixXd regressors(1 + bone_->of_vertices.rows(), std::ssize(input_.skull.points));
   ForEachVertex(input_, run, [&](std::size_t i) {
     regressors.col(static_cast<Eigen::Index>(i)) =
-        relief_->At(input_.skull.points[i], static_cast<int>(i));
+        bone_->At(input_.skull.points[i], static_cast<int>(i));
   });
   return regressors;
 }

@@ -13,8 +13,8 @@ bool GoesAlong(const Scheme& scheme) {
       return true;
     }
   }
-  if constexpr (requires { scheme.mean == DepthMean::kCovariates; }) {
-    if (scheme.mean == DepthMean::kCovariates) {
+  if constexpr (requires { LooksAtBone(scheme.mean); }) {
+    if (LooksAtBone(scheme.mean)) {
       return true;
     }
   }

@@ -12,6 +12,7 @@
 #include "interp/interpolate_depth.h"
 #include "interp/kriging/gaussian_regression.h"
 #include "interp/kriging/surface_matern_likelihood.h"
+#include "interp/on_surface/bone_geometry.h"
 #include "interp/on_surface/bone_relief.h"
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/base/error.h"
@@ -343,12 +344,18 @@ TEST_P(EveryMean, ASubjectThatIsTheTableTimesAFactorIsThatEverywhere) {
   }
 }
 
-TEST_P(EveryMean, DepthsThatAreTheReliefTimesAFactorAreThatEverywhere) {
-  DowelScene scene = ScatteredScene(12);
-  scene.skull = Plate(160, 40);  // of edges that are kept
-  for (Vec3& p : scene.skull.points) {
+// Of edges that are kept.
+TriMesh RoughPlate() {
+  TriMesh plate = Plate(160, 40);
+  for (Vec3& p : plate.points) {
     p.z() = 6 * std::sin(p.x() / 15) * std::cos(p.y() / 25);
   }
+  return plate;
+}
+
+TEST_P(EveryMean, DepthsThatAreTheReliefTimesAFactorAreThatEverywhere) {
+  DowelScene scene = ScatteredScene(12);
+  scene.skull = RoughPlate();
   scene.normals = VertexNormals(scene.skull);
   const Eigen::MatrixXd relief = BoneRelief(scene.skull, std::vector<double>{10.0, 40.0});
   const auto depth_at = [&](std::size_t v) {
@@ -368,6 +375,33 @@ TEST_P(EveryMean, DepthsThatAreTheReliefTimesAFactorAreThatEverywhere) {
   }
   scene.dowels.resize(2);
   EXPECT_THROW(InterpolateDepth(covariates, scene.Input(), RunContext{}), InputError);
+}
+
+TEST_P(EveryMean, DepthsThatFollowThePlaceInTheHeadDoSoEverywhere) {
+  DowelScene scene = ScatteredScene(14);
+  scene.skull = RoughPlate();
+  scene.normals = VertexNormals(scene.skull);
+  const std::vector<std::string> sites = {"mso_l", "mio_l", "mso_r", "mio_r", "zy_l", "zy_r"};
+  for (std::size_t k = 0; k < scene.dowels.size(); ++k) {
+    scene.dowels[k].site = k < sites.size() ? sites[k] : "d" + std::to_string(k);
+    scene.dowels[k].base = scene.skull.points[113 * (k + 1)];
+  }
+  const Eigen::MatrixXd geometry = BoneGeometry(scene.skull, FrameOfHead(scene.dowels));
+  const auto depth_at = [&](std::size_t v) {
+    return 20 +
+           Eigen::RowVector4d(0.3, 2, -1, 0.02).dot(geometry.col(static_cast<Eigen::Index>(v)));
+  };
+  for (std::size_t k = 0; k < scene.dowels.size(); ++k) {
+    scene.dowels[k].depth_mm = depth_at(113 * (k + 1));
+  }
+  const DepthScheme scheme = With(GetParam(), DepthMean::kGeometry);
+  EXPECT_TRUE(NeedsSurface(scheme));
+  const DepthField field = InterpolateDepth(scheme, scene.Input(), RunContext{});
+  for (std::size_t i = 0; i < field.status.size(); ++i) {
+    ASSERT_NEAR(field.depth_mm[i], depth_at(i), 1e-3);
+  }
+  scene.dowels.resize(6);
+  EXPECT_THROW(InterpolateDepth(scheme, scene.Input(), RunContext{}), InputError);
 }
 
 }  // namespace
