@@ -12,6 +12,7 @@
 #include "problems/pipeline/case.h"
 #include "problems/population/skull_grid.h"
 #include "problems/propose/propose_landmarks.h"
+#include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -66,19 +67,18 @@ Vec3 PointOf(const Landmark& landmark) {
   return {landmark.point[0], landmark.point[1], landmark.point[2]};
 }
 
-// Nearer ones are a mistake (landmark_mistakes.h).
-double SamePoint_mm(const std::vector<Landmark>& landmarks) {
+Box3 ExtentOf(const std::vector<Landmark>& landmarks) {
   Box3 box;
   for (const Landmark& landmark : landmarks) {
     box.extend(PointOf(landmark));
   }
-  return std::min(0.5, 0.002 * box.diagonal().norm());
+  return box;
 }
 
 // Of proposed landmarks on one point the surest stays: no person has placed them, so that no person
 // has mistaken anything, and the other sites are as good as they were.
 void DropClashing(Marked& marked) {
-  const double same_mm = SamePoint_mm(marked.file.landmarks);
+  const double same_mm = SamePoint_mm(ExtentOf(marked.file.landmarks));
   std::vector<Landmark> by_confidence = marked.file.landmarks, kept;
   std::ranges::stable_sort(by_confidence, std::ranges::greater{},
                            [&](const Landmark& l) { return marked.confidence.at(l.site); });

@@ -122,8 +122,7 @@ class Search {
     for (const SitePoint& s : sites_) {
       box.extend(s.point);
     }
-    // Files in metres have all points within a millimetre of each other.
-    const double same_mm = std::min(0.5, 0.002 * box.diagonal().norm());
+    const double same_mm = SamePoint_mm(box);
     std::vector<bool> told(sites_.size(), false);
     for (std::size_t i = 0; i < sites_.size(); ++i) {
       std::vector<std::string> same = {SiteInWords(sites_[i].site)};
@@ -332,6 +331,8 @@ class Search {
 };
 
 }  // namespace
+
+double SamePoint_mm(const Box3& of_all) { return std::min(0.5, 0.002 * of_all.diagonal().norm()); }
 
 LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
                                       const MeshQuery& query, const PlaceOptions& options) {

@@ -16,8 +16,12 @@ struct LandmarkMistakes {
   std::vector<std::string> notes;   // what may be meant so
 };
 
+// So near to each other two landmarks have the same point: 0.5 mm, or 0.2 % of the extent of all if
+// that is less, for files in metres have all points within a millimetre.
+double SamePoint_mm(const Box3& of_all);
+
 // In this order; what explains the rest ends the search.
-//   same point      sites within 0.5 mm, or 0.2 % of the extent of all sites if that is less
+//   same point      sites within SamePoint_mm of each other
 //   another frame   more than half of the sites further than max_distance_mm from the bone, or of
 //                   another size than a skull: whether negated axes or another unit would lay them
 //                   on the bone (median at most that far)
