@@ -21,11 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFarthestMm = 5;                // of sites and landmarks from the mean
+constexpr double kFarthestFromMean_mm = 5;       // of sites and landmarks from the mean
 constexpr int kFirstUsed = 28, kLandmarks = 68;  // Multi-PIE; before: outline and brows
 // RMS of the largest mode. Faces have some mm; the bounds are a factor of 1000 apart, so that no
 // model is within them in two units of m, mm and um.
-constexpr double kLeastModeMm = 0.05, kMostModeMm = 50;
+constexpr double kLeastMode_mm = 0.05, kMostMode_mm = 50;
 
 const fs::path& Named(const fs::path& path, const char* option) {
   if (path.empty()) {
@@ -132,19 +132,19 @@ void CheckOfMean(const TriMesh& mesh, const fs::path& file, const TriMesh& mean,
   }
 }
 
-double RmsMm(const Eigen::VectorXd& mode) {
+double RmsOfMode_mm(const Eigen::VectorXd& mode) {
   return mode.stableNorm() / std::sqrt(static_cast<double>(mode.size()) / 3);
 }
 
 Eigen::VectorXd ModeOfMesh(const fs::path& file, const TriMesh& mean, const fs::path& mean_file) {
-  constexpr double kRoundingMm = 0.001;  // of a text file with three digits
+  constexpr double kTextRounding_mm = 0.001;  // of a text file with three digits
   const TriMesh mesh = ReadMesh(file);
   CheckOfMean(mesh, file, mean, mean_file);
   Eigen::VectorXd mode(3 * std::ssize(mean.points));
   for (std::size_t v = 0; v < mean.points.size(); ++v) {
     mode.segment<3>(3 * static_cast<Eigen::Index>(v)) = mesh.points[v] - mean.points[v];
   }
-  if (RmsMm(mode) <= kRoundingMm) {
+  if (RmsOfMode_mm(mode) <= kTextRounding_mm) {
     throw InputError(fmt::format("{}: it is the mean, and so no mode; take it out of the folder",
                                  file.string()));
   }
@@ -171,7 +171,7 @@ Eigen::MatrixXd ReadModes(const ModesPrior& source, const TriMesh& mean) {
                                                 : ModesOfArray(source, mean.points.size());
 }
 
-bool IsSizeOfMode(double rms_mm) { return rms_mm >= kLeastModeMm && rms_mm <= kMostModeMm; }
+bool IsSizeOfMode(double rms_mm) { return rms_mm >= kLeastMode_mm && rms_mm <= kMostMode_mm; }
 
 // The scale that would bring the largest mode into range, where a unit was mistaken.
 std::string ScaleRemedy(const ModesPrior& source, double rms_mm) {
@@ -195,7 +195,7 @@ void CheckSize(const ModesPrior& source, const Eigen::MatrixXd& modes) {
   Eigen::Index largest = 0;
   double rms_mm = 0;
   for (Eigen::Index k = 0; k < modes.cols(); ++k) {
-    if (const double rms = RmsMm(modes.col(k)); rms > rms_mm) {
+    if (const double rms = RmsOfMode_mm(modes.col(k)); rms > rms_mm) {
       rms_mm = rms;
       largest = k;
     }
@@ -204,18 +204,18 @@ void CheckSize(const ModesPrior& source, const Eigen::MatrixXd& modes) {
     throw InputError(fmt::format(
         "{}: the largest mode, number {}, moves the points by {:.3g} mm (RMS), and {} to {} mm are "
         "allowed; {}",
-        source.modes.string(), largest + 1, rms_mm, kLeastModeMm, kMostModeMm,
+        source.modes.string(), largest + 1, rms_mm, kLeastMode_mm, kMostMode_mm,
         ScaleRemedy(source, rms_mm)));
   }
 }
 
 void CheckNear(const CsvReader& table, const std::string& what, double distance_mm,
                const fs::path& mean) {
-  if (!(distance_mm <= kFarthestMm)) {
+  if (!(distance_mm <= kFarthestFromMean_mm)) {
     table.Fail(
         fmt::format("{} lies {:.1f} mm from {}, and at most {} mm are allowed; both must be "
                     "of one frame, in mm",
-                    what, distance_mm, mean.string(), kFarthestMm));
+                    what, distance_mm, mean.string(), kFarthestFromMean_mm));
   }
 }
 
