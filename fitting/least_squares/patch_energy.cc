@@ -28,25 +28,36 @@ Eigen::Matrix4d Derivative(const Eigen::Matrix4d& c) {
   return d;
 }
 
-// Integrals over [0,1] of products of the `order`-th derivatives of the four segments, order 0..2.
-Gram SegmentGram(int order) {
+// Of the `order`-th derivatives of the segments, order 0..2.
+Eigen::Matrix4d DerivativeCoefficients(int order) {
   Eigen::Matrix4d c = SegmentCoefficients();
   for (int k = 0; k < order; ++k) {
     c = Derivative(c);
   }
+  return c;
+}
+
+// Integrals over [0,1] of a segment's k-th derivative times another's l-th.
+Gram SegmentGram(int k, int l) {
   Eigen::Matrix4d moments;  // of t^(p + q)
   for (int p = 0; p < 4; ++p) {
     for (int q = 0; q < 4; ++q) {
       moments(p, q) = 1.0 / (p + q + 1);
     }
   }
-  return c * moments * c.transpose();
+  return DerivativeCoefficients(k) * moments * DerivativeCoefficients(l).transpose();
 }
 
-// Integral over the patch of (d^k/ds^k d^l/dt^l f)^2.
-ElementStiffness DerivativeStiffness(int k, int l, double size_s, double size_t) {
-  const Gram s = SegmentGram(k) * std::pow(size_s, 1 - 2 * k);
-  const Gram t = SegmentGram(l) * std::pow(size_t, 1 - 2 * l);
+struct DerivativeOrders {
+  int s = 0, t = 0;
+};
+
+// Integral over the patch of one derivative of f times another; symmetric only if they are the
+// same.
+ElementStiffness ProductForm(const DerivativeOrders& one, const DerivativeOrders& other,
+                             double size_s, double size_t) {
+  const Gram s = SegmentGram(one.s, other.s) * std::pow(size_s, 1 - one.s - other.s);
+  const Gram t = SegmentGram(one.t, other.t) * std::pow(size_t, 1 - one.t - other.t);
   ElementStiffness form;
   for (int row = 0; row < 16; ++row) {
     for (int col = 0; col < 16; ++col) {
@@ -54,6 +65,11 @@ ElementStiffness DerivativeStiffness(int k, int l, double size_s, double size_t)
     }
   }
   return form;
+}
+
+// Integral over the patch of (d^k/ds^k d^l/dt^l f)^2.
+ElementStiffness DerivativeStiffness(int k, int l, double size_s, double size_t) {
+  return ProductForm({k, l}, {k, l}, size_s, size_t);
 }
 
 }  // namespace
@@ -86,9 +102,26 @@ Stencil PatchGrid::StencilAt(const Vec2& uv, DerivativeOrder order) const {
   return semblance::StencilAt(Shape(), 0, uv, order);
 }
 
-ElementStiffness ThinPlateStiffness(double size_s, double size_t) {
-  return DerivativeStiffness(2, 0, size_s, size_t) + 2 * DerivativeStiffness(1, 1, size_s, size_t) +
-         DerivativeStiffness(0, 2, size_s, size_t);
+std::array<ElementStiffness, 6> BendingStiffnesses(double size_s, double size_t) {
+  constexpr DerivativeOrders kSs = {2, 0}, kSt = {1, 1}, kTt = {0, 2};
+  const auto of = [&](const DerivativeOrders& one, const DerivativeOrders& other) {
+    return ProductForm(one, other, size_s, size_t);
+  };
+  const auto mixed = [&](const DerivativeOrders& one, const DerivativeOrders& other) {
+    return ElementStiffness((of(one, other) + of(other, one)) / 2);
+  };
+  return {of(kSs, kSs),    of(kSt, kSt),    of(kTt, kTt),
+          mixed(kSs, kSt), mixed(kSt, kTt), mixed(kSs, kTt)};
+}
+
+ElementStiffness ThinPlateStiffness(double size_s, double size_t, const BendingMetric& metric) {
+  const std::array<ElementStiffness, 6> forms = BendingStiffnesses(size_s, size_t);
+  const BendingSums factors = BendingFactors(metric);
+  ElementStiffness sum = ElementStiffness::Zero();
+  for (std::size_t k = 0; k < forms.size(); ++k) {
+    sum += factors[k] * forms[k];
+  }
+  return sum;
 }
 
 ElementStiffness MembraneStiffness(double size_s, double size_t) {

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "fitting/least_squares/bending_metric.h"
 #include "surfaces/hspline/control_net.h"
 #include "surfaces/hspline/hspline_surface.h"
 
@@ -32,8 +33,12 @@ using Matrix16 = Eigen::Matrix<double, 16, 16>;
 // x^T stiffness x is the energy of one patch for one coordinate x (16) of its vertices.
 using ElementStiffness = Matrix16;
 
-// Integral over a patch of size_s x size_t (mm) of f_ss^2 + 2 f_st^2 + f_tt^2; rank 13.
-ElementStiffness ThinPlateStiffness(double size_s, double size_t);
+// Integral over a patch of size_s x size_t (mm) of f_ss^2 + 2 f_st^2 + f_tt^2; rank 13. With
+// another metric M than the plane's own of tr((M H)^2), H being the matrix of second derivatives.
+ElementStiffness ThinPlateStiffness(double size_s, double size_t,
+                                    const BendingMetric& metric = BendingMetric::Identity());
+// x^T of each x are the patch's BendingSums.
+std::array<ElementStiffness, 6> BendingStiffnesses(double size_s, double size_t);
 // Integral over a patch of size_s x size_t (mm) of f_s^2 + f_t^2; rank 15.
 ElementStiffness MembraneStiffness(double size_s, double size_t);
 

@@ -80,6 +80,7 @@ struct Snapshot {
   NestedSpace space;
   NestedSolve::Packed solution;
   double weight = kNaN;
+  BendingMetric metric;
   double held_square = kNaN;
   int round = -1;
 };
@@ -187,7 +188,7 @@ class NestedFitter {
     Look();
     PointChoice fitted = Fitted();
     const std::size_t count = fitted.Count(points_);
-    solve_.Begin(space_, std::move(fitted));
+    solve_.Begin(space_, std::move(fitted), metric_);
     NestedWeightSearch search(count, solve_, least_gain_);
     if (std::isnan(weight_)) {
       search.Scan();
@@ -195,13 +196,37 @@ class NestedFitter {
     } else {
       search.ClimbAnew(4, weight_);
     }
+    SearchLengths(search);
     const NestedWeight chosen = search.Finish();
     least_gain_ = search.least_gain();
     if (std::isnan(chosen.weight)) {
       Fail("no smoothness has a usable solve; give more points than a plane needs");
     }
     weight_ = chosen.weight;
+    metric_ = solve_.metric();
     Judge(chosen, search.steps());
+  }
+
+  // The lengths in which the surface bends.
+  void SearchLengths(NestedWeightSearch& search) {
+    if (!plan_.stretched) {
+      return;
+    }
+    if (space_.finest() >= finest_ && space_.finest() > finest_scanned_ && HasFoundNothing()) {
+      search.ScanStretches(4);
+      finest_scanned_ = space_.finest();
+    }
+    search.Stretch(4);
+  }
+
+  // Vertices as dense as the points have not brought the surface nearer to those held out, yet
+  // the closest points agree.
+  bool HasFoundNothing() const {
+    constexpr double kNothing = 0.7;
+    const std::vector<NestedRound>& rounds = report_.rounds;
+    return !rounds.empty() &&
+           rounds.back().held_out_rms_mm > kNothing * rounds.front().held_out_rms_mm &&
+           ClosestAgree();
   }
 
   // By the points held out.
@@ -224,6 +249,7 @@ class NestedFitter {
     report_.rounds.push_back({.finest = space_.finest(),
                               .vertices = space_.Vertices(),
                               .weight = chosen.weight,
+                              .stretch = StretchOf(metric_),
                               .degrees_of_freedom = chosen.degrees_of_freedom,
                               .rms_mm = std::sqrt(chosen.mean_square),
                               .held_out_rms_mm = std::sqrt(held),
@@ -233,6 +259,7 @@ class NestedFitter {
       best_ = Snapshot{.space = space_,
                        .solution = solve_.Solution(),
                        .weight = weight_,
+                       .metric = metric_,
                        .held_square = held,
                        .round = static_cast<int>(report_.rounds.size()) - 1};
     }
@@ -283,8 +310,12 @@ class NestedFitter {
         level >= std::min(cap_, cheap ? finest_ + 1 : finest_) || !ClosestAgree()) {
       return false;
     }
-    densified_ = true;
     const double least = cheap ? kCheapDense : kDense;
+    if (level > 0 && HasFoundNothing() &&
+        OverlayDense(points_, level - 1, least, space_) > kFewNew * space_.Vertices()) {
+      return true;  // gaps of that level, where nothing could be found
+    }
+    densified_ = true;
     return OverlayDense(points_, level, least, space_) > 0;
   }
 
@@ -332,6 +363,7 @@ class NestedFitter {
     report_.chosen_round = best.round;
     report_.held_out_rms_mm = std::sqrt(best.held_square);
     weight_ = best.weight;
+    metric_ = best.metric;
     DropOutliers(report_.held_out_rms_mm);
     NestedWeight chosen = FitAll();
     if (DropOutliers(std::sqrt(chosen.score))) {
@@ -396,7 +428,7 @@ class NestedFitter {
   NestedWeight FitAll() {
     PointChoice kept{.left_out = outlier_};
     const std::size_t count = kept.Count(points_);
-    solve_.Begin(space_, std::move(kept));
+    solve_.Begin(space_, std::move(kept), metric_);
     NestedWeightSearch search(count, solve_, least_gain_);
     search.Climb(2, weight_);
     const NestedWeight chosen = search.Finish();
@@ -406,6 +438,7 @@ class NestedFitter {
 
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
+    report_.stretch = StretchOf(metric_);
     report_.weighted = points_.weighted;
     report_.met_to_rounding = report_.held_out_rms_mm <= rounding_mm_;
     report_.limited_by_density =
@@ -503,6 +536,8 @@ class NestedFitter {
   int finest_seen_ = 0;              // level on which those show something
   std::vector<Residual> residuals_;  // of those that are looked at
   double weight_ = kNaN, least_gain_ = 0;
+  BendingMetric metric_ = BendingMetric::Identity();
+  int finest_scanned_ = -1;  // level
   bool densified_ = false;
   std::optional<Snapshot> best_;
   AutoReport report_;

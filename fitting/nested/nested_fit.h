@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fitting/least_squares/bending_metric.h"
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/problem/fit_target.h"
 #include "surfaces/base/run_context.h"
@@ -19,6 +20,7 @@ struct NestedRound {
   int finest = -1;                   // level
   int vertices = -1;                 // that say something of their own
   double weight = kNaN;              // of the thin-plate energy, mm^4 (SmoothnessTerm, length_mm 1)
+  BendingStretch stretch;            // of the lengths in which that energy is measured
   double degrees_of_freedom = kNaN;  // trace of the influence matrix
   double rms_mm = kNaN;              // of the points that were fitted, along one axis, weighted
   double held_out_rms_mm = kNaN;     // of the points that were not, weighted
@@ -34,6 +36,7 @@ struct AutoReport {
   int chosen_round = -1;
   double weight = kNaN;                 // of the thin-plate energy, as NestedRound; all points
   double length_mm = 1;                 // of the smoothness that the weights are for
+  BendingStretch stretch;               // likewise
   double noise_mm = kNaN;               // standard deviation of a point along one axis, by the fit
   double neighbour_noise_mm = kNaN;     // by a quadratic through each point's 20 neighbours
   double closer_noise_mm = kNaN;        // by a plane through 8: less, if detail passes for noise
@@ -55,10 +58,11 @@ struct NestedFitResult {
 };
 
 // A tenth of the points is held out. In rounds: the thin-plate weight by generalised
-// cross-validation, outliers (outlier_search.h), and finer vertices where residuals are correlated
-// (unresolved_detail.h), as long as there are such places or points are dense. Of all rounds the
-// one that predicts the points held out best, or within a tenth of a per cent the coarsest, is
-// fitted again to all points. With many points the first rounds look at some of them.
+// cross-validation, and with the plan's `stretched` in which lengths it measures bending; outliers
+// (outlier_search.h), and finer vertices where residuals are correlated (unresolved_detail.h), as
+// long as there are such places or points are dense. Of all rounds the one that predicts the points
+// held out best, or within a tenth of a per cent the coarsest, is fitted again to all points. With
+// many points the first rounds look at some of them.
 //   start: without detail; what it leaves of the points is smoothed, not the surface itself.
 // Copies of a point count once. Throws InputError for a start with detail, without extent, or fewer
 // than 16 points that differ; Cancelled.

@@ -87,8 +87,9 @@ void NestedSolve::Enter(const NestedSpace& space) {
   absolute_ = Zeros();
 }
 
-void NestedSolve::Begin(const NestedSpace& space, PointChoice used) {
+void NestedSolve::Begin(const NestedSpace& space, PointChoice used, const BendingMetric& metric) {
   Enter(space);
+  metric_ = metric;
   used_ = std::move(used);
   levels_.clear();
   Shares data_shares;
@@ -99,9 +100,7 @@ void NestedSolve::Begin(const NestedSpace& space, PointChoice used) {
     if (space[level].leaves) {
       system.matrix = StencilMatrix(layout, RunsAround(layout, system.leaves));
     }
-    system.energy = ThinPlateStiffness(lengths_mm_.x() / layout.grid.patches_u,
-                                       lengths_mm_.y() / layout.grid.patches_v) /
-                    lengths_mm_.prod();
+    system.energy = EnergyOf(layout.grid);
     data_shares.emplace_back(layout.Patches(), 0.0);
   }
   right_ = Zeros();
@@ -114,7 +113,8 @@ void NestedSolve::Begin(const NestedSpace& space, PointChoice used) {
     AddRestricted(right_[level], Runs(level), right_[level - 1]);
     right_[level - 1].FoldHalo(Runs(level - 1));
   }
-  MakeDiagonals(std::move(data_shares));
+  const double data = MakeDataDiagonals(std::move(data_shares));
+  even_weight_ = data / MakeEnergyDiagonals() / std::max(weight_sum_, 1e-300);
 }
 
 // Points of one leaf follow each other. visit(leaf, indices).
@@ -161,55 +161,77 @@ void NestedSolve::AddPoints(Shares& data_shares) {
   ForEachLeaf(0, points_.size(), used_, add);
 }
 
-// What each vertex of each level would see of points and energy, were the level alone.
-void NestedSolve::MakeDiagonals(Shares data_shares) {
-  static const std::array<double, 16> squares = MeanSquares();
-  Shares energy_shares;
-  for (const LevelSystem& system : levels_) {
-    energy_shares.emplace_back(system.leaves.begin(), system.leaves.end());
+Matrix16 NestedSolve::EnergyOf(const PatchGrid& grid) const {
+  return ThinPlateStiffness(lengths_mm_.x() / grid.patches_u, lengths_mm_.y() / grid.patches_v,
+                            metric_) /
+         lengths_mm_.prod();
+}
+
+// visit(i, j, patch): of the patches that are there.
+template <class Visit>
+void NestedSolve::ForEachPatch(int level, const Visit& visit) const {
+  const GridLayout& layout = (*space_)[level].layout;
+  for (int j = 0; j < layout.grid.patches_v; ++j) {
+    for (int i = 0; i < layout.grid.patches_u; ++i) {
+      const std::size_t patch = layout.Patch(i, j);
+      if ((*space_)[level].there[patch] != 0) {
+        visit(i, j, patch);
+      }
+    }
   }
-  double data = 0, energy = 0;
+}
+
+// What each vertex of each level would see of the points, were the level alone. Returns the sum.
+double NestedSolve::MakeDataDiagonals(Shares shares) {
+  static const std::array<double, 16> squares = MeanSquares();
+  double sum = 0;
   for (int level = Finest(); level >= 0; --level) {
     LevelSystem& system = levels_[level];
     const GridLayout& layout = (*space_)[level].layout;
     if (level < Finest()) {
-      const GridLayout& finer = (*space_)[level + 1].layout;
-      SumUp(finer, data_shares[level + 1], 1, layout, data_shares[level]);
-      SumUp(finer, energy_shares[level + 1], 0.25, layout, energy_shares[level]);
+      SumUp((*space_)[level + 1].layout, shares[level + 1], 1, layout, shares[level]);
     }
     system.data_diagonal = GridValues(layout, 1);
-    system.energy_diagonal = GridValues(layout, 1);
     system.inverse = GridValues(layout, 1);
-    std::array<double, 16> own;
-    for (int k = 0; k < 16; ++k) {
-      own[k] = system.energy(k, k);
-    }
-    for (int j = 0; j < layout.grid.patches_v; ++j) {
-      for (int i = 0; i < layout.grid.patches_u; ++i) {
-        const std::size_t patch = layout.Patch(i, j);
-        if ((*space_)[level].there[patch] != 0) {
-          Scatter(layout, i, j, squares, data_shares[level][patch],
-                  system.data_diagonal.Channel(0));
-          Scatter(layout, i, j, own, energy_shares[level][patch],
-                  system.energy_diagonal.Channel(0));
-          data += data_shares[level][patch];
-          energy += energy_shares[level][patch] * system.energy.trace();
-        }
-      }
-    }
+    ForEachPatch(level, [&](int i, int j, std::size_t patch) {
+      Scatter(layout, i, j, squares, shares[level][patch], system.data_diagonal.Channel(0));
+      sum += shares[level][patch];
+    });
   }
-  const double each = std::accumulate(squares.begin(), squares.end(), 0.0);
-  even_weight_ = each * data / energy / std::max(weight_sum_, 1e-300);
+  return std::accumulate(squares.begin(), squares.end(), 0.0) * sum;
 }
 
-// The matrix as it stands has the weight of the last call.
-void NestedSolve::SetWeight(double weight) {
-  const double more = (weight - weight_) * weight_sum_;
-  weight_ = weight;
+// The same of the energy at weight 1.
+double NestedSolve::MakeEnergyDiagonals() {
+  Shares shares;
+  for (const LevelSystem& system : levels_) {
+    shares.emplace_back(system.leaves.begin(), system.leaves.end());
+  }
+  double sum = 0;
+  std::array<double, 16> own;
+  for (int level = Finest(); level >= 0; --level) {
+    LevelSystem& system = levels_[level];
+    const GridLayout& layout = (*space_)[level].layout;
+    if (level < Finest()) {
+      SumUp((*space_)[level + 1].layout, shares[level + 1], 0.25, layout, shares[level]);
+    }
+    system.energy_diagonal = GridValues(layout, 1);
+    Eigen::Map<Eigen::Vector<double, 16>>(own.data()) = system.energy.diagonal();
+    ForEachPatch(level, [&](int i, int j, std::size_t patch) {
+      Scatter(layout, i, j, own, shares[level][patch], system.energy_diagonal.Channel(0));
+      sum += shares[level][patch] * system.energy.trace();
+    });
+  }
+  return sum;
+}
+
+// Adds to the matrices what form_of(system) is, once per leaf.
+template <class FormOf>
+void NestedSolve::AddToLeaves(const FormOf& form_of) {
   for (int level = 0; level <= Finest(); ++level) {
     LevelSystem& system = levels_[level];
     const GridLayout& layout = (*space_)[level].layout;
-    const Matrix16 form = more * system.energy;
+    const Matrix16 form = form_of(system);
     for (int j = 0; (*space_)[level].leaves && j < layout.grid.patches_v; ++j) {
       for (int i = 0; i < layout.grid.patches_u; ++i) {
         if (system.leaves[layout.Patch(i, j)] != 0) {
@@ -217,9 +239,35 @@ void NestedSolve::SetWeight(double weight) {
         }
       }
     }
+  }
+}
+
+// The matrix as it stands has the weight of the last call.
+void NestedSolve::SetWeight(double weight) {
+  const double more = (weight - weight_) * weight_sum_;
+  weight_ = weight;
+  AddToLeaves([&](const LevelSystem& system) -> Matrix16 { return more * system.energy; });
+  Invert();
+}
+
+void NestedSolve::Invert() {
+  for (int level = 0; level <= Finest(); ++level) {
+    LevelSystem& system = levels_[level];
     InvertOn(Runs(level), system.data_diagonal.Channel(0), system.energy_diagonal.Channel(0),
              weight_ * weight_sum_, (*space_)[level].active.data(), system.inverse.Channel(0));
   }
+}
+
+void NestedSolve::SetMetric(const BendingMetric& metric) {
+  metric_ = metric;
+  const double factor = weight_ * weight_sum_;
+  AddToLeaves([&](const LevelSystem& system) -> Matrix16 { return -factor * system.energy; });
+  for (int level = 0; level <= Finest(); ++level) {
+    levels_[level].energy = EnergyOf((*space_)[level].layout.grid);
+  }
+  AddToLeaves([&](const LevelSystem& system) -> Matrix16 { return factor * system.energy; });
+  MakeEnergyDiagonals();
+  Invert();
 }
 
 void NestedSolve::Absolute(const NestedValues& x) {
@@ -332,10 +380,10 @@ double NestedSolve::SumOfSquares() {
   return sum;
 }
 
-// Of the solution, at weight 1.
-double NestedSolve::Energy() {
+// visit(level, vertices): the sixteen of each leaf, channel by channel.
+template <class Visit>
+void NestedSolve::ForEachLeafOfSolution(const Visit& visit) {
   Absolute(solution_);
-  double sum = 0;
   std::array<double, 16> vertices;
   for (int level = 0; level <= Finest(); ++level) {
     const LevelSystem& system = levels_[level];
@@ -344,12 +392,36 @@ double NestedSolve::Energy() {
       for (int i = 0; i < layout.grid.patches_u; ++i) {
         for (int c = 0; system.leaves[layout.Patch(i, j)] != 0 && c < points_.channels; ++c) {
           Gather(absolute_[level], c, i, j, vertices);
-          sum += QuadraticForm(system.energy.data(), vertices.data());
+          visit(level, vertices.data());
         }
       }
     }
   }
+}
+
+// Of the solution, at weight 1.
+double NestedSolve::Energy() {
+  double sum = 0;
+  ForEachLeafOfSolution([&](int level, const double* vertices) {
+    sum += QuadraticForm(levels_[level].energy.data(), vertices);
+  });
   return sum;
+}
+
+BendingSums NestedSolve::Bending() {
+  std::vector<std::array<ElementStiffness, 6>> forms;
+  for (int level = 0; level <= Finest(); ++level) {
+    const PatchGrid& grid = (*space_)[level].layout.grid;
+    forms.push_back(
+        BendingStiffnesses(lengths_mm_.x() / grid.patches_u, lengths_mm_.y() / grid.patches_v));
+  }
+  BendingSums sums{};
+  ForEachLeafOfSolution([&](int level, const double* vertices) {
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      sums[k] += QuadraticForm(forms[level][k].data(), vertices);
+    }
+  });
+  return sums;
 }
 
 // Point by point where too few digits would be left.

@@ -31,9 +31,13 @@ class NestedSolve {
   void Enter(const NestedSpace& space);
   // Enters it, and takes the points of a choice. With one more channel, a random sign per point,
   // for the trace.
-  void Begin(const NestedSpace& space, PointChoice used);
+  void Begin(const NestedSpace& space, PointChoice used,
+             const BendingMetric& metric = BendingMetric::Identity());
   // The weight of the thin-plate energy, mm^2 per energy.
   void SetWeight(double weight);
+  // In which lengths bending is measured instead of those since the beginning.
+  void SetMetric(const BendingMetric& metric);
+  const BendingMetric& metric() const { return metric_; }
   // Until what is left to gain is below `least_gain` of the sum of w |e|^2 (0: far below rounding).
   // Returns the number of steps.
   int Solve(double least_gain);
@@ -42,6 +46,7 @@ class NestedSolve {
   double MeanSquare();
   // The trace of the influence matrix at the last solution, by one probe (Hutchinson 1990).
   double Trace() const;
+  BendingSums Bending();  // of the last solution, over all channels but the probe
   double WeightSum() const { return weight_sum_; }
   // The diagonals' sums over those of the energy at weight 1: where points and energy balance.
   double EvenWeight() const { return even_weight_; }
@@ -80,7 +85,16 @@ class NestedSolve {
   void AddResiduals(std::size_t begin, std::size_t end, const PointChoice& choice,
                     std::vector<NestedResidual>& residuals) const;
   void AddPoints(std::vector<std::vector<double>>& data_shares);
-  void MakeDiagonals(std::vector<std::vector<double>> data_shares);
+  Matrix16 EnergyOf(const PatchGrid& grid) const;
+  template <class Visit>
+  void ForEachPatch(int level, const Visit& visit) const;
+  double MakeDataDiagonals(std::vector<std::vector<double>> shares);
+  double MakeEnergyDiagonals();
+  template <class FormOf>
+  void AddToLeaves(const FormOf& form_of);
+  void Invert();
+  template <class Visit>
+  void ForEachLeafOfSolution(const Visit& visit);
   void Multiply(const NestedValues& x, NestedValues& product);
   void Absolute(const NestedValues& x);
   double Energy();
@@ -97,6 +111,7 @@ class NestedSolve {
   PointChoice used_;
   std::vector<LevelSystem> levels_;
   NestedValues right_, solution_, absolute_, direction_, product_, residual_;
+  BendingMetric metric_ = BendingMetric::Identity();
   double weight_ = 0, weight_sum_ = 0, square_sum_ = 0, even_weight_ = kNaN;
 };
 

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace semblance {
 namespace {
 
 // Times the weight at which points and energy balance: no more than a plane is left.
 constexpr double kSmoothest = 100;
+constexpr double kMostStretch = 16;
 
 }  // namespace
 
@@ -85,6 +87,56 @@ void NestedWeightSearch::ClimbAnew(double factor, double from) {
   }
   if (best_.weight != before) {
     Climb(factor, best_.weight);
+  }
+}
+
+// Whether the best weight that the search finds in other lengths predicts plainly better; else all
+// is as it was. Lengths are one more number to choose, which the score knows nothing of.
+template <class Search>
+bool NestedWeightSearch::TryMetric(const BendingMetric& metric, const Search& search) {
+  constexpr double kPlainly = 0.99;
+  const BendingMetric metric_before = solve_.metric();
+  const NestedWeight before = std::exchange(best_, {});
+  NestedSolve::Packed solution_before = std::exchange(best_solution_, {});
+  tried_.clear();
+  solve_.SetMetric(metric);
+  search();
+  if (best_.score < kPlainly * before.score) {
+    return true;
+  }
+  tried_.clear();
+  solve_.SetMetric(metric_before);
+  best_ = before;
+  best_solution_ = std::move(solution_before);
+  return false;
+}
+
+// The weight changes so that what the surface pays for its bending stays. A surface that is smooth
+// in lengths that are too even bends too evenly: where it points to, the answer lies farther off.
+void NestedWeightSearch::Stretch(double factor) {
+  constexpr int kMost = 4;
+  constexpr double kApart = 2;  // less is not worth the solves
+  bool better = !std::isnan(best_.weight);
+  for (int k = 0; k < kMost && better; ++k) {
+    Finish();
+    const BendingSums bending = solve_.Bending();
+    const BendingMetric from = solve_.metric(),
+                        next = MetricBeyond(from, MetricOfLeastBending(bending, kMostStretch),
+                                            kMostStretch);
+    if (StretchBetween(from, next) < kApart) {
+      return;
+    }
+    const double weight = best_.weight * BendingIn(from, bending) / BendingIn(next, bending);
+    better = TryMetric(next, [&] { Climb(factor, weight); });
+  }
+}
+
+void NestedWeightSearch::ScanStretches(double factor) {
+  constexpr double kStretch = 4, kTurn_deg = 45;
+  const double weight = best_.weight;
+  for (int k = 0; k < 4 && !std::isnan(weight); ++k) {
+    TryMetric(MetricOf({.stretch = kStretch, .direction_deg = k * kTurn_deg}),
+              [&] { ClimbAnew(factor, weight); });
   }
 }
 

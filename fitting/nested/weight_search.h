@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thin-plate weight of a nested fit by generalised cross-validation.
+// The thin-plate weight of a nested fit, and in which lengths it bends, by generalised
+// cross-validation.
 #pragma once
 
 #include <cstddef>
@@ -32,7 +33,13 @@ class NestedWeightSearch {
   // for detail that the coarser ones could not follow looked like noise to them.
   void ClimbAnew(double factor, double from);
 
-  // Brings the solve to the best weight.
+  // From the best weight on: lengths in which the surface bends less, as long as they predict
+  // plainly better. At every step the surface itself tells them.
+  void Stretch(double factor);
+  // Where the surface shows nothing of what is there: lengths stretched along four directions.
+  void ScanStretches(double factor);
+
+  // Brings the solve to the best weight and lengths.
   NestedWeight Finish();
   int steps() const { return steps_; }
   double least_gain() const { return least_gain_; }  // for the next search
@@ -40,10 +47,12 @@ class NestedWeightSearch {
  private:
   NestedWeight Try(double weight);
   bool IsBetter(const NestedWeight& next) const;
+  template <class Search>
+  bool TryMetric(const BendingMetric& metric, const Search& search);
 
   double count_;
   NestedSolve& solve_;
-  std::map<double, NestedWeight> tried_;
+  std::map<double, NestedWeight> tried_;  // in the lengths of the solve
   NestedWeight best_;
   NestedSolve::Packed best_solution_;
   double least_gain_;

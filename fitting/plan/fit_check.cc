@@ -130,8 +130,9 @@ class FaultFinder {
       } else if (!known || automatic > 1) {
         Add(fmt::format("terms[{}]", k),
             "the auto plan weighs 'points' without a loss (it finds outliers by itself) and one "
-            "'smoothness' of the displacement with weight: auto; leave 'terms' out, or take plan: "
-            "adaptive; other terms, with numbers as weights, need solver: ceres");
+            "'smoothness' of the displacement with weight: auto, whose stretch it finds; leave "
+            "'terms' out, or take plan: adaptive; other terms, with numbers as weights, need "
+            "solver: ceres");
       }
     }
     NeedPoints("the auto plan has no term 'points' with a weight; add one", "terms");
@@ -150,9 +151,10 @@ class FaultFinder {
   static bool IsOfAutoPlan(const Term& term) {
     const auto* const points = std::get_if<PointTerm>(&term);
     const auto* const smooth = std::get_if<SmoothnessTerm>(&term);
-    return points != nullptr ? points->loss == RobustLoss::kNone
-                             : smooth != nullptr && smooth->weight.automatic &&
-                                   smooth->of == SmoothnessOf::kDisplacement;
+    return points != nullptr
+               ? points->loss == RobustLoss::kNone
+               : smooth != nullptr && smooth->weight.automatic &&
+                     smooth->of == SmoothnessOf::kDisplacement && smooth->stretch == 1;
   }
 
   // The first of the terms `points` with a weight; without any there is a fault.

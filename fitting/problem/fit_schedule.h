@@ -212,6 +212,7 @@ struct AutoPlan {
   int finest = 7;                             // level, however dense the points are
   OutlierRule outliers = OutlierRule::kDrop;  // keep: every point is believed
   int relaxation_rounds = 0;                  // of moves of (u,v) before the fit, at most
+  bool stretched = true;                      // smoothness may be measured in stretched lengths
 };
 template <class Visitor>
 void Fields(Visitor& visit, AutoPlan& o) {
@@ -233,6 +234,12 @@ void Fields(Visitor& visit, AutoPlan& o) {
                          "only about right; 0: they stay as they are. For `semblance fit`, without "
                          "joins and exact points"},
         o.relaxation_rounds);
+  visit(
+      FieldInfo{.name = "stretched",
+                .doc = "true: where the surface bends plainly less along one direction, as a ridge "
+                       "along its crest, bending counts more along it and less across it "
+                       "(smoothness.stretch), if that predicts better; false: alike"},
+      o.stretched);
 }
 
 // How every plan goes to the minimum of its terms.

@@ -43,14 +43,17 @@ constexpr auto EnumNames(SmoothnessOf) {
 // integrated exactly; f is the displacement from the template (its features survive) or the surface
 // itself. s and t are u and v stretched to the template's mean lengths in mm (rms of |S_u| and of
 // |S_v| of its level 0), so the same f costs the same at every level, however the patches are
-// proportioned. Translations and all affine maps of the template are free of cost. Against
-// dense points of weight 1 it damps a wave of length x by 1 / (1 + weight (2 pi length_mm / x)^4):
-// the default keeps waves longer than about 20 mm.
+// proportioned. With a stretch (BendingStretch) bending along direction_deg counts stretch^2 times,
+// bending across it 1 / stretch^2 times. Translations and all affine maps of the template are free
+// of cost. Against dense points of weight 1 it damps a wave of length x by 1 / (1 + weight (2 pi
+// length_mm / x)^4): the default keeps waves longer than about 20 mm.
 struct SmoothnessTerm {
   static constexpr std::string_view kName = "smoothness";
   AutoOr<double> weight = 0.01;                   // auto: from the points
   SmoothnessOf of = SmoothnessOf::kDisplacement;  // what is smooth
   double length_mm = 10;                          // over which bending is measured
+  double stretch = 1;                             // of lengths along a direction
+  double direction_deg = 0;                       // of that, from s towards t
 };
 template <class Visitor>
 void Fields(Visitor& visit, SmoothnessTerm& o) {
@@ -64,6 +67,19 @@ void Fields(Visitor& visit, SmoothnessTerm& o) {
                   .max = 1e3,
                   .doc = "length over which bending is measured; enters by its fourth power"},
         o.length_mm);
+  visit(FieldInfo{.name = "stretch",
+                  .min = 1,
+                  .max = 100,
+                  .doc = "bending along direction_deg counts this squared times, and across it as "
+                         "much less: for surfaces that bend less along one direction, as a ridge "
+                         "along its crest"},
+        o.stretch);
+  visit(FieldInfo{.name = "direction_deg",
+                  .unit = "deg",
+                  .min = -180,
+                  .max = 180,
+                  .doc = "direction of the stretch, from u towards v, u and v being in mm"},
+        o.direction_deg);
 }
 
 // Membrane: weight * length_mm^2 * mean over the surface of |f_s|^2 + |f_t|^2, integrated exactly;

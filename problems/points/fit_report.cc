@@ -30,10 +30,16 @@ constexpr double kHangTogether = 0.1;  // correlation of neighbours' residuals
 constexpr double kSmaller = 0.85;      // of the noise that the neighbours show
 
 Json RoundJson(const NestedRound& round) {
-  return {{"finest", round.finest}, {"vertices", round.vertices},
-          {"weight", round.weight}, {"degrees_of_freedom", round.degrees_of_freedom},
-          {"rms_mm", round.rms_mm}, {"held_out_rms_mm", round.held_out_rms_mm},
-          {"steps", round.steps},   {"outliers", round.outliers}};
+  return {{"finest", round.finest},
+          {"vertices", round.vertices},
+          {"weight", round.weight},
+          {"stretch", round.stretch.stretch},
+          {"direction_deg", round.stretch.direction_deg},
+          {"degrees_of_freedom", round.degrees_of_freedom},
+          {"rms_mm", round.rms_mm},
+          {"held_out_rms_mm", round.held_out_rms_mm},
+          {"steps", round.steps},
+          {"outliers", round.outliers}};
 }
 
 bool LeavesDetail(const AutoReport& r) {
@@ -60,6 +66,8 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"held_out_rms_mm", r.held_out_rms_mm},
                {"weight", r.weight},
                {"length_mm", r.length_mm},
+               {"stretch", r.stretch.stretch},
+               {"direction_deg", r.stretch.direction_deg},
                {"neighbour_correlation", r.neighbour_correlation},
                {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},
@@ -85,6 +93,13 @@ std::string AutoText(const AutoReport& r) {
     text += fmt::format("; held out {:.3g}", r.held_out_rms_mm);
   }
   text += '\n';
+  if (r.stretch.stretch > 1) {
+    text += fmt::format(
+        "it bends less along {:.0f} deg from u towards v: smoothness counts lengths along it "
+        "{:.2g} "
+        "times\n",
+        r.stretch.direction_deg, r.stretch.stretch);
+  }
   if (!r.repeated.empty()) {
     text += fmt::format(
         "{} given before, at the same place: each counts once\n",

@@ -297,6 +297,7 @@ std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const Give
   const std::span<const double> weights = given.weights;
   const SigmaOptions options{.noise_mm = report.noise_mm,
                              .weight = report.weight,
+                             .stretch = report.stretch,
                              .lengths_mm = MeanLengths(start),
                              .met = given.met};
   return std::make_shared<const SurfaceSigma>(

@@ -69,6 +69,7 @@ inline std::vector<Term> AllTerms() {
   terms.push_back(DistortionTerm{.weight = 2, .of = DistortionOf::kArea, .length_mm = 20});
   terms.push_back(PriorTerm{.weight = 3, .towards = PriorTowards::kTemplate});
   terms.push_back(SmoothnessTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
+  terms.push_back(SmoothnessTerm{.weight = 0.2, .stretch = 3, .direction_deg = 40});
   terms.push_back(MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface, .length_mm = 20});
   return terms;
 }

@@ -74,6 +74,38 @@ TEST(PatchEnergy, FormsEqualQuadratureOfTheDerivatives) {
   EXPECT_NEAR(lengths.y(), std::sqrt(Integral(net, m, n, 0, 1)), 1e-11 * lengths.y());
 }
 
+// Of tr((M H)^2) from the definition, and of a patch whose sides are stretched instead.
+TEST(PatchEnergy, BendingInOtherLengthsIsThatOfItsMetric) {
+  const int m = 3, n = 4;
+  const double lu = 7, lv = 5;
+  const ControlNet net = RandomNet(m, n, 3);
+  const BendingMetric metric = MetricOf({.stretch = 2.5, .direction_deg = 35});
+  const Quadrature q = GaussLegendre(8);
+  double expected = 0;
+  for (int k = 0; k < 64 * m * n; ++k) {
+    const int patch = k / 64, a = k % 8, b = k / 8 % 8;
+    const Vec2 uv((patch % m + q.nodes[a]) / m, (patch / m + q.nodes[b]) / n);
+    const auto derivative = [&](int of_u, int of_v) -> Vec3 {
+      return PlainStencil(m, n, uv, of_u, of_v).Apply(net) /
+             (std::pow(lu, of_u) * std::pow(lv, of_v));
+    };
+    const Vec3 ss = derivative(2, 0), st = derivative(1, 1), tt = derivative(0, 2);
+    for (int c = 0; c < 3; ++c) {
+      Eigen::Matrix2d h;
+      h << ss[c], st[c], st[c], tt[c];
+      expected +=
+          q.weights[a] * q.weights[b] / (m * n) * lu * lv * (metric * h * metric * h).trace();
+    }
+  }
+  const PatchGrid grid{.patches_u = m, .patches_v = n};
+  EXPECT_NEAR(StiffnessEnergy(ThinPlateStiffness(lu / m, lv / n, metric), grid, net), expected,
+              1e-11 * expected);
+  const ElementStiffness along_t =
+      ThinPlateStiffness(2, 3, MetricOf({.stretch = 4, .direction_deg = 90}));
+  EXPECT_LT((along_t - ThinPlateStiffness(2 * 2, 3 / 2.0)).cwiseAbs().maxCoeff(),
+            1e-12 * along_t.maxCoeff());
+}
+
 TEST(PatchEnergy, RootsReproduceTheFormsAndShowTheirNullSpaces) {
   const ElementStiffness thin = ThinPlateStiffness(2, 3), membrane = MembraneStiffness(2, 3);
   const Eigen::MatrixXd a = StiffnessRoot(thin), b = StiffnessRoot(membrane);

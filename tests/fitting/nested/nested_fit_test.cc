@@ -114,6 +114,28 @@ TEST(NestedFit, WavesThatCoarseLevelsTakeForNoiseAreFound) {
   EXPECT_NEAR(fit.report.noise_mm, 5e-3, 5e-4);
 }
 
+// Waves that run in a direction of their own.
+auto SlantingWaves(double count) {
+  return [count](const Vec2& q) {
+    const double along = 0.8 * q.x() + 0.6 * q.y();
+    return Vec3(q.x(), q.y(), 0.06 * std::sin(2 * std::numbers::pi * count * along));
+  };
+}
+
+// Too few points for a surface that may bend alike along all directions.
+TEST(NestedFit, WavesAlongOneDirectionNeedFewerPoints) {
+  const auto waves = SlantingWaves(20);
+  const FitTarget target = Heights(waves, 5000, 5e-3);
+  const NestedFitResult fit = FitAuto(target),
+                        alike = FitAuto(target, Closure::kOpen, {.stretched = false});
+  const double rms = ErrorAgainst(waves, fit.surface, 150).rms;
+  EXPECT_LT(rms, 8e-3);
+  EXPECT_GT(ErrorAgainst(waves, alike.surface, 150).rms, 1.5 * rms);
+  EXPECT_GT(fit.report.stretch.stretch, 2);
+  EXPECT_NEAR(fit.report.stretch.direction_deg, 126.9, 10) << "along the crests";
+  EXPECT_EQ(alike.report.stretch.stretch, 1);
+}
+
 // One point in twenty, all on one side.
 TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
   FitTarget target = Heights(FrankePoint, 10000, 1e-3);
@@ -380,6 +402,17 @@ TEST(NestedFit, CeresFindsTheSameSurface) {
   }
 }
 
+TEST(NestedFit, CeresFindsTheSameSurfaceInStretchedLengths) {
+  const FitTarget target = Heights(SlantingWaves(4), 2000, 5e-3);
+  const FitResult fastest = FitBy(Solver::kFastest, {PointTerm{}, kSmooth}, target),
+                  ceres = FitBy(Solver::kCeres, {PointTerm{}, kSmooth}, target);
+  EXPECT_GT(ceres.automatic->stretch.stretch, 2);
+  EXPECT_LT(
+      ErrorAgainst([&](const Vec2& uv) { return fastest.surface.Point(uv); }, ceres.surface, 60)
+          .rms,
+      1e-3);
+}
+
 // A membrane as stiff as that lets the surface rise by hardly anything over its start.
 TEST(NestedFit, WithCeresOtherTermsTakePart) {
   const FitTarget target = Heights(FrankePoint, 3000, 1e-3);
@@ -399,6 +432,11 @@ TEST(NestedFit, WithCeresOtherTermsTakePart) {
   EXPECT_THAT(Refusal(Solver::kFastest, MembraneTerm{}), HasSubstr("need solver: ceres"));
   EXPECT_THAT(Refusal(Solver::kCeres, MembraneTerm{.weight = AutoOr<double>::Auto()}),
               HasSubstr("one 'smoothness'"));
+  const Term stretched = SmoothnessTerm{.weight = AutoOr<double>::Auto(), .stretch = 2};
+  EXPECT_THAT(testing::WordsOf<InputError>([&] {
+                FitBy(Solver::kFastest, {PointTerm{}, stretched}, target);
+              }),
+              HasSubstr("whose stretch it finds"));
 }
 
 TEST(NestedFit, WhatCannotBeFittedIsSaid) {

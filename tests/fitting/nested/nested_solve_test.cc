@@ -180,7 +180,11 @@ TEST(NestedSolve, AStencilsProductIsTheSumOfThoseOfThePatches) {
 }
 
 // All vertices of level 1 overlaid is level 1 as a plain B-spline, which a direct factor solves.
-TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
+class NestedSolveIn : public ::testing::TestWithParam<double> {};  // a stretch of lengths
+INSTANTIATE_TEST_SUITE_P(Lengths, NestedSolveIn, ::testing::Values(1.0, 2.5));
+
+TEST_P(NestedSolveIn, ALevelComesOutAsByADirectFactor) {
+  const BendingStretch stretch{.stretch = GetParam(), .direction_deg = 30};
   for (const Closure closure : kClosures) {
     const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1, .closure = closure};
     const HSplineSurface start = PlainStart(shape);
@@ -193,11 +197,14 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
     space.Link();
     constexpr double kWeight = 1e-5;
     NestedSolve solve(points, MeanLengths(start));
-    solve.Begin(space, {});
+    solve.Begin(space, {}, MetricOf(stretch));
     solve.SetWeight(kWeight);
     solve.Solve(0);
     const std::vector<Term> terms = {PointTerm{},
-                                     SmoothnessTerm{.weight = kWeight, .length_mm = 1}};
+                                     SmoothnessTerm{.weight = kWeight,
+                                                    .length_mm = 1,
+                                                    .stretch = stretch.stretch,
+                                                    .direction_deg = stretch.direction_deg}};
     const LevelSolution direct =
         FitLevel(ViewOfLevel(start, start, target, 1, {.aim = FitAim::kLevel, .held = {}}), terms,
                  Solver::kFastest);
@@ -212,6 +219,34 @@ TEST(NestedSolve, ALevelComesOutAsByADirectFactor) {
         EXPECT_LT((moved - direct.net.At(i, j)).norm(), 1e-4) << i << " " << j;
       }
     }
+  }
+}
+
+// Lengths that change in between leave nothing of those before; the sums are of the same surface.
+TEST(NestedSolve, LengthsMayChange) {
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0};
+  const HSplineSurface start = PlainStart(shape);
+  const NestedPoints points = DisplacementsOf(start, PointsFor(Closure::kOpen, 1000, 0.01));
+  const NestedSpace space(shape);
+  const BendingMetric metric = MetricOf({.stretch = 3, .direction_deg = 120});
+  NestedSolve changed(points, MeanLengths(start)), at_once(points, MeanLengths(start));
+  changed.Begin(space, {});
+  changed.SetWeight(1e-4);
+  changed.Solve(0);
+  changed.SetMetric(metric);
+  changed.Solve(0);
+  at_once.Begin(space, {}, metric);
+  at_once.SetWeight(1e-4);
+  at_once.Solve(0);
+  const NestedSolve::Packed a = changed.Solution(), b = at_once.Solution();
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_NEAR(a[k], b[k], 1e-5);
+  }
+  const BendingSums one = changed.Bending(), other = at_once.Bending();
+  EXPECT_GT(one[0], 0);
+  for (std::size_t k = 0; k < one.size(); ++k) {
+    EXPECT_NEAR(one[k], other[k], 1e-4 * (one[0] + one[2]));
   }
 }
 
