@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "fitting/least_squares/cross_validation_score.h"
+
 namespace semblance {
 namespace {
 
@@ -30,11 +32,12 @@ NestedWeight NestedWeightSearch::Try(double weight) {
   solve_.SetWeight(weight);
   steps_ += solve_.Solve(least_gain_);
   const double mean_square = std::max(solve_.MeanSquare(), 0.0);  // less is rounding
-  const double trace = solve_.Trace(), left = 1 - trace / count_;
-  constexpr double kGain = 0.01, kLeast = 0.02;
+  const double trace = solve_.Trace();
+  constexpr double kGain = 0.01;
+  constexpr double kLeast = 0.02;  // what is left is known no better by the trace of one probe
   least_gain_ = kGain * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
   at->second = {.weight = weight,
-                .score = left > kLeast ? mean_square / (left * left) : kNaN,
+                .score = CrossValidationScore(mean_square, trace, count_, kLeast),
                 .degrees_of_freedom = trace,
                 .mean_square = mean_square};
   if (IsBetter(at->second)) {

@@ -12,6 +12,7 @@
 #include <set>
 #include <utility>
 
+#include "fitting/least_squares/cross_validation_score.h"
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/solve/space_system.h"
@@ -176,7 +177,7 @@ class AttributeSolver {
   }
 
   WeightTrial Try(double weight) {
-    constexpr double kShift = 1e-11, kLeast = 1e-6;
+    constexpr double kShift = 1e-11;
     WeightTrial trial{.values = {}, .scores = std::vector<double>(values_.size(), kNaN)};
     const SparseMatrix lower = points_part_ + weight * energy_;
     const SparseFactor factor(lower, kShift * std::max(lower.diagonal().mean(), 1e-300));
@@ -185,13 +186,13 @@ class AttributeSolver {
     }
     trial.values = factor.Solve(right_);
     trial.trace = probe_share_ * probes_.cwiseProduct(factor.Solve(influenced_)).sum();
-    const double left = 1 - trial.trace / static_cast<double>(used_.size());
     const Eigen::MatrixXd product = points_part_.selfadjointView<Eigen::Lower>() * trial.values;
-    for (std::size_t c = 0; c < values_.size() && left > kLeast; ++c) {
+    for (std::size_t c = 0; c < values_.size(); ++c) {
       const auto column = static_cast<Eigen::Index>(c);
       const double misfit = 1 - 2 * trial.values.col(column).dot(right_.col(column)) +
                             trial.values.col(column).dot(product.col(column));
-      trial.scores[c] = std::max(misfit, 0.0) / (left * left);
+      trial.scores[c] =
+          CrossValidationScore(misfit, trial.trace, static_cast<double>(used_.size()));
       Keep(weight, trial, c);
     }
     return trial;
@@ -199,7 +200,7 @@ class AttributeSolver {
 
   void Keep(double weight, const WeightTrial& trial, std::size_t c) {
     Best& best = best_[c];
-    if (std::isnan(best.score) || trial.scores[c] < best.score) {
+    if (trial.scores[c] < best.score || (std::isnan(best.score) && !std::isnan(trial.scores[c]))) {
       best = {.weight = weight,
               .score = trial.scores[c],
               .trace = trial.trace,

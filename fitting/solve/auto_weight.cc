@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "fitting/least_squares/cross_validation_score.h"
 #include "fitting/least_squares/sparse_factor.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -71,9 +72,9 @@ class WeightSearch {
         step.cwiseProduct(problem_.points.lower.selfadjointView<Eigen::Lower>() * step).sum();
     const double trace = probes_.cwiseProduct(factor.Solve(influenced_)).sum() /
                          (probes_.rows() <= kExact ? 1.0 : static_cast<double>(probes_.cols()));
-    const double left = 1 - trace / problem_.count;
-    const double score = left > 1e-6 ? std::max(misfit, 0.0) / (left * left) : kNaN;
-    return {.weight = weight, .score = score, .degrees_of_freedom = trace};
+    return {.weight = weight,
+            .score = CrossValidationScore(misfit, trace, problem_.count),
+            .degrees_of_freedom = trace};
   }
 
   const WeightProblem& problem_;
