@@ -42,8 +42,8 @@ Archive OpenArchive(const std::string& name) {
   Archive a(archive_read_new());
   archive_read_support_filter_gzip(a.get());
   archive_read_support_format_tar(a.get());
-  constexpr std::size_t kBlock = 1 << 16;
-  if (archive_read_open_filename(a.get(), name.c_str(), kBlock) != ARCHIVE_OK) {
+  constexpr std::size_t kArchiveBlock = 1 << 16;
+  if (archive_read_open_filename(a.get(), name.c_str(), kArchiveBlock) != ARCHIVE_OK) {
     ThrowNoProject(name, a.get());
   }
   return a;

@@ -92,7 +92,7 @@ void Take(std::string_view& bytes, std::optional<Value>& value) {
 
 // Calls `visit` with each member.
 template <class Header, class Visit>
-void Members(Header& header, const Visit& visit) {
+void VisitMembers(Header& header, const Visit& visit) {
   for (auto* text : {&header.series_uid, &header.series_number, &header.description,
                      &header.modality, &header.image_type}) {
     visit(*text);
@@ -164,7 +164,7 @@ std::vector<DicomHeader> ScanDicomApart(const std::vector<fs::path>& files,
           tell(files[n].string());
           for (const DicomHeader& header : ScanDicom({files[n]})) {
             Put(headers, n);
-            Members(header, [&](const auto& member) { Put(headers, member); });
+            VisitMembers(header, [&](const auto& member) { Put(headers, member); });
           }
         }
         return headers;
@@ -176,7 +176,7 @@ std::vector<DicomHeader> ScanDicomApart(const std::vector<fs::path>& files,
     Take(rest, n);
     DicomHeader& header = headers.emplace_back();
     header.file = files.at(n);
-    Members(header, [&](auto& member) { Take(rest, member); });
+    VisitMembers(header, [&](auto& member) { Take(rest, member); });
   }
   return headers;
 }
