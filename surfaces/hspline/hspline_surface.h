@@ -87,7 +87,6 @@ class HSplineSurface {
   // InputError), none. One call for many vertices is much faster than many calls: each makes the
   // stored vertices anew, from the coarsest level that it changes.
   void SetOffsets(const std::map<VertexId, std::optional<Vec3>>& offsets);
-  void SetOffset(const VertexId& vertex, const Vec3& offset) { SetOffsets({{vertex, offset}}); }
 
   std::size_t Bytes() const;  // of memory held; a node of the offsets counts 96
 

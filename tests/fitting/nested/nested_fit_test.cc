@@ -443,7 +443,7 @@ TEST(NestedFit, WhatCannotBeFittedIsSaid) {
   const FitTarget few = Scattered(FrankePoint, 10, 0, 1);
   EXPECT_THROW(FitAuto(few), InputError);
   HSplineSurface detailed = testing::PlainStart({.patches_u = 8, .patches_v = 8, .max_level = 1});
-  detailed.SetOffset({1, 5, 5}, Vec3(0, 0, 1));
+  detailed.SetOffsets({{{1, 5, 5}, Vec3(0, 0, 1)}});
   const std::vector<Vec3> positions(100, Vec3::Zero());
   const std::vector<Vec2> uv(100, Vec2::Constant(0.5));
   EXPECT_THROW(FitNested(detailed, {positions, uv}, {}, {}), InputError);

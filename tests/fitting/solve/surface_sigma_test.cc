@@ -69,7 +69,7 @@ std::vector<HSplineSurface> Functions(const HSplineSurface& surface) {
   }
   for (const auto& [vertex, offset] : empty.Offsets()) {
     functions.push_back(empty);
-    functions.back().SetOffset(vertex, Vec3::UnitX());
+    functions.back().SetOffsets({{vertex, Vec3::UnitX()}});
   }
   return functions;
 }

@@ -38,7 +38,8 @@ TEST(MetricDistortion, IsNoneForAMovedAndKnownForAScaledSurface) {
 TEST(MetricDistortion, LooksOnlyWhereItIsWanted) {
   const HSplineSurface rest = Template();
   HSplineSurface surface = rest;
-  surface.SetOffset({2, 9, 5}, Vec3(1, 2, 3));  // its patches: columns 6..9 of 16, rows 2..5 of 12
+  // Its patches: columns 6..9 of 16, rows 2..5 of 12.
+  surface.SetOffsets({{{2, 9, 5}, Vec3(1, 2, 3)}});
   const Vec3 place = rest.Point(rest.ParameterOf({2, 9, 5}));
   const auto near = [&](const Vec3& p) { return (p - place).norm() < 8; };
   const auto far = [&](const Vec3& p) { return p.z() > 60; };

@@ -104,7 +104,8 @@ TEST(FitJoins, AwayFromTheEdgeNothingChanges) {
 // A surface that is given with detail of its own along the edge, whatever the new points ask for.
 TEST(FitJoins, AFinerGivenEdgeIsFollowed) {
   HSplineSurface given = GivenSurface({.patches_v = 4, .plan = AdaptivePlan{.finest = 2}});
-  given.SetOffset({2, 17, 7}, Vec3(0, 0, 0.02));  // beyond u = 1 by its knot, so it moves the edge
+  // Beyond u = 1 by its knot, so it moves the edge.
+  given.SetOffsets({{{2, 17, 7}, Vec3(0, 0, 0.02)}});
   const JoinedFit joined = JoinFit(RightOf(1500), {Opened(given, kRight)}, {});
   EXPECT_LT(joined.joins[0].largest_gap_mm, 1e-9 * kExtent);
   EXPECT_TRUE(joined.joins[0].Holds()) << JoinLines(joined.joins)[0];

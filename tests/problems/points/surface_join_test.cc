@@ -58,7 +58,7 @@ TEST_F(SurfaceJoins, AreReadWithTheHashOfTheirFile) {
 // The place at t, and the spans, as the new edge sees them.
 TEST_F(SurfaceJoins, AReversedEdgeIsSeenFromItsEnd) {
   OpenedJoin opened = Open("open.json", SurfaceEdge::kU0, SurfaceEdge::kU1).at(0);
-  opened.surface.SetOffset({1, 10, 1}, Vec3(0, 0, 1));  // near v = 0
+  opened.surface.SetOffsets({{{1, 10, 1}, Vec3(0, 0, 1)}});  // near v = 0
   const std::vector<EdgeSpan> spans = opened.ItsSpans();
   EXPECT_EQ(opened.ItsPlace(0.25), Vec2(1, 0.25));
   EXPECT_EQ(spans.front().level, 1);

@@ -163,7 +163,7 @@ TEST_P(DeepHSpline, RefinementToLevelEightNeverChangesTheShape) {
     const SurfaceFrame frame = after.LevelFrame(level - 1, after.ParameterOf(center));
     const bool world = shape().reference == OffsetReference::kWorld;
     const Mat3 axes = world ? Mat3::Identity() : frame.axes;
-    after.SetOffset(center, axes.transpose() * (refined - frame.point));
+    after.SetOffsets({{center, Vec3(axes.transpose() * (refined - frame.point))}});
   }
   ASSERT_EQ(after.Offsets().size(), 8u);
   double size = 0, worst = 0;
@@ -183,7 +183,7 @@ TEST_P(DeepHSpline, AnEditOfLevelEightMovesItsOverlayAndNotOneBitElsewhere) {
   VertexId vertex = Near(kFinest, {0.52, 0.33});
   vertex.i |= 1;  // odd: it lies on a vertex of level 7, the centre of an overlay
   vertex.j |= 1;
-  after.SetOffset(vertex, Vec3(0, 0, 1));
+  after.SetOffsets({{vertex, Vec3(0, 0, 1)}});
   const Vec2 center = before.ParameterOf(vertex);
   const double side_u = 1.0 / shape().PatchesU(kFinest - 1),
                side_v = 1.0 / shape().PatchesV(kFinest - 1);
@@ -204,7 +204,7 @@ TEST_P(DeepHSpline, AnEditOfLevelEightMovesItsOverlayAndNotOneBitElsewhere) {
 TEST_P(DeepHSpline, IsC2AcrossTheBordersOfOverlays) {
   HSplineSurface surface = SmoothSurface(shape(), 4);
   const VertexId vertex = Near(kFinest, {0.4, 0.6});
-  surface.SetOffset(vertex, Vec3(0.3, 0.2, 0.5));
+  surface.SetOffsets({{vertex, Vec3(0.3, 0.2, 0.5)}});
   const double m = shape().PatchesU(kFinest), n = shape().PatchesV(kFinest), h = 1e-12;
   for (const DerivativeOrder order : {DerivativeOrder{}, {1, 0}, {0, 1}, {1, 1}, {2, 0}, {0, 2}}) {
     const double scale = std::pow(m, order.u) * std::pow(n, order.v);
@@ -231,7 +231,7 @@ TEST_P(DeepHSpline, MemoryGrowsWithTheEditsNotWithTheLevel) {
   std::size_t before = smooth;
   const double columns = shape().Columns(kFinest), rows = shape().Rows(kFinest);
   for (int edit = 0; edit < 20; ++edit) {
-    surface.SetOffset({kFinest, edit * 37 + 20, (edit * 71) % 900 + 20}, Vec3(0, 0, 1));
+    surface.SetOffsets({{{kFinest, edit * 37 + 20, (edit * 71) % 900 + 20}, Vec3(0, 0, 1)}});
     // A chain of at most 6 x 6 vertices a level, with what describes their columns.
     EXPECT_LT(surface.Bytes(), before + 8 * (36 * sizeof(Vec3) + 6 * 40) + 200 +
                                    (edit == 0 ? 2 * 2 * 4 * columns + 4000 : 0));

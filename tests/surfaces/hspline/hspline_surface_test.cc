@@ -338,8 +338,7 @@ TEST(HSpline, OneOffsetIsSetReadAndRemoved) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
   HSplineSurface surface = SmoothSurface(shape, 1);
   const ControlNet untouched = surface.Net(2);
-  surface.SetOffset({1, 4, 5}, Vec3(1, 2, 3));
-  surface.SetOffset({2, 4, 5}, Vec3(4, 5, 6));
+  surface.SetOffsets({{{1, 4, 5}, Vec3(1, 2, 3)}, {{2, 4, 5}, Vec3(4, 5, 6)}});
   EXPECT_EQ(surface.Offset({1, 4, 5}), Vec3(1, 2, 3));
   EXPECT_EQ(surface.Offsets(2), (std::map<VertexId, Vec3>{{{2, 4, 5}, Vec3(4, 5, 6)}}));
   EXPECT_EQ(surface.Offset({2, 5, 5}), std::nullopt);
@@ -356,7 +355,7 @@ TEST(HSpline, AnOffsetIsKeptInTheFrameOfTheCoarserSurface) {
     const VertexId vertex{1, 5, 6};
     const Vec3 offset(0.5, -2, 3);
     const SurfaceFrame frame = surface.Frame(surface.ParameterOf(vertex));
-    surface.SetOffset(vertex, offset);
+    surface.SetOffsets({{vertex, offset}});
     const Vec3 expected = reference == OffsetReference::kWorld
                               ? Vec3(frame.point + offset)
                               : Vec3(frame.point + frame.du.normalized() * offset.x() +
@@ -385,7 +384,7 @@ TEST(HSpline, AVertexInfluencesMostItsParameter) {
 TEST(HSpline, ADegenerateLevelZeroUnderDetailIsReportedWithItsPlace) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
   HSplineSurface surface = SmoothSurface(shape, 1);
-  surface.SetOffset({1, 5, 5}, Vec3(0, 0, 1));
+  surface.SetOffsets({{{1, 5, 5}, Vec3(0, 0, 1)}});
   const HSplineSurface before = surface;
   ControlNet flat = surface.Net(0);
   flat.vertices.assign(flat.vertices.size(), Vec3(1, 2, 3));

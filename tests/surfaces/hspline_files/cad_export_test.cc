@@ -70,8 +70,7 @@ class CadExport : public ::testing::TestWithParam<std::tuple<HSplineShape, CadFo
 
 TEST_P(CadExport, ReadsBackAsTheSameSurface) {
   HSplineSurface surface = testing::SmoothSurface(shape(), 1);
-  surface.SetOffset({5, 70, 80}, Vec3(1, 2, 3));
-  surface.SetOffset({1, 3, 3}, Vec3(-1, 2, 1));
+  surface.SetOffsets({{{5, 70, 80}, Vec3(1, 2, 3)}, {{1, 3, 3}, Vec3(-1, 2, 1)}});
   const std::vector<Handle(Geom_Surface)> faces = ReadBack(format(), format().write(surface));
   ASSERT_EQ(faces.size(), FewRegions(shape(), PatchTree(surface)).size());
   EXPECT_GT(faces.size(), 1u);
@@ -96,7 +95,7 @@ TEST_P(CadExport, ReadsBackAsTheSameSurface) {
 TEST_P(CadExport, AFaceWithMuchDetailIsOneSurface) {
   HSplineSurface surface = testing::SmoothSurface(shape(), 2);
   for (int i = 1; i < 9; ++i) {
-    surface.SetOffset({2, i, 8}, Vec3(1, 2, 3));
+    surface.SetOffsets({{{2, i, 8}, Vec3(1, 2, 3)}});
   }
   ASSERT_GT(UniformRegions(PatchTree(surface)).size(), 1u);
   const std::vector<Handle(Geom_Surface)> faces = ReadBack(format(), format().write(surface));

@@ -102,8 +102,8 @@ TEST(AdaptiveTessellation, ACellIsNoMoreThanTwiceItsNeighbourAcrossASeam) {
   const HSplineShape shape{
       .patches_u = 8, .patches_v = 8, .max_level = 6, .closure = Closure::kPeriodicUv};
   HSplineSurface surface = testing::SmoothSurface(shape, 1);
-  surface.SetOffset({6, 200, 1}, Vec3(0, 0, 2));  // at v = 0
-  surface.SetOffset({6, 1, 300}, Vec3(0, 0, 2));  // at u = 0
+  surface.SetOffsets({{{6, 200, 1}, Vec3(0, 0, 2)}});  // at v = 0
+  surface.SetOffsets({{{6, 1, 300}, Vec3(0, 0, 2)}});  // at u = 0
   const Tessellation t = TessellateToChord(surface, 0.5);
   const EdgeReport edges = CheckEdges(t.mesh);
   EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
@@ -114,7 +114,7 @@ TEST(AdaptiveTessellation, DetailCostsTrianglesOnlyWhereItIs) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 6};
   HSplineSurface surface = testing::SmoothSurface(shape, 1);
   const std::size_t smooth = TessellateToChord(surface, 0.1).mesh.triangles.size();
-  surface.SetOffset({6, 101, 101}, Vec3(0, 0, 2));
+  surface.SetOffsets({{{6, 101, 101}, Vec3(0, 0, 2)}});
   EXPECT_LT(TessellateToChord(surface, 0.1).mesh.triangles.size(), smooth + 2000);
 }
 

@@ -100,7 +100,7 @@ TEST(HSplineBatch, MemoryGrowsWithTheDetailAndNotWithTheLevel) {
       testing::SmoothSurface({.patches_u = 8, .patches_v = 8, .max_level = 7}, 1);
   const std::size_t bytes = HSplineBatch(surface).Bytes();
   EXPECT_LT(bytes, 64 * 700u);
-  surface.SetOffset({7, 501, 501}, Vec3(0, 0, 1));
+  surface.SetOffsets({{{7, 501, 501}, Vec3(0, 0, 1)}});
   EXPECT_LT(HSplineBatch(surface).Bytes(), bytes + 7 * 16 * 3 * 700u);
 }
 

@@ -80,7 +80,7 @@ TEST(SurfaceEdge, SpansCoverTheEdgeOnce) {
 TEST(SurfaceEdge, AnEditedVertexSplitsThePatchesThatItReaches) {
   HSplineSurface surface =
       SmoothSurface({.patches_u = 4, .patches_v = 4, .max_level = 1}, /*random_seed=*/1);
-  surface.SetOffset({1, 0, 5}, Vec3(0, 0, 1));  // on v = 1/2; moves v in (1/4, 3/4) near u = 0
+  surface.SetOffsets({{{1, 0, 5}, Vec3(0, 0, 1)}});  // on v = 1/2; moves v in (1/4, 3/4) near u = 0
   EXPECT_THAT(SpansAlong(surface, SurfaceEdge::kU0),
               ElementsAre(EdgeSpan{0, 0}, EdgeSpan{1, 2}, EdgeSpan{1, 3}, EdgeSpan{1, 4},
                           EdgeSpan{1, 5}, EdgeSpan{0, 3}));
