@@ -47,7 +47,7 @@ bool IsWhole(const Json& json, const std::string& id, const DenseOptions& grid) 
 std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id,
                                 const PopulationPlan& plan) {
   const fs::path file = FileOf(folder, id);
-  if (!fs::exists(file)) {
+  if (!fs::is_regular_file(file)) {  // a pipe would be waited for
     return std::nullopt;
   }
   try {

@@ -38,15 +38,14 @@ struct Marked {
 Marked Propose(const SubjectData& data, const std::string& name,
                std::span<const ReferenceHead> references, const RunContext& context) {
   if (references.empty()) {
-    throw InputError(fmt::format(
-        "{}: it has no landmarks, and no skull has any by which they could be proposed; name one "
-        "under measure.references",
-        name));
+    throw InputError(
+        "it has no landmarks, and no skull has any by which they could be proposed; name one under "
+        "measure.references");
   }
-  const Proposal proposal = ProposeLandmarks(data.skull, name, references, context);
+  const Proposal proposal = ProposeLandmarks(data.skull, "the skull", references, context);
   if (proposal.axes != "LPS") {
-    throw InputError(fmt::format("{}: its skull looks as if it were in {}; write `axes: {}` there",
-                                 name, proposal.axes, proposal.axes));
+    throw InputError(fmt::format("its skull looks as if it were in {0}; write `axes: {0}` there",
+                                 proposal.axes));
   }
   Marked marked{ProposalFile(proposal, name), {}, {}};
   for (const ProposedSite& site : proposal.sites) {
@@ -210,7 +209,7 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
                              std::span<const ReferenceHead> references, const RunContext& context) {
   SubjectData data = LoadSubject(subject.subject, context, Landmarking::kOpen);
   if (!data.skin) {
-    throw InputError(fmt::format("{}: it has no skin; a depth needs one", subject.name));
+    throw InputError("it has no skin; a depth needs one");
   }
   const bool open = data.landmarks.landmarks.empty();
   Marked marked =

@@ -40,7 +40,7 @@ struct SubjectDepths {
 // taken to the skin that is seen from outside. references: not empty if the subject has no
 // landmarks. Of proposed landmarks on one point (landmark_mistakes.h) the surest counts; the others
 // are sites without a depth. Throws InputError as LoadSubject, CheckSubject and ProposeLandmarks,
-// and for a subject without a skin; Cancelled.
+// and for a subject without a skin; Cancelled. The words leave the subject's name to the caller.
 SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOptions& options,
                              std::span<const ReferenceHead> references, const RunContext& context);
 

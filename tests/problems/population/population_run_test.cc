@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -85,6 +86,9 @@ TEST(MeasurePopulation, GoesOnWhereItWasAndShardsGiveTheSameBytes) {
                         changed.replace(at, std::string(from).size(), to));
     EXPECT_EQ(ReadMeasured(plan, folder / "a").at(3).status, "missing") << to;
   }
+  fs::remove(folder / "a" / ("subjects/" + damaged + ".json"));
+  ASSERT_EQ(::mkfifo((folder / "a" / ("subjects/" + damaged + ".json")).c_str(), 0600), 0);
+  EXPECT_EQ(ReadMeasured(plan, folder / "a").at(3).status, "missing");
   const PopulationRunSummary again = MeasurePopulation(plan, folder / "a", {}, {});
   EXPECT_EQ(again.skipped, kFew - 3);
   EXPECT_EQ(again.done, 3);
