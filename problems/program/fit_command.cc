@@ -15,6 +15,7 @@
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
+#include "problems/points/residual_files.h"
 #include "problems/program/work_options.h"
 #include "surfaces/base/error.h"
 
@@ -68,6 +69,7 @@ int FitCommand(const FitArguments& arguments) {
   const std::vector<std::string> notes = WritePointFit(
       options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
   folder.Publish();
+  RemoveOldResiduals(folder.Root(), folder.Files().Written());
   fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
              result.fit.residual_mm.size(), result.parameters,
              result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),

@@ -399,6 +399,22 @@ TEST_F(FitCommand, NothingThatItReadsIsReplaced) {
       << "points may lie beside what comes of them";
 }
 
+TEST_F(FitCommand, ForceLeavesNoResidualsOfAnEarlierFit) {
+  const auto there = [&](const std::string& residuals) {
+    const auto outcome = Call(fmt::format(
+        "fit {}/points.csv --out out --force --quiet --set report=false --set residuals={}",
+        kConfigs, residuals));
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return std::pair(fs::exists(folder_ / "out/residuals.csv"),
+                     fs::exists(folder_ / "out/residuals.ply"));
+  };
+  EXPECT_EQ(there("csv"), std::pair(true, false));
+  EXPECT_EQ(there("ply"), std::pair(false, true));
+  EXPECT_EQ(there("none"), std::pair(false, false));
+  Write("out/residuals.csv", "x,y,z\n0,0,0\n");
+  EXPECT_EQ(there("none"), std::pair(true, false)) << "it is no fit's";
+}
+
 TEST_F(FitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
   Write("bad.csv", "x,y,z\n0,0,zero\n");
