@@ -51,13 +51,18 @@ PointTable NonEmpty(PointTable table, const std::string& name) {
   return table;
 }
 
+double NextFinite(TextLines& lines) {
+  const double number = lines.NextDouble();
+  if (!std::isfinite(number)) {
+    lines.Fail("a number is not finite; give numbers");
+  }
+  return number;
+}
+
 Vec3 NextPosition(TextLines& lines) {
   Vec3 p;
   for (int c = 0; c < 3; ++c) {
-    p[c] = lines.NextDouble();
-  }
-  if (!p.allFinite()) {
-    lines.Fail("a coordinate is not finite; give numbers");
+    p[c] = NextFinite(lines);
   }
   return p;
 }
@@ -79,18 +84,16 @@ PointTable ParseXyz(std::string_view text, const std::string& name) {
 
 // With all the digits of the points, and the faces, if there are any, as triangles.
 PointTable ParseObj(std::string_view text, const std::string& name) {
-  TextLines lines(text, name, {.comment = '#'});
   PointTable table;
-  bool has_faces = false;
+  table.triangles = ReadObj(text, name).triangles;  // without faces too, for it refuses other lines
+  TextLines lines(text, name, {.comment = '#'});
   while (lines.NextLine()) {
-    const std::string_view word = lines.NextWord();
-    has_faces = has_faces || word == "f";
-    if (word == "v") {
+    if (lines.NextWord() == "v") {
       table.positions.push_back(NextPosition(lines));
+      while (!lines.AtLineEnd()) {
+        NextFinite(lines);  // a weight or a colour
+      }
     }
-  }
-  if (has_faces) {
-    table.triangles = ReadObj(text, name).triangles;
   }
   return table;
 }

@@ -302,6 +302,13 @@ TEST_F(PointFiles, WhatIsNotOfItsKindIsRefusedByName) {
   EXPECT_THAT(Refusal("c.xyz", "# nothing\n"), HasSubstr("there is no point"));
   EXPECT_THAT(Refusal("a.obj", "v 1 2 nan\n"), HasSubstr("a.obj"));
   EXPECT_THAT(Refusal("b.obj", "vn 0 0 1\n"), HasSubstr("there is no point"));
+  EXPECT_THAT(Refusal("c.obj", "v 1 2 3\nx,y,z\n"), HasSubstr("c.obj: line 2: 'x,y,z' is not a"));
+  EXPECT_THAT(Refusal("d.obj", "v 1 2 3\nv 1 2\n"), HasSubstr("line 2: a number is missing"));
+  EXPECT_THAT(Refusal("e.obj", "v 1 2 3 4 5\n"), HasSubstr("line 1: a vertex has 3, 4, 6 or 7"));
+  EXPECT_THAT(Refusal("f.obj", "v 1 2 3 grey\n"), HasSubstr("line 1: 'grey' is not a number"));
+  EXPECT_THAT(Refusal("g.obj", "v 1 2 3 0 nan 0\n"), HasSubstr("line 1: a number is not finite"));
+  EXPECT_EQ(Read("h.obj", "o cloud\nv 1 2 3 0.5\nv 1 2 3 0 0.5 1\nvn 0 0 1\n").positions.size(),
+            2u);
   EXPECT_THAT(Refusal("a.ply", "ply\nformat ascii 1.0\nend_header\n"), HasSubstr("a.ply"));
   EXPECT_THAT(WordsOf<Error>([&] { ReadPointFile(folder_ / "missing.csv"); }),
               HasSubstr("missing.csv"));
