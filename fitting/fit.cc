@@ -242,7 +242,8 @@ class Fitter {
       context_.ThrowIfStopped();
       context_.Report("fit", fmt::format("level {}, fraction {}", step.level, step.fraction),
                       static_cast<double>(result_.levels.size()) / static_cast<double>(most_steps));
-      driver_.Take({.solve = [&](std::span<const Term> terms) { return SolveLevel(step, terms); },
+      driver_.Take({.solve = [&](std::span<const Term> terms,
+                                 SolveReport report) { return SolveLevel(step, terms, report); },
                     .level = step.level,
                     .view = [&](const FitTarget& target) { return View(step.level, target); }});
     }
@@ -258,17 +259,20 @@ class Fitter {
                        {.aim = AimOf(options_.plan), .held = Held()});
   }
 
-  LevelSummary SolveLevel(const ScheduleStep& step, std::span<const Term> terms) {
+  LevelSummary SolveLevel(const ScheduleStep& step, std::span<const Term> terms,
+                          SolveReport report) {
     LevelView view = View(step.level, driver_.target());
     const bool frozen = std::holds_alternative<FrozenFeatures>(options_.features);
     const std::vector<int> stay = frozen ? view.held : std::vector<int>();
-    LevelSolution solution = FitLevel(std::move(view), terms, options_.solver);
+    LevelSolution solution = FitLevel(std::move(view), terms, options_.solver, report);
     LevelSummary summary = std::move(solution.summary);
     summary.level = step.level;
     summary.fraction = step.fraction;
     summary.max_move_mm = WriteBack(std::move(solution.net), step, stay, result_.surface);
     summary.rms_before_mm = driver_.rms_mm();
-    summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
+    summary.rms_after_mm = report == SolveReport::kFull
+                               ? PointRms(result_.surface, driver_.target(), context_.threads)
+                               : kNaN;
     return summary;
   }
 
@@ -282,9 +286,9 @@ class Fitter {
                     .solver = options_.solver,
                     .threads = context_.threads});
     all.AddAsked(plan.finest);
-    const auto solve = [&](std::span<const Term>) {
+    const auto solve = [&](std::span<const Term>, SolveReport report) {
       SeePoints(all);
-      const LevelSummary summary = all.Solve(SolveTolerance::kLoose);
+      const LevelSummary summary = all.Solve(SolveTolerance::kLoose, report);
       if (driver_.MovesPoints()) {
         Take(all, features);
       }
@@ -296,7 +300,7 @@ class Fitter {
       driver_.Take({.solve = solve});
       SeePoints(all);
     }
-    driver_.Solve({.solve = [&](std::span<const Term>) {
+    driver_.Solve({.solve = [&](std::span<const Term>, SolveReport) {
       LevelSummary summary = all.Settle();
       CheckMet(all, driver_.target());
       if (Take(all, features)) {
@@ -315,10 +319,11 @@ class Fitter {
     result_.surface = std::move(alone.surface);
     result_.automatic = std::move(alone.automatic);
     for (const LevelSummary& level : alone.levels) {
-      driver_.Solve({.solve = [&](std::span<const Term>) { return level; }});
+      driver_.Solve({.solve = [&](std::span<const Term>, SolveReport) { return level; }});
     }
-    driver_.Solve(
-        {.solve = [&](std::span<const Term> terms) { return SettleAlone(terms, start); }});
+    driver_.Solve({.solve = [&](std::span<const Term> terms, SolveReport) {
+      return SettleAlone(terms, start);
+    }});
     TellOf(result_.surface, points.Points(), alone.residual_mm, context_.threads,
            *result_.automatic);
     Believe(driver_.target(), result_.automatic->outliers);

@@ -9,11 +9,17 @@ namespace semblance {
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
+// What a row of a matrix stands for.
+enum class RowKind {
+  kUnknown,
+  kCoordinate,  // row 3 v + c: of vertex v; those of two vertices meet in all nine entries or none
+};
+
 // Of `lower` (the lower triangle of a positive semidefinite matrix) + shift times the identity;
 // CHOLMOD, one thread.
 class SparseFactor {
  public:
-  SparseFactor(const SparseMatrix& lower, double shift);
+  SparseFactor(const SparseMatrix& lower, double shift, RowKind rows = RowKind::kUnknown);
   ~SparseFactor();
   bool usable() const;  // false: not positive definite
   Eigen::MatrixXd Solve(const Eigen::MatrixXd& right) const;

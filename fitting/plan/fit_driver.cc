@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <set>
+#include <type_traits>
 #include <utility>
 
 #include "fitting/relaxation/dowel_mesh.h"
@@ -68,6 +69,22 @@ double SumOfCosts(const LevelSummary& summary) {
   return sum;
 }
 
+// How many solves of a step follow its first.
+int SolvesAgain(const Relaxation& relaxation) {
+  return std::visit(
+      []<class R>(const R& chosen) {
+        if constexpr (std::is_same_v<R, TangentDistanceRelaxation>) {
+          return chosen.rounds + chosen.tangent_rounds;
+        } else if constexpr (std::is_same_v<R, NoRelaxation> ||
+                             std::is_same_v<R, FootpointRelaxation>) {
+          return 0;
+        } else {
+          return chosen.rounds;
+        }
+      },
+      relaxation);
+}
+
 int RestoreTemplateFeatures(const HSplineSurface& rest, std::span<const VertexId> features,
                             HSplineSurface& surface) {
   RestoreFeature(ExtractFeature(rest, "rest", features), features, surface);
@@ -98,6 +115,7 @@ FitDriver::FitDriver(const HSplineSurface& rest, const FitTarget& target, const 
                       std::holds_alternative<AutoPlan>(options.plan)  // which measure by themselves
                   ? kNaN
                   : PointRms(result.surface, target, context.threads)),
+      rounds_(SolvesAgain(options.relaxation)),
       moves_(MovesOf(options.relaxation)) {
   if (moves_) {
     moved_ = target;
@@ -105,13 +123,15 @@ FitDriver::FitDriver(const HSplineSurface& rest, const FitTarget& target, const 
   }
 }
 
-void FitDriver::Solve(const FitStep& step) {
-  result_.levels.push_back(step.solve(terms_));
+void FitDriver::Solve(const FitStep& step) { Solve(step, SolveReport::kFull); }
+
+void FitDriver::Solve(const FitStep& step, SolveReport report) {
+  result_.levels.push_back(step.solve(terms_, report));
   rms_mm_ = result_.levels.back().rms_after_mm;
 }
 
 void FitDriver::Take(const FitStep& step) {
-  Solve(step);
+  Solve(step, rounds_ > 0 ? SolveReport::kNone : SolveReport::kFull);
   if (mesh_) {
     result_.relaxations.emplace_back();
     std::visit([&](const auto& chosen) { After(step, chosen); }, options_.relaxation);
@@ -119,7 +139,7 @@ void FitDriver::Take(const FitStep& step) {
 }
 
 void FitDriver::After(const FitStep&, const NoRelaxation&) {}
-void FitDriver::After(const FitStep&, const FootpointRelaxation&) { Keep(Move(*moves_)); }
+void FitDriver::After(const FitStep&, const FootpointRelaxation&) { Keep(Move(*moves_, {})); }
 void FitDriver::After(const FitStep& step, const AlternatingRelaxation&) { Alternate(step); }
 void FitDriver::After(const FitStep& step, const TangentDistanceRelaxation& chosen) {
   Alternate(step);
@@ -128,21 +148,22 @@ void FitDriver::After(const FitStep& step, const TangentDistanceRelaxation& chos
 void FitDriver::After(const FitStep& step, const JointRelaxation& chosen) {
   for (int round = 0; round < chosen.rounds; ++round) {
     Keep(MoveJointly(step));
-    SolveAgain(step, terms_);
+    SolveAgain(step, terms_, round);
   }
 }
 
 void FitDriver::Alternate(const FitStep& step) {
   for (int round = 0; round < moves_->rounds; ++round) {
-    Keep(MoveOnce());
-    SolveAgain(step, terms_);
+    Keep(MoveOnce(round));
+    SolveAgain(step, terms_, round);
   }
 }
 
 // As a part of the last step.
-void FitDriver::SolveAgain(const FitStep& step, std::span<const Term> terms) {
+void FitDriver::SolveAgain(const FitStep& step, std::span<const Term> terms, int round) {
   const double rms_before_mm = result_.levels.back().rms_before_mm;
-  result_.levels.back() = step.solve(terms);
+  result_.levels.back() =
+      step.solve(terms, IsLast(round) ? SolveReport::kFull : SolveReport::kNone);
   result_.levels.back().rms_before_mm = rms_before_mm;
   rms_mm_ = result_.levels.back().rms_after_mm;
 }
@@ -150,22 +171,22 @@ void FitDriver::SolveAgain(const FitStep& step, std::span<const Term> terms) {
 void FitDriver::Slide(const FitStep& step, const TangentDistanceRelaxation& chosen) {
   const std::vector<Term> terms =
       AsTangentPoints(terms_, chosen.tangential, result_.levels.back().auto_weight);
-  for (int round = 0; round < chosen.tangent_rounds; ++round) {
-    SolveAgain(step, terms);
-    Keep(MoveOnce());
+  for (int round = chosen.rounds; round < rounds_; ++round) {
+    SolveAgain(step, terms, round);
+    Keep(MoveOnce(round));
     result_.levels.back().rms_after_mm = rms_mm_;
   }
 }
 
-RelaxationSummary FitDriver::MoveOnce() {
+RelaxationSummary FitDriver::MoveOnce(int round) {
   NetworkMoves once = *moves_;
   once.rounds = 1;
-  return Move(once);
+  return Move(once, {.before = round == 0, .after = IsLast(round)});
 }
 
-RelaxationSummary FitDriver::Move(const NetworkMoves& moves) {
-  const RelaxationSummary summary = Relax(result_.surface, rest_, *mesh_, moves, moved_);
-  rms_mm_ = PointRms(result_.surface, moved_, context_.threads);
+RelaxationSummary FitDriver::Move(const NetworkMoves& moves, const MeasuredPenalties& measured) {
+  const RelaxationSummary summary = Relax(result_.surface, rest_, *mesh_, moves, moved_, measured);
+  rms_mm_ = measured.after ? PointRms(result_.surface, moved_, context_.threads) : kNaN;
   return summary;
 }
 

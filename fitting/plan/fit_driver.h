@@ -22,7 +22,7 @@ double PointRms(const HSplineSurface& surface, const FitTarget& target, int thre
 // One step or round of a plan.
 struct FitStep {
   // Brings the result's surface to the minimum of the terms, or part of the way.
-  std::function<LevelSummary(std::span<const Term> terms)> solve;
+  std::function<LevelSummary(std::span<const Term> terms, SolveReport report)> solve;
   int level = -1;  // that is fitted alone, with a view of it; -1: all at once
   std::function<LevelView(const FitTarget& target)> view = {};
 };
@@ -43,10 +43,12 @@ class FitDriver {
   std::span<const Term> terms() const { return terms_; }
   const FitTarget& target() const { return mesh_ ? moved_ : given_; }  // where they are now
   bool MovesPoints() const { return mesh_.has_value(); }
-  double rms_mm() const { return rms_mm_; }
+  double rms_mm() const { return rms_mm_; }  // between steps
 
  private:
-  void SolveAgain(const FitStep& step, std::span<const Term> terms);
+  // Of the rounds of a step, only what was before the first and what is after the last is measured.
+  void Solve(const FitStep& step, SolveReport report);
+  void SolveAgain(const FitStep& step, std::span<const Term> terms, int round);
   void After(const FitStep& step, const NoRelaxation& chosen);
   void After(const FitStep& step, const FootpointRelaxation& chosen);
   void After(const FitStep& step, const AlternatingRelaxation& chosen);
@@ -54,8 +56,9 @@ class FitDriver {
   void After(const FitStep& step, const JointRelaxation& chosen);
   void Alternate(const FitStep& step);
   void Slide(const FitStep& step, const TangentDistanceRelaxation& chosen);
-  RelaxationSummary MoveOnce();
-  RelaxationSummary Move(const NetworkMoves& moves);
+  bool IsLast(int round) const { return round == rounds_ - 1; }
+  RelaxationSummary MoveOnce(int round);
+  RelaxationSummary Move(const NetworkMoves& moves, const MeasuredPenalties& measured);
   RelaxationSummary MoveJointly(const FitStep& step);
   void Keep(const RelaxationSummary& next);
   void MeasurePoints(bool known);
@@ -67,6 +70,7 @@ class FitDriver {
   const RunContext& context_;
   FitResult& result_;
   double rms_mm_;
+  int rounds_;  // solves of a step after its first
   std::optional<NetworkMoves> moves_;
   FitTarget moved_;  // the points as relaxation has left them; unused without
   std::optional<DowelMesh> mesh_;

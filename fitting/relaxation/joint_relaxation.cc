@@ -130,6 +130,7 @@ class JointRound {
         level_(level),
         target_(target),
         relaxer_(surface, rest, mesh, moves, target),
+        order_(relaxer_.Order()),
         start_(relaxer_.uv()),
         penalty_weight_(PointWeight(level.terms) / static_cast<double>(target.points.size())),
         weight_sum_(relaxer_.mean_weight() * static_cast<double>(target.points.size())) {}
@@ -206,7 +207,7 @@ class JointRound {
     }
     relaxer_.SetUv(uv);
     double sum = 0;
-    for (const int corner : relaxer_.order()) {
+    for (const int corner : order_) {
       sum += relaxer_.Held(corner).energy;
     }
     return level_.cost(target) + penalty_weight_ * sum;
@@ -217,6 +218,7 @@ class JointRound {
   const JointLevel& level_;
   const FitTarget& target_;
   Relaxer relaxer_;
+  std::vector<int> order_;  // of the corners
   std::vector<Vec2> start_;
   double penalty_weight_;
   double weight_sum_;
@@ -232,7 +234,7 @@ void JointRound::AddPoints(ControlNet& net, std::vector<Vec2>& places,
       continue;
     }
     for (std::size_t k = 0; k < places.size(); ++k) {
-      for (const int m : relaxer_.members(relaxer_.order()[k])) {
+      for (const int m : relaxer_.members(order_[k])) {
         const FitPoint& p = target_.points[m];
         if (points != nullptr) {
           const double scale = points->weight * p.weight / weight_sum_;
@@ -252,7 +254,7 @@ void JointRound::AddPoints(ControlNet& net, std::vector<Vec2>& places,
 void JointRound::AddPoint(const FitPoint& point, std::size_t k, double scale,
                           std::unique_ptr<ceres::LossFunction> loss, ControlNet& net,
                           std::vector<Vec2>& places, ceres::Problem& problem) const {
-  const PatchIndex patch = PatchAt(level_.view.grid, start_[relaxer_.order()[k]]);
+  const PatchIndex patch = PatchAt(level_.view.grid, start_[order_[k]]);
   std::vector<double*> blocks = {places[k].data()};
   for (const int vertex : level_.view.grid.PatchVertices(patch.i, patch.j)) {
     blocks.push_back(net.vertices[vertex].data());
@@ -265,7 +267,7 @@ void JointRound::AddPoint(const FitPoint& point, std::size_t k, double scale,
 void JointRound::AddPenalties(std::vector<Vec2>& places, ceres::Problem& problem) const {
   const Mat2 per_mm = level_.view.lengths_mm.cwiseInverse().asDiagonal();
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const int corner = relaxer_.order()[k];
+    const int corner = order_[k];
     const LocalPenalty held = relaxer_.Held(corner);
     const Mat2 matrix = per_mm * (held.matrix + relaxer_.Damping(corner)) * per_mm;
     problem.AddResidualBlock(new PenaltyCost(places[k], penalty_weight_ * (per_mm * held.gradient),
@@ -278,7 +280,7 @@ void JointRound::AddPenalties(std::vector<Vec2>& places, ceres::Problem& problem
 void JointRound::Bound(std::vector<Vec2>& places, ceres::Problem& problem) const {
   const Vec2 patches(level_.view.grid.patches_u, level_.view.grid.patches_v);
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const int corner = relaxer_.order()[k];
+    const int corner = order_[k];
     const PatchIndex patch = PatchAt(level_.view.grid, start_[corner]);
     const Vec2 low(patch.i, patch.j), far = relaxer_.LongestMove(corner);
     for (int axis = 0; axis < 2; ++axis) {
@@ -319,7 +321,7 @@ ceres::Solver::Options SchurOptions(std::vector<Vec2>& places, ControlNet& net,
 std::vector<Vec2> JointRound::Solved() {
   ControlNet net = level_.view.start;
   std::vector<Vec2> places;
-  for (const int corner : relaxer_.order()) {
+  for (const int corner : order_) {
     places.push_back(start_[corner].cwiseProduct(level_.view.lengths_mm));
   }
   ceres::Problem problem;
@@ -336,7 +338,7 @@ std::vector<Vec2> JointRound::Solved() {
   }
   Bound(places, problem);
   for (std::size_t k = 0; k < places.size(); ++k) {
-    if (relaxer_.IsKept(relaxer_.order()[k])) {
+    if (relaxer_.IsKept(order_[k])) {
       problem.SetParameterBlockConstant(places[k].data());
     }
   }
@@ -344,7 +346,7 @@ std::vector<Vec2> JointRound::Solved() {
   ceres::Solve(SchurOptions(places, net, problem), &problem, &summary);
   std::vector<Vec2> way(start_.size(), Vec2::Zero());
   for (std::size_t k = 0; summary.IsSolutionUsable() && k < places.size(); ++k) {
-    const int corner = relaxer_.order()[k];
+    const int corner = order_[k];
     if (!relaxer_.IsKept(corner)) {
       way[corner] = places[k].cwiseQuotient(level_.view.lengths_mm) - start_[corner];
     }

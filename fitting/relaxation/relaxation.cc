@@ -35,13 +35,19 @@ DowelMesh NetworkOf(const HSplineSurface& rest, const FitTarget& target,
 }
 
 RelaxationSummary Relax(const HSplineSurface& surface, const HSplineSurface& rest,
-                        const DowelMesh& mesh, const NetworkMoves& moves, FitTarget& target) {
+                        const DowelMesh& mesh, const NetworkMoves& moves, FitTarget& target,
+                        const MeasuredPenalties& measured) {
   Relaxer relaxer(surface, rest, mesh, moves, target);
-  RelaxationSummary summary{.before = relaxer.Penalties(), .after = {}};
+  RelaxationSummary summary;
+  if (measured.before) {
+    summary.before = relaxer.Penalties();
+  }
   for (int round = 0; round < moves.rounds; ++round) {
     relaxer.Round(summary);
   }
-  summary.after = relaxer.Penalties();
+  if (measured.after) {
+    summary.after = relaxer.Penalties();
+  }
   MovePoints(surface, relaxer.uv(), target, summary);
   return summary;
 }

@@ -157,11 +157,17 @@ struct RelaxationSummary {
   int steps_shortened = 0;  // of single points in one round, for that
 };
 
+// Which penalties Relax measures; those it does not are NaN.
+struct MeasuredPenalties {
+  bool before = true, after = true;
+};
+
 // Moves the (u,v) of the points of `target` on the surface as it stands, each by a damped
 // Gauss-Newton step of its penalties per round, shortened until they fall and no triangle turns
 // over. `mesh` was made of the points in the template `rest`, in their order. Without links a point
 // may pass u = 0 of a closed surface.
 RelaxationSummary Relax(const HSplineSurface& surface, const HSplineSurface& rest,
-                        const DowelMesh& mesh, const NetworkMoves& moves, FitTarget& target);
+                        const DowelMesh& mesh, const NetworkMoves& moves, FitTarget& target,
+                        const MeasuredPenalties& measured = {});
 
 }  // namespace semblance

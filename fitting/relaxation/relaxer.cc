@@ -27,38 +27,65 @@ SurfaceSample SampleAt(const HSplineSurface& surface, const Vec2& uv) {
 Relaxer::Relaxer(const HSplineSurface& surface, const HSplineSurface& rest, const DowelMesh& mesh,
                  const NetworkMoves& moves, const FitTarget& target)
     : surface_(surface), mesh_(mesh), moves_(moves), target_(target) {
-  for (std::size_t k = 0; k < target.points.size(); ++k) {
+  const std::size_t count = target.points.size();
+  const bool linked = !mesh.edges().empty();
+  uv_.reserve(count);
+  rest_points_.reserve(linked ? count : 0);
+  spots_.reserve(count);
+  for (std::size_t k = 0; k < count; ++k) {
     uv_.push_back(target.points[k].uv);
-    rest_points_.push_back(rest.Point(mesh.rest_uv()[k]));
+    if (linked) {
+      rest_points_.push_back(rest.Point(mesh.rest_uv()[k]));
+    }
     spots_.push_back(SampleAt(surface, uv_.back()));
   }
   LinkMembers();
   LinkNeighbours();
+  order_ = linked ? Order() : Corners();
 }
 
 void Relaxer::LinkMembers() {
-  members_.resize(uv_.size());
+  const std::vector<int>& corner = mesh_.corner();
+  first_member_.assign(uv_.size() + 1, 0);
   kept_.resize(uv_.size());
   std::vector<double> weights;
+  weights.reserve(uv_.size());
   for (std::size_t k = 0; k < uv_.size(); ++k) {
-    members_[mesh_.corner()[k]].push_back(static_cast<int>(k));
+    ++first_member_[corner[k] + 1];
     if (std::ranges::find(moves_.kept, target_.points[k].label) != moves_.kept.end()) {
-      kept_[mesh_.corner()[k]] = true;
+      kept_[corner[k]] = true;
     }
     weights.push_back(target_.points[k].weight);
+  }
+  std::partial_sum(first_member_.begin(), first_member_.end(), first_member_.begin());
+  members_.resize(uv_.size());
+  std::vector<int> next = first_member_;
+  for (std::size_t k = 0; k < uv_.size(); ++k) {
+    members_[next[corner[k]]++] = static_cast<int>(k);
   }
   std::sort(weights.begin(), weights.end());
   mean_weight_ = std::accumulate(weights.begin(), weights.end(), 0.0) /
                  static_cast<double>(std::max<std::size_t>(weights.size(), 1));
-  for (std::size_t k = 0; k < uv_.size(); ++k) {
-    if (!members_[k].empty()) {
-      order_.push_back(static_cast<int>(k));
+}
+
+std::vector<int> Relaxer::Corners() const {
+  std::vector<int> corners;
+  corners.reserve(uv_.size());
+  for (int k = 0; k < static_cast<int>(uv_.size()); ++k) {
+    if (!members(k).empty()) {
+      corners.push_back(k);
     }
   }
-  std::sort(order_.begin(), order_.end(), [&](int a, int b) {
+  return corners;
+}
+
+std::vector<int> Relaxer::Order() const {
+  std::vector<int> order = Corners();
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
     const Vec2 &p = mesh_.rest_uv()[a], &q = mesh_.rest_uv()[b];
     return std::pair(p.x(), p.y()) < std::pair(q.x(), q.y());
   });
+  return order;
 }
 
 void Relaxer::LinkNeighbours() {
@@ -103,7 +130,7 @@ void Relaxer::AddNeighbour(int corner, int other, const Vec2& uv, const SurfaceS
 LocalPenalty Relaxer::LocalAt(int corner, const Vec2& uv, const SurfaceSample& spot,
                               double distance) const {
   LocalPenalty local;
-  for (const int m : members_[corner]) {
+  for (const int m : members(corner)) {
     const FitPoint& p = target_.points[m];
     local.Add(distance * p.weight / mean_weight_, spot.point - p.position, spot.du, spot.dv);
     if (moves_.standard > 0 && p.role != PointRole::kSeed) {

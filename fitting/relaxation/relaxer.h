@@ -3,6 +3,7 @@
 // relaxation of relaxation.h.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "fitting/relaxation/dowel_mesh.h"
@@ -35,15 +36,20 @@ class Relaxer {
   // Everything but the moves must outlive it.
   Relaxer(const HSplineSurface& surface, const HSplineSurface& rest, const DowelMesh& mesh,
           const NetworkMoves& moves, const FitTarget& target);
-  // Moves every corner once, in an order that is the network's own.
+  // Moves every corner once: linked ones in the network's order; others have no effect on each
+  // other.
   void Round(RelaxationSummary& summary);
   RelaxationPenalties Penalties() const;
   const std::vector<Vec2>& uv() const { return uv_; }
   void SetUv(const std::vector<Vec2>& uv);  // one per point, equal for the points of a corner
 
-  // For fits that move vertices too. The corners in the network's own order, and their points.
-  const std::vector<int>& order() const { return order_; }
-  const std::vector<int>& members(int corner) const { return members_[corner]; }
+  // For fits that move vertices too. The corners by the template's (u,v), which is the network's
+  // own order, and their points.
+  std::vector<int> Order() const;
+  std::span<const int> members(int corner) const {
+    return std::span(members_).subspan(first_member_[corner],
+                                       first_member_[corner + 1] - first_member_[corner]);
+  }
   bool IsKept(int corner) const { return kept_[corner]; }  // PointMoves::kept
   double mean_weight() const { return mean_weight_; }
   // Of a corner where it is, its neighbours held: all penalties but the distance.
@@ -55,6 +61,7 @@ class Relaxer {
 
  private:
   void LinkMembers();
+  std::vector<int> Corners() const;  // that stand for points, as these are given
   void LinkNeighbours();
   LocalPenalty LocalAt(int corner, const Vec2& uv, const SurfaceSample& spot,
                        double distance) const;
@@ -76,10 +83,11 @@ class Relaxer {
   const FitTarget& target_;
   double mean_weight_ = 1;
   std::vector<Vec2> uv_;
-  std::vector<Vec3> rest_points_;
+  std::vector<Vec3> rest_points_;  // of linked points
   std::vector<SurfaceSample> spots_;
-  std::vector<int> order_;                    // of the corners, by the template's (u,v)
-  std::vector<std::vector<int>> members_;     // of a corner
+  std::vector<int> order_;                    // in which the corners move
+  std::vector<int> first_member_;             // of a corner, and after the last one the end
+  std::vector<int> members_;                  // points, those of a corner together
   std::vector<bool> kept_;                    // corners that do not move
   std::vector<std::vector<int>> neighbours_;  // of a corner
   std::vector<std::vector<int>> around_;      // triangles of a corner

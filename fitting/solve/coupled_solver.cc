@@ -107,7 +107,7 @@ class CoupledSquares {
   }
 
   SparseMatrix NormalMatrix() const {
-    TriangleSum sum(static_cast<Eigen::Index>(3 * net_.vertices.size()));
+    BlockTriangleSum sum(net_.vertices.size());
     blocks_->ForEach([&](const ResidualBlocks::Block& block) {
       Add(
           block.vertices,
@@ -147,18 +147,11 @@ class CoupledSquares {
 
  private:
   // product(a, b): 3 x 3 of the a-th and the b-th of the vertices.
-  static void Add(std::span<const int> vertices, const auto& product, TriangleSum& sum) {
+  static void Add(std::span<const int> vertices, const auto& product, BlockTriangleSum& sum) {
     for (std::size_t a = 0; a < vertices.size(); ++a) {
       for (std::size_t b = 0; b < vertices.size(); ++b) {
-        if (vertices[a] < vertices[b]) {
-          continue;
-        }
-        const Mat3 of_both = product(a, b);
-        for (int k = 0; k < 9; ++k) {
-          const int row = 3 * vertices[a] + k % 3, column = 3 * vertices[b] + k / 3;
-          if (row >= column) {
-            sum.Add(row, column, of_both(k % 3, k / 3));
-          }
+        if (vertices[a] >= vertices[b]) {
+          sum.Add(vertices[a], vertices[b], product(a, b));
         }
       }
     }
@@ -191,7 +184,8 @@ SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, C
     return outcome;
   }
   const std::size_t vertices = net.vertices.size();
-  const SparseFactor factor(squares.NormalMatrix(), ProximalShift(terms, vertices));
+  const SparseFactor factor(squares.NormalMatrix(), ProximalShift(terms, vertices),
+                            RowKind::kCoordinate);
   const ControlNet before = net;
   Eigen::Map<Eigen::VectorXd> x(net.vertices.front().data(),
                                 static_cast<Eigen::Index>(3 * vertices));

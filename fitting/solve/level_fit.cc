@@ -9,10 +9,11 @@
 
 namespace semblance {
 
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver) {
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver,
+                       SolveReport report) {
   LevelSolution solution{.net = view.start, .summary = {}};
   SpaceSolve solve(std::move(view), terms, solver);
-  solution.summary = solve.Settle();
+  solution.summary = solve.Settle(report);
   solution.net.vertices = solve.Values().vertices;
   return solution;
 }

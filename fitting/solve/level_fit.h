@@ -30,8 +30,10 @@ struct LevelSolution {
 // leave vertices undetermined, the solution nearest to view.start is taken (thesis 4.2 has no word
 // on it; the steps are damped by a multiple of the identity, a proximal-point iteration, which
 // converges to it). Observations are used in a canonical order, so their order has no effect.
-// Throws InputError if nothing can be solved: sizes that disagree, a template without extent for a
-// term that needs it, or points without a foot on bone for one that looks at bone.
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver = Solver::kCeres);
+// Without a report the summary has no terms, no coverage and no rank. Throws InputError if nothing
+// can be solved: sizes that disagree, a template without extent for a term that needs it, or points
+// without a foot on bone for one that looks at bone.
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver = Solver::kCeres,
+                       SolveReport report = SolveReport::kFull);
 
 }  // namespace semblance

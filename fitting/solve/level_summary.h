@@ -9,6 +9,10 @@
 
 namespace semblance {
 
+// What a solve measures beside what it needs. Of rounds that follow each other only the last is
+// told of, and measuring is a good part of a round.
+enum class SolveReport { kFull, kNone };
+
 struct PatchCoverage {
   int patches = -1;                   // of the level; adaptive fits: the finest everywhere
   int empty_patches = -1;             // in which no observation lies

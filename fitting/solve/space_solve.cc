@@ -274,19 +274,21 @@ void SpaceSolve::EditMirrors() {
   space_.Edit(mirrors);
 }
 
-LevelSummary SpaceSolve::Settle() {
+LevelSummary SpaceSolve::Settle(SolveReport report) {
   if (!std::exchange(settled_, true)) {
     Measure();
   }
-  LevelSummary summary = Solve(SolveTolerance::kTight);
-  NoteCoverage(summary);
+  LevelSummary summary = Solve(SolveTolerance::kTight, report);
+  if (report == SolveReport::kFull) {
+    NoteCoverage(summary);
+  }
   return summary;
 }
 
-LevelSummary SpaceSolve::Solve(SolveTolerance until) {
+LevelSummary SpaceSolve::Solve(SolveTolerance until, SolveReport report) {
   Begin();
   const double auto_weight = ChooseSmoothness();
-  const Standing before = Stand();
+  const Standing before = Stand(report);
   const bool direct = solver_ == Solver::kFastest && (GoesDirectly() || AllLinear(terms_));
   const SolverOutcome outcome = GoesDirectly() ? Descend(until)
                                 : direct       ? SolveAtOnce()
@@ -294,7 +296,7 @@ LevelSummary SpaceSolve::Solve(SolveTolerance until) {
   if (!outcome.usable) {
     Take(start_);
   }
-  const Standing after = Stand();
+  const Standing after = Stand(report);
   LevelSummary summary{.level = space_.finest(),
                        .fraction = 1,
                        .terms = {},
@@ -307,7 +309,7 @@ LevelSummary SpaceSolve::Solve(SolveTolerance until) {
                        .solver = direct ? "direct" : "ceres",
                        .termination = outcome.termination,
                        .usable = outcome.usable};
-  for (std::size_t k = 0; k < terms_.size(); ++k) {
+  for (std::size_t k = 0; k < after.costs.size(); ++k) {
     summary.terms.push_back({std::string(TermName(terms_[k])), before.costs[k], after.costs[k]});
   }
   return summary;
@@ -535,10 +537,12 @@ SolverOutcome SpaceSolve::Reweigh(double least_move) {
   return outcome;
 }
 
-SpaceSolve::Standing SpaceSolve::Stand() {
+SpaceSolve::Standing SpaceSolve::Stand(SolveReport report) {
   Standing standing{.rms_mm = rms_mm_};
-  for (const Term& term : terms_) {
-    standing.costs.push_back(CostOf(term));
+  if (report == SolveReport::kFull) {
+    for (const Term& term : terms_) {
+      standing.costs.push_back(CostOf(term));
+    }
   }
   return standing;
 }

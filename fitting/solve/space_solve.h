@@ -50,7 +50,7 @@ class SpaceSolve {
   // After the target's points have moved.
   void SeePoints();
   // Chooses `weight: auto`, then goes to the minimum.
-  LevelSummary Solve(SolveTolerance until);
+  LevelSummary Solve(SolveTolerance until, SolveReport report = SolveReport::kFull);
   // Adds the vertices that exact points ask for, to level `finest` at most.
   void AddAsked(int finest);
   // Adds the vertices that the plan asks for, those over exact points that are not met, and with a
@@ -63,7 +63,7 @@ class SpaceSolve {
   // The last solve, tight, with what the points determine of it. From now on a loss is as wide as
   // its term has it; before, where the surface is still far from most points, at least three times
   // their median distance, so that it does not take them for outliers.
-  LevelSummary Settle();
+  LevelSummary Settle(SolveReport report = SolveReport::kFull);
 
   // By generalised cross-validation at the surface as it stands, around the weight of the last
   // time; NaN if no term is `auto`.
@@ -85,7 +85,7 @@ class SpaceSolve {
  private:
   struct Standing {
     double rms_mm = kNaN;            // of the points, weighted
-    std::vector<double> costs = {};  // of each term, mm^2
+    std::vector<double> costs = {};  // of each term, mm^2; none without a report
   };
 
   void Begin();
@@ -104,7 +104,7 @@ class SpaceSolve {
   void Measure();
   std::vector<double> FactorsOf(const std::vector<double>& squares) const;
   std::vector<int> HeldRows() const;
-  Standing Stand();
+  Standing Stand(SolveReport report);
   double CostOf(const Term& term);
   double LeastLossWidth_mm() const;
   double MaxMove() const;

@@ -122,8 +122,8 @@ DofStencil LevelView::StencilAt(const Vec2& uv, DerivativeOrder order) const {
   return stencil;
 }
 
-Vec3 LevelView::PointAt(const Vec2& uv, const ControlNet& net) const {
-  return space == nullptr ? grid.StencilAt(uv).Apply(net) : StencilAt(uv).Apply(net);
+Vec3 LevelView::PointAt(const Vec2& uv, const ControlNet& net, DerivativeOrder order) const {
+  return space == nullptr ? grid.StencilAt(uv, order).Apply(net) : StencilAt(uv, order).Apply(net);
 }
 
 void AddElementRows(const SplineElement& element, std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,

@@ -73,7 +73,8 @@ struct LevelView {
   SplineElement Element(int element) const;
   LocalStencil LocalAt(const Vec2& uv, DerivativeOrder order = {}) const;
   DofStencil StencilAt(const Vec2& uv, DerivativeOrder order = {}) const;
-  Vec3 PointAt(const Vec2& uv, const ControlNet& net) const;  // of the surface with these dofs
+  // Of the surface with these dofs, or a derivative of it.
+  Vec3 PointAt(const Vec2& uv, const ControlNet& net, DerivativeOrder order = {}) const;
 };
 
 // Gives a sink rows over the sixteen vertices of an element as rows over its dofs.

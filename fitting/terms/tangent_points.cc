@@ -28,30 +28,24 @@ Eigen::MatrixXd GramOver(const SplineElement& element, const ColumnPerPoint& wei
 }  // namespace
 
 Vec3 NormalBefore(const LevelView& view, const Vec2& uv) {
-  const Vec3 du = view.StencilAt(uv, {1, 0}).Apply(view.start),
-             dv = view.StencilAt(uv, {0, 1}).Apply(view.start), normal = du.cross(dv);
+  const Vec3 du = view.PointAt(uv, view.start, {1, 0}), dv = view.PointAt(uv, view.start, {0, 1}),
+             normal = du.cross(dv);
   const bool none = normal.norm() <= 1e-12 * (du.squaredNorm() + dv.squaredNorm());
   return none ? Vec3(Vec3::Zero()) : normal.normalized();
 }
 
 TangentSums::TangentSums(const TangentPointTerm& term, const LevelView& view)
     : view_(view), scale_(term.weight / view.WeightSum()), tangential_(term.tangential) {
+  constexpr std::size_t kMost = 16384;  // points of a run
   normals_.reserve(view.observations.size());
   for (const Observation& o : view.observations) {
-    normals_.push_back(NormalBefore(view, o.uv));
-  }
-}
-
-void TangentSums::ForEachRun(const auto& use) const {
-  constexpr std::size_t kMost = 16384;
-  const std::span<const Observation> all(view_.observations);
-  const auto element = [&](std::size_t k) { return view_.LocalAt(all[k].uv).element; };
-  for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
-    const int of_run = element(begin);
-    while (end < all.size() && end - begin < kMost && element(end) == of_run) {
-      ++end;
+    const int element = view.LocalAt(o.uv).element;
+    if (runs_.empty() || runs_.back().element != element ||
+        runs_.back().end - runs_.back().begin == kMost) {
+      runs_.push_back({element, normals_.size(), normals_.size()});
     }
-    use(view_.Element(of_run), begin, end);
+    ++runs_.back().end;
+    normals_.push_back(NormalBefore(view, o.uv));
   }
 }
 
@@ -63,54 +57,66 @@ Mat3 TangentSums::MetricAt(std::size_t observation) const {
 }
 
 void TangentSums::ForEachElement(const UseSum& use) const {
-  ForEachRun([&](const SplineElement& element, std::size_t begin, std::size_t end) {
-    const auto count = static_cast<Eigen::Index>(end - begin);
-    ColumnPerPoint weights(16, count);
-    Eigen::Matrix<double, Eigen::Dynamic, 6> factors(count, 6);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      const LocalStencil at = view_.LocalAt(view_.observations[begin + k].uv);
-      weights.col(k) = Eigen::Map<const Eigen::Matrix<double, 16, 1>>(at.weight.data());
-      const Mat3 metric = MetricAt(begin + k);
-      for (int p = 0; p < 6; ++p) {
-        factors(k, p) = metric(kPairs[p].first, kPairs[p].second);
-      }
-    }
-    const auto dofs = static_cast<Eigen::Index>(element.dofs.size());
-    Eigen::MatrixXd normal(3 * dofs, 3 * dofs);
+  for (const Run& run : runs_) {
+    const SplineElement element = view_.Element(run.element);
+    use(element.dofs, NormalOf(run, element));
+  }
+}
+
+Eigen::MatrixXd TangentSums::NormalOf(const Run& run, const SplineElement& element) const {
+  const auto count = static_cast<Eigen::Index>(run.end - run.begin);
+  ColumnPerPoint weights(16, count);
+  Eigen::Matrix<double, Eigen::Dynamic, 6> factors(count, 6);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const LocalStencil at = view_.LocalAt(view_.observations[run.begin + k].uv);
+    weights.col(k) = Eigen::Map<const Eigen::Matrix<double, 16, 1>>(at.weight.data());
+    const Mat3 metric = MetricAt(run.begin + k);
     for (int p = 0; p < 6; ++p) {
-      const auto [i, j] = kPairs[p];
-      const Eigen::MatrixXd gram = GramOver(element, weights, factors.col(p));
-      for (Eigen::Index a = 0; a < dofs; ++a) {
-        for (Eigen::Index b = 0; b < dofs; ++b) {
-          normal(3 * a + i, 3 * b + j) = normal(3 * a + j, 3 * b + i) = gram(a, b);
-        }
+      factors(k, p) = metric(kPairs[p].first, kPairs[p].second);
+    }
+  }
+  const auto dofs = static_cast<Eigen::Index>(element.dofs.size());
+  Eigen::MatrixXd normal(3 * dofs, 3 * dofs);
+  for (int p = 0; p < 6; ++p) {
+    const auto [i, j] = kPairs[p];
+    const Eigen::MatrixXd gram = GramOver(element, weights, factors.col(p));
+    for (Eigen::Index a = 0; a < dofs; ++a) {
+      for (Eigen::Index b = 0; b < dofs; ++b) {
+        normal(3 * a + i, 3 * b + j) = normal(3 * a + j, 3 * b + i) = gram(a, b);
       }
     }
-    use(element.dofs, normal);
-  });
+  }
+  return normal;
 }
 
 void TangentSums::ForEachDof(const std::function<void(std::span<const int> dofs)>& use) const {
-  ForEachRun([&](const SplineElement& element, std::size_t, std::size_t) { use(element.dofs); });
+  for (const Run& run : runs_) {
+    use(view_.Element(run.element).dofs);
+  }
 }
 
 void TangentSums::AddDownhill(const ControlNet& net, Eigen::VectorXd& down) const {
-  ForEachRun([&](const SplineElement& element, std::size_t begin, std::size_t end) {
-    const PatchMatrix vertices = element.Vertices(net);
-    PatchMatrix pull = PatchMatrix::Zero();
-    for (std::size_t k = begin; k < end; ++k) {
-      const Observation& o = view_.observations[k];
-      const LocalStencil at = view_.LocalAt(o.uv);
-      const Eigen::Map<const Eigen::Matrix<double, 1, 16>> weights(at.weight.data());
-      const Vec3 misfit = o.position - (weights * vertices).transpose();
-      pull += weights.transpose() * (MetricAt(k) * misfit).transpose();
-    }
+  for (const Run& run : runs_) {
+    const SplineElement element = view_.Element(run.element);
+    const PatchMatrix pull = PullOf(run, element.Vertices(net));
     const Eigen::MatrixXd over_dofs =
         element.IsIdentity() ? Eigen::MatrixXd(pull) : element.extraction.transpose() * pull;
     for (std::size_t d = 0; d < element.dofs.size(); ++d) {
       down.segment<3>(3 * element.dofs[d]) += over_dofs.row(static_cast<Eigen::Index>(d));
     }
-  });
+  }
+}
+
+PatchMatrix TangentSums::PullOf(const Run& run, const PatchMatrix& vertices) const {
+  PatchMatrix pull = PatchMatrix::Zero();
+  for (std::size_t k = run.begin; k < run.end; ++k) {
+    const Observation& o = view_.observations[k];
+    const LocalStencil at = view_.LocalAt(o.uv);
+    const Eigen::Map<const Eigen::Matrix<double, 1, 16>> weights(at.weight.data());
+    const Vec3 misfit = o.position - (weights * vertices).transpose();
+    pull += weights.transpose() * (MetricAt(k) * misfit).transpose();
+  }
+  return pull;
 }
 
 namespace {

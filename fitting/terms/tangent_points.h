@@ -31,12 +31,20 @@ class TangentSums {
   void AddDownhill(const ControlNet& net, Eigen::VectorXd& down) const;
 
  private:
-  // Calls use(element, begin, end) for observations begin .. end - 1, all in that element.
-  void ForEachRun(const auto& use) const;
+  // Observations begin .. end - 1, all in one element.
+  struct Run {
+    int element;
+    std::size_t begin, end;
+  };
+
+  Eigen::MatrixXd NormalOf(const Run& run, const SplineElement& element) const;
+  // -J^T r over the element's sixteen vertices.
+  PatchMatrix PullOf(const Run& run, const PatchMatrix& vertices) const;
   Mat3 MetricAt(std::size_t observation) const;  // J^T J of the point where the surface is
 
   const LevelView& view_;
   double scale_, tangential_;
+  std::vector<Run> runs_;      // of all observations, in their order
   std::vector<Vec3> normals_;  // of the surface before the solve, per observation; 0: it has none
 };
 

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "fitting/least_squares/triangle_sum.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {
@@ -79,6 +80,51 @@ TEST(SparseFactor, NoLibraryStartsThreads) {
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(lower.rows());
   const Eigen::VectorXd solved = factor.Solve(ones);
   EXPECT_LT((lower.selfadjointView<Eigen::Lower>() * solved - ones).norm(), 1e-10);
+}
+
+// Blocks that couple x, y and z of each vertex of a ring and of its neighbours.
+SparseMatrix RingOfVertices(int vertices) {
+  Random random(5);
+  BlockTriangleSum sum(vertices);
+  for (int v = 0; v < vertices; ++v) {
+    const int next = (v + 1) % vertices;
+    const Eigen::MatrixXd a = Eigen::MatrixXd::NullaryExpr(8, 6, [&] { return random.Normal(); });
+    const Eigen::MatrixXd normal = a.transpose() * a;
+    sum.Add(v, v, normal.topLeftCorner<3, 3>());
+    sum.Add(next, next, normal.bottomRightCorner<3, 3>());
+    sum.Add(std::max(v, next), std::min(v, next),
+            v < next ? normal.bottomLeftCorner<3, 3>() : normal.topRightCorner<3, 3>());
+  }
+  return sum.Take();
+}
+
+TEST(BlockTriangleSum, IsTheSumOfItsBlocks) {
+  Random random(3);
+  const auto number = [&] { return random.Normal(); };
+  const Mat3 a = Mat3::NullaryExpr(number), b = Mat3::NullaryExpr(number),
+             c = Mat3::NullaryExpr(number);
+  BlockTriangleSum sum(3);
+  sum.Add(2, 0, a);
+  sum.Add(1, 0, b);
+  sum.Add(2, 0, c);
+  sum.Add(1, 1, c);
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(9, 9);
+  expected.block<3, 3>(6, 0) = a + c;
+  expected.block<3, 3>(3, 0) = b;
+  expected.block<3, 3>(3, 3).triangularView<Eigen::Lower>() = c;
+  const SparseMatrix taken = sum.Take();
+  EXPECT_EQ(Eigen::MatrixXd(taken), expected);
+  EXPECT_EQ(taken.nonZeros(), 9 + 9 + 6);
+}
+
+TEST(SparseFactor, IsTheSameByVertex) {
+  const SparseMatrix lower = RingOfVertices(40);
+  const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(lower.rows(), -1, 2);
+  const SparseFactor plain(lower, 1e-3), by_vertex(lower, 1e-3, RowKind::kCoordinate);
+  ASSERT_TRUE(plain.usable() && by_vertex.usable());
+  const Eigen::VectorXd solved = plain.Solve(right);
+  EXPECT_LT((by_vertex.Solve(right) - solved).norm(), 1e-10 * solved.norm());
+  EXPECT_NEAR(by_vertex.LogDeterminant(), plain.LogDeterminant(), 1e-9);
 }
 
 TEST(NumericalRank, OfNothingIsZero) { EXPECT_EQ(NumericalRank(SparseMatrix(7, 7), 5), 0); }

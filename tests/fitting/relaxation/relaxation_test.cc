@@ -186,6 +186,25 @@ TEST(Relaxation, PenaltiesFall) {
   EXPECT_GT(some.max_move_mm, 1);
 }
 
+// Rounds between the first and the last measure nothing, which the result does not show.
+TEST(Relaxation, AResultTellsOfTheFirstPointsAndTheLast) {
+  const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
+  const FitTarget target = Dowels(subject, 0.05);
+  for (const Relaxation& relaxation : EveryRelaxation(2)) {
+    const FitResult result = Fit(rest, target, {}, ShortOptions(relaxation), {});
+    for (const LevelSummary& level : result.levels) {
+      EXPECT_FALSE(level.terms.empty());
+      EXPECT_GE(level.rank, 0);
+      EXPECT_GT(level.rms_before_mm, 0);
+      EXPECT_GT(level.rms_after_mm, 0);
+    }
+    for (const RelaxationSummary& moves : result.relaxations) {
+      EXPECT_GT(moves.before.distance, 0);
+      EXPECT_GT(moves.after.distance, 0);
+    }
+  }
+}
+
 TEST(Relaxation, APointOnTheSurfaceArrivesAtIt) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2);
   const Vec2 truth(0.4, 0.6);
