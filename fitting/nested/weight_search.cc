@@ -118,9 +118,10 @@ bool NestedWeightSearch::TryMetric(const BendingMetric& metric, const Search& se
 // in lengths that are too even bends too evenly: where it points to, the answer lies farther off.
 void NestedWeightSearch::Stretch(double factor) {
   constexpr int kMost = 4;
-  constexpr double kApart = 2;  // less is not worth the solves
+  constexpr double kApart = 2;     // less is not worth the solves
+  constexpr double kShare = 0.05;  // of the points: fewer parameters leave little to save
   bool better = !std::isnan(best_.weight);
-  for (int k = 0; k < kMost && better; ++k) {
+  for (int k = 0; k < kMost && better && best_.degrees_of_freedom > kShare * count_; ++k) {
     Finish();
     const BendingSums bending = solve_.Bending();
     const BendingMetric from = solve_.metric(),

@@ -38,6 +38,6 @@ void RunLinear();
 
 // `count` points of the head with noise 1e-4; finer vertices where a point is farther off than the
 // tolerance. Errors on a grid of 400 x 400 that was not fitted.
-Measured MeasureHead(int count, double tolerance);
+Measured MeasureHead(int count, double tolerance, Solver solver = Solver::kFastest);
 
 }  // namespace semblance::bench
