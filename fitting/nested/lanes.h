@@ -24,13 +24,14 @@ SEMBLANCE_INLINE double SumOfEight(const Wider& n) {
   return ((n[0] + n[4]) + (n[2] + n[6])) + ((n[1] + n[5]) + (n[3] + n[7]));
 }
 
-// CubicWeights, in the instructions of whichever clone calls it.
+// CubicWeights, to the bit, in the instructions of whichever clone calls it: each of the four is a
+// cubic of t or 1 - t, so that one division serves them all.
 SEMBLANCE_INLINE void WeightsAt(double t, double* weights) {
+  constexpr Wide kOnes = {0, 4, 4, 0}, kSquares = {0, 6, 6, 0}, kCubes = {1, 3, 3, 1};
   const double s = 1 - t;
-  weights[0] = s * s * s / 6;
-  weights[1] = (4 - 6 * t * t + 3 * t * t * t) / 6;
-  weights[2] = (4 - 6 * s * s + 3 * s * s * s) / 6;
-  weights[3] = t * t * t / 6;
+  const Wide x = {s, t, s, t};
+  const Wide cubics = (kOnes - kSquares * x * x + kCubes * x * x * x) / 6;
+  std::memcpy(weights, &cubics, sizeof cubics);
 }
 
 }  // namespace semblance

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
@@ -22,12 +23,26 @@ struct Evidence {
   std::vector<double> together, apart;
 };
 
-// Points and what is left of them, in the order of the curve.
+// Points and what is left of them, in the order of the curve. What each level asks of a point
+// stands together: of all points, few are looked at.
 struct EvidencePoints {
-  const NestedPoints& points;
-  std::span<const std::uint32_t> indices;
+  struct Place {
+    double x, y, weight;  // in patches of level 0
+  };
+  int channels;
+  std::vector<Place> places;
   std::span<const NestedResidual> residuals;
 };
+
+EvidencePoints EvidencePointsOf(const NestedPoints& points, std::span<const std::uint32_t> indices,
+                                std::span<const NestedResidual> residuals) {
+  EvidencePoints of{.channels = points.channels, .places = {}, .residuals = residuals};
+  of.places.reserve(indices.size());
+  for (const std::uint32_t k : indices) {
+    of.places.push_back({points.X(k), points.Y(k), points.Weight(k)});
+  }
+  return of;
+}
 
 // Points begin .. end - 1 of a patch, and where on it they are.
 struct PatchOfPoints {
@@ -36,70 +51,75 @@ struct PatchOfPoints {
   int i, j;
 };
 
-// Of a patch's sixteen functions: the sums of w N e along each channel, and last of (w N)^2 |e|^2.
-using FunctionSums = double[4][16];
+// Adds the first four numbers to one row of a patch's vertices, and the others to the next.
+SEMBLANCE_INLINE void AddTwoRows(const Wider& sums, double* row, double* next) {
+  Wide some[2], there[2];
+  std::memcpy(some, &sums, sizeof some);
+  std::memcpy(&there[0], row, sizeof(Wide));
+  std::memcpy(&there[1], next, sizeof(Wide));
+  there[0] += some[0];
+  there[1] += some[1];
+  std::memcpy(row, &there[0], sizeof(Wide));
+  std::memcpy(next, &there[1], sizeof(Wide));
+}
 
+// Of a patch's sixteen functions: the sums of w N e along each channel, and last of (w N)^2 |e|^2.
 template <int channels>
 SEMBLANCE_INLINE void SumPatch(const EvidencePoints& of, const PatchOfPoints& patch,
-                               FunctionSums& sums) {
-  double u[4], v[4], both[16];
+                               GridValues& values) {
+  double u[4], v[4];
+  Wider sums[channels + 1][2] = {};
   for (std::size_t n = patch.begin; n < patch.end; ++n) {
-    const std::uint32_t k = of.indices[n];
-    WeightsAt(of.points.X(k) * patch.scale - patch.i, u);
-    WeightsAt(of.points.Y(k) * patch.scale - patch.j, v);
-    const double w = of.points.Weight(k);
-    for (int m = 0; m < 16; ++m) {
-      both[m] = w * u[m % 4] * v[m / 4];
-    }
-    double square = 0;
-    for (int c = 0; c < channels; ++c) {
-      const double e = of.residuals[n].along[c];
-      square += e * e;
-      for (int m = 0; m < 16; ++m) {
-        sums[c][m] += both[m] * e;
+    const auto& [x, y, w] = of.places[n];
+    WeightsAt(x * patch.scale - patch.i, u);
+    WeightsAt(y * patch.scale - patch.j, v);
+    const Wider along_u = w * Wider{u[0], u[1], u[2], u[3], u[0], u[1], u[2], u[3]};
+    for (int half = 0; half < 2; ++half) {
+      const double a = v[2 * half], b = v[2 * half + 1];
+      const Wider both = along_u * Wider{a, a, a, a, b, b, b, b};
+      double square = 0;
+      for (int c = 0; c < channels; ++c) {
+        const double e = of.residuals[n].along[c];
+        square += e * e;
+        sums[c][half] += both * e;
       }
+      sums[channels][half] += both * both * square;
     }
-    for (int m = 0; m < 16; ++m) {
-      sums[channels][m] += both[m] * both[m] * square;
+  }
+  for (int c = 0; c <= channels; ++c) {
+    for (int half = 0; half < 2; ++half) {
+      const int j = patch.j + 2 * half;
+      AddTwoRows(sums[c][half], values.Row(c, j) + patch.i, values.Row(c, j + 1) + patch.i);
     }
   }
 }
 
 SEMBLANCE_WIDE void SumPatchOf1(const EvidencePoints& of, const PatchOfPoints& patch,
-                                FunctionSums& sums) {
-  SumPatch<1>(of, patch, sums);
+                                GridValues& values) {
+  SumPatch<1>(of, patch, values);
 }
 SEMBLANCE_WIDE void SumPatchOf2(const EvidencePoints& of, const PatchOfPoints& patch,
-                                FunctionSums& sums) {
-  SumPatch<2>(of, patch, sums);
+                                GridValues& values) {
+  SumPatch<2>(of, patch, values);
 }
 SEMBLANCE_WIDE void SumPatchOf3(const EvidencePoints& of, const PatchOfPoints& patch,
-                                FunctionSums& sums) {
-  SumPatch<3>(of, patch, sums);
+                                GridValues& values) {
+  SumPatch<3>(of, patch, values);
 }
 
 // The channels' sums, and last that of squares.
 void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridValues& values) {
-  constexpr void (*kSum[])(const EvidencePoints&, const PatchOfPoints&, FunctionSums&) = {
+  constexpr void (*kSum[])(const EvidencePoints&, const PatchOfPoints&, GridValues&) = {
       SumPatchOf1, SumPatchOf2, SumPatchOf3};
   const auto patch_of = [&](std::size_t n) {
-    return PatchOn(layout.grid, level, of.points.X(of.indices[n]), of.points.Y(of.indices[n]));
+    return PatchOn(layout.grid, level, of.places[n].x, of.places[n].y);
   };
-  for (std::size_t begin = 0, end = 0; begin < of.indices.size(); begin = end) {
+  for (std::size_t begin = 0, end = 0; begin < of.places.size(); begin = end) {
     const auto [i, j] = patch_of(begin);
-    for (end = begin + 1; end < of.indices.size() && patch_of(end) == std::array{i, j};) {
+    for (end = begin + 1; end < of.places.size() && patch_of(end) == std::array{i, j};) {
       ++end;
     }
-    alignas(64) FunctionSums sums = {};
-    kSum[of.points.channels - 1](of, {begin, end, static_cast<double>(1 << level), i, j}, sums);
-    for (int c = 0; c <= of.points.channels; ++c) {
-      for (int b = 0; b < 4; ++b) {
-        double* const row = values.Row(c, j + b) + i;
-        for (int a = 0; a < 4; ++a) {
-          row[a] += sums[c][a + 4 * b];
-        }
-      }
-    }
+    kSum[of.channels - 1](of, {begin, end, static_cast<double>(1 << level), i, j}, values);
   }
 }
 
@@ -118,7 +138,7 @@ void FoldSeam(GridValues& values) {
 }
 
 Evidence EvidenceOn(const EvidencePoints& of, const GridLayout& layout, int level) {
-  const int channels = of.points.channels;
+  const int channels = of.channels;
   GridValues values(layout, channels + 1);
   SumUp(of, layout, level, values);
   FoldSeam(values);
@@ -196,12 +216,13 @@ UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const NestedSp
                                       std::span<const NestedResidual> residuals) {
   UnresolvedDetail detail{.seen = {}, .first = space.FinestWhole() + 1};
   detail.seen.resize(1);
+  const EvidencePoints of = EvidencePointsOf(points, indices, residuals);
   GridLayout coarser = space[0].layout;
   for (int level = 1; level <= finest; ++level) {
     const GridLayout layout = coarser.Finer();
     detail.seen.emplace_back();
     if (level >= detail.first) {
-      const Evidence evidence = EvidenceOn({points, indices, residuals}, layout, level);
+      const Evidence evidence = EvidenceOn(of, layout, level);
       detail.seen.back() = PatchesSeen(layout, coarser, evidence);
     }
     coarser = layout;

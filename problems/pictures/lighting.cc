@@ -11,9 +11,7 @@
 namespace semblance {
 namespace {
 
-constexpr int kMapSize = 512;   // texels along a side of a depth map
 constexpr int kSkyLights = 26;  // in one set of directions, so that pictures share its depth maps
-constexpr SampleWindow kWholeMap = {0, kMapSize, 0, kMapSize};
 
 // Directions spread evenly over the sphere (Fibonacci lattice); z is up.
 Vec3 SphereDirection(int i, int count) {
@@ -96,16 +94,18 @@ Mat3 ViewTowards(const Vec3& to_viewer) {
   return view;
 }
 
-ShadowMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const Box3& box,
+ShadowMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const ShadowMaps& all,
                 const Vec3& to_light) {
-  const double diameter = std::max(box.diagonal().norm(), 1e-9);
-  ShadowMap map{
-      .projection = {.view_from_world = ViewTowards(to_light),
-                     .centre = box.center(),
-                     .samples_per_mm = (kMapSize - 4) / diameter,
-                     .width = kMapSize,
-                     .height = kMapSize},
-      .depth = std::vector<float>(kMapSize * kMapSize, std::numeric_limits<float>::infinity())};
+  const double diameter = std::max(all.box.diagonal().norm(), 1e-9);
+  const int size = all.texels;
+  ShadowMap map{.projection = {.view_from_world = ViewTowards(to_light),
+                               .centre = all.box.center(),
+                               .samples_per_mm = (size - 4) / diameter,
+                               .width = static_cast<double>(size),
+                               .height = static_cast<double>(size)},
+                .texels = size,
+                .depth = std::vector<float>(static_cast<std::size_t>(size) * size,
+                                            std::numeric_limits<float>::infinity())};
   std::vector<RasterPoint> points(flat.vertices.size());
   for (std::size_t v = 0; v < points.size(); ++v) {
     if (casts[flat.object_of_vertex[v]]) {
@@ -114,9 +114,9 @@ ShadowMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const Box
   }
   for (const SceneTriangle& t : flat.triangles) {
     if (casts[t.object]) {
-      VisitSamples(points[t.corners[0]], points[t.corners[1]], points[t.corners[2]], kWholeMap,
-                   [&](const Coverage& s) {
-                     float& depth = map.depth[s.y * kMapSize + s.x];
+      VisitSamples(points[t.corners[0]], points[t.corners[1]], points[t.corners[2]],
+                   {0, size, 0, size}, [&](const Coverage& s) {
+                     float& depth = map.depth[static_cast<std::size_t>(s.y) * size + s.x];
                      depth = std::min(depth, s.depth);
                    });
     }
@@ -136,7 +136,7 @@ Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
   const float texel_mm = static_cast<float>(1 / map.projection.samples_per_mm);
   const std::int32_t half = kSubsamples / 2;
   const int x = (at.x - half) >> 8, y = (at.y - half) >> 8;
-  if (x < 0 || y < 0 || x + 1 >= kMapSize || y + 1 >= kMapSize) {
+  if (x < 0 || y < 0 || x + 1 >= map.texels || y + 1 >= map.texels) {
     return Rgb::Ones();
   }
   const float fx = static_cast<float>((at.x - half) & 255) / kSubsamples;
@@ -145,7 +145,7 @@ Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
   for (int k = 0; k < 4; ++k) {
     const int dx = k & 1, dy = k >> 1;
     const float weight = (dx != 0 ? fx : 1 - fx) * (dy != 0 ? fy : 1 - fy);
-    const float thickness = at.depth - map.depth[(y + dy) * kMapSize + x + dx] - texel_mm;
+    const float thickness = at.depth - map.depth[(y + dy) * map.texels + x + dx] - texel_mm;
     sum += thickness > 0 ? Rgb(weight * Passed(thickness, scatter_mm)) : Rgb::Constant(weight);
   }
   return sum;
@@ -221,7 +221,7 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
     }
   }
   ParallelFor(missing.size(), threads, 1, [&](std::size_t i) {
-    *missing[i].second = MapOf(flat, casts, box, missing[i].first);
+    *missing[i].second = MapOf(flat, casts, maps, missing[i].first);
   });
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
     if (!flat.is_seen.empty() && !flat.is_seen[v]) {

@@ -50,11 +50,15 @@ struct FlatScene {
 // What is nearest to a light, seen from it.
 struct ShadowMap {
   Projection projection;
+  int texels = 0;            // along a side
   std::vector<float> depth;  // row by row; infinite where nothing is
 };
 
 // Those that several pictures of the same opaque meshes have in common.
 struct ShadowMaps {
+  // Along a side of each. Light is known at vertices and spread between them, so few vertices need
+  // few texels.
+  int texels = 512;
   std::map<std::array<double, 3>, ShadowMap> of_direction;  // to the light
   Box3 box;                                                 // of what casts these shadows
 };

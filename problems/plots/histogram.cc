@@ -21,13 +21,19 @@ struct Range {
   bool is_cut = false;  // values lie beyond
 };
 
-Range RangeOf(std::vector<double> values) {
-  constexpr double kReach = 2.5;
+// The quantile is looked for only where so many are small that it can be.
+Range RangeOf(std::span<const double> values) {
+  constexpr double kReach = 2.5, kMost = 0.95;
   if (values.empty()) {
     return {};
   }
   const double largest = *std::ranges::max_element(values);
-  const double most = Quantile(values, 0.95);
+  const auto small = std::ranges::count_if(values, [&](double v) { return kReach * v < largest; });
+  double most = largest;
+  if (static_cast<double>(small) >= kMost * static_cast<double>(values.size())) {
+    std::vector<double> in_order(values.begin(), values.end());
+    most = Quantile(in_order, kMost);
+  }
   const bool is_cut = most > 0 && kReach * most < largest;
   const double high = is_cut ? kReach * most : largest;
   return {.high = high > 0 ? high : 1, .is_cut = is_cut};

@@ -23,6 +23,9 @@
 namespace semblance {
 namespace {
 
+// What several parts of the page tell of; none where no plan had one.
+using Tolerance = std::optional<ToleranceReport>;
+
 std::string Figure(double value) {
   return std::isfinite(value) ? fmt::format("{:.3g}", value) : "";
 }
@@ -31,23 +34,13 @@ std::size_t VerticesOf(const HSplineSurface& surface) {
   return surface.Net(0).vertices.size() + surface.Offsets().size();
 }
 
-// What several parts of the page tell, found once.
-struct Figures {
-  DistanceQuantiles distance;
-  std::optional<ToleranceReport> tolerance;
-};
-
-Figures FiguresOf(const PointFitOptions& options, const PointFit& result) {
-  return {.distance = QuantilesOf(result.fit), .tolerance = ToleranceOf(options, result)};
-}
-
-std::vector<std::string> Notes(const PointFit& result, const Figures& figures) {
+std::vector<std::string> Notes(const PointFit& result, const Tolerance& tolerance) {
   std::vector<std::string> notes;
   for (const std::string& fault : result.Faults()) {
     notes.push_back("The result is not usable: " + fault);
   }
-  if (figures.tolerance) {
-    notes.push_back(ToleranceText(*figures.tolerance));
+  if (tolerance) {
+    notes.push_back(ToleranceText(*tolerance));
   }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
@@ -64,19 +57,19 @@ std::vector<std::string> Notes(const PointFit& result, const Figures& figures) {
   return notes;
 }
 
-std::vector<ReportTile> Tiles(const PointFit& result, const Figures& r) {
+std::vector<ReportTile> Tiles(const PointFit& result, const Tolerance& tolerance) {
   std::vector<ReportTile> tiles = {
       {"points", std::to_string(result.fit.residual_mm.size()), "", "(u,v): " + result.parameters},
       {"RMS distance", Figure(result.fit.point_rms_mm), "mm", "of the points from the surface"},
-      {"median", Figure(r.distance.median_mm), "mm", ""},
-      {"95th percentile", Figure(r.distance.p95_mm), "mm", ""},
-      {"largest", Figure(r.distance.max_mm), "mm", ""},
+      {"median", Figure(result.distance.median_mm), "mm", ""},
+      {"95th percentile", Figure(result.distance.p95_mm), "mm", ""},
+      {"largest", Figure(result.distance.max_mm), "mm", ""},
       {"control vertices", std::to_string(VerticesOf(result.fit.surface)), "", ""}};
   if (std::isfinite(result.weighted_rms_mm)) {
     tiles.insert(tiles.begin() + 2, {"weighted RMS", Figure(result.weighted_rms_mm), "mm",
                                      "points count by their weights, as in the fit"});
   }
-  if (const auto& tolerance = r.tolerance) {
+  if (tolerance) {
     tiles.push_back({"tolerance", tolerance->Met() ? "met" : "missed", "",
                      fmt::format("{:.4g} mm; {} beyond it", tolerance->tolerance_mm,
                                  Counted(tolerance->beyond, "point"))});
@@ -92,11 +85,11 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Figures& r) {
   return tiles;
 }
 
-ReportSection DistanceSection(const PointFit& result, const Figures& figures) {
+ReportSection DistanceSection(const PointFit& result, const Tolerance& tolerance) {
   std::vector<HistogramMark> marks = {{result.fit.point_rms_mm, "RMS"},
-                                      {figures.distance.p95_mm, "95 %"}};
-  if (figures.tolerance) {
-    marks.push_back({figures.tolerance->tolerance_mm, "tolerance"});
+                                      {result.distance.p95_mm, "95 %"}};
+  if (tolerance) {
+    marks.push_back({tolerance->tolerance_mm, "tolerance"});
   }
   return {.heading = "How far the points are off",
           .images = {{HistogramSvg(result.fit.residual_mm, marks, "distance (mm)"),
@@ -199,7 +192,7 @@ ReportSection RoundsSection(const FitResult& fit, bool is_weighted) {
 
 std::string FitPageHtml(const PointFitOptions& options, const PointSource& source,
                         const PointFit& result, const PageTrim& trim, int threads) {
-  const Figures figures = FiguresOf(options, result);
+  const Tolerance tolerance = ToleranceOf(options, result);
   FitGrid grid = GridOf(result.fit, threads);
   if (trim.kept != nullptr) {
     TrimGrid(*trim.kept, threads, grid);
@@ -210,7 +203,7 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
   report.subtitle = fmt::format(
       "An H-spline surface through {} of {}",
       Counted(static_cast<long long>(result.fit.residual_mm.size()), "point"), source.name);
-  report.notes = Notes(result, figures);
+  report.notes = Notes(result, tolerance);
   if (trim.report) {
     report.notes.push_back(TrimText(*trim.report) + ", in surface.ply and here");
   }
@@ -218,9 +211,9 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
   report.scenes_note = "Thinned out for looking; surface.hspline.json is exact.";
   report.main_images = {
       {SurfacePng(grid, threads), "", "the surface, and the points' distances in colours on it"}};
-  report.tiles = Tiles(result, figures);
+  report.tiles = Tiles(result, tolerance);
   report.sections = {
-      DistanceSection(result, figures),
+      DistanceSection(result, tolerance),
       {.heading = "Where it was refined",
        .images = {{DomainPng(grid, cells),
                    "The domain: u to the right, v upwards. Grey: no point there.",

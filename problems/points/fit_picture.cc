@@ -146,7 +146,8 @@ std::string SurfacePng(const FitGrid& fine, int threads) {
   Scene plain, mapped;
   plain.objects = {{.mesh = grid.mesh, .material = PlasticMaterial({0.62, 0.70, 0.78})}};
   mapped.objects = {MappedObject(grid.mesh, grid.rms_mm, DistanceColours(grid))};
-  ShadowMaps shadows;  // of one mesh
+  ShadowMaps shadows;    // of one mesh
+  shadows.texels = 256;  // several from a vertex to the next of 71
   const auto render = [&](const Scene& scene, Lighting lighting) {
     return std::move(RenderAll(scene, {&camera, 1}, Options(lighting), shadows, threads).front());
   };
@@ -154,7 +155,8 @@ std::string SurfacePng(const FitGrid& fine, int threads) {
                                          render(mapped, Lighting::kEven)};
   return EncodePng(ContactSheet(pictures, {.title = "",
                                            .captions = {"the surface", "distance of the points"},
-                                           .legend = DistanceLegend(grid)}));
+                                           .legend = DistanceLegend(grid)}),
+                   PngEffort::kQuick);
 }
 
 std::string DomainPng(const FitGrid& grid, const std::vector<FitCell>& cells) {
@@ -162,7 +164,8 @@ std::string DomainPng(const FitGrid& grid, const std::vector<FitCell>& cells) {
   return EncodePng(
       ContactSheet(pictures, {.title = "",
                               .captions = {"distance over (u,v)", "cells: the brighter, the finer"},
-                              .legend = DistanceLegend(grid)}));
+                              .legend = DistanceLegend(grid)}),
+      PngEffort::kQuick);
 }
 
 namespace {

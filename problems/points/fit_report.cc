@@ -194,7 +194,6 @@ Json TrimJson(const TrimReport& trim) {
 // What every fit has.
 Json FiguresJson(const PointFitOptions& options, const PointSource& source,
                  const PointFit& result) {
-  const DistanceQuantiles distance = QuantilesOf(result.fit);
   return {{"title", options.title},
           {"version", SEMBLANCE_VERSION},
           {"points_file", source.name},
@@ -202,9 +201,9 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"points", result.fit.residual_mm.size()},
           {"parameters", result.parameters},
           {"rms_mm", result.fit.point_rms_mm},
-          {"median_mm", distance.median_mm},
-          {"p95_mm", distance.p95_mm},
-          {"max_mm", distance.max_mm},
+          {"median_mm", result.distance.median_mm},
+          {"p95_mm", result.distance.p95_mm},
+          {"max_mm", result.distance.max_mm},
           {"control_vertices", VerticesJson(result.fit.surface)},
           {"usable", result.Faults().empty()},
           {"faults", result.Faults()}};

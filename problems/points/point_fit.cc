@@ -427,6 +427,7 @@ PointFit FoundBy(PlacedPoints placed, JoinedFit joined, std::vector<PointAttribu
           .moves = placed.moves,
           .fit = std::move(joined.fit),
           .weighted_rms_mm = kNaN,
+          .distance = {},
           .joins = std::move(joined.joins),
           .attributes = std::move(attributes),
           .attribute_at = {},
@@ -489,6 +490,7 @@ void CompareWith(const GivenPoints& given, PointFit& result) {
   result.sigma_factor = given.has_sigma && report ? SigmaFactorOf(*report, given.weights) : kNaN;
   result.reach = ReachBeyond(result.fit.surface, given.box);
   result.off = given.has_uv ? kNaN : result.fit.point_rms_mm / given.box.diagonal().norm();
+  result.distance = QuantilesOf(result.fit);
   TellRms(given.weights, result);
 }
 

@@ -119,7 +119,8 @@ struct PointFit {
   // written terms have them.
   FitResult fit;
   double weighted_rms_mm = kNaN;  // the same with the points' weights; NaN where all are equal
-  std::vector<JoinReport> joins;  // one per join
+  DistanceQuantiles distance;
+  std::vector<JoinReport> joins;                  // one per join
   std::vector<PointAttribute> attributes;         // as given
   std::vector<std::vector<double>> attribute_at;  // fitted, at the points
   AttributeFit attribute_fit;

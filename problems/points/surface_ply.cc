@@ -123,8 +123,11 @@ void CheckChord(const AutoOr<double>& chord_mm, const HSplineSurface& start,
                 const ScatteredPoints& points, const RunContext& context) {
   constexpr std::size_t kFewest = 16;  // for the auto plan
   constexpr double kFinest = 1e-7;     // of the extent, whatever the surface
+  if (chord_mm.automatic) {
+    return;
+  }
   const double extent_mm = DiagonalOf(points.positions);
-  if (chord_mm.automatic || chord_mm.value > extent_mm / kChords) {
+  if (chord_mm.value > extent_mm / kChords) {
     return;
   }
   double least_mm = std::max(chord_mm.value, kFinest * extent_mm);

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <string>
@@ -73,8 +72,7 @@ int FitCommand(const FitArguments& arguments) {
   fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
              result.fit.residual_mm.size(), result.parameters,
              result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
-             result.fit.point_rms_mm,
-             *std::max_element(result.fit.residual_mm.begin(), result.fit.residual_mm.end()));
+             result.fit.point_rms_mm, result.distance.max_mm);
   if (result.fit.automatic) {
     fmt::print("{}", AutoText(*result.fit.automatic));
   }

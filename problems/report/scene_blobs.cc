@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string_view>
+#include <utility>
 
 #include "problems/output/manifest.h"
 #include "surfaces/base/base64.h"
@@ -68,11 +70,31 @@ std::vector<std::uint32_t> Numbers(const std::string& base64, std::size_t width)
   return numbers;
 }
 
+// By the SHA-256 of blob.dump(), which is not made: its texts are long, and as base64 they stand in
+// JSON as they are.
+std::string NameOf(const Json& blob) {
+  Sha256 sha;
+  std::string_view before = "{";
+  for (const auto& [key, value] : blob.items()) {
+    sha.Add(fmt::format("{}\"{}\":", before, key));
+    if (value.is_string()) {
+      sha.Add("\"");
+      sha.Add(value.get_ref<const std::string&>());
+      sha.Add("\"");
+    } else {
+      sha.Add(value.dump());
+    }
+    before = ",";
+  }
+  sha.Add("}");
+  return sha.Hex().substr(0, 16);
+}
+
 }  // namespace
 
-std::string SceneBlobs::Add(const Json& blob) {
-  std::string name = Sha256OfText(blob.dump()).substr(0, 16);
-  blobs_[name] = blob;
+std::string SceneBlobs::Add(Json blob) {
+  std::string name = NameOf(blob);
+  blobs_[name] = std::move(blob);
   return name;
 }
 
@@ -81,7 +103,7 @@ std::string SceneBlobs::AddMesh(const TriMesh& mesh) { return Add(BlobOfMesh(mes
 std::string SceneBlobs::AddLines(std::span<const Vec3> points, std::span<const Segment> segments) {
   Json blob = PointsJson(points);
   blob["segments"] = Indices(segments, points.size());
-  return Add(blob);
+  return Add(std::move(blob));
 }
 
 std::string SceneBlobs::AddValues(std::span<const double> values_mm) {

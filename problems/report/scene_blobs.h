@@ -28,7 +28,7 @@ class SceneBlobs {
   const nlohmann::ordered_json& All() const { return blobs_; }
 
  private:
-  std::string Add(const nlohmann::ordered_json& blob);
+  std::string Add(nlohmann::ordered_json blob);
 
   nlohmann::ordered_json blobs_ = nlohmann::ordered_json::object();
 };

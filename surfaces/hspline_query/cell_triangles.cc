@@ -4,7 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <map>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -13,7 +13,7 @@
 namespace semblance {
 namespace {
 
-// Triangles over a quadtree's cells; vertices by their (v, u) on the finest lattice.
+// Triangles over a quadtree's cells; vertices by their place on the finest lattice.
 class Triangulation {
  public:
   Triangulation(const HSplineShape& shape, const std::set<DomainCell>& cells) : shape_(shape) {
@@ -23,9 +23,9 @@ class Triangulation {
         Vertex(box[0] + k % 2 * box[2], box[1] + k / 2 * box[2]);
       }
     }
-    const std::map<std::pair<std::int64_t, std::int64_t>, int> corners = vertices_;
+    corners_ = static_cast<int>(result_.uv.size());
     for (const DomainCell& cell : cells) {
-      Emit(Box(cell), corners);
+      Emit(Box(cell));
     }
   }
 
@@ -38,24 +38,28 @@ class Triangulation {
     return {cell.i * size, cell.j * size, size};
   }
 
-  std::pair<std::int64_t, std::int64_t> Key(std::int64_t x, std::int64_t y) const {
-    const std::int64_t columns = shape_.patches_u * (std::int64_t{2} << kDeepestCell),
-                       rows = shape_.patches_v * (std::int64_t{2} << kDeepestCell);
-    return {shape_.ClosedV() ? y % rows : y, shape_.ClosedU() ? x % columns : x};
+  // Of the lattice, along u and v.
+  std::int64_t Columns() const { return shape_.patches_u * (std::int64_t{2} << kDeepestCell); }
+  std::int64_t Rows() const { return shape_.patches_v * (std::int64_t{2} << kDeepestCell); }
+
+  // Row by row; one for both sides of a seam.
+  std::int64_t PlaceOf(std::int64_t x, std::int64_t y) const {
+    return (shape_.ClosedV() ? y % Rows() : y) * (Columns() + 1) +
+           (shape_.ClosedU() ? x % Columns() : x);
   }
 
   int Vertex(std::int64_t x, std::int64_t y) {
-    const auto [vertex, is_new] = vertices_.emplace(Key(x, y), static_cast<int>(result_.uv.size()));
+    const std::int64_t place = PlaceOf(x, y);
+    const auto [vertex, is_new] = vertices_.emplace(place, static_cast<int>(result_.uv.size()));
     if (is_new) {
-      const double unit = 2 << kDeepestCell;
-      result_.uv.emplace_back(static_cast<double>(vertex->first.second) / (shape_.patches_u * unit),
-                              static_cast<double>(vertex->first.first) / (shape_.patches_v * unit));
+      const std::int64_t across = Columns() + 1;
+      result_.uv.emplace_back(static_cast<double>(place % across) / static_cast<double>(Columns()),
+                              static_cast<double>(place / across) / static_cast<double>(Rows()));
     }
     return vertex->second;
   }
 
-  void Emit(const std::array<std::int64_t, 3>& box,
-            const std::map<std::pair<std::int64_t, std::int64_t>, int>& corners) {
+  void Emit(const std::array<std::int64_t, 3>& box) {
     const auto [x, y, size] = box;
     const std::int64_t half = size / 2;
     // Counter-clockwise from the lowest corner; in between, where a neighbour is finer.
@@ -69,7 +73,8 @@ class Triangulation {
                                                                           {x, y + half}}};
     std::vector<int> ring;
     for (const auto& [px, py] : around) {
-      if (const auto found = corners.find(Key(px, py)); found != corners.end()) {
+      if (const auto found = vertices_.find(PlaceOf(px, py));
+          found != vertices_.end() && found->second < corners_) {
         ring.push_back(found->second);
       }
     }
@@ -86,7 +91,8 @@ class Triangulation {
   }
 
   HSplineShape shape_;
-  std::map<std::pair<std::int64_t, std::int64_t>, int> vertices_;
+  std::unordered_map<std::int64_t, int> vertices_;  // by place
+  int corners_ = 0;  // the first of them; those that follow lie within cells
   Tessellation result_;
 };
 

@@ -6,6 +6,7 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "problems/pictures/colour_map.h"
@@ -52,16 +53,18 @@ double Ink(const Image& image) {  // pixels worth of black on white
 
 TEST(Png, AnotherReaderSeesTheSamePixels) {
   const Image image = Gradient(13, 7);
-  const std::string bytes = EncodePng(image);
-  png_image png{};
-  png.version = PNG_IMAGE_VERSION;
-  ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
-  png.format = PNG_FORMAT_RGB;
-  std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(png));
-  ASSERT_NE(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr), 0);
-  EXPECT_EQ(png.width, 13u);
-  EXPECT_EQ(png.height, 7u);
-  EXPECT_EQ(pixels, image.rgb);
+  for (const PngEffort effort : {PngEffort::kSmall, PngEffort::kQuick}) {
+    const std::string bytes = EncodePng(image, effort);
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
+    png.format = PNG_FORMAT_RGB;
+    std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(png));
+    ASSERT_NE(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr), 0);
+    EXPECT_EQ(png.width, 13u);
+    EXPECT_EQ(png.height, 7u);
+    EXPECT_EQ(pixels, image.rgb);
+  }
 }
 
 TEST(Png, SameBytesEachTimeAndNoTimeInThem) {
@@ -84,6 +87,25 @@ TEST(Image, DrawingIsClippedToThePicture) {
   ExpectColour(PixelAt(image, 0, 0), {1, 0, 0}, 0);
   ExpectColour(PixelAt(image, 1, 1), {1, 1, 1}, 0);
   ExpectColour(PixelAt(image, 3, 2), {0, 0, 1}, 0);
+}
+
+TEST(Image, APictureIsPastedPixelByPixelAndBeyondTheEdgesNotAtAll) {
+  const Image picture = Gradient(5, 4);
+  const Image paper = MakeImage(4, 3, {1, 1, 1});
+  for (const auto& [x, y] : {std::array{0, 0}, std::array{-2, -3}, std::array{2, 1},
+                             std::array{4, 0}, std::array{0, 3}, std::array{-5, -4}}) {
+    Image image = paper;
+    Paste(image, picture, x, y);
+    for (int row = 0; row < image.height; ++row) {
+      for (int column = 0; column < image.width; ++column) {
+        const bool is_covered =
+            column >= x && row >= y && column < x + picture.width && row < y + picture.height;
+        ExpectColour(
+            PixelAt(image, column, row),
+            is_covered ? PixelAt(picture, column - x, row - y) : PixelAt(paper, column, row), 0);
+      }
+    }
+  }
 }
 
 TEST(Lettering, EveryPrintableCharacterHasItsOwnShape) {

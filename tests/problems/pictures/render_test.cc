@@ -100,6 +100,21 @@ TEST(Render, SeveralSidesAndLightingsTogetherAreThoseOfEachAlone) {
   }
 }
 
+// Between vertices the light is spread anyway.
+TEST(Render, FewVerticesNeedFewTexels) {
+  const Camera camera = CameraFor(View::kFront, Box3(Vec3(-42, -42, -42), Vec3(42, 42, 42)), 1);
+  const RenderOptions options{.width = 90, .height = 80};
+  ShadowMaps fine, coarse;
+  coarse.texels = fine.texels / 2;
+  const Image few = RenderAll(Crowd(), {&camera, 1}, options, coarse, 1).front();
+  const Image many = RenderAll(Crowd(), {&camera, 1}, options, fine, 1).front();
+  double sum = 0;
+  for (std::size_t k = 0; k < few.rgb.size(); ++k) {
+    sum += std::abs(few.rgb[k] - many.rgb[k]);
+  }
+  EXPECT_LT(sum / static_cast<double>(few.rgb.size()), 1);
+}
+
 TEST(Render, ShadowsOfOtherMeshesAreRefused) {
   ShadowMaps shadows;
   const Camera camera = FrontCamera(60);
