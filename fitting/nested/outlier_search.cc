@@ -12,19 +12,22 @@ namespace {
 
 constexpr std::ptrdiff_t kBlock = 24;  // points that share a median; half as many more on each side
 constexpr int kNearest = 8, kWindow = 20, kPasses = 4;
-constexpr double kFar = 6, kAlike = 0.5;
+constexpr double kFar = 6, kFarther = 10;
+constexpr double kTail = 0.2;  // of those that are farther
+constexpr double kAlike = 0.5;
 constexpr double kTells = 4;      // standard deviations of a point that it can tell from none
 constexpr double kMostVotes = 4;  // of a point, in those of most
 
 class OutlierSearch {
  public:
   OutlierSearch(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
-                const LeastSpread& least)
+                const LeastSpread& least, double far)
       : points_(points),
         every_(every),
         count_(static_cast<std::ptrdiff_t>((points.size() + every - 1) / every)),
         all_(residuals),
-        least_(least) {}
+        least_(least),
+        far_(far) {}
 
   std::ptrdiff_t count() const { return count_; }
 
@@ -146,7 +149,7 @@ class OutlierSearch {
       middle += reach * reach;
     }
     return voteless == 0 && std::sqrt(largest) + std::sqrt(middle) <
-                                kFar * std::max(least_.noise_mm, least_.rounding_mm);
+                                far_ * std::max(least_.noise_mm, least_.rounding_mm);
   }
 
   void Look(std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -169,7 +172,7 @@ class OutlierSearch {
   double NoiseOf(std::ptrdiff_t k) const { return noise_mm_ / ScaleOf(k); }
 
   bool IsFar(std::ptrdiff_t k) const {
-    return Off(k) > kFar * std::max({spread_mm_, NoiseOf(k), least_.rounding_mm});
+    return Off(k) > far_ * std::max({spread_mm_, NoiseOf(k), least_.rounding_mm});
   }
 
   double Off(std::ptrdiff_t k) const {
@@ -218,6 +221,7 @@ class OutlierSearch {
   std::span<const NestedResidual> residuals_;  // from `first_` on
   std::ptrdiff_t first_ = 0;
   LeastSpread least_;
+  double far_;  // standard deviations
   const std::vector<char>* before_ = nullptr;
   std::array<double, 3> middle_{};
   double spread_mm_ = 0;  // of the points around, whatever their weights
@@ -242,13 +246,9 @@ std::vector<char> BesideThose(const std::vector<char>& changed) {
   return beside;
 }
 
-}  // namespace
-
 // A pass looks again only where what the one before has found is news.
-int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
-                 const LeastSpread& least, std::vector<char>& outlier) {
+int Search(OutlierSearch search, std::size_t every, std::vector<char>& outlier) {
   static_assert(kWindow < kBlock);
-  OutlierSearch search(points, every, residuals, least);
   std::vector<char> found(search.count());
   for (std::size_t k = 0; k < found.size(); ++k) {
     found[k] = outlier[k * every];
@@ -265,6 +265,23 @@ int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsB
     outlier[k * every] = found[k];
   }
   return static_cast<int>(std::count(found.begin(), found.end(), 1));
+}
+
+}  // namespace
+
+int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
+                 const LeastSpread& least, std::vector<char>& outlier) {
+  std::vector<char> farther = outlier;
+  const int count = Search({points, every, residuals, least, kFar}, every, outlier);
+  if (count == 0) {
+    return 0;
+  }
+  const int fewer = Search({points, every, residuals, least, kFarther}, every, farther);
+  if (count - fewer <= kTail * fewer) {
+    return count;
+  }
+  outlier = std::move(farther);
+  return fewer;
 }
 
 }  // namespace semblance

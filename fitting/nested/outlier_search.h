@@ -31,6 +31,9 @@ struct LeastSpread {
 // a third of them may be outliers too) and of `least`, and fewer than half of the eight
 // points nearest to it have one like it. So detail that the surface does not follow yet, which
 // neighbours share, is none, and the width falls with the residuals as the surface gets finer.
+// Gross errors are a kind of their own, most of them much farther off. Where those between six and
+// ten standard deviations are more than a fifth of those beyond, distances have a tail, as where a
+// surface is too coarse for edges and steps; then only those beyond ten are outliers.
 // With weights the standard deviation is that of the points around it times its own sigma over
 // theirs, or theirs as it is, whichever is more: the one is what noise would do, the other what
 // detail does. Points that are surer count more for the median, at most four times as much as most;

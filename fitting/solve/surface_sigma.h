@@ -19,7 +19,7 @@ struct SigmaOptions {
   double noise_mm = kNaN;  // standard deviation of a point along one axis; of points with weights
                            // the root of their weighted mean square (AutoReport)
   double weight = kNaN;    // of the thin-plate energy (SmoothnessTerm, length_mm 1), > 0 or 0
-  BendingStretch stretch;  // likewise
+  BendingStretch stretch = {};             // likewise
   Vec2 lengths_mm = Vec2::Constant(kNaN);  // what [0,1] stands for along u and v
   std::span<const Vec2> met = {};          // where the surface is held to exact points
 };

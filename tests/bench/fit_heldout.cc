@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points that were held out: a terrain without noise, and a deep-drawn part with noise and gaps.
+// Points that were held out: a terrain without noise, a deep-drawn part with noise and gaps, and
+// real faces.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <functional>
+#include <map>
+#include <numbers>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fitting/fit.h"
 #include "surfaces/base/random.h"
+#include "surfaces/mesh_files/mesh_io.h"
 #include "tests/bench/fit_parts.h"
 #include "tests/bench/mba.h"
 #include "tests/bench/peer_program.h"
@@ -54,6 +60,50 @@ Scene SheetScene() {
   return scene;
 }
 
+// The front of a head's skin down to 200 mm below its top, as distances from a vertical axis over
+// angle and height; of what lies behind each other, as in airways, the outermost. None
+// without the mesh, which lies beside the project.
+std::optional<Scene> FaceScene(const std::string& person) {
+  constexpr double kDown_mm = 200, kSide_deg = 55, kCell_mm = 2, kSkin_mm = 1;
+  const std::filesystem::path path =
+      std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "../shared/data" / person / "skin.ply";
+  if (!std::filesystem::exists(path)) {
+    return std::nullopt;
+  }
+  const std::vector<Vec3> skin = ReadMesh(path).points;
+  const double top = std::ranges::max(skin, {}, [](const Vec3& p) { return p.z(); }).z();
+  Vec3 sum = Vec3::Zero();
+  double count = 0;
+  for (const Vec3& p : skin) {
+    if (p.z() > top - kDown_mm) {
+      sum += p;
+      ++count;
+    }
+  }
+  const Vec3 centre = sum / count;
+  FitTarget face;
+  std::map<std::array<int, 2>, double> farthest;  // of a cell
+  const auto cell_of = [&](const FitPoint& p) {
+    return std::array{static_cast<int>(p.uv.x() * kDown_mm / kCell_mm),
+                      static_cast<int>(p.uv.y() * kDown_mm / kCell_mm)};
+  };
+  for (const Vec3& p : skin) {
+    const double turn_deg =
+        std::atan2(p.x() - centre.x(), centre.y() - p.y()) * 180 / std::numbers::pi;
+    if (p.z() > top - kDown_mm && std::abs(turn_deg) < kSide_deg) {
+      const Vec2 uv(0.5 + turn_deg / (2 * kSide_deg), 1 - (top - p.z()) / kDown_mm);
+      const double radius = (p - centre).head<2>().norm();
+      face.points.push_back({.label = {}, .position = Vec3(0, 0, radius), .uv = uv});
+      double& cell = farthest[cell_of(face.points.back())];
+      cell = std::max(cell, radius);
+    }
+  }
+  std::erase_if(face.points, [&](const FitPoint& p) {
+    return p.position.z() < farthest.at(cell_of(p)) - kSkin_mm;
+  });
+  return Split(std::move(face));
+}
+
 double RmsAt(const std::vector<FitPoint>& points, const Height& height) {
   double sum = 0;
   for (const FitPoint& p : points) {
@@ -89,6 +139,17 @@ Measured FitScene(const Scene& scene, const SchedulePlan& plan) {
       .weight = AutoOr<double>::Auto(), .of = SmoothnessOf::kSurface, .length_mm = 1};
   const FitOptions options{
       .plan = plan, .terms = {PointTerm{}, smooth}, .solver = Solver::kFastest};
+  const double begin = CpuSecondsSoFar();
+  const FitResult result = Fit(testing::PlainStart(shape), scene.fitted, {}, options, {});
+  return Score(scene, begin, [&](const Vec2& uv) { return result.surface.Point(uv).z(); });
+}
+
+// Nothing chosen at all.
+Measured FitUntold(const Scene& scene) {
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0};
+  const FitOptions options{.plan = AutoPlan{},
+                           .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto()}},
+                           .solver = Solver::kFastest};
   const double begin = CpuSecondsSoFar();
   const FitResult result = Fit(testing::PlainStart(shape), scene.fitted, {}, options, {});
   return Score(scene, begin, [&](const Vec2& uv) { return result.surface.Point(uv).z(); });
@@ -166,11 +227,32 @@ void RunSheet() {
   Print("fit.sheet_gap_max_vs_range_of_mba", mba.largest_mm, kNaN, kNaN, "1");
 }
 
+// Against the peer that is best on the very points held out.
+void RunFaces() {
+  for (const std::string person : {"vhm", "cthead", "cranium"}) {
+    const std::string name = "fit.untuned.skin_" + person + "_heldout_rms_vs_best_peer";
+    const std::optional<Scene> scene = FaceScene(person);
+    if (!scene) {
+      fmt::print(stderr, "no skin of {}: {} is skipped\n", person, name);
+      continue;
+    }
+    const Measured ours = MeasureApart([&] { return FitUntold(*scene); });
+    const Measured mba = BestMba(*scene), fitpack = BestFitpack(*scene);
+    PrintScene(name, ours, std::fmin(mba.rms_mm, fitpack.rms_mm), 1 / 1.1);
+    fmt::print(stderr,
+               "{}: {} points; ours {:.3f} mm in {:.2f} s, MBA {:.3f} in {:.2f}, FITPACK "
+               "{:.3f} in {:.1f}\n",
+               person, scene->fitted.points.size(), ours.rms_mm, ours.seconds, mba.rms_mm,
+               mba.seconds, fitpack.rms_mm, fitpack.seconds);
+  }
+}
+
 }  // namespace
 
 void RunHeldOut() {
   RunSheet();
   RunTerrain();
+  RunFaces();
 }
 
 }  // namespace semblance::bench

@@ -23,8 +23,8 @@ void RunPeers();
 // (u,v) that are off, or found, moved to the points' feet before the fit that is told nothing.
 void RunFeet();
 
-// Points held out of a terrain and of a deep-drawn part with gaps, with `weight: auto`, against MBA
-// and FITPACK at their best.
+// Points held out of a terrain and of a deep-drawn part with gaps, with `weight: auto`, and of real
+// faces with nothing chosen, against MBA and FITPACK at their best.
 void RunHeldOut();
 
 // The share of a surface within the intervals of an adaptive fit that should hold 90 % of it.

@@ -165,6 +165,37 @@ TEST(SurfaceSigma, CountsTheParametersOfTheFitAndHoldsTheTruth) {
   EXPECT_NEAR(within / 4000.0, 0.90, 0.06);
 }
 
+// Waves along one direction leave fewer parameters in lengths that are stretched along the crests.
+TEST(SurfaceSigma, CountsInTheLengthsOfTheFit) {
+  Points points = PointsAt(2000, 5);
+  points.weights.clear();
+  Random random(6);
+  for (std::size_t k = 0; k < points.uv.size(); ++k) {
+    const Vec2& q = points.uv[k];
+    const double wave = std::sin(25 * (0.8 * q.x() + 0.6 * q.y()));
+    points.positions[k] = Vec3(q.x(), q.y(), 0.06 * wave + 5e-3 * random.Normal());
+  }
+  const HSplineSurface start =
+      StartSurface({.patches_u = 8, .patches_v = 8, .max_level = 0}, points.positions, points.uv);
+  const NestedFitResult fit = FitNested(start, {points.positions, points.uv}, {}, {});
+  const AutoReport& report = fit.report;
+  ASSERT_GT(report.stretch.stretch, 2);
+  SigmaOptions options{.noise_mm = report.noise_mm,
+                       .weight = report.weight,
+                       .stretch = report.stretch,
+                       .lengths_mm = MeanLengths(start)};
+  const auto counted = [&] {
+    return SurfaceSigma(fit.surface, points.Columns(), report.outliers, options)
+        .degrees_of_freedom();
+  };
+  const double freedom =
+      report.rounds[static_cast<std::size_t>(report.chosen_round)].degrees_of_freedom;
+  const double stretched = counted();
+  EXPECT_NEAR(stretched, freedom, 4 * std::sqrt(2 * freedom) + 0.2 * freedom);
+  options.stretch = {};
+  EXPECT_GT(std::abs(counted() - stretched), 0.2 * stretched);
+}
+
 TEST(SurfaceSigma, WhatIsNotDeterminedIsLarge) {
   const HSplineSurface surface = Refined(Closure::kOpen);
   const SigmaOptions options{.noise_mm = 1, .weight = 0, .lengths_mm = {1, 1}};
