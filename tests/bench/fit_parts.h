@@ -2,6 +2,7 @@
 // The parts of fit_bench; each prints its lines.
 #pragma once
 
+#include "fitting/problem/fit_schedule.h"
 #include "tests/bench/fit_measure.h"
 
 namespace semblance::bench {
