@@ -145,14 +145,13 @@ FitTarget Without(std::span<const std::uint32_t> outliers, FitTarget target) {
 
 // With the weight that the plan has chosen, for points of weight 1 and a length of 1 mm, and with
 // its stretch, unless a number is given.
-std::vector<Term> WithSmoothness(std::span<const Term> terms, double weight,
-                                 const BendingStretch& stretch) {
+std::vector<Term> WithSmoothness(std::span<const Term> terms, const AutoReport& chosen) {
   std::vector<Term> all(terms.begin(), terms.end());
   if (const int automatic = AutoTerm(all); automatic >= 0) {
     auto& smooth = std::get<SmoothnessTerm>(all[automatic]);
-    smooth.stretch = stretch.stretch;
-    smooth.direction_deg = stretch.direction_deg;
-    SetWeight(weight * WeightAsWritten(all, smooth.length_mm), all[automatic]);
+    smooth.stretch = chosen.stretch;
+    smooth.direction_deg = chosen.direction_deg;
+    SetWeight(chosen.weight * WeightAsWritten(all, smooth.length_mm), all[automatic]);
   }
   return all;
 }
@@ -334,8 +333,7 @@ class Fitter {
   LevelSummary SettleAlone(std::span<const Term> terms, const ControlNet& rest) {
     context_.Report("fit", "all terms");
     const FitTarget kept = Without(result_.automatic->outliers, driver_.target());
-    const std::vector<Term> weighed =
-        WithSmoothness(terms, result_.automatic->weight, result_.automatic->stretch);
+    const std::vector<Term> weighed = WithSmoothness(terms, *result_.automatic);
     const bool exact = !kept.exact.empty();
     const HSplineSurface start =
         exact ? WithLevels(result_.surface, FinestAllowed(options_.plan, result_.surface.shape()))

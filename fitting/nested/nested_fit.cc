@@ -179,7 +179,9 @@ class NestedFitter {
   int Find(const ResidualsBetween& residuals, double noise_mm) {
     constexpr double kAtBorders = 10;  // rounding lets the smoothness show, more so there
     const LeastSpread least{.noise_mm = noise_mm, .rounding_mm = kAtBorders * rounding_mm_};
-    const int count = FindOutliers(points_, every_, residuals, least, outlier_);
+    // Gross errors bend the first surface so that some of them are not far from it.
+    const OutlierTail tail = report_.rounds.empty() ? OutlierTail::kGoes : OutlierTail::kStays;
+    const int count = FindOutliers(points_, every_, residuals, least, tail, outlier_);
     points_.TakeMeanWeight(outlier_);
     return count;
   }
@@ -249,7 +251,8 @@ class NestedFitter {
     report_.rounds.push_back({.finest = space_.finest(),
                               .vertices = space_.Vertices(),
                               .weight = chosen.weight,
-                              .stretch = StretchOf(metric_),
+                              .stretch = StretchOf(metric_).stretch,
+                              .direction_deg = StretchOf(metric_).direction_deg,
                               .degrees_of_freedom = chosen.degrees_of_freedom,
                               .rms_mm = std::sqrt(chosen.mean_square),
                               .held_out_rms_mm = std::sqrt(held),
@@ -438,7 +441,8 @@ class NestedFitter {
 
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
-    report_.stretch = StretchOf(metric_);
+    report_.stretch = StretchOf(metric_).stretch;
+    report_.direction_deg = StretchOf(metric_).direction_deg;
     report_.weighted = points_.weighted;
     report_.met_to_rounding = report_.held_out_rms_mm <= rounding_mm_;
     report_.limited_by_density =

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "fitting/least_squares/bending_metric.h"
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/problem/fit_target.h"
 #include "surfaces/base/run_context.h"
@@ -20,7 +19,8 @@ struct NestedRound {
   int finest = -1;                   // level
   int vertices = -1;                 // that say something of their own
   double weight = kNaN;              // of the thin-plate energy, mm^4 (SmoothnessTerm, length_mm 1)
-  BendingStretch stretch = {};       // of the lengths in which that energy is measured
+  double stretch = 1;                // of the lengths in which it is measured (SmoothnessTerm)
+  double direction_deg = 0;          // of the stretch
   double degrees_of_freedom = kNaN;  // trace of the influence matrix
   double rms_mm = kNaN;              // of the points that were fitted, along one axis, weighted
   double held_out_rms_mm = kNaN;     // of the points that were not, weighted
@@ -36,7 +36,8 @@ struct AutoReport {
   int chosen_round = -1;
   double weight = kNaN;                 // of the thin-plate energy, as NestedRound; all points
   double length_mm = 1;                 // of the smoothness that the weights are for
-  BendingStretch stretch = {};          // likewise
+  double stretch = 1;                   // likewise
+  double direction_deg = 0;             // likewise
   double noise_mm = kNaN;               // standard deviation of a point along one axis, by the fit
   double neighbour_noise_mm = kNaN;     // by a quadratic through each point's 20 neighbours
   double closer_noise_mm = kNaN;        // by a plane through 8: less, if detail passes for noise

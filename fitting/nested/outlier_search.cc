@@ -270,11 +270,11 @@ int Search(OutlierSearch search, std::size_t every, std::vector<char>& outlier) 
 }  // namespace
 
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
-                 const LeastSpread& least, std::vector<char>& outlier) {
+                 const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier) {
   std::vector<char> farther = outlier;
   const int count = Search({points, every, residuals, least, kFar}, every, outlier);
-  if (count == 0) {
-    return 0;
+  if (count == 0 || tail == OutlierTail::kGoes) {
+    return count;
   }
   const int fewer = Search({points, every, residuals, least, kFarther}, every, farther);
   if (count - fewer <= kTail * fewer) {

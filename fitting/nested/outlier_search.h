@@ -26,6 +26,9 @@ struct LeastSpread {
   double rounding_mm = 0;  // of every point
 };
 
+// What becomes of points that are only somewhat too far, where they are many.
+enum class OutlierTail { kStays, kGoes };
+
 // Says of one point in `every` whether it is an outlier: its residual, less the median of the
 // points around it, is more than six standard deviations of theirs (by their median, so that up to
 // a third of them may be outliers too) and of `least`, and fewer than half of the eight
@@ -33,13 +36,14 @@ struct LeastSpread {
 // neighbours share, is none, and the width falls with the residuals as the surface gets finer.
 // Gross errors are a kind of their own, most of them much farther off. Where those between six and
 // ten standard deviations are more than a fifth of those beyond, distances have a tail, as where a
-// surface is too coarse for edges and steps; then only those beyond ten are outliers.
+// surface is too coarse for edges and steps; then only those beyond ten are outliers if the tail
+// stays.
 // With weights the standard deviation is that of the points around it times its own sigma over
 // theirs, or theirs as it is, whichever is more: the one is what noise would do, the other what
 // detail does. Points that are surer count more for the median, at most four times as much as most;
 // and those whose own noise hides what is asked have no say.
 // outlier: per point; what stands there when it begins has no vote. Returns how many there are.
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
-                 const LeastSpread& least, std::vector<char>& outlier);
+                 const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier);
 
 }  // namespace semblance

@@ -117,12 +117,11 @@ struct SurfaceSigma::Model {
     points = std::vector<Observation>();  // frees it, which {} would not
     space.Measure({}, /*threads=*/1, nullptr);
     const double scale = 1 / cloud.weight_sum();
-    const std::vector<Term> smooth = {
-        SmoothnessTerm{.weight = options.weight,
-                       .of = SmoothnessOf::kSurface,
-                       .length_mm = 1,
-                       .stretch = options.stretch.stretch,
-                       .direction_deg = options.stretch.direction_deg}};
+    const std::vector<Term> smooth = {SmoothnessTerm{.weight = options.weight,
+                                                     .of = SmoothnessOf::kSurface,
+                                                     .length_mm = 1,
+                                                     .stretch = options.stretch,
+                                                     .direction_deg = options.direction_deg}};
     const SparseMatrix of_points = Assemble(space, scale, {}).lower;
     const SparseMatrix energy =
         Assemble(space, 0, StiffnessByLevel(space.shape(), smooth, options.lengths_mm)).lower;

@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "fitting/least_squares/bending_metric.h"
 #include "fitting/solve/attribute_fit.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_surface.h"
@@ -16,10 +15,11 @@ namespace semblance {
 
 // What a fit was made of, and what it has found.
 struct SigmaOptions {
-  double noise_mm = kNaN;  // standard deviation of a point along one axis; of points with weights
-                           // the root of their weighted mean square (AutoReport)
-  double weight = kNaN;    // of the thin-plate energy (SmoothnessTerm, length_mm 1), > 0 or 0
-  BendingStretch stretch = {};             // likewise
+  double noise_mm = kNaN;    // standard deviation of a point along one axis; of points with weights
+                             // the root of their weighted mean square (AutoReport)
+  double weight = kNaN;      // of the thin-plate energy (SmoothnessTerm, length_mm 1), > 0 or 0
+  double stretch = 1;        // likewise
+  double direction_deg = 0;  // likewise
   Vec2 lengths_mm = Vec2::Constant(kNaN);  // what [0,1] stands for along u and v
   std::span<const Vec2> met = {};          // where the surface is held to exact points
 };

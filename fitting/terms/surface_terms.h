@@ -43,7 +43,7 @@ constexpr auto EnumNames(SmoothnessOf) {
 // integrated exactly; f is the displacement from the template (its features survive) or the surface
 // itself. s and t are u and v stretched to the template's mean lengths in mm (rms of |S_u| and of
 // |S_v| of its level 0), so the same f costs the same at every level, however the patches are
-// proportioned. With a stretch (BendingStretch) bending along direction_deg counts stretch^2 times,
+// proportioned. With a stretch bending along direction_deg counts stretch^2 times,
 // bending across it 1 / stretch^2 times. Translations and all affine maps of the template are free
 // of cost. Against dense points of weight 1 it damps a wave of length x by 1 / (1 + weight (2 pi
 // length_mm / x)^4): the default keeps waves longer than about 20 mm.

@@ -33,8 +33,8 @@ Json RoundJson(const NestedRound& round) {
   return {{"finest", round.finest},
           {"vertices", round.vertices},
           {"weight", round.weight},
-          {"stretch", round.stretch.stretch},
-          {"direction_deg", round.stretch.direction_deg},
+          {"stretch", round.stretch},
+          {"direction_deg", round.direction_deg},
           {"degrees_of_freedom", round.degrees_of_freedom},
           {"rms_mm", round.rms_mm},
           {"held_out_rms_mm", round.held_out_rms_mm},
@@ -66,8 +66,8 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"held_out_rms_mm", r.held_out_rms_mm},
                {"weight", r.weight},
                {"length_mm", r.length_mm},
-               {"stretch", r.stretch.stretch},
-               {"direction_deg", r.stretch.direction_deg},
+               {"stretch", r.stretch},
+               {"direction_deg", r.direction_deg},
                {"neighbour_correlation", r.neighbour_correlation},
                {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},
@@ -93,12 +93,12 @@ std::string AutoText(const AutoReport& r) {
     text += fmt::format("; held out {:.3g}", r.held_out_rms_mm);
   }
   text += '\n';
-  if (r.stretch.stretch > 1) {
+  if (r.stretch > 1) {
     text += fmt::format(
-        "it bends less along {:.0f} deg from u towards v: smoothness counts lengths along it "
+        "it bends less along {:.0f} deg from u towards v than across: smoothness is stretched "
         "{:.2g} "
-        "times\n",
-        r.stretch.direction_deg, r.stretch.stretch);
+        "times along it\n",
+        r.direction_deg, r.stretch);
   }
   if (!r.repeated.empty()) {
     text += fmt::format(

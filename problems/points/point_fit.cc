@@ -298,6 +298,7 @@ std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const Give
   const SigmaOptions options{.noise_mm = report.noise_mm,
                              .weight = report.weight,
                              .stretch = report.stretch,
+                             .direction_deg = report.direction_deg,
                              .lengths_mm = MeanLengths(start),
                              .met = given.met};
   return std::make_shared<const SurfaceSigma>(
