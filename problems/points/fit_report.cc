@@ -95,9 +95,8 @@ std::string AutoText(const AutoReport& r) {
   text += '\n';
   if (r.stretch > 1) {
     text += fmt::format(
-        "it bends less along {:.0f} deg from u towards v than across: smoothness is stretched "
-        "{:.2g} "
-        "times along it\n",
+        "it bends less along {:.0f} deg from u towards v than across: smoothness is stretched by "
+        "{:.2g}\n",
         r.direction_deg, r.stretch);
   }
   if (!r.repeated.empty()) {
