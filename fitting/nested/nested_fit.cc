@@ -483,7 +483,8 @@ class NestedFitter {
     return sum;
   }
 
-  // Level by level: an offset is measured from the next coarser surface, in its frame.
+  // Level by level: an offset is measured from the next coarser surface, in its frame or the
+  // world's.
   HSplineSurface Surface() {
     const NestedValues& displacements = solve_.Displacements();
     HSplineShape shape = start_.shape();
@@ -512,6 +513,7 @@ class NestedFitter {
                                                     const HSplineSurface& surface) const {
     std::map<VertexId, std::optional<Vec3>> offsets;
     const NestedLevel& nested = space_[level];
+    const bool world = surface.shape().reference == OffsetReference::kWorld;
     for (int i = 0; i < rest.columns; ++i) {
       for (int j = 0; j < rest.rows; ++j) {
         if (nested.active[nested.layout.At(i, j)] == 0 || space_.IsCovered(level, i, j)) {
@@ -520,7 +522,8 @@ class NestedFitter {
         const VertexId vertex{level, i, j};
         const SurfaceFrame frame = surface.LevelFrame(level - 1, surface.ParameterOf(vertex));
         const Vec3 way = rest.At(i, j) + InSpace(displacements, i, j) - frame.point;
-        offsets.emplace_hint(offsets.end(), vertex, Vec3(frame.axes.transpose() * way));
+        offsets.emplace_hint(offsets.end(), vertex,
+                             world ? way : Vec3(frame.axes.transpose() * way));
       }
     }
     return offsets;

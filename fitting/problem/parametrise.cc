@@ -6,8 +6,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "fitting/problem/torus.h"
@@ -74,7 +76,7 @@ Parametrisation ParametersOf(const Scan& points, const GivenParameters& given) {
   if (points.given_uv.empty()) {
     Fail(
         "type 'given' needs each point's (u,v) (of a table, the columns u and v); give them, or "
-        "take 'plane', 'cylinder' or 'torus'");
+        "take 'plane', 'cylinder', 'sphere' or 'torus'");
   }
   return TakeGiven({points.given_uv.begin(), points.given_uv.end()}, given, points.name_of);
 }
@@ -204,8 +206,8 @@ Parametrisation TakePlane(Candidate plane) {
 
 constexpr char kOtherWays[] =
     "give u and v, or triangles between the points (a PLY, OBJ, STL or OFF with faces) with "
-    "parameters: mesh, or, for what goes round, parameters: cylinder with closure: periodic_u, or "
-    "parameters: torus with closure: periodic_uv";
+    "parameters: mesh, or, for what goes round, parameters: cylinder or, if it is closed like a "
+    "ball, sphere, with closure: periodic_u, or parameters: torus with closure: periodic_uv";
 
 Parametrisation ParametersOf(const Scan& points, const PlaneParameters& plane) {
   std::vector<Candidate> planes = PlanesOver(points, plane);
@@ -293,45 +295,67 @@ double MeanRadius(const CylinderAxis& axis, std::span<const Vec3> positions) {
   return sum / static_cast<double>(positions.size());
 }
 
-// Medians of the distances from the axis: of the hundredth of the points at either end, and of all.
-struct CylinderRadii {
-  double narrower_end_mm = kNaN, all_mm = kNaN;
+// The hundredth of the points at an end: medians of their distances from the axis, and from their
+// own mean, which tells a tip that is off the axis from a ring.
+struct CylinderEnd {
+  double from_axis_mm = kNaN, from_mean_mm = kNaN;
 };
 
+struct CylinderRadii {
+  std::array<CylinderEnd, 2> ends;
+  double all_mm = kNaN;  // median of all points' distances from the axis
+
+  double NarrowerEnd() const { return std::min(ends[0].from_axis_mm, ends[1].from_axis_mm); }
+  // A ball has areas on its cylinder as any tube has, but at its poles no angle.
+  bool Closes() const { return NarrowerEnd() < kLeast * all_mm; }
+  bool AreBothTips() const {
+    return std::max(ends[0].from_mean_mm, ends[1].from_mean_mm) < kRing * all_mm;
+  }
+
+ private:
+  static constexpr double kLeast = 0.2, kRing = 0.5;
+};
+
+CylinderEnd EndOf(std::span<const std::tuple<double, double, std::uint32_t>> some,
+                  std::span<const Vec3> positions) {
+  std::vector<double> from_axis, from_mean;
+  std::vector<Vec3> at_end;
+  for (const auto& [along, distance, k] : some) {
+    from_axis.push_back(distance);
+    at_end.push_back(positions[k]);
+  }
+  const Vec3 mean = MeanOf(at_end);
+  for (const Vec3& p : at_end) {
+    from_mean.push_back((p - mean).norm());
+  }
+  return {UpperMedian(from_axis), UpperMedian(from_mean)};
+}
+
 CylinderRadii RadiiOf(const CylinderAxis& axis, std::span<const Vec3> positions) {
-  std::vector<std::pair<double, double>> along;  // and the distance
+  std::vector<std::tuple<double, double, std::uint32_t>> along;  // the distance, and which point
   std::vector<double> distances;
-  for (const Vec3& p : positions) {
-    const Vec3 x = p - axis.centre;
+  for (std::uint32_t k = 0; k < positions.size(); ++k) {
+    const Vec3 x = positions[k] - axis.centre;
     distances.push_back(std::hypot(x.dot(axis.third), x.dot(axis.across)));
-    along.emplace_back(x.dot(axis.direction), distances.back());
+    along.emplace_back(x.dot(axis.direction), distances.back(), k);
   }
   constexpr std::size_t kFewest = 8;
   const std::size_t count = std::min(positions.size(), std::max(positions.size() / 100, kFewest));
   const auto end_of = [&](const auto& before) {
     std::ranges::nth_element(along, along.begin() + static_cast<std::ptrdiff_t>(count) - 1, before);
-    std::vector<double> at_end;
-    for (std::size_t k = 0; k < count; ++k) {
-      at_end.push_back(along[k].second);
-    }
-    return UpperMedian(at_end);
+    return EndOf(std::span(along).first(count), positions);
   };
-  const double low = end_of(std::less()), high = end_of(std::greater());
-  return {std::min(low, high), UpperMedian(distances)};
+  const CylinderEnd low = end_of(std::less()), high = end_of(std::greater());
+  return {{low, high}, UpperMedian(distances)};
 }
 
-// A ball has areas on its cylinder as any tube has, but at its poles no angle.
-void CheckEnds(const CylinderAxis& axis, std::span<const Vec3> positions) {
-  constexpr double kLeast = 0.2;
-  const CylinderRadii radii = RadiiOf(axis, positions);
-  if (radii.narrower_end_mm < kLeast * radii.all_mm) {
-    Fail(
-        fmt::format("the points close at an end of the cylinder, where their angle is not known: "
-                    "half of the last hundredth are within {:.3g} mm of the axis, of all points "
-                    "within {:.3g} mm; cut off what closes the ends, or give u and v; or write "
-                    "folds: accept",
-                    radii.narrower_end_mm, radii.all_mm));
-  }
+[[noreturn]] void FailForEnds(const CylinderRadii& radii) {
+  Fail(
+      fmt::format("the points close at an end of the cylinder, where their angle is not known: "
+                  "half of the last hundredth are within {:.3g} mm of the axis, of all points "
+                  "within {:.3g} mm; take parameters: sphere if they are closed at both ends, cut "
+                  "off what closes the ends, or give u and v; or write folds: accept",
+                  radii.NarrowerEnd(), radii.all_mm));
 }
 
 Candidate OnCylinder(const CylinderAxis& axis, std::span<const Vec3> positions) {
@@ -346,32 +370,169 @@ Candidate OnCylinder(const CylinderAxis& axis, std::span<const Vec3> positions) 
   return cylinder;
 }
 
-Parametrisation ParametersOf(const Scan& points, const CylinderParameters& cylinder) {
+// The best of those that may be taken, and whether its ends close.
+struct TriedCylinder {
+  CylinderAxis axis;
+  Candidate best;
+  CylinderRadii radii;
+};
+
+TriedCylinder TryCylinders(const Scan& points, const CylinderParameters& cylinder) {
   const std::vector<CylinderAxis> axes = AxesFor(cylinder, points.positions);
-  const std::vector<Candidate> cylinders =
-      Choose(points, static_cast<int>(axes.size()),
-             [&](int k) { return OnCylinder(axes[k], points.positions); });
-  const Candidate& best = cylinders.back();
-  if (!MayBeTaken(best, cylinder.folds)) {
+  std::vector<Candidate> cylinders = Choose(points, static_cast<int>(axes.size()), [&](int k) {
+    return OnCylinder(axes[k], points.positions);
+  });
+  if (!MayBeTaken(cylinders.back(), cylinder.folds)) {
     Fail(fmt::format(
         "the points fold over the cylinder, or close at its ends, where its angle is not known: "
-        "{}; give another axis, cut off what closes the ends, or give u and v; or write folds: "
-        "accept",
+        "{}; give another axis, take parameters: sphere if they are closed at both ends, cut off "
+        "what closes the ends, or give u and v; or write folds: accept",
         FaultsText(cylinders)));
   }
-  if (cylinder.folds != FoldRule::kAccept) {
-    CheckEnds(axes[best.number], points.positions);
-  }
-  Parametrisation result{.uv = AroundAxis(axes[best.number], points.positions),
+  const CylinderAxis& axis = axes[cylinders.back().number];
+  return {axis, std::move(cylinders.back()), RadiiOf(axis, points.positions)};
+}
+
+Parametrisation TakeCylinder(const Scan& points, const TriedCylinder& tried) {
+  Parametrisation result{.uv = AroundAxis(tried.axis, points.positions),
                          .source = ParameterSource::kCylinder,
-                         .how = best.how,
-                         .faults = best.faults};
+                         .how = tried.best.how,
+                         .faults = tried.best.faults};
   for (Vec2& uv : result.uv) {
     uv.x() = std::clamp(uv.x(), 0.0, 1.0);
   }
-  TurnToTriangles(best.faults, 1, result.uv);
+  TurnToTriangles(tried.best.faults, 1, result.uv);
   Normalise(1, "the cylinder's axis", result.uv);
   return result;
+}
+
+Parametrisation ParametersOf(const Scan& points, const CylinderParameters& cylinder) {
+  const TriedCylinder tried = TryCylinders(points, cylinder);
+  if (cylinder.folds != FoldRule::kAccept && tried.radii.Closes()) {
+    FailForEnds(tried.radii);
+  }
+  return TakeCylinder(points, tried);
+}
+
+// Of the least and the greatest the one farther from the middle one. What is long or flat is most
+// nearly round about it, and takes a quarter fewer vertices than about the others; how near the
+// surface comes to the points, also at the poles, differs little.
+Vec3 OddAxisOf(const Principal& principal) {
+  const Vec3& s = principal.spreads;
+  return principal.axes.col(s[2] * s[0] >= s[1] * s[1] ? 2 : 0);
+}
+
+PolarSphere SphereFor(const SphereParameters& asked, std::span<const Vec3> points,
+                      const Principal& principal) {
+  const Vec3 axis(asked.axis[0], asked.axis[1], asked.axis[2]);
+  if (!axis.allFinite()) {
+    Fail("the sphere's axis is not finite; give three numbers");
+  }
+  const PolarSphere sphere = SphereThrough(points, axis.isZero(0) ? OddAxisOf(principal) : axis);
+  if (!sphere.centre.allFinite() || !(sphere.radius_mm > 0)) {
+    Fail("no sphere goes near the points, which lie on a plane or in one place; give u and v");
+  }
+  return sphere;
+}
+
+// Why the points are no sphere; empty if they go all round.
+std::string HoleFault(const PolarSphere& sphere, std::span<const Vec3> points, const Mat3& axes) {
+  constexpr double kMostWidth = 0.8;  // of a cap of 45 degrees; of a tube with open ends 1
+  const EmptyRay ray = WidestRay(
+      sphere, points, std::array<Vec3, 4>{axes.col(0), axes.col(1), axes.col(2), sphere.axis});
+  if (ray.Width() <= kMostWidth) {
+    return "";
+  }
+  const std::string nearest = std::isfinite(ray.nearest_mm)
+                                  ? fmt::format("no point is nearer than {:.3g} mm", ray.nearest_mm)
+                                  : "no point lies on that side";
+  return fmt::format(
+      "the points do not go all round the centre of the sphere, [{:.4g}, {:.4g}, {:.4g}] mm: to "
+      "the ray along [{:.2g}, {:.2g}, {:.2g}] {}, half of all are within {:.3g} mm of its line; "
+      "take plane for an open surface, cylinder for a tube, or mesh, or give u and v",
+      sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), ray.direction.x(), ray.direction.y(),
+      ray.direction.z(), nearest, ray.usual_mm);
+}
+
+Candidate OnSphere(const PolarSphere& sphere, std::vector<Vec2> angles) {
+  const double half_round_mm = std::numbers::pi * sphere.radius_mm;
+  Candidate over{
+      .how = fmt::format("the sphere along [{:.3g}, {:.3g}, {:.3g}] about "
+                         "[{:.4g}, {:.4g}, {:.4g}] of radius {:.4g} mm",
+                         sphere.axis.x(), sphere.axis.y(), sphere.axis.z(), sphere.centre.x(),
+                         sphere.centre.y(), sphere.centre.z(), sphere.radius_mm),
+      .at = std::move(angles),
+      .period_mm = Vec2(2 * half_round_mm, 0)};
+  for (Vec2& p : over.at) {
+    p = p.cwiseProduct(Vec2(2 * half_round_mm, half_round_mm));
+  }
+  return over;
+}
+
+struct TriedSphere {
+  PolarSphere sphere;
+  std::vector<Vec2> angles;
+  Candidate over;
+  std::string fault;  // why it may not be taken; empty if it may
+};
+
+TriedSphere TrySphere(const Scan& points, const SphereParameters& asked) {
+  const Principal principal = PrincipalOf(points.positions);
+  TriedSphere tried{.sphere = SphereFor(asked, points.positions, principal),
+                    .angles = {},
+                    .over = {},
+                    .fault = {}};
+  tried.fault = HoleFault(tried.sphere, points.positions, principal.axes);
+  if (!tried.fault.empty()) {
+    return tried;
+  }
+  tried.angles = AnglesAbout(tried.sphere, points.positions);
+  tried.over = OnSphere(tried.sphere, tried.angles);
+  tried.over.faults = FaultsOf(points, tried.over);
+  if (!MayBeTaken(tried.over, asked.folds)) {
+    tried.fault = fmt::format(
+        "the points fold over the sphere, for rays from its centre meet them more than once: {}; "
+        "cut the mesh open and take parameters: mesh, or give u and v; or write folds: accept",
+        FaultsText({tried.over}));
+  }
+  return tried;
+}
+
+Parametrisation TakeSphere(const Scan& points, TriedSphere tried) {
+  Poles poles = PolesOf(tried.sphere, points.positions, tried.angles);
+  if (tried.over.faults.mirrored) {
+    for (Vec2& p : tried.angles) {
+      p.y() = 1 - p.y();
+    }
+    std::swap(poles[0], poles[1]);
+  }
+  return {.uv = std::move(tried.angles),
+          .source = ParameterSource::kSphere,
+          .how = std::move(tried.over.how),
+          .faults = tried.over.faults,
+          .poles = poles};
+}
+
+Parametrisation ParametersOf(const Scan& points, const SphereParameters& asked) {
+  TriedSphere tried = TrySphere(points, asked);
+  if (!tried.fault.empty()) {
+    Fail(tried.fault);
+  }
+  return TakeSphere(points, std::move(tried));
+}
+
+// What ends in tips may be a sphere; a tube that is cut aslant is none, and stays a cylinder.
+Parametrisation CylinderOrSphere(const Scan& points) {
+  const TriedCylinder cylinder = TryCylinders(points, {});
+  if (cylinder.radii.AreBothTips()) {
+    if (TriedSphere sphere = TrySphere(points, {}); sphere.fault.empty()) {
+      return TakeSphere(points, std::move(sphere));
+    }
+  }
+  if (cylinder.radii.Closes()) {
+    FailForEnds(cylinder.radii);
+  }
+  return TakeCylinder(points, cylinder);
 }
 
 // The widest part of a turn in which no value lies.
@@ -454,7 +615,7 @@ Parametrisation ParametersOf(const Scan& points, const MeshParameters& mesh) {
   if (points.triangles.empty()) {
     Fail(
         "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces, "
-        "or take 'plane' or 'cylinder'");
+        "or take 'plane', 'cylinder' or 'sphere'");
   }
   MeshLayout layout = LayOut({.points = {points.positions.begin(), points.positions.end()},
                               .triangles = {points.triangles.begin(), points.triangles.end()}},
@@ -483,7 +644,7 @@ Parametrisation ParametersOf(const Scan& points, const AutoParameters&) {
     return ParametersOf(points, TorusParameters{});
   }
   if (points.closure == Closure::kPeriodicU) {
-    return ParametersOf(points, CylinderParameters{});
+    return CylinderOrSphere(points);
   }
   std::vector<Candidate> planes = PlanesOver(points, {});
   if (MayBeTaken(planes.back(), FoldRule::kRefuse)) {

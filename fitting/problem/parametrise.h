@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 
 #include "fitting/problem/mesh_map.h"
 #include "fitting/problem/one_to_one.h"
+#include "fitting/problem/sphere.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_shape.h"
@@ -21,14 +23,15 @@ namespace semblance {
 
 // The parameters that are given, if there are any. Otherwise those of a torus for a surface that
 // goes round both ways, of a cylinder for one that goes round in u, and of a plane for an open one.
-// Where every plane folds and there are triangles, the mesh is laid out.
+// What goes round in u and closes at both ends of the cylinder gets those of a sphere, unless it
+// folds over that. Where every plane folds and there are triangles, the mesh is laid out.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
 template <class Visitor>
 void Fields(Visitor&, AutoParameters&) {}
 
-// What becomes of a plane, cylinder or torus over which the points fold.
+// What becomes of a plane, cylinder, sphere or torus over which the points fold.
 enum class FoldRule { kRefuse, kAccept };
 constexpr auto EnumNames(FoldRule) { return std::to_array<std::string_view>({"refuse", "accept"}); }
 template <class Visitor>
@@ -86,6 +89,23 @@ void Fields(Visitor& visit, CylinderParameters& o) {
   FoldField(visit, o.folds);
 }
 
+// Azimuth around an axis, closed, and angle from the pole at its foot over pi, for closed surfaces
+// that every ray from the centre of the sphere nearest to the points (sphere.h) meets once. At
+// either pole an edge of the domain is one place.
+struct SphereParameters {
+  static constexpr std::string_view kName = "sphere";
+  std::array<double, 3> axis = {0, 0, 0};  // from pole to pole; 0: found from the points
+  FoldRule folds = FoldRule::kRefuse;      // of points that lie over each other
+};
+template <class Visitor>
+void Fields(Visitor& visit, SphereParameters& o) {
+  visit(FieldInfo{.name = "axis",
+                  .doc = "direction of v, from the pole v = 0 to the pole v = 1; [0, 0, 0] takes "
+                         "that in which the points spread most, or, of flat ones, least"},
+        o.axis);
+  FoldField(visit, o.folds);
+}
+
 // Angles around an axis and around the ring's circle about it, for points that go round both ways;
 // the ring and its tube are those of the torus nearest to the points (torus.h).
 struct TorusParameters {
@@ -117,12 +137,13 @@ void Fields(Visitor& visit, MeshParameters& o) {
         o.map);
 }
 
-using Parameters = std::variant<AutoParameters, GivenParameters, PlaneParameters,
-                                CylinderParameters, TorusParameters, MeshParameters>;
+using Parameters =
+    std::variant<AutoParameters, GivenParameters, PlaneParameters, CylinderParameters,
+                 SphereParameters, TorusParameters, MeshParameters>;
 
-enum class ParameterSource { kGiven, kPlane, kCylinder, kTorus, kMesh };
+enum class ParameterSource { kGiven, kPlane, kCylinder, kSphere, kTorus, kMesh };
 constexpr auto EnumNames(ParameterSource) {
-  return std::to_array<std::string_view>({"given", "plane", "cylinder", "torus", "mesh"});
+  return std::to_array<std::string_view>({"given", "plane", "cylinder", "sphere", "torus", "mesh"});
 }
 
 struct Parametrisation {
@@ -130,6 +151,7 @@ struct Parametrisation {
   ParameterSource source = ParameterSource::kGiven;
   std::string how = {};   // in words: which plane, axis or map; empty of given ones
   MapFaults faults = {};  // of what was chosen; none of given ones, which are not looked at
+  std::optional<Poles> poles = {};  // of a sphere
 };
 
 // What messages call a point, by its index; empty: "point 1" and so on.
@@ -152,9 +174,9 @@ Parametrisation TakeGiven(std::vector<Vec2> given_uv, const GivenParameters& giv
 // where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are
 // any. Throws InputError for no points, `given` without given_uv, a number of given_uv that is not
 // that of the points, an empty range, given_uv outside of it, points that span no plane or have no
-// extent along the axis, points that are no torus, close at an end of the cylinder, or fold over
-// every plane, cylinder or torus that may be taken, `mesh` without triangles, a corner that is no
-// point, and as LayOut.
+// extent along the axis, points that are no torus, close at an end of the cylinder, do not go all
+// round the sphere's centre, or fold over every plane, cylinder, sphere or torus that may be taken,
+// `mesh` without triangles, a corner that is no point, and as LayOut.
 Parametrisation Parametrise(const Scan& scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},

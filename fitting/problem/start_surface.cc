@@ -19,33 +19,32 @@ Vec3 Around(double turns) {
 }
 
 // The functions of (u,v) whose sums the surface is taken from.
-template <Closure closure>
-auto Functions(const Vec2& uv) {
-  if constexpr (closure == Closure::kOpen) {
-    return Vec3(1, uv.x(), uv.y());
-  } else if constexpr (closure == Closure::kPeriodicU) {
-    const Vec3 u = Around(uv.x());
-    Eigen::Matrix<double, 6, 1> f;
-    f << u, uv.y() * u;
-    return f;
-  } else {
-    const Vec3 u = Around(uv.x()), v = Around(uv.y());
-    Eigen::Matrix<double, 9, 1> f;
-    f << u, v[1] * u, v[2] * u;
-    return f;
-  }
+Vec3 OpenFunctions(const Vec2& uv) { return {1, uv.x(), uv.y()}; }
+
+Eigen::Matrix<double, 6, 1> TubeFunctions(const Vec2& uv) {
+  const Vec3 u = Around(uv.x());
+  return (Eigen::Matrix<double, 6, 1>() << u, uv.y() * u).finished();
 }
 
-template <Closure closure>
-ControlNet NetOf(const HSplineShape& shape, std::span<const Vec3> positions,
-                 std::span<const Vec2> uv) {
-  constexpr int n = decltype(Functions<closure>({}))::RowsAtCompileTime;
+Eigen::Matrix<double, 9, 1> RingFunctions(const Vec2& uv) {
+  const Vec3 u = Around(uv.x()), v = Around(uv.y());
+  return (Eigen::Matrix<double, 9, 1>() << u, v[1] * u, v[2] * u).finished();
+}
+
+Eigen::Vector4d BallFunctions(const Vec2& uv) {
+  const Vec3 u = Around(uv.x()), v = Around(uv.y() / 2);
+  return {1, v[1], v[2] * u[1], v[2] * u[2]};
+}
+
+template <int n>
+ControlNet NetOf(Eigen::Matrix<double, n, 1> (*functions)(const Vec2&), const HSplineShape& shape,
+                 std::span<const Vec3> positions, std::span<const Vec2> uv) {
   Eigen::Matrix<double, n, n> normal = Eigen::Matrix<double, n, n>::Zero();
   Eigen::Matrix<double, n, 3> right = Eigen::Matrix<double, n, 3>::Zero();
   const Vec3 mean = std::accumulate(positions.begin(), positions.end(), Vec3(Vec3::Zero())) /
                     static_cast<double>(positions.size());
   for (std::size_t k = 0; k < positions.size(); ++k) {
-    const Eigen::Matrix<double, n, 1> f = Functions<closure>(uv[k]);
+    const Eigen::Matrix<double, n, 1> f = functions(uv[k]);
     normal += f * f.transpose();
     right += f * (positions[k] - mean).transpose();
   }
@@ -55,16 +54,13 @@ ControlNet NetOf(const HSplineShape& shape, std::span<const Vec3> positions,
   for (int j = 0; j < net.rows; ++j) {
     for (int i = 0; i < net.columns; ++i) {
       const Vec2 place((i - 1.0) / shape.patches_u, (j - 1.0) / shape.patches_v);
-      net.vertices.push_back(mean + x.transpose() * Functions<closure>(place));
+      net.vertices.push_back(mean + x.transpose() * functions(place));
     }
   }
   return net;
 }
 
-}  // namespace
-
-HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
-                            std::span<const Vec2> uv) {
+void Check(const HSplineShape& shape, std::span<const Vec3> positions, std::span<const Vec2> uv) {
   CheckShape(shape);
   if (positions.empty() || uv.size() != positions.size()) {
     throw InputError(
@@ -72,10 +68,22 @@ HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> pos
                     "(u,v) for each",
                     positions.size(), uv.size()));
   }
-  const auto net_of = shape.ClosedV()   ? NetOf<Closure::kPeriodicUv>
-                      : shape.ClosedU() ? NetOf<Closure::kPeriodicU>
-                                        : NetOf<Closure::kOpen>;
-  return HSplineSurface(shape, net_of(shape, positions, uv));
+}
+
+}  // namespace
+
+HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
+                            std::span<const Vec2> uv) {
+  Check(shape, positions, uv);
+  return HSplineSurface(shape, shape.ClosedV()   ? NetOf(RingFunctions, shape, positions, uv)
+                               : shape.ClosedU() ? NetOf(TubeFunctions, shape, positions, uv)
+                                                 : NetOf(OpenFunctions, shape, positions, uv));
+}
+
+HSplineSurface StartBall(const HSplineShape& shape, std::span<const Vec3> positions,
+                         std::span<const Vec2> uv) {
+  Check(shape, positions, uv);
+  return HSplineSurface(shape, NetOf(BallFunctions, shape, positions, uv));
 }
 
 }  // namespace semblance

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/problem/torus.h"
-#include "surfaces/base/quantile.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -8,24 +7,17 @@
 #include <cmath>
 #include <numbers>
 
+#include "fitting/problem/around_axis.h"
+#include "surfaces/base/quantile.h"
+
 namespace semblance {
 namespace {
-
-constexpr double kTurn = 2 * std::numbers::pi;
 
 // Centre, tilt of the axis, radii of ring and tube.
 using Seven = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
 enum class Axis { kTurns, kStays };
-
-// Two directions across an axis; right-handed with it.
-std::array<Vec3, 2> Across(const Vec3& axis) {
-  Eigen::Index least = 0;
-  axis.cwiseAbs().minCoeff(&least);
-  const Vec3 a = axis.cross(Vec3::Unit(least)).normalized();
-  return {a, axis.cross(a)};
-}
 
 std::vector<Vec3> Thinned(std::span<const Vec3> points, std::size_t most) {
   const std::size_t every = (points.size() + most - 1) / most;
@@ -201,11 +193,6 @@ Vec3 Signed(const Vec3& axis) {
   Eigen::Index largest = 0;
   axis.cwiseAbs().maxCoeff(&largest);
   return axis[largest] < 0 ? Vec3(-axis) : axis;
-}
-
-double Turns(double y, double x) {
-  const double turns = std::atan2(y, x) / kTurn;
-  return turns < 0 ? std::min(turns + 1, 1.0) : turns;
 }
 
 }  // namespace

@@ -155,6 +155,15 @@ Json MapJson(const PointFit& result) {
           {"collapsed_share", result.map_faults.collapsed}};
 }
 
+Json PolesJson(const std::array<PoleGap, 2>& poles) {
+  Json json = Json::array();
+  for (const int v : {0, 1}) {
+    const Vec3& at = poles[v].place;
+    json.push_back({{"v", v}, {"at_mm", {at.x(), at.y(), at.z()}}, {"gap_mm", poles[v].gap_mm}});
+  }
+  return json;
+}
+
 Json AttributesJson(const PointFit& result) {
   Json json = Json::array();
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
@@ -216,6 +225,9 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   }
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
+  }
+  if (result.poles) {
+    json["poles"] = PolesJson(*result.poles);
   }
   if (result.moves) {
     json["moves"] = MovesJson(*result.moves);
@@ -279,6 +291,11 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   }
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
+  }
+  if (result.poles) {
+    notes.push_back(
+        fmt::format("poles: the edges v = 0 and v = 1 are one place each to {:.3g} and {:.3g} mm",
+                    (*result.poles)[0].gap_mm, (*result.poles)[1].gap_mm));
   }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));

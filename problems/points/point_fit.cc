@@ -15,6 +15,7 @@
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
+#include "fitting/plan/pole_points.h"
 #include "fitting/problem/start_surface.h"
 #include "fitting/solve/auto_weight.h"
 #include "problems/points/join_report.h"
@@ -40,6 +41,9 @@ std::string ClosureFault(ParameterSource source, Closure closure) {
   if (source == ParameterSource::kCylinder && closure != Closure::kPeriodicU) {
     return "parameters on a cylinder go round in u alone; write closure: periodic_u";
   }
+  if (source == ParameterSource::kSphere && closure != Closure::kPeriodicU) {
+    return "parameters on a sphere go round in u alone; write closure: periodic_u";
+  }
   if (source == ParameterSource::kTorus && closure != Closure::kPeriodicUv) {
     return "parameters on a torus go round both ways; write closure: periodic_uv";
   }
@@ -62,6 +66,8 @@ std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
              ? std::optional(ParameterSource::kPlane)
          : std::holds_alternative<CylinderParameters>(parameters)
              ? std::optional(ParameterSource::kCylinder)
+         : std::holds_alternative<SphereParameters>(parameters)
+             ? std::optional(ParameterSource::kSphere)
          : std::holds_alternative<TorusParameters>(parameters)
              ? std::optional(ParameterSource::kTorus)
          : std::holds_alternative<MeshParameters>(parameters)
@@ -385,6 +391,13 @@ std::vector<ExactPoint> ExactOf(const PointTable& table, std::span<const Vec2> u
   return exact;
 }
 
+// At a pole the frame of an offset would turn with the noise.
+HSplineSurface BallOver(HSplineShape shape, std::span<const Vec3> positions,
+                        std::span<const Vec2> uv) {
+  shape.reference = OffsetReference::kWorld;
+  return StartBall(shape, positions, uv);
+}
+
 JoinedFit FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
                    std::span<const OpenedJoin> joins, const FitOptions& options,
                    const RunContext& context) {
@@ -426,6 +439,8 @@ PointFit FoundBy(PlacedPoints placed, JoinedFit joined, std::vector<PointAttribu
           .how = std::move(placed.parameters.how),
           .map_faults = placed.parameters.faults,
           .moves = placed.moves,
+          .poles = placed.parameters.poles ? std::optional(PoleGapsOf(joined.fit.surface))
+                                           : std::nullopt,
           .fit = std::move(joined.fit),
           .weighted_rms_mm = kNaN,
           .distance = {},
@@ -527,15 +542,21 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   StepClock step(context);
   PlacedPoints placed = PlacePoints(table, options, step, context);
   std::vector<Vec2>& uv = placed.parameters.uv;
-  const HSplineSurface start = StartSurface(shape, table.positions, uv);
+  const std::optional<Poles> poles = placed.parameters.poles;
+  const HSplineSurface start =
+      poles ? BallOver(shape, table.positions, uv) : StartSurface(shape, table.positions, uv);
   CheckChord(options.chord_mm, start, {table.positions, uv}, context);
   std::vector<ExactPoint> exact = ExactOf(table, uv);
   const GivenPoints given = GivenOf(table, placed.parameters.source, exact);
   OwnedPoints points{std::move(table.positions), std::move(uv), std::move(table.weights)};
+  const std::size_t added = poles ? AddPolePoints(*poles, points) : 0;
   JoinedFit joined = step("fit", [&] {
     return FitOwned(start, std::move(points), std::move(exact), joins, AfterMoves(options.fit),
                     context);
   });
+  if (poles) {
+    ForgetLastPoints(added, given.weights, joined.fit);
+  }
   PointFit result = FoundBy(std::move(placed), std::move(joined), std::move(attributes));
   CompareWith(given, result);
   AddAttributes(given.weights, context, step, result);

@@ -11,6 +11,7 @@
 
 #include "fitting/fit.h"
 #include "fitting/plan/fit_faults.h"
+#include "fitting/plan/pole_points.h"
 #include "fitting/problem/parametrise.h"
 #include "fitting/relaxation/foot_moves.h"
 #include "fitting/solve/attribute_fit.h"
@@ -63,8 +64,8 @@ void Fields(Visitor& visit, PointFitOptions& o) {
   visit(FieldInfo{.name = "patches_v", .min = 1, .max = kMostPatches, .doc = "of level 0 along v"},
         o.patches_v);
   visit(FieldInfo{.name = "closure",
-                  .doc = "open; periodic_u for surfaces that go round in u, as a tube does; "
-                         "periodic_uv for those that go round both ways, as a torus does"},
+                  .doc = "open; periodic_u for surfaces that go round in u, as a tube or a ball "
+                         "does; periodic_uv for those that go round both ways, as a torus does"},
         o.closure);
   visit(FieldInfo{.name = "parameters", .doc = "where the points' (u,v) come from"}, o.parameters);
   visit(FieldInfo{.name = "attributes",
@@ -111,10 +112,11 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
-  std::string parameters;               // given, plane, cylinder, torus or mesh
+  std::string parameters;               // given, plane, cylinder, sphere, torus or mesh
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
+  std::optional<std::array<PoleGap, 2>> poles = {};  // of a sphere, at v = 0 and v = 1
   // Its point_rms_mm: each point counts as much as any other. The weights of its smoothness: as the
   // written terms have them.
   FitResult fit;
@@ -143,11 +145,11 @@ struct PointFit {
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
 // Throws InputError as Parametrise, StartSurface, Fit, FitJoined and FitAttributes do, for a
-// closure that does not suit the parameters (a cylinder goes round in u, a torus both ways, a plane
-// and a mesh do not), for joins of points without (u,v) of their own, for attributes that the table
-// has not, for a trim below what the points are apart, and for a chord so fine that a coarse fit of
-// some of the points has already shown surface.ply to be too large, and for moves of (u,v) beside
-// exact points. Reads the surfaces that are joined, and throws as OpenJoins does.
+// closure that does not suit the parameters (a cylinder and a sphere go round in u, a torus both
+// ways, a plane and a mesh do not), for joins of points without (u,v) of their own, for attributes
+// that the table has not, for a trim below what the points are apart, and for a chord so fine that
+// a coarse fit of some of the points has already shown surface.ply to be too large, and for moves
+// of (u,v) beside exact points. Reads the surfaces that are joined, and throws as OpenJoins does.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // What the points came from.

@@ -146,6 +146,16 @@ def ring(draw):
     return "\n".join(rows) + "\n"
 
 
+def ball(draw):
+    """Points of a sphere, for what closes at two poles."""
+    rows = ["x,y,z,u,v"]
+    for _ in range(400):
+        x, y, z = (draw.gauss(0, 1) for _ in range(3))
+        r = (1 + draw.gauss(0, 0.01)) / math.sqrt(x * x + y * y + z * z)
+        rows.append(f"{r * x:.6f},{r * y:.6f},{r * z:.6f},{math.atan2(y, x) / (2 * math.pi) % 1:.6f},{draw.random():.6f}")
+    return "\n".join(rows) + "\n"
+
+
 class ShareIsUsed(Exception):
     """No call is begun after the share's seconds."""
 
@@ -205,6 +215,7 @@ class Runner:
             (self.folder / "points.csv").write_text("\n".join(rows) + "\n")
             (self.folder / "scan.ply").write_text(scan(draw))
             (self.folder / "ring.csv").write_text(ring(draw))
+            (self.folder / "ball.csv").write_text(ball(draw))
             return {"configs": self.configs, "first": first}
         code, said, _ = call([self.program, "run", "base.yaml", "--out", "first", "--quiet"], self.folder)
         if code != 0:
@@ -218,7 +229,7 @@ class Runner:
     def write(self, tree):
         parameters = tree.get("parameters")
         kind = parameters.get("type") if isinstance(parameters, dict) else parameters
-        self.points = {"mesh": "scan.ply", "torus": "ring.csv"}.get(kind, "points.csv")
+        self.points = {"mesh": "scan.ply", "sphere": "ball.csv", "torus": "ring.csv"}.get(kind, "points.csv")
         (self.folder / "case.yaml").write_text(yaml({"base": "base.yaml", **tree}))
 
     def check(self, trees):

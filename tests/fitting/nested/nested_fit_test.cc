@@ -449,5 +449,28 @@ TEST(NestedFit, WhatCannotBeFittedIsSaid) {
   EXPECT_THROW(FitNested(detailed, {positions, uv}, {}, {}), InputError);
 }
 
+// Whatever offsets refer to, the surface that is written is the one that was measured.
+TEST(NestedFit, OffsetsAlongTheAxesOfTheWorldGiveTheSameSurface) {
+  const FitTarget target = Scattered(RingPoint, 5000, 1e-3, 4);
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+  for (const FitPoint& p : target.points) {
+    positions.push_back(p.position);
+    uv.push_back(p.uv);
+  }
+  HSplineShape shape{
+      .patches_u = 8, .patches_v = 8, .max_level = 0, .closure = Closure::kPeriodicUv};
+  const NestedFitResult frame =
+      FitNested(StartSurface(shape, positions, uv), {positions, uv}, {}, {});
+  shape.reference = OffsetReference::kWorld;
+  const NestedFitResult world =
+      FitNested(StartSurface(shape, positions, uv), {positions, uv}, {}, {});
+  ASSERT_GT(world.surface.Offsets().size(), 10u);
+  for (std::size_t k = 0; k < uv.size(); k += 50) {
+    EXPECT_LT((world.surface.Point(uv[k]) - frame.surface.Point(uv[k])).norm(), 1e-9);
+    EXPECT_NEAR((world.surface.Point(uv[k]) - positions[k]).norm(), world.residual_mm[k], 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace semblance

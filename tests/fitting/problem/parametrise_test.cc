@@ -225,6 +225,168 @@ TEST(Parametrise, OfAClosedSurfaceAutoIsTheCylinder) {
   EXPECT_EQ(p.source, ParameterSource::kCylinder);
 }
 
+// A bumpy stone, longest along z, by its directions, each the same way in any pose.
+std::vector<Vec3> Stone(int count, const Mat3& turn) {
+  Random random(6);
+  std::vector<Vec3> points;
+  for (int k = 0; k < count; ++k) {
+    const Vec3 d = Vec3(random.Normal(), random.Normal(), random.Normal()).normalized();
+    const double r = 30 * (1 + 0.1 * std::sin(3 * d.x() + 1) * std::cos(2 * d.y()));
+    points.emplace_back(turn * (r * Vec3(d.x(), d.y(), 1.4 * d.z())) + Vec3(1, 2, 3));
+  }
+  return points;
+}
+
+TEST(Parametrise, OfWhatClosesAtBothEndsAutoIsTheSphere) {
+  for (const std::vector<Vec3>& points : {OnSphere(3000), Stone(3000, Mat3::Identity())}) {
+    const Parametrisation p =
+        Parametrise(Scan{.positions = points, .closure = Closure::kPeriodicU});
+    EXPECT_EQ(p.source, ParameterSource::kSphere);
+    EXPECT_THAT(p.how, HasSubstr("the sphere along ["));
+    EXPECT_LT(p.faults.Sum(), 0.003);
+    ASSERT_TRUE(p.poles);
+    EXPECT_THAT(WordsOf({.positions = points}, CylinderParameters{}),
+                HasSubstr("take parameters: sphere"));
+  }
+}
+
+// Its ends are tips as those of a ball are, but nothing closes them.
+TEST(Parametrise, ATubeThatIsCutAslantStaysACylinder) {
+  std::vector<Vec3> points;
+  for (int k = 0; k < 400; ++k) {
+    points.push_back(OnCylinder(k, Mat3::Identity()));
+    points.back().z() += 0.7 * points.back().x();
+  }
+  const Parametrisation p = Parametrise(Scan{.positions = points, .closure = Closure::kPeriodicU});
+  EXPECT_EQ(p.source, ParameterSource::kCylinder);
+}
+
+// About the axis that is asked for, to rounding: a sphere's own angles.
+TEST(Parametrise, ASphereHasAzimuthAndPolarAngle) {
+  const std::vector<Vec3> points = OnSphere(1000);
+  const Parametrisation p = Parametrise(points, SphereParameters{.axis = {0, 0, 9}});
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    EXPECT_NEAR(p.uv[k].y(), 1 - std::acos(points[k].z() / 40) / std::numbers::pi, 1e-9);
+    const double turn = std::atan2(points[k].y(), points[k].x()) -
+                        std::atan2(points[0].y(), points[0].x()),
+                 off = turn / (2 * std::numbers::pi) - (p.uv[k].x() - p.uv[0].x());
+    EXPECT_NEAR(off, std::round(off), 1e-9);
+  }
+  EXPECT_LT(((*p.poles)[0] - Vec3(0, 0, -40)).norm(), 1e-9);
+  EXPECT_LT(((*p.poles)[1] - Vec3(0, 0, 40)).norm(), 1e-9);
+}
+
+// But for where the azimuth starts, and which pole is which.
+TEST(Parametrise, ASphereIsFoundHoweverItLies) {
+  const Mat3 turn = Eigen::AngleAxisd(0.9, Vec3(1, -2, 0.5).normalized()).matrix();
+  const Parametrisation upright = Parametrise(Stone(2000, Mat3::Identity()), SphereParameters{}),
+                        turned = Parametrise(Stone(2000, turn), SphereParameters{});
+  const bool same = std::abs(upright.uv[0].y() - turned.uv[0].y()) < 1e-6;
+  for (std::size_t k = 0; k < upright.uv.size(); ++k) {
+    const double v = turned.uv[k].y();
+    EXPECT_NEAR(upright.uv[k].y(), same ? v : 1 - v, 1e-9);
+    const double off = upright.uv[k].x() - upright.uv[0].x() -
+                       (same ? 1 : -1) * (turned.uv[k].x() - turned.uv[0].x());
+    EXPECT_NEAR(off, std::round(off), 1e-9);
+  }
+  for (const int pole : {0, 1}) {
+    const Vec3 back = turn.transpose() * ((*turned.poles)[same ? pole : 1 - pole] - Vec3(1, 2, 3));
+    EXPECT_LT((back + Vec3(1, 2, 3) - (*upright.poles)[pole]).norm(), 1e-7);
+  }
+}
+
+// A ball of n rings of n points, longest along z, with one vertex at each pole.
+TriMesh BallMesh(int n) {
+  TriMesh mesh;
+  const auto add = [&](double turn, double v) {
+    const double a = 2 * std::numbers::pi * turn, t = std::numbers::pi * v;
+    mesh.points.emplace_back(10 * std::sin(t) * std::cos(a), 10 * std::sin(t) * std::sin(a),
+                             -12 * std::cos(t));
+  };
+  for (int j = 1; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      add(static_cast<double>(i) / n, static_cast<double>(j) / n);
+    }
+  }
+  const int low = n * (n - 1), high = low + 1;
+  add(0, 0);
+  add(0, 1);
+  for (int i = 0; i < n; ++i) {
+    const int next = (i + 1) % n, last = n * (n - 2);
+    mesh.triangles.push_back({low, next, i});
+    mesh.triangles.push_back({high, last + i, last + next});
+    for (int j = 0; j < last; j += n) {
+      mesh.triangles.push_back({j + i, j + next, j + n + next});
+      mesh.triangles.push_back({j + i, j + n + next, j + n + i});
+    }
+  }
+  return mesh;
+}
+
+// The surface's normal looks as the triangles do, and the poles go with v.
+TEST(Parametrise, ASphereLooksAsTheTrianglesDo) {
+  TriMesh mesh = BallMesh(40);
+  for (const bool inward : {false, true}) {
+    for (Triangle& t : mesh.triangles) {
+      if (inward) {
+        std::swap(t[1], t[2]);
+      }
+    }
+    const Parametrisation p = Parametrise(
+        Scan{.positions = mesh.points, .triangles = mesh.triangles}, SphereParameters{});
+    EXPECT_EQ(p.faults.mirrored, inward);
+    const Vec2 lengths_mm = 10 * std::numbers::pi * Vec2(2, 1);
+    std::vector<Vec2> at;
+    for (const Vec2& uv : p.uv) {
+      at.push_back(uv.cwiseProduct(lengths_mm));
+    }
+    const Vec2 period_mm(lengths_mm.x(), 0);
+    const MapFaults faults = FaultsOfTriangles({mesh.points, at, period_mm}, mesh.triangles);
+    EXPECT_LT(faults.Sum(), 0.01);
+    EXPECT_FALSE(faults.mirrored);
+    EXPECT_NEAR(((*p.poles)[1] - (*p.poles)[0]).z(), inward ? -24 : 24, 1e-3);
+  }
+}
+
+TEST(Parametrise, WhatDoesNotGoAllRoundIsNoSphere) {
+  std::vector<Vec3> cap, tube;
+  for (const Vec3& p : OnSphere(6000)) {
+    if (p.z() < 20) {
+      cap.push_back(p);
+    }
+  }
+  for (int k = 0; k < 400; ++k) {
+    tube.push_back(OnCylinder(k, Mat3::Identity()));
+  }
+  const std::vector<Vec3> sheet = FrankePoints(1000);
+  for (const std::vector<Vec3>& points : {cap, tube, sheet}) {
+    EXPECT_THAT(WordsOf({.positions = points}, SphereParameters{}),
+                HasSubstr("do not go all round the centre of the sphere"));
+  }
+  std::vector<Vec3> flat = sheet;
+  for (Vec3& p : flat) {
+    p.z() = 0;
+  }
+  EXPECT_THAT(WordsOf({.positions = flat}, SphereParameters{}),
+              ::testing::AnyOf(HasSubstr("no sphere goes near"), HasSubstr("all round")));
+  EXPECT_THAT(WordsOf({.positions = tube}, SphereParameters{.axis = {0, kNaN, 1}}),
+              HasSubstr("the sphere's axis is not finite"));
+}
+
+// A ball with another one in it, and a ring's tube: rays from the centre meet them twice.
+TEST(Parametrise, WhatFoldsOverTheSphereIsRefusedUnlessAccepted) {
+  std::vector<Vec3> twice = OnSphere(4000);
+  for (std::size_t k = 0; k < twice.size(); k += 2) {
+    twice[k] *= 0.5;
+  }
+  const std::string words = WordsOf({.positions = twice}, SphereParameters{});
+  EXPECT_THAT(words, HasSubstr("fold over the sphere"));
+  EXPECT_THAT(words, HasSubstr("folds: accept"));
+  EXPECT_GT(Parametrise(twice, SphereParameters{.folds = FoldRule::kAccept}).faults.folded, 0.3);
+  EXPECT_THAT(WordsOf({.positions = RingPoints(4000, 0)}, SphereParameters{}),
+              ::testing::AnyOf(HasSubstr("fold over the sphere"), HasSubstr("all round")));
+}
+
 // Two thirds of a sphere, as a scan: it folds over every plane, and its triangles are laid out. The
 // surface's normal looks as theirs do, whichever way that is.
 TEST(Parametrise, TrianglesThatFoldAreLaidOut) {

@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -244,6 +246,7 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
   EXPECT_THAT(read("parameters: cylinder\nclosure: periodic_uv\n"),
               HasSubstr("go round in u alone; write closure: periodic_u"));
+  EXPECT_THAT(read("parameters: sphere\n"), HasSubstr("closure: parameters on a sphere"));
   EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"),
               HasSubstr("closure: parameters on a torus go round both ways"));
   EXPECT_THAT(read("parameters: mesh\nclosure: periodic_uv\n"), HasSubstr("do not go round"));
@@ -338,8 +341,99 @@ TEST(PointFit, ABallIsNoTube) {
   }
   PointFitOptions options;
   options.closure = Closure::kPeriodicU;
+  EXPECT_EQ(FitPoints(table, options, {}).parameters, "sphere");
+  options.parameters = CylinderParameters{};
   EXPECT_THAT(testing::WordsOf<InputError>([&] { FitPoints(table, options, {}); }),
               HasSubstr("the points close at an end of the cylinder"));
+}
+
+// A stone, smooth over its poles: its distance from the origin along a unit direction.
+double StoneRadius(const Vec3& d) {
+  return 1 + 0.15 * std::sin(3 * d.x() + 1) * std::cos(2 * d.y()) +
+         0.1 * std::sin(4 * d.z() + 2 * d.x() - d.y());
+}
+
+PointTable StonePoints(int count, double noise) {
+  Random random(3);
+  PointTable table;
+  for (int k = 0; k < count; ++k) {
+    const Vec3 d = Vec3(random.Normal(), random.Normal(), random.Normal()).normalized(),
+               off(random.Normal(), random.Normal(), random.Normal());
+    table.positions.push_back(StoneRadius(d) * d + noise * off);
+  }
+  return table;
+}
+
+// Largest and root mean square distance along the rays, of rings from v = first to last.
+struct RingErrors {
+  double rms = 0, largest = 0;
+};
+RingErrors ErrorsOfStone(const HSplineSurface& surface, double first, double last) {
+  constexpr int kRings = 40, kAround = 60;
+  double squares = 0, weights = 0;
+  RingErrors errors;
+  for (int j = 0; j < kRings; ++j) {
+    const double v = first + (last - first) * (j + 0.5) / kRings;
+    for (int i = 0; i < kAround; ++i) {
+      const Vec3 p = surface.Point(Vec2((i + 0.5) / kAround, v));
+      const double off = std::abs(p.norm() - StoneRadius(p.normalized()));
+      squares += std::sin(std::numbers::pi * v) * off * off;
+      weights += std::sin(std::numbers::pi * v);
+      errors.largest = std::max(errors.largest, off);
+    }
+  }
+  errors.rms = std::sqrt(squares / weights);
+  return errors;
+}
+
+// Also within ten degrees of the poles, where there are few points; each pole is one place to less
+// than the noise.
+TEST(PointFit, AStoneIsFoundBelowItsNoiseAlsoAtItsPoles) {
+  constexpr double kNoise = 1e-3;
+  const PointTable table = StonePoints(10000, kNoise);
+  PointFitOptions options;
+  options.closure = Closure::kPeriodicU;
+  options.sigma = true;
+  const PointFit result = FitPoints(table, options, {});
+  EXPECT_EQ(result.parameters, "sphere");
+  EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
+  EXPECT_LT(ErrorsOfStone(result.fit.surface, 0, 1).rms, 0.5 * kNoise);
+  for (const double v : {0.0, 1.0}) {
+    const RingErrors errors = ErrorsOfStone(result.fit.surface, v, std::abs(v - 1.0 / 18));
+    EXPECT_LT(errors.rms, 1.5 * kNoise);
+    EXPECT_LT(errors.largest, 4 * kNoise);
+  }
+  ASSERT_TRUE(result.poles);
+  for (const PoleGap& pole : *result.poles) {
+    EXPECT_LT(pole.gap_mm, kNoise);
+    EXPECT_NEAR(pole.place.norm(), StoneRadius(pole.place.normalized()), kNoise);
+  }
+  // Nothing is told of points that were not given.
+  EXPECT_EQ(result.fit.residual_mm.size(), table.positions.size());
+  EXPECT_EQ(result.fit.uv.size(), table.positions.size());
+  EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
+  for (const std::uint32_t k : result.fit.automatic->outliers) {
+    EXPECT_LT(k, table.positions.size());
+  }
+  EXPECT_NEAR(result.fit.automatic->noise_mm, 0.6 * kNoise, 0.1 * kNoise);
+}
+
+// By every plan, the finest levels alone too, for which the start's edges are one place exactly.
+TEST(PointFit, ASphereIsFittedByEveryPlan) {
+  const PointTable table = StonePoints(3000, 1e-3);
+  const std::vector<Term> smooth = {PointTerm{}, SmoothnessTerm{.weight = 1e-9, .length_mm = 1}};
+  const std::vector<FitOptions> all = {
+      {.plan = AdaptivePlan{.tolerance_mm = 0.02, .finest = 2}, .terms = smooth},
+      {.plan = ListedPlan{.schedule = {{.level = 0}, {.level = 1}}}, .terms = smooth},
+      {.plan = ListedPlan{.schedule = {{.level = 2}}}, .terms = smooth}};
+  for (const FitOptions& fit : all) {
+    const PointFit result = FitPoints(
+        table, {.closure = Closure::kPeriodicU, .parameters = SphereParameters{}, .fit = fit}, {});
+    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
+    EXPECT_LT(result.fit.point_rms_mm, 0.01);
+    EXPECT_LT((*result.poles)[0].gap_mm, 0.02);
+    EXPECT_EQ(result.fit.residual_mm.size(), 3000u);
+  }
 }
 
 // At a hundred million mm, digits of a hundredth of a micrometre are left.

@@ -3,8 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/surface_cells.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -141,6 +147,41 @@ TEST(AdaptiveTessellation, ChordsThatCannotBeAreRefused) {
   EXPECT_THROW(TessellateToChord(surface, 0), InputError);
   EXPECT_THROW(TessellateToChord(surface, kNaN), InputError);
   EXPECT_THROW(TessellateToChord(surface, 1e-15), InputError);
+}
+
+// A tube whose ends are drawn together to nearly a point each.
+TEST(JoinEdge, ATubeWithBothEdgesJoinedIsClosed) {
+  const HSplineShape shape{
+      .patches_u = 8, .patches_v = 6, .max_level = 0, .closure = Closure::kPeriodicU};
+  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      const double turn = 2 * std::numbers::pi * i / net.columns,
+                   angle = std::numbers::pi * (j - 1) / shape.patches_v;
+      net.vertices.emplace_back(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn),
+                                0.01 * (i % 2) - std::cos(angle));
+    }
+  }
+  const HSplineSurface surface(shape, net);
+  Tessellation t = TessellateToChord(surface, 1e-3);
+  EXPECT_GT(CheckEdges(t.mesh).boundary, 10);
+  const Tessellation untouched = t;
+  JoinEdge(t, 0.4321, Vec3::Zero());
+  EXPECT_EQ(t.mesh.triangles, untouched.mesh.triangles);
+  const Vec3 low = surface.Point({0, 0}), high = surface.Point({0, 1});
+  JoinEdge(t, 0, low);
+  JoinEdge(t, 1, high);
+  const EdgeReport edges = CheckEdges(t.mesh);
+  EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
+  ASSERT_EQ(t.uv.size(), t.mesh.points.size());
+  ASSERT_EQ(t.normals.size(), t.mesh.points.size());
+  for (const auto& [v, place] : {std::pair(0.0, low), std::pair(1.0, high)}) {
+    ASSERT_EQ(std::ranges::count(t.uv, v, [](const Vec2& uv) { return uv.y(); }), 1);
+    const auto at =
+        std::ranges::find(t.uv, v, [](const Vec2& uv) { return uv.y(); }) - t.uv.begin();
+    EXPECT_EQ(t.mesh.points[at], place);
+    EXPECT_GT(t.normals[at].z() * (v == 0 ? -1 : 1), 0.999);
+  }
 }
 
 }  // namespace
