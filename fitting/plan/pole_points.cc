@@ -7,6 +7,8 @@
 #include <numeric>
 #include <vector>
 
+#include "fitting/nested/nested_points.h"
+
 namespace semblance {
 namespace {
 

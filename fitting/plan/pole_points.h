@@ -6,12 +6,13 @@
 #include <cstddef>
 #include <span>
 
-#include "fitting/nested/nested_points.h"
 #include "fitting/plan/fit_result.h"
 #include "fitting/problem/sphere.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {
+
+struct OwnedPoints;
 
 // Adds points along v = 0 and v = 1, at the pole each: as many along an edge as half the root of
 // the number of points, each of the points' mean weight. Evenly spread points get fewer towards a
