@@ -23,6 +23,7 @@
 #include "tests/testing/point_csv.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/stone.h"
 
 namespace semblance {
 namespace {
@@ -31,7 +32,9 @@ using testing::ErrorAgainst;
 using testing::FrankePoint;
 using ::testing::HasSubstr;
 using testing::HeadPoint;
+using testing::RingErrors;
 using testing::Scattered;
+using testing::StoneRadius;
 using testing::UvCsv;
 
 const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs/fit";
@@ -347,43 +350,14 @@ TEST(PointFit, ABallIsNoTube) {
               HasSubstr("the points close at an end of the cylinder"));
 }
 
-// A stone, smooth over its poles: its distance from the origin along a unit direction.
-double StoneRadius(const Vec3& d) {
-  return 1 + 0.15 * std::sin(3 * d.x() + 1) * std::cos(2 * d.y()) +
-         0.1 * std::sin(4 * d.z() + 2 * d.x() - d.y());
-}
-
 PointTable StonePoints(int count, double noise) {
-  Random random(3);
   PointTable table;
-  for (int k = 0; k < count; ++k) {
-    const Vec3 d = Vec3(random.Normal(), random.Normal(), random.Normal()).normalized(),
-               off(random.Normal(), random.Normal(), random.Normal());
-    table.positions.push_back(StoneRadius(d) * d + noise * off);
-  }
+  table.positions = testing::PointsAround(StoneRadius, count, noise);
   return table;
 }
 
-// Largest and root mean square distance along the rays, of rings from v = first to last.
-struct RingErrors {
-  double rms = 0, largest = 0;
-};
 RingErrors ErrorsOfStone(const HSplineSurface& surface, double first, double last) {
-  constexpr int kRings = 40, kAround = 60;
-  double squares = 0, weights = 0;
-  RingErrors errors;
-  for (int j = 0; j < kRings; ++j) {
-    const double v = first + (last - first) * (j + 0.5) / kRings;
-    for (int i = 0; i < kAround; ++i) {
-      const Vec3 p = surface.Point(Vec2((i + 0.5) / kAround, v));
-      const double off = std::abs(p.norm() - StoneRadius(p.normalized()));
-      squares += std::sin(std::numbers::pi * v) * off * off;
-      weights += std::sin(std::numbers::pi * v);
-      errors.largest = std::max(errors.largest, off);
-    }
-  }
-  errors.rms = std::sqrt(squares / weights);
-  return errors;
+  return testing::ErrorsOfRings(surface, StoneRadius, first, last);
 }
 
 // Also within ten degrees of the poles, where there are few points; each pole is one place to less
