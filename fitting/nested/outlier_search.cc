@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <utility>
 
@@ -133,7 +134,7 @@ class OutlierSearch {
     char voteless = 0;
     for (std::ptrdiff_t k = begin; k < end; ++k) {
       const std::array<double, 3>& e = ResidualOf(k).along;
-      voteless |= (*before_)[k];
+      voteless = static_cast<char>(voteless | (*before_)[k]);
       for (int c = 0; c < 3; ++c) {
         sum[c] += e[c];
         squares[c] += e[c] * e[c];
@@ -241,7 +242,9 @@ namespace {
 std::vector<char> BesideThose(const std::vector<char>& changed) {
   std::vector<char> beside = changed;
   for (std::size_t b = 0; b < changed.size(); ++b) {
-    beside[b] |= (b > 0 ? changed[b - 1] : 0) | (b + 1 < changed.size() ? changed[b + 1] : 0);
+    const bool is_next =
+        (b > 0 && changed[b - 1] != 0) || (b + 1 < changed.size() && changed[b + 1] != 0);
+    beside[b] = beside[b] != 0 || is_next ? 1 : 0;
   }
   return beside;
 }
@@ -267,21 +270,41 @@ int Search(OutlierSearch search, std::size_t every, std::vector<char>& outlier) 
   return static_cast<int>(std::count(found.begin(), found.end(), 1));
 }
 
+std::vector<std::uint32_t> IndicesOf(const std::vector<char>& outlier) {
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t k = 0; k < outlier.size(); ++k) {
+    if (outlier[k] != 0) {
+      indices.push_back(k);
+    }
+  }
+  return indices;
+}
+
+void Become(const std::vector<std::uint32_t>& indices, std::vector<char>& outlier) {
+  std::ranges::fill(outlier, 0);
+  for (const std::uint32_t k : indices) {
+    outlier[k] = 1;
+  }
+}
+
 }  // namespace
 
+// Outliers are few, and points may be ten million: their indices take less than one more flag each.
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
                  const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier) {
-  std::vector<char> farther = outlier;
+  const std::vector<std::uint32_t> before = IndicesOf(outlier);
   const int count = Search({points, every, residuals, least, kFar}, every, outlier);
   if (count == 0 || tail == OutlierTail::kGoes) {
     return count;
   }
-  const int fewer = Search({points, every, residuals, least, kFarther}, every, farther);
-  if (count - fewer <= kTail * fewer) {
-    return count;
+  const std::vector<std::uint32_t> far = IndicesOf(outlier);
+  Become(before, outlier);
+  const int fewer = Search({points, every, residuals, least, kFarther}, every, outlier);
+  if (count - fewer > kTail * fewer) {
+    return fewer;
   }
-  outlier = std::move(farther);
-  return fewer;
+  Become(far, outlier);
+  return count;
 }
 
 }  // namespace semblance

@@ -63,6 +63,7 @@ std::array<PoleGap, 2> PoleGapsOf(const HSplineSurface& surface) {
   std::array<PoleGap, 2> gaps;
   for (const int pole : {0, 1}) {
     std::vector<Vec3> edge;
+    edge.reserve(static_cast<std::size_t>(count));
     for (int k = 0; k < count; ++k) {
       edge.push_back(surface.Point(Vec2((k + 0.5) / count, pole)));
     }

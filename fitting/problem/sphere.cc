@@ -98,6 +98,7 @@ Quadratic TermsAt(const Vec2& p) {
 std::vector<double> MissesOf(const Quadratic& coefficients, const std::vector<NearPole>& nearest,
                              double reach) {
   std::vector<double> misses;
+  misses.reserve(nearest.size());
   for (const NearPole& p : nearest) {
     misses.push_back(std::abs(p.distance_mm - coefficients.dot(TermsAt(p.place / reach))));
   }

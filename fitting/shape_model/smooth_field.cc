@@ -10,7 +10,7 @@
 namespace semblance {
 namespace {
 
-double Kernel(double squared_mm, const SmoothFieldOptions& o) {
+double KernelAt(double squared_mm, const SmoothFieldOptions& o) {
   const auto bell = [&](double sd_mm, double length_mm) {
     return sd_mm * sd_mm * std::exp(-squared_mm / (2 * length_mm * length_mm));
   };
@@ -42,14 +42,14 @@ Eigen::MatrixXd SmoothFieldFactor(std::span<const Vec3> points, std::span<const 
   }
   for (Eigen::Index c = 0; c < m; ++c) {
     for (Eigen::Index v = 0; v < n; ++v) {
-      across(v, c) = alpha[v] * Kernel((points[v] - points[centres[c]]).squaredNorm(), options);
+      across(v, c) = alpha[v] * KernelAt((points[v] - points[centres[c]]).squaredNorm(), options);
     }
     for (Eigen::Index other = 0; other < m; ++other) {
       among(other, c) =
-          Kernel((points[centres[other]] - points[centres[c]]).squaredNorm(), options);
+          KernelAt((points[centres[other]] - points[centres[c]]).squaredNorm(), options);
     }
   }
-  among.diagonal().array() += 1e-8 * Kernel(0, options) + 1e-12;  // centres that nearly coincide
+  among.diagonal().array() += 1e-8 * KernelAt(0, options) + 1e-12;  // centres that nearly coincide
   const Eigen::LLT<Eigen::MatrixXd> factor(among);
   return factor.matrixL().solve(across.transpose()).transpose();
 }
