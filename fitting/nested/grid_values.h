@@ -22,7 +22,7 @@ struct GridLayout {
   PatchGrid grid;
 
   std::size_t Stride() const {
-    return static_cast<std::size_t>(grid.Columns() + 2 * kHalo + kBlock);
+    return static_cast<std::size_t>(grid.Columns()) + std::size_t{2} * kHalo + kBlock;
   }
   std::size_t Size() const { return Stride() * static_cast<std::size_t>(grid.Rows()); }
   // i: -kHalo .. Columns() + kHalo - 1; j: likewise of rows.
