@@ -12,6 +12,7 @@
 #include <tuple>
 #include <utility>
 
+#include "fitting/problem/around_axis.h"
 #include "fitting/problem/torus.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -226,10 +227,9 @@ struct CylinderAxis {
 // The circle of least squares (Kasa) through the points as seen along the direction is its centre.
 CylinderAxis AxisAlong(const Vec3& direction, std::span<const Vec3> points) {
   CylinderAxis axis{.direction = direction.normalized(), .across = {}, .third = {}, .centre = {}};
-  Eigen::Index least = 0;
-  axis.direction.cwiseAbs().minCoeff(&least);
-  axis.across = axis.direction.cross(Vec3::Unit(least)).normalized();
-  axis.third = axis.direction.cross(axis.across);
+  const auto [across, third] = Across(axis.direction);
+  axis.across = across;
+  axis.third = third;
   const Vec3 mean = MeanOf(points);
   Mat3 normal = Mat3::Zero();
   Vec3 right = Vec3::Zero();
@@ -280,8 +280,7 @@ std::vector<Vec2> AroundAxis(const CylinderAxis& axis, std::span<const Vec3> pos
   around.reserve(positions.size());
   for (const Vec3& p : positions) {
     const Vec3 x = p - axis.centre;
-    const double turn = std::atan2(x.dot(axis.third), x.dot(axis.across)) / (2 * std::numbers::pi);
-    around.emplace_back(turn < 0 ? turn + 1 : turn, x.dot(axis.direction));
+    around.emplace_back(Turns(x.dot(axis.third), x.dot(axis.across)), x.dot(axis.direction));
   }
   return around;
 }
