@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string_view>
 #include <utility>
 
 #include "problems/output/manifest.h"
@@ -70,30 +69,10 @@ std::vector<std::uint32_t> Numbers(const std::string& base64, std::size_t width)
   return numbers;
 }
 
-// By the SHA-256 of blob.dump(), which is not made: its texts are long, and as base64 they stand in
-// JSON as they are.
-std::string NameOf(const Json& blob) {
-  Sha256 sha;
-  std::string_view before = "{";
-  for (const auto& [key, value] : blob.items()) {
-    sha.Add(fmt::format("{}\"{}\":", before, key));
-    if (value.is_string()) {
-      sha.Add("\"");
-      sha.Add(value.get_ref<const std::string&>());
-      sha.Add("\"");
-    } else {
-      sha.Add(value.dump());
-    }
-    before = ",";
-  }
-  sha.Add("}");
-  return sha.Hex().substr(0, 16);
-}
-
 }  // namespace
 
 std::string SceneBlobs::Add(Json blob) {
-  std::string name = NameOf(blob);
+  std::string name = Sha256OfText(blob.dump()).substr(0, 16);
   blobs_[name] = std::move(blob);
   return name;
 }
