@@ -37,7 +37,7 @@ using ElementStiffness = Matrix16;
 // another metric M than the plane's own of tr((M H)^2), H being the matrix of second derivatives.
 ElementStiffness ThinPlateStiffness(double size_s, double size_t,
                                     const BendingMetric& metric = BendingMetric::Identity());
-// x^T of each x are the patch's BendingSums.
+// The patch's BendingSums: for one coordinate x of its vertices the k-th is x^T form[k] x.
 std::array<ElementStiffness, 6> BendingStiffnesses(double size_s, double size_t);
 // Integral over a patch of size_s x size_t (mm) of f_s^2 + f_t^2; rank 15.
 ElementStiffness MembraneStiffness(double size_s, double size_t);

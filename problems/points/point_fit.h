@@ -121,8 +121,8 @@ struct PointFit {
   // written terms have them.
   FitResult fit;
   double weighted_rms_mm = kNaN;  // the same with the points' weights; NaN where all are equal
-  DistanceQuantiles distance;
-  std::vector<JoinReport> joins;                  // one per join
+  DistanceQuantiles distance;     // of the points from the surface
+  std::vector<JoinReport> joins;  // one per join
   std::vector<PointAttribute> attributes;         // as given
   std::vector<std::vector<double>> attribute_at;  // fitted, at the points
   AttributeFit attribute_fit;
