@@ -47,7 +47,7 @@ const std::map<std::string, Layers> kRooms = {
     {"interp",
      {{"dowels"}, {"on_surface"}, {"kriging"}, {"schemes"}, {"stacking"}, {kHall}, {"evaluation"}}},
     {"fitting",
-     {{"least_squares", "problem"},
+     {{"least_squares", "parameters", "problem"},
       {"shape_model", "space"},
       {"terms"},
       {"nested", "solve"},

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <span>
 
+#include "fitting/parameters/sphere.h"
 #include "fitting/plan/fit_result.h"
-#include "fitting/problem/sphere.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {

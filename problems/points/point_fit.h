@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "fitting/parameters/parametrise.h"
 #include "fitting/plan/fit_faults.h"
 #include "fitting/plan/pole_points.h"
-#include "fitting/problem/parametrise.h"
 #include "fitting/relaxation/foot_moves.h"
 #include "fitting/solve/attribute_fit.h"
 #include "fitting/solve/surface_sigma.h"

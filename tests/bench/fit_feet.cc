@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
-#include "fitting/problem/parametrise.h"
+#include "fitting/parameters/parametrise.h"
 #include "fitting/problem/start_surface.h"
 #include "fitting/relaxation/foot_moves.h"
 #include "surfaces/hspline_query/hspline_project.h"

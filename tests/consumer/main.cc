@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A surface through scattered points, with the installed package alone: `app < points.txt`.
 #include <semblance/fitting/fit.h>
-#include <semblance/fitting/problem/parametrise.h>
+#include <semblance/fitting/parameters/parametrise.h>
 #include <semblance/fitting/problem/start_surface.h>
 
 #include <iostream>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/parametrise.h"
+#include "fitting/parameters/parametrise.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

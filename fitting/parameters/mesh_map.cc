@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/mesh_map.h"
+#include "fitting/parameters/mesh_map.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/border.h>
@@ -22,7 +22,7 @@
 #include <string>
 #include <utility>
 
-#include "fitting/problem/one_to_one.h"
+#include "fitting/parameters/one_to_one.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/one_to_one.h"
+#include "fitting/parameters/one_to_one.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/torus.h"
+#include "fitting/parameters/torus.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fitting/problem/around_axis.h"
+#include "fitting/parameters/around_axis.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {

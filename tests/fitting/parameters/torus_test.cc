@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/torus.h"
+#include "fitting/parameters/torus.h"
 
 #include <gtest/gtest.h>
 

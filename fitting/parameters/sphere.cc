@@ -1,23 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/sphere.h"
+#include "fitting/parameters/sphere.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
-#include "fitting/problem/around_axis.h"
+#include "fitting/parameters/around_axis.h"
+#include "fitting/parameters/principal_frame.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
-
-Vec3 MeanOf(std::span<const Vec3> points) {
-  return std::accumulate(points.begin(), points.end(), Vec3(Vec3::Zero())) /
-         static_cast<double>(points.size());
-}
 
 // Evenly over all directions, along a spiral whose steps turn by the golden angle.
 std::vector<Vec3> EvenDirections(int count) {
@@ -142,7 +137,7 @@ double DistanceOfPole(const std::vector<NearPole>& nearest) {
 }  // namespace
 
 PolarSphere SphereThrough(std::span<const Vec3> points, const Vec3& axis) {
-  const Vec3 mean = MeanOf(points);
+  const Vec3 mean = MeanPoint(points);
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
   Eigen::Vector4d right = Eigen::Vector4d::Zero();
   for (const Vec3& p : points) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/sphere.h"
+#include "fitting/parameters/sphere.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "fitting/problem/around_axis.h"
+#include "fitting/parameters/around_axis.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/problem/mesh_map.h"
+#include "fitting/parameters/mesh_map.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include "fitting/problem/one_to_one.h"
+#include "fitting/parameters/one_to_one.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/grid_mesh.h"
 #include "tests/testing/shapes.h"
