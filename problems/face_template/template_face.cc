@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <set>
 #include <utility>
 
+#include "problems/face_template/domain_grid.h"
 #include "problems/face_template/head_formula.h"
 #include "problems/face_template/template_sites.h"
 #include "problems/subject/phantom_shape.h"
@@ -18,82 +18,17 @@
 namespace semblance {
 namespace {
 
-// ---------------------------------------------------------------------------------------------
-// Least squares of one level
-// ---------------------------------------------------------------------------------------------
-
-constexpr int kSamplesPerPatch = 6;
-
-using Matrix = Eigen::MatrixXd;
-
-enum class Direction { kU, kV };
-
-int Patches(const HSplineShape& shape, int level, Direction axis) {
-  return (axis == Direction::kU ? shape.patches_u : shape.patches_v) << level;
-}
-
-double SampleAt(int sample, int patches) {
-  return static_cast<double>(sample) / (kSamplesPerPatch * patches);
-}
-
-// Row s: the weights of the patches + 3 vertices of a line of the net at its sample s. The weights
-// of a stencil summed over the other direction are those of the line.
-Matrix Collocation(const HSplineShape& shape, int level, Direction axis) {
-  const int patches = Patches(shape, level, axis);
-  const int columns = Patches(shape, level, Direction::kU) + 3;
-  Matrix rows = Matrix::Zero(kSamplesPerPatch * patches + 1, patches + 3);
-  for (int s = 0; s < rows.rows(); ++s) {
-    const double t = SampleAt(s, patches);
-    const Stencil stencil =
-        StencilAt(shape, level, axis == Direction::kU ? Vec2(t, 0) : Vec2(0, t));
-    for (int k = 0; k < 16; ++k) {
-      const int vertex = stencil.index[k];
-      rows(s, axis == Direction::kU ? vertex % columns : vertex / columns) += stencil.weight[k];
-    }
-  }
-  return rows;
-}
-
-// (A^T A)^-1 A^T: from the samples of a line to its vertices.
-Matrix LeastSquares(const HSplineShape& shape, int level, Direction axis) {
-  const Matrix a = Collocation(shape, level, axis);
-  return (a.transpose() * a).ldlt().solve(a.transpose());
-}
-
-std::array<Matrix, 3> SampleFormula(int patches_u, int patches_v) {
-  std::array<Matrix, 3> samples;
-  samples.fill(Matrix(kSamplesPerPatch * patches_u + 1, kSamplesPerPatch * patches_v + 1));
-  for (int j = 0; j < samples[0].cols(); ++j) {
-    for (int i = 0; i < samples[0].rows(); ++i) {
-      const Vec3 p = HeadPoint(SampleAt(i, patches_u), SampleAt(j, patches_v));
-      for (int k = 0; k < 3; ++k) {
-        samples[k](i, j) = p[k];
-      }
-    }
-  }
-  return samples;
-}
-
-// The plain B-spline of one level that is closest to the formula over a grid of samples. On such a
-// grid the least squares of the surface is that of its columns, then its rows.
+// The plain B-spline of one level that is closest to the formula over a grid of samples.
 ControlNet FitFormula(const HSplineShape& shape, int level) {
-  const Matrix along_u = LeastSquares(shape, level, Direction::kU);
-  const Matrix along_v = LeastSquares(shape, level, Direction::kV);
-  const auto samples =
-      SampleFormula(Patches(shape, level, Direction::kU), Patches(shape, level, Direction::kV));
-  ControlNet net{.columns = static_cast<int>(along_u.rows()),
-                 .rows = static_cast<int>(along_v.rows()),
-                 .vertices = {}};
-  net.vertices.resize(static_cast<std::size_t>(net.columns) * net.rows);
-  for (int k = 0; k < 3; ++k) {
-    const Matrix vertices = along_u * samples[k] * along_v.transpose();
-    for (int j = 0; j < net.rows; ++j) {
-      for (int i = 0; i < net.columns; ++i) {
-        net.At(i, j)[k] = vertices(i, j);
-      }
-    }
+  constexpr int kSamplesPerPatch = 6;
+  const DomainGrid grid{kSamplesPerPatch * shape.PatchesU(level) + 1,
+                        kSamplesPerPatch * shape.PatchesV(level) + 1};
+  std::vector<Vec3> samples;
+  for (std::size_t k = 0; k < grid.size(); ++k) {
+    const Vec2 uv = grid.UvAt(k);
+    samples.push_back(HeadPoint(uv.x(), uv.y()));
   }
-  return net;
+  return NetThrough(shape, level, grid, samples);
 }
 
 // Makes the net its own mirror image, so that rounding does not tell the sides apart.

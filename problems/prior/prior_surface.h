@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
+#include "problems/face_template/domain_grid.h"
 #include "problems/face_template/template_face.h"
-#include "problems/prior/domain_grid.h"
 #include "problems/prior/face_prior.h"
 #include "surfaces/base/run_context.h"
 

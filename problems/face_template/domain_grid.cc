@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/prior/domain_grid.h"
+#include "problems/face_template/domain_grid.h"
 
 #include <fmt/format.h>
 
