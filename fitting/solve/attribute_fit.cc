@@ -15,11 +15,11 @@
 #include "fitting/least_squares/cross_validation_score.h"
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/least_squares/sparse_factor.h"
+#include "fitting/least_squares/trace_probes.h"
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
 namespace semblance {
@@ -154,26 +154,9 @@ class AttributeSolver {
           Assemble(groups_[c / kTogether]->space, scale, {}, SystemPart::kRight)
               .right.col(static_cast<Eigen::Index>(c % kTogether));
     }
-    MakeProbes();
-  }
-
-  // Of the trace (Hutchinson 1990); all directions where they are few.
-  void MakeProbes() {
-    constexpr Eigen::Index kExact = 256, kProbes = 16;
-    const Eigen::Index unknowns = points_part_.rows();
-    if (unknowns <= kExact) {
-      probes_ = Eigen::MatrixXd::Identity(unknowns, unknowns);
-      probe_share_ = 1;
-    } else {
-      constexpr std::uint64_t kRandomSeed = 1;
-      Random random(kRandomSeed);
-      probes_.resize(unknowns, kProbes);
-      for (Eigen::Index k = 0; k < probes_.size(); ++k) {
-        probes_(k / kProbes, k % kProbes) = random.Sign();
-      }
-      probe_share_ = 1.0 / kProbes;
-    }
-    influenced_ = points_part_.selfadjointView<Eigen::Lower>() * probes_;
+    constexpr int kProbes = 16;
+    probes_ = TraceProbes(points_part_.rows(), kProbes);
+    influenced_ = points_part_.selfadjointView<Eigen::Lower>() * probes_.directions();
   }
 
   WeightTrial Try(double weight) {
@@ -185,7 +168,7 @@ class AttributeSolver {
       return trial;
     }
     trial.values = factor.Solve(right_);
-    trial.trace = probe_share_ * probes_.cwiseProduct(factor.Solve(influenced_)).sum();
+    trial.trace = probes_.TraceOf(factor.Solve(influenced_));
     const Eigen::MatrixXd product = points_part_.selfadjointView<Eigen::Lower>() * trial.values;
     for (std::size_t c = 0; c < values_.size(); ++c) {
       const auto column = static_cast<Eigen::Index>(c);
@@ -248,8 +231,8 @@ class AttributeSolver {
   std::vector<ColumnScale> scales_;
   std::vector<std::unique_ptr<ColumnGroup>> groups_;
   SparseMatrix points_part_, energy_;  // lower triangles
-  Eigen::MatrixXd right_, probes_, influenced_;
-  double probe_share_ = kNaN;
+  Eigen::MatrixXd right_, influenced_;
+  TraceProbes probes_;
   std::vector<Best> best_;
 };
 

@@ -9,35 +9,21 @@
 
 #include "fitting/least_squares/cross_validation_score.h"
 #include "fitting/least_squares/sparse_factor.h"
+#include "fitting/least_squares/trace_probes.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
 
-constexpr Eigen::Index kExact = 256;  // unknowns
 constexpr int kProbes = 32;
 constexpr int kRoughProbes = 8;  // to find the decade
-
-Eigen::MatrixXd ProbesFor(Eigen::Index unknowns, int count) {
-  if (unknowns <= kExact) {
-    return Eigen::MatrixXd::Identity(unknowns, unknowns);
-  }
-  constexpr std::uint64_t kRandomSeed = 1;
-  Random random(kRandomSeed);
-  Eigen::MatrixXd probes(unknowns, count);
-  for (Eigen::Index k = 0; k < probes.size(); ++k) {
-    probes(k / count, k % count) = random.Sign();
-  }
-  return probes;
-}
 
 class WeightSearch {
  public:
   // probes: of the trace, if it is not taken exactly.
   WeightSearch(const WeightProblem& problem, int probes)
-      : problem_(problem), probes_(ProbesFor(problem.points.lower.rows(), probes)) {
-    influenced_ = problem.points.lower.selfadjointView<Eigen::Lower>() * probes_;
+      : problem_(problem), probes_(problem.points.lower.rows(), probes) {
+    influenced_ = problem.points.lower.selfadjointView<Eigen::Lower>() * probes_.directions();
   }
 
   // NaN scores are never the best.
@@ -70,15 +56,15 @@ class WeightSearch {
     const double misfit =
         problem_.misfit - 2 * step.cwiseProduct(problem_.points.right).sum() +
         step.cwiseProduct(problem_.points.lower.selfadjointView<Eigen::Lower>() * step).sum();
-    const double trace = probes_.cwiseProduct(factor.Solve(influenced_)).sum() /
-                         (probes_.rows() <= kExact ? 1.0 : static_cast<double>(probes_.cols()));
+    const double trace = probes_.TraceOf(factor.Solve(influenced_));
     return {.weight = weight,
             .score = CrossValidationScore(misfit, trace, problem_.count),
             .degrees_of_freedom = trace};
   }
 
   const WeightProblem& problem_;
-  Eigen::MatrixXd probes_, influenced_;
+  TraceProbes probes_;
+  Eigen::MatrixXd influenced_;
   std::map<double, WeightChoice> tried_;
   WeightChoice best_;
 };
