@@ -66,9 +66,8 @@ KrigingScene SceneOf(const Kriging& options, const DepthInput& input,
       {Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd()}, {}, {}};
   for (const DepthSample& sample : samples) {
     const auto i = static_cast<Eigen::Index>(scene.bases.size());
-    const double nugget_mm = options.nugget_share * sample.sd_mm;
     scene.data.depth_mm[i] = sample.depth_mm;
-    scene.data.nugget_mm2[i] = std::isfinite(nugget_mm) ? nugget_mm * nugget_mm : 0;
+    scene.data.nugget_mm2[i] = Nugget_mm2(options.nugget_share, sample.sd_mm);
     scene.bases.push_back(sample.base);
   }
   scene.data.regressors = mean.At(scene.bases, run).transpose();

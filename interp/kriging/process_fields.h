@@ -2,6 +2,8 @@
 // The options that all Gaussian processes of depths have.
 #pragma once
 
+#include <cmath>
+
 #include "surfaces/base/fields.h"
 
 namespace semblance {
@@ -42,6 +44,12 @@ void NuggetShareField(Visitor& visit, double& share) {
                   .doc = "a dowel's depth is taken as uncertain by this times its sd_mm (none: "
                          "certain); 0 honours every dowel, more smooths"},
         share);
+}
+
+// The variance of a dowel's depth by that option.
+inline double Nugget_mm2(double nugget_share, double sd_mm) {
+  const double nugget_mm = nugget_share * sd_mm;
+  return std::isfinite(nugget_mm) ? nugget_mm * nugget_mm : 0;
 }
 
 template <class Visitor>
