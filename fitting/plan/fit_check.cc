@@ -264,6 +264,18 @@ void CheckExact(std::span<const ExactPoint> exact, const FitOptions& options) {
 
 }  // namespace
 
+std::vector<std::string> UnusedOptions(const FitOptions& options) {
+  std::vector<std::string> notes;
+  for (std::size_t k = 0; k < options.terms.size(); ++k) {
+    const auto* points = std::get_if<PointTerm>(&options.terms[k]);
+    if (points != nullptr && points->loss == RobustLoss::kNone &&
+        points->loss_width_mm != PointTerm().loss_width_mm) {
+      notes.push_back(fmt::format("terms[{}].loss_width_mm: `loss: none` does not look at it", k));
+    }
+  }
+  return notes;
+}
+
 void CheckFit(const HSplineSurface& start, const ScatteredPoints& points,
               const FitOptions& options) {
   if (points.size() == 0) {

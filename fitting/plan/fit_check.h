@@ -22,6 +22,10 @@ struct FitFault {
 // is max_level. Everything that Fit refuses whatever the points and features are.
 std::vector<FitFault> FaultsOf(const FitOptions& options, int max_level);
 
+// What is given and not looked at, a line each, with the option's path as above. No fault: a study
+// may compare losses, none among them, at one width.
+std::vector<std::string> UnusedOptions(const FitOptions& options);
+
 // Throws InputError as Fit does (fit.h).
 void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
               std::span<const VertexId> features, const FitOptions& options);

@@ -261,6 +261,14 @@ void AddDifferences(const std::string& path, const ConfigNode& given, const Conf
   }
 }
 
+std::vector<std::string> UnusedOfFit(const Experiment& experiment) {
+  std::vector<std::string> notes = UnusedOptions(experiment.fit);
+  for (std::string& note : notes) {
+    note.insert(0, "fit.");
+  }
+  return notes;
+}
+
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
@@ -294,7 +302,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
 std::vector<std::string> UnusedOptions(const Experiment& experiment) {
   const FaceSource face = WayToFace(experiment);
   if (std::holds_alternative<FittedTemplate>(face)) {
-    return {};
+    return UnusedOfFit(experiment);
   }
   const ConfigNode given = ConfigTreeOf(experiment), usual = ConfigTreeOf(Experiment());
   std::vector<std::string> paths;
@@ -307,6 +315,9 @@ std::vector<std::string> UnusedOptions(const Experiment& experiment) {
     });
   }
   std::vector<std::string> notes;
+  if (std::holds_alternative<PriorThenFit>(face)) {
+    notes = UnusedOfFit(experiment);
+  }
   for (const std::string& path : paths) {
     notes.push_back(fmt::format("{}: `face: {}` does not look at it{}", path, NameOf(face),
                                 path == "seeds.weight" && AsksPrior(face)

@@ -268,8 +268,9 @@ FaceSource WayToFace(const Experiment& experiment);
 // that the generic face does not have. Told with the other faults when a configuration is read.
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment);
 
-// What is set of first_fit, seeds, rounds and fit though the way to the face does not look at it, a
-// line each. No fault: a study may compare ways that share these options.
+// What is set of first_fit, seeds, rounds and fit though the way to the face does not look at it,
+// or though the fit does not, a line each. No fault: a study may compare ways that share these
+// options.
 std::vector<std::string> UnusedOptions(const Experiment& experiment);
 
 }  // namespace semblance

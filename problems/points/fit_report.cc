@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "fitting/plan/fit_check.h"
 #include "problems/config/config.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_page.h"
@@ -310,6 +311,9 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   if (std::isfinite(result.sigma_factor)) {
     notes.push_back(fmt::format("the points are off by {:.3g} times the sigma that was given",
                                 result.sigma_factor));
+  }
+  for (const std::string& unused : UnusedOptions(options.fit)) {
+    notes.push_back("fit." + unused);
   }
   if (!options.chord_mm.automatic && chord_mm > options.chord_mm.value) {
     notes.push_back(fmt::format(

@@ -18,6 +18,7 @@ namespace semblance {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
@@ -86,6 +87,22 @@ TEST(Experiment, WhatAFaceDoesNotLookAtOfSeedsAndFitIsTold) {
                                HasSubstr("seeds.weight: `face: prior_then_fit` does not look at "
                                          "it; face.seed_weight"),
                                HasSubstr("first_fit: ")));
+}
+
+TEST(Experiment, AWidthWithoutALossIsTold) {
+  const auto unused = [](const std::string& face, const std::string& points) {
+    return UnusedOptions(ReadConfigText<Experiment>(
+        fmt::format("face: {}\nfit: {{terms: [smoothness, {{type: points{}}}]}}\n", face, points),
+        "a.yaml"));
+  };
+  for (const char* face : {"fit", "prior_then_fit"}) {
+    EXPECT_THAT(unused(face, ", loss_width_mm: 3"),
+                ElementsAre("fit.terms[1].loss_width_mm: `loss: none` does not look at it"));
+    EXPECT_THAT(unused(face, ", loss: huber, loss_width_mm: 3"), IsEmpty());
+    EXPECT_THAT(unused(face, ", loss_width_mm: 5"), IsEmpty()) << "the default";
+  }
+  EXPECT_THAT(unused("thin_plate", ", loss_width_mm: 3"),
+              ElementsAre(HasSubstr("fit.terms: `face: thin_plate`")));
 }
 
 // What a trial would refuse only after its skull was filled.

@@ -415,6 +415,16 @@ TEST_F(FitCommand, ForceLeavesNoResidualsOfAnEarlierFit) {
   EXPECT_EQ(there("none"), std::pair(true, false)) << "it is no fit's";
 }
 
+TEST_F(FitCommand, AWidthWithoutALossIsTold) {
+  const auto outcome =
+      Call(fmt::format("fit {}/points.csv --out out --quiet --set 'fit.terms=[{{type: points, "
+                       "loss_width_mm: 3}}, {{type: smoothness, weight: auto, length_mm: 1}}]'",
+                       kConfigs));
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out,
+              HasSubstr("fit.terms[0].loss_width_mm: `loss: none` does not look at it"));
+}
+
 TEST_F(FitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
   Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
   Write("bad.csv", "x,y,z\n0,0,zero\n");
