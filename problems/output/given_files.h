@@ -9,12 +9,20 @@
 
 namespace semblance {
 
+// How a file that the program wrote is known where no manifest names it.
+struct FileMark {
+  const char* name = "";        // a regular expression
+  std::string_view words = {};  // that stand in its first 64 KiB
+};
+
 struct GivenFiles {
   // Empty names, and "-", stand for no file.
   std::vector<std::filesystem::path> files;
   // What the job may write into its folder, relative to it; * stands for any characters. For the
   // refusal before the work: StagedFolder replaces no given file, whatever its name.
   std::span<const std::string_view> outputs = {};
+  // Of outputs that are not written each time (old_files.h).
+  std::span<const FileMark> marks = {};
 };
 
 // Whether `name` is one of the outputs.

@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "problems/output/old_files.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/temporary_files.h"
 
@@ -196,6 +197,7 @@ void StagedFolder::MoveFiles() {
       KeepAndFail(fmt::format("{} is a file that was read", file.string()));
     }
   }
+  const std::vector<std::string> old = OldFiles(root_, given_, files);
   if (!files.empty()) {
     fs::remove(root_ / files.back(), error);  // it says that the others are one job's
   }
@@ -206,6 +208,7 @@ void StagedFolder::MoveFiles() {
       KeepAndFail(fmt::format("{}: {}", file.string(), error.message()));
     }
   }
+  RemoveFiles(root_, old);
   fs::remove_all(from, error);
 }
 

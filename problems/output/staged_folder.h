@@ -17,7 +17,8 @@ namespace semblance {
 // Where `root` is missing or empty, the folder of the program's own is ".NAME.semblance-part"
 // beside it and takes its name in one step. Where `root` holds something, or where nothing can be
 // put beside it, it is ".semblance-part" in `root`, and its files are moved one by one, the one
-// that was written last at the end; files of other names stay.
+// that was written last at the end. Files of other names stay, but for those that an earlier job of
+// the same kind has left there (old_files.h).
 //
 // While it lives nobody else writes `root` in this way. What a killed process has left there is
 // cleared by the next one.

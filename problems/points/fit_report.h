@@ -11,6 +11,7 @@
 #include "fitting/nested/nested_fit.h"
 #include "fitting/relaxation/foot_moves.h"
 #include "problems/output/files.h"
+#include "problems/output/given_files.h"
 #include "problems/points/point_fit.h"
 #include "surfaces/base/run_context.h"
 
@@ -30,6 +31,12 @@ inline constexpr std::array<std::string_view, 9> kPointFitFiles = {
     "resolved.yaml", "surface.hspline.json", "surface.ply",
     "residuals.csv", "residuals.ply",        "attributes_*.hspline.json",
     "report.html",   "timing.json",          "result.json"};
+
+// Those of them that not every fit writes: by what stands in their heads.
+inline constexpr std::array<FileMark, 4> kPointFitMarks = {
+    FileMark{R"(residuals\.csv)", "residual_mm"}, FileMark{R"(residuals\.ply)", "residual_mm"},
+    FileMark{R"(attributes_\d+\.hspline\.json)", "semblance-hspline"},
+    FileMark{R"(report\.html)", "An H-spline surface through"}};
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
 // surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (three attributes each),

@@ -3,11 +3,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <system_error>
 #include <vector>
 
 #include "surfaces/base/csv.h"
@@ -47,13 +44,6 @@ std::vector<std::string> NamesOf(const ResidualColumns& columns, bool outliers) 
     names.push_back(attribute.name + "_residual");
   }
   return names;
-}
-
-// By what stands at its head in either format.
-bool IsOfAFit(const std::filesystem::path& file) {
-  std::string head(256, '\0');
-  std::ifstream(file, std::ios::binary).read(head.data(), std::ssize(head));
-  return head.find("residual_mm") != std::string::npos;
 }
 
 }  // namespace
@@ -106,15 +96,6 @@ std::string ResidualsPly(const ResidualColumns& columns) {
     }
   }
   return bytes;
-}
-
-void RemoveOldResiduals(const std::filesystem::path& folder, std::span<const std::string> written) {
-  for (const char* name : {"residuals.csv", "residuals.ply"}) {
-    std::error_code ignored;
-    if (std::ranges::find(written, name) == written.end() && IsOfAFit(folder / name)) {
-      std::filesystem::remove(folder / name, ignored);
-    }
-  }
 }
 
 }  // namespace semblance

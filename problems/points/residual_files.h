@@ -2,8 +2,6 @@
 // What a fit leaves of each point, as a file.
 #pragma once
 
-#include <filesystem>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -28,10 +26,5 @@ std::string ResidualsCsv(const ResidualColumns& columns);
 // The same as binary PLY: vertices at (u, v, 0) with the scalars residual_mm, outlier, sigma_mm,
 // NAME and NAME_residual, floats.
 std::string ResidualsPly(const ResidualColumns& columns);
-
-// Removes the residuals that an earlier fit has left in `folder`, but for files that are among
-// `written`: they would pass for those of this fit. Files of other origin stay, whatever their
-// names.
-void RemoveOldResiduals(const std::filesystem::path& folder, std::span<const std::string> written);
 
 }  // namespace semblance

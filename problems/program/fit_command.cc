@@ -14,7 +14,6 @@
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
-#include "problems/points/residual_files.h"
 #include "problems/program/work_options.h"
 #include "surfaces/base/error.h"
 
@@ -48,7 +47,8 @@ void CheckOrder(const std::vector<std::string>& files) {
 // What is read, and what may be written.
 GivenFiles GivenTo(const FitArguments& arguments, const PointFitOptions& options) {
   GivenFiles given{.files = {arguments.files.begin(), arguments.files.end()},
-                   .outputs = kPointFitFiles};
+                   .outputs = kPointFitFiles,
+                   .marks = kPointFitMarks};
   for (const NamedFile& named : NamedFiles(options)) {
     given.files.push_back(named.file);
   }
@@ -68,7 +68,6 @@ int FitCommand(const FitArguments& arguments) {
   const std::vector<std::string> notes = WritePointFit(
       options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
   folder.Publish();
-  RemoveOldResiduals(folder.Root(), folder.Files().Written());
   fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
              result.fit.residual_mm.size(), result.parameters,
              result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),

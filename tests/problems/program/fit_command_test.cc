@@ -415,6 +415,38 @@ TEST_F(FitCommand, ForceLeavesNoResidualsOfAnEarlierFit) {
   EXPECT_EQ(there("none"), std::pair(true, false)) << "it is no fit's";
 }
 
+TEST_F(FitCommand, ForceLeavesNoReportOrAttributesOfAnEarlierFit) {
+  const FitTarget target = Scattered(FrankePoint, 400, 1e-3, 1);
+  const auto fit = [&](const std::string& attributes, const std::string& options) {
+    std::string points = fmt::format("x,y,z{}\n", attributes);
+    for (const FitPoint& point : target.points) {
+      const Vec3& p = point.position;
+      points += fmt::format("{},{},{}", p.x(), p.y(), p.z());
+      for (const char c : attributes) {
+        points += c == ',' ? fmt::format(",{}", p.x()) : "";
+      }
+      points += "\n";
+    }
+    Write("points.csv", points);
+    const auto outcome = Call("fit points.csv --out out --force --quiet " + options);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+  };
+  const auto exists = [&](const char* name) { return fs::exists(folder_ / "out" / name); };
+  fit(",a,b,c,d", "--set 'attributes=[a, b, c, d]'");
+  EXPECT_TRUE(exists("report.html"));
+  EXPECT_TRUE(exists("attributes_2.hspline.json"));
+  Write("out/attributes_old.hspline.json", R"({"format":"semblance-hspline"})");
+  fit(",a", "--set 'attributes=[a]' --set report=false");
+  EXPECT_FALSE(exists("report.html"));
+  EXPECT_TRUE(exists("attributes_1.hspline.json"));
+  EXPECT_FALSE(exists("attributes_2.hspline.json"));
+  EXPECT_TRUE(exists("attributes_old.hspline.json")) << "no fit writes that name";
+  Write("out/report.html", "<html>mine</html>");
+  fit("", "--set report=false");
+  EXPECT_FALSE(exists("attributes_1.hspline.json"));
+  EXPECT_TRUE(exists("report.html")) << "it is no fit's";
+}
+
 TEST_F(FitCommand, AWidthWithoutALossIsTold) {
   const auto outcome =
       Call(fmt::format("fit {}/points.csv --out out --quiet --set 'fit.terms=[{{type: points, "
