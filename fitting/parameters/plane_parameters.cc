@@ -16,9 +16,9 @@ namespace {
 using PlaneAxes = std::array<Vec3, 2>;
 
 PlaneAxes LeastSquaresPlane(std::span<const Vec3> positions) {
-  constexpr double kRounding = 1e-14;  // of mean squares; points of a slanted line come to 1e-16
+  constexpr double kRoundingShare = 1e-14;  // of mean squares; a slanted line comes to 1e-16
   const PrincipalFrame principal = PrincipalFrameOf(positions);
-  if (!(principal.spreads[1] > kRounding * principal.spreads[2])) {
+  if (!(principal.spreads[1] > kRoundingShare * principal.spreads[2])) {
     FailParameters("the points lie on a line and span no plane; give (u,v), or other points");
   }
   return {principal.axes.col(2), principal.axes.col(1)};
