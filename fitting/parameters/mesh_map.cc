@@ -22,6 +22,7 @@
 #include <string>
 #include <utility>
 
+#include "fitting/closed_mesh/mesh_pieces.h"
 #include "fitting/parameters/one_to_one.h"
 #include "surfaces/base/error.h"
 
@@ -36,26 +37,14 @@ using Vertex = LayoutMesh::Vertex_index;
 using Border = LayoutMesh::Halfedge_index;
 using PositionMap = LayoutMesh::Property_map<Vertex, LayoutKernel::Point_2>;
 
-[[noreturn]] void FailLayout(const std::string& what) {
-  throw InputError("parameters: the mesh cannot be laid out on the plane: " + what);
-}
+constexpr char kRefused[] = "parameters: the mesh cannot be laid out on the plane";
 
-void CheckPieces(const TriMesh& mesh) {
-  std::vector<char> used(mesh.points.size(), 0);
-  for (const Triangle& t : mesh.triangles) {
-    used[t[0]] = used[t[1]] = used[t[2]] = 1;
-  }
-  if (const auto loose = std::count(used.begin(), used.end(), 0); loose > 0) {
-    FailLayout(fmt::format("{} of its {} points belong to no triangle; remove them", loose,
-                           mesh.points.size()));
-  }
-  if (const int pieces = ConnectedComponents(mesh).count; pieces != 1) {
-    FailLayout(fmt::format("it has {} pieces; keep one", pieces));
-  }
+[[noreturn]] void FailLayout(const std::string& what) {
+  throw InputError(fmt::format("{}: {}", kRefused, what));
 }
 
 LayoutMesh HalfedgesOf(const TriMesh& mesh) {
-  CheckPieces(mesh);
+  CheckOnePiece(mesh, kRefused);
   std::vector<LayoutKernel::Point_3> points;
   points.reserve(mesh.points.size());
   for (const Vec3& p : mesh.points) {
@@ -95,9 +84,9 @@ Border OnlyBorder(LayoutMesh& mesh) {
   processing::extract_boundary_cycles(mesh, std::back_inserter(borders));
   if (borders.empty()) {
     FailLayout(
-        "it is closed and has no border; cut it open, or, if it goes round an axis, take "
-        "parameters: cylinder with closure: periodic_u, or, if it is a ring, parameters: torus "
-        "with closure: periodic_uv");
+        "it is closed and has no border; write closure: periodic_u, with which it is laid out on a "
+        "sphere, or, if it is a ring, take parameters: torus with closure: periodic_uv, or cut it "
+        "open");
   }
   const auto longest = std::max_element(
       borders.begin(), borders.end(),

@@ -6,19 +6,50 @@
 #include <cstddef>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "fitting/closed_mesh/closed_map.h"
 #include "fitting/parameters/map_candidate.h"
+#include "fitting/parameters/sphere.h"
 
 namespace semblance {
+namespace {
+
+TriMesh MeshOf(const Scan& points) {
+  return {.points = {points.positions.begin(), points.positions.end()},
+          .triangles = {points.triangles.begin(), points.triangles.end()}};
+}
+
+Parametrisation OnSphere(const Scan& points) {
+  const ClosedLayout layout = LayOutOnSphere(MeshOf(points));
+  if (layout.folded > kMostFaults) {
+    FailParameters(fmt::format(
+        "the mesh laid out on the sphere folds {} of it, for parts of it are too thin or have "
+        "triangles without area; make its triangles even (remesh it), or give u and v",
+        PercentText(layout.folded)));
+  }
+  const PolarSphere sphere{.centre = Vec3::Zero(), .axis = layout.axis, .radius_mm = 1};
+  std::vector<Vec2> uv = AnglesAbout(sphere, layout.at);
+  const Poles poles = PolesAmong(points.positions, uv);
+  return {.uv = std::move(uv),
+          .source = ParameterSource::kMesh,
+          .how = "the mesh laid out on the sphere",
+          .faults = {.folded = layout.folded, .collapsed = layout.collapsed},
+          .poles = poles};
+}
+
+}  // namespace
+
 Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh) {
   if (points.triangles.empty()) {
     FailParameters(
         "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces, "
         "or take 'plane', 'cylinder' or 'sphere'");
   }
-  MeshLayout layout = LayOut({.points = {points.positions.begin(), points.positions.end()},
-                              .triangles = {points.triangles.begin(), points.triangles.end()}},
-                             mesh.map);
+  if (points.closure == Closure::kPeriodicU) {
+    return OnSphere(points);
+  }
+  MeshLayout layout = LayOut(MeshOf(points), mesh.map);
   const std::string_view map = EnumNames(layout.map)[static_cast<std::size_t>(layout.map)];
   MapCandidate laid{.how = fmt::format("the mesh laid out by {}", map), .at = std::move(layout.at)};
   laid.faults = MapFaultsOf(points, laid);

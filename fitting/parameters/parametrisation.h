@@ -27,7 +27,7 @@ struct Scan {
   std::span<const Vec3> positions;           // mm
   std::span<const Vec2> given_uv = {};       // one per point, or none
   std::span<const Triangle> triangles = {};  // between the points, or none
-  Closure closure = Closure::kOpen;          // of the surface that is wanted, for AutoParameters
+  Closure closure = Closure::kOpen;          // of the surface that is wanted
   PointNames name_of = {};                   // of a point, where it was read
 };
 
@@ -41,7 +41,7 @@ struct Parametrisation {
   ParameterSource source = ParameterSource::kGiven;
   std::string how = {};   // in words: which plane, axis or map; empty of given ones
   MapFaults faults = {};  // of what was chosen; none of given ones, which are not looked at
-  std::optional<Poles> poles = {};  // of a sphere
+  std::optional<Poles> poles = {};  // of what lies on a sphere
 };
 
 }  // namespace semblance

@@ -7,10 +7,18 @@
 #include <utility>
 #include <vector>
 
+#include "fitting/closed_mesh/closed_map.h"
 #include "fitting/parameters/map_candidate.h"
 
 namespace semblance {
 namespace {
+
+// By rays where they meet it once, for that needs no triangles to be right.
+Parametrisation SphereOrMesh(const Scan& points) {
+  TriedSphere sphere = TrySphere(points, {});
+  return sphere.fault.empty() ? TakeSphere(points, std::move(sphere))
+                              : ParametriseBy(points, MeshParameters{});
+}
 
 // What ends in tips may be a sphere; a tube that is cut aslant is none, and stays a cylinder.
 Parametrisation CylinderOrSphere(const Scan& points) {
@@ -34,7 +42,7 @@ Parametrisation ParametriseBy(const Scan& points, const AutoParameters&) {
     return ParametriseBy(points, TorusParameters{});
   }
   if (points.closure == Closure::kPeriodicU) {
-    return CylinderOrSphere(points);
+    return IsClosed(points.triangles) ? SphereOrMesh(points) : CylinderOrSphere(points);
   }
   std::vector<MapCandidate> planes = PlanesOver(points, {});
   if (MayBeTaken(planes.back(), FoldRule::kRefuse)) {

@@ -50,35 +50,33 @@ EmptyRay RayAlong(const Vec3& direction, std::span<const Vec3> from_centre) {
   return ray;
 }
 
-// The point's angle from a pole over pi, and its distance from the centre.
+// A point around a pole.
 struct NearPole {
-  double angle = kNaN;  // over pi
+  std::size_t point = 0;
+  double angle = kNaN;  // from the pole, over pi
   Vec2 place;           // that angle along the azimuth
-  double distance_mm = kNaN;
 };
 
 // Those of the next points and, all round the pole, those within about twice their angle: a scan's
 // rows are not cut, and there are several of them.
-std::vector<NearPole> NearestToPole(const PolarSphere& sphere, std::span<const Vec3> points,
-                                    std::span<const Vec2> uv, int pole) {
+std::vector<NearPole> NearestToPole(std::span<const Vec2> uv, int pole) {
   constexpr std::size_t kShare = 512, kFewest = 6, kMost = 16;
   constexpr double kReach = 2.2;
   std::vector<double> angles;
-  angles.reserve(points.size());
+  angles.reserve(uv.size());
   for (const Vec2& p : uv) {
     angles.push_back(pole == 0 ? p.y() : 1 - p.y());
   }
   std::vector<double> sorted = angles;
-  const std::size_t next =
-      std::min(points.size(), std::clamp(points.size() / kShare, kFewest, kMost)) - 1;
+  const std::size_t next = std::min(uv.size(), std::clamp(uv.size() / kShare, kFewest, kMost)) - 1;
   std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(next));
   std::vector<NearPole> nearest;
-  for (std::size_t k = 0; k < points.size(); ++k) {
+  for (std::size_t k = 0; k < uv.size(); ++k) {
     if (angles[k] <= kReach * sorted[next]) {
       const double turn = 2 * std::numbers::pi * uv[k].x();
-      nearest.push_back({.angle = angles[k],
-                         .place = angles[k] * Vec2(std::cos(turn), std::sin(turn)),
-                         .distance_mm = (points[k] - sphere.centre).norm()});
+      nearest.push_back({.point = k,
+                         .angle = angles[k],
+                         .place = angles[k] * Vec2(std::cos(turn), std::sin(turn))});
     }
   }
   return nearest;
@@ -90,29 +88,30 @@ Quadratic TermsAt(const Vec2& p) {
   return (Quadratic() << 1, p.x(), p.y(), p.x() * p.x(), p.x() * p.y(), p.y() * p.y()).finished();
 }
 
+// Of what the points have, `values`, one per point around the pole.
 std::vector<double> MissesOf(const Quadratic& coefficients, const std::vector<NearPole>& nearest,
-                             double reach) {
+                             std::span<const double> values, double reach) {
   std::vector<double> misses;
   misses.reserve(nearest.size());
-  for (const NearPole& p : nearest) {
-    misses.push_back(std::abs(p.distance_mm - coefficients.dot(TermsAt(p.place / reach))));
+  for (std::size_t k = 0; k < nearest.size(); ++k) {
+    misses.push_back(std::abs(values[k] - coefficients.dot(TermsAt(nearest[k].place / reach))));
   }
   return misses;
 }
 
-Quadratic QuadraticThrough(const std::vector<NearPole>& nearest, std::span<const double> weights,
-                           double reach) {
+Quadratic QuadraticThrough(const std::vector<NearPole>& nearest, std::span<const double> values,
+                           std::span<const double> weights, double reach) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Quadratic right = Quadratic::Zero();
   for (std::size_t k = 0; k < nearest.size(); ++k) {
     const Quadratic terms = TermsAt(nearest[k].place / reach);
     normal += weights[k] * terms * terms.transpose();
-    right += weights[k] * nearest[k].distance_mm * terms;
+    right += weights[k] * values[k] * terms;
   }
   return normal.completeOrthogonalDecomposition().solve(right);
 }
 
-double DistanceOfPole(const std::vector<NearPole>& nearest) {
+double ValueAtPole(const std::vector<NearPole>& nearest, std::span<const double> values) {
   constexpr int kRounds = 8;
   constexpr double kWidth = 4.685 * 1.4826;  // 95 % efficient for normal errors
   double reach = 1e-300;
@@ -120,18 +119,29 @@ double DistanceOfPole(const std::vector<NearPole>& nearest) {
     reach = std::max(reach, p.angle);
   }
   std::vector<double> weights(nearest.size(), 1);
-  Quadratic quadratic = QuadraticThrough(nearest, weights, reach);
+  Quadratic quadratic = QuadraticThrough(nearest, values, weights, reach);
   for (int round = 0; round < kRounds; ++round) {
-    const std::vector<double> misses = MissesOf(quadratic, nearest, reach);
+    const std::vector<double> misses = MissesOf(quadratic, nearest, values, reach);
     std::vector<double> sorted = misses;
-    const double width = std::max(kWidth * UpperMedian(sorted), 1e-12 * quadratic[0]);
+    const double width =
+        std::max({kWidth * UpperMedian(sorted), 1e-12 * std::abs(quadratic[0]), 1e-300});
     for (std::size_t k = 0; k < nearest.size(); ++k) {
       const double off = std::min(misses[k] / width, 1.0);
       weights[k] = (1 - off * off) * (1 - off * off);
     }
-    quadratic = QuadraticThrough(nearest, weights, reach);
+    quadratic = QuadraticThrough(nearest, values, weights, reach);
   }
   return quadratic[0];
+}
+
+template <class ValueOf>
+double ValueAtPole(const std::vector<NearPole>& nearest, const ValueOf& value_of) {
+  std::vector<double> values;
+  values.reserve(nearest.size());
+  for (const NearPole& p : nearest) {
+    values.push_back(value_of(p.point));
+  }
+  return ValueAtPole(nearest, std::span<const double>(values));
 }
 
 }  // namespace
@@ -186,11 +196,23 @@ EmptyRay WidestRay(const PolarSphere& sphere, std::span<const Vec3> points,
 }
 
 Poles PolesOf(const PolarSphere& sphere, std::span<const Vec3> points, std::span<const Vec2> uv) {
+  const auto distance = [&](std::size_t k) { return (points[k] - sphere.centre).norm(); };
   Poles poles;
   for (const int pole : {0, 1}) {
-    const std::vector<NearPole> nearest = NearestToPole(sphere, points, uv, pole);
     const double sense = pole == 0 ? -1 : 1;
-    poles[pole] = sphere.centre + sense * DistanceOfPole(nearest) * sphere.axis;
+    poles[pole] =
+        sphere.centre + sense * ValueAtPole(NearestToPole(uv, pole), distance) * sphere.axis;
+  }
+  return poles;
+}
+
+Poles PolesAmong(std::span<const Vec3> points, std::span<const Vec2> uv) {
+  Poles poles;
+  for (const int pole : {0, 1}) {
+    const std::vector<NearPole> nearest = NearestToPole(uv, pole);
+    for (const int c : {0, 1, 2}) {
+      poles[pole][c] = ValueAtPole(nearest, [&](std::size_t k) { return points[k][c]; });
+    }
   }
   return poles;
 }

@@ -48,4 +48,7 @@ using Poles = std::array<Vec3, 2>;
 //   uv: of the points, by AnglesAbout.
 Poles PolesOf(const PolarSphere& sphere, std::span<const Vec3> points, std::span<const Vec2> uv);
 
+// The same of a surface of any form over the angles: each coordinate has such a quadratic.
+Poles PolesAmong(std::span<const Vec3> points, std::span<const Vec2> uv);
+
 }  // namespace semblance

@@ -88,7 +88,7 @@ TriedSphere TrySphere(const Scan& points, const SphereParameters& asked) {
   if (!MayBeTaken(tried.over, asked.folds)) {
     tried.fault = fmt::format(
         "the points fold over the sphere, for rays from its centre meet them more than once: {}; "
-        "cut the mesh open and take parameters: mesh, or give u and v; or write folds: accept",
+        "if triangles close them, take parameters: mesh, else give u and v; or write folds: accept",
         FaultsText({tried.over}));
   }
   return tried;

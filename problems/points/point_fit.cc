@@ -47,8 +47,11 @@ std::string ClosureFault(ParameterSource source, Closure closure) {
   if (source == ParameterSource::kTorus && closure != Closure::kPeriodicUv) {
     return "parameters on a torus go round both ways; write closure: periodic_uv";
   }
-  if (closure != Closure::kOpen &&
-      (source == ParameterSource::kPlane || source == ParameterSource::kMesh)) {
+  if (closure == Closure::kPeriodicUv && source == ParameterSource::kMesh) {
+    return "parameters on a mesh do not go round both ways; write closure: periodic_u if it is "
+           "closed, else open";
+  }
+  if (closure != Closure::kOpen && source == ParameterSource::kPlane) {
     return fmt::format("parameters on a {} do not go round; write closure: open", NameOf(source));
   }
   return "";

@@ -116,7 +116,7 @@ struct PointFit {
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
-  std::optional<std::array<PoleGap, 2>> poles = {};  // of a sphere, at v = 0 and v = 1
+  std::optional<std::array<PoleGap, 2>> poles = {};  // on a sphere, at v = 0 and v = 1
   // Its point_rms_mm: each point counts as much as any other. The weights of its smoothness: as the
   // written terms have them.
   FitResult fit;
@@ -145,11 +145,12 @@ struct PointFit {
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
 // Throws InputError as Parametrise, StartSurface, Fit, FitJoined and FitAttributes do, for a
-// closure that does not suit the parameters (a cylinder and a sphere go round in u, a torus both
-// ways, a plane and a mesh do not), for joins of points without (u,v) of their own, for attributes
-// that the table has not, for a trim below what the points are apart, and for a chord so fine that
-// a coarse fit of some of the points has already shown surface.ply to be too large, and for moves
-// of (u,v) beside exact points. Reads the surfaces that are joined, and throws as OpenJoins does.
+// closure that does not suit the parameters (a cylinder, a sphere and a closed mesh go round in
+// u, a torus both ways, a plane and an open mesh do not), for joins of points without (u,v) of
+// their own, for attributes that the table has not, for a trim below what the points are apart, and
+// for a chord so fine that a coarse fit of some of the points has already shown surface.ply to be
+// too large, and for moves of (u,v) beside exact points. Reads the surfaces that are joined, and
+// throws as OpenJoins does.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // What the points came from.

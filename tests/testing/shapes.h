@@ -57,6 +57,23 @@ inline TriMesh SphereMesh(const Vec3& center, double radius, int rings) {
   return mesh;
 }
 
+// A torus of n x n squares of two triangles each, outward normals.
+inline TriMesh RingMesh(int n) {
+  TriMesh mesh;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      const double p = 2 * std::numbers::pi * i / n, t = 2 * std::numbers::pi * j / n;
+      mesh.points.emplace_back((30 + 10 * std::cos(t)) * std::cos(p),
+                               (30 + 10 * std::cos(t)) * std::sin(p), 10 * std::sin(t));
+      const int a = i + n * j, b = (i + 1) % n + n * j, c = i + n * ((j + 1) % n),
+                d = (i + 1) % n + n * ((j + 1) % n);
+      mesh.triangles.push_back({a, b, d});
+      mesh.triangles.push_back({a, d, c});
+    }
+  }
+  return mesh;
+}
+
 // Two meshes as one, in parts.
 inline TriMesh Joined(TriMesh a, const TriMesh& b) {
   const auto offset = static_cast<std::int32_t>(a.points.size());

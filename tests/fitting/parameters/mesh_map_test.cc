@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include "fitting/parameters/one_to_one.h"
@@ -103,7 +102,7 @@ TEST(MeshMap, WhatIsNoDiscIsRefusedWithWhatToDo) {
     return "no error";
   };
   const TriMesh plate = testing::Plate(10, 4), sphere = testing::SphereMesh({0, 0, 50}, 10, 8);
-  EXPECT_THAT(message(sphere), HasSubstr("closed"));
+  EXPECT_THAT(message(sphere), HasSubstr("it is closed"));
   EXPECT_THAT(message(sphere), HasSubstr("closure: periodic_u"));
   EXPECT_THAT(message(testing::Joined(plate, sphere)), HasSubstr("2 pieces"));
   TriMesh loose = plate;
@@ -120,20 +119,7 @@ TEST(MeshMap, WhatIsNoDiscIsRefusedWithWhatToDo) {
 
 // A torus with a triangle missing has a border, and a handle.
 TEST(MeshMap, AHandleIsCounted) {
-  constexpr int kAround = 12;
-  TriMesh torus;
-  for (int j = 0; j < kAround; ++j) {
-    for (int i = 0; i < kAround; ++i) {
-      const double p = 2 * std::numbers::pi * i / kAround, t = 2 * std::numbers::pi * j / kAround;
-      torus.points.emplace_back((30 + 10 * std::cos(t)) * std::cos(p),
-                                (30 + 10 * std::cos(t)) * std::sin(p), 10 * std::sin(t));
-      const int a = i + kAround * j, b = (i + 1) % kAround + kAround * j,
-                c = i + kAround * ((j + 1) % kAround),
-                d = (i + 1) % kAround + kAround * ((j + 1) % kAround);
-      torus.triangles.push_back({a, b, d});
-      torus.triangles.push_back({a, d, c});
-    }
-  }
+  TriMesh torus = testing::RingMesh(12);
   torus.triangles.pop_back();
   try {
     LayOut(torus, MeshMap::kAuto);

@@ -11,8 +11,10 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "tests/testing/closed_shapes.h"
 #include "tests/testing/grid_mesh.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
@@ -385,6 +387,42 @@ TEST(Parametrise, WhatFoldsOverTheSphereIsRefusedUnlessAccepted) {
   EXPECT_GT(Parametrise(twice, SphereParameters{.folds = FoldRule::kAccept}).faults.folded, 0.3);
   EXPECT_THAT(WordsOf({.positions = RingPoints(4000, 0)}, SphereParameters{}),
               ::testing::AnyOf(HasSubstr("fold over the sphere"), HasSubstr("all round")));
+}
+
+// Rays from no centre meet it once: its triangles are laid out on a sphere.
+TEST(Parametrise, AClosedMeshThatFoldsOverTheSphereIsLaidOutOnOne) {
+  const testing::ClosedShape bean = testing::Bean();
+  const TriMesh mesh = testing::MeshOf(bean, 3000, 0);
+  Scan scan{.positions = mesh.points, .triangles = mesh.triangles, .closure = Closure::kPeriodicU};
+  EXPECT_THAT(WordsOf(scan, SphereParameters{}), HasSubstr("take parameters: mesh"));
+  for (const Parameters& parameters :
+       {Parameters(AutoParameters{}), Parameters(MeshParameters{})}) {
+    const Parametrisation p = Parametrise(scan, parameters);
+    EXPECT_EQ(p.source, ParameterSource::kMesh);
+    EXPECT_EQ(p.how, "the mesh laid out on the sphere");
+    EXPECT_EQ(p.faults.Sum(), 0);
+    ASSERT_TRUE(p.poles);
+    for (const Vec3& pole : *p.poles) {
+      EXPECT_LT((pole - bean.FootOf(pole)).norm(), 1e-3);
+    }
+  }
+  scan.closure = Closure::kOpen;
+  EXPECT_THAT(WordsOf(scan, AutoParameters{}), HasSubstr("write closure: periodic_u"));
+  EXPECT_THAT(WordsOf(scan, MeshParameters{}), HasSubstr("write closure: periodic_u"));
+}
+
+TEST(Parametrise, AMeshThatIsNotClosedDoesNotGoRound) {
+  const TriMesh plate = testing::Plate(10, 8), ring = testing::RingMesh(20);
+  EXPECT_THAT(
+      WordsOf(
+          {.positions = plate.points, .triangles = plate.triangles, .closure = Closure::kPeriodicU},
+          MeshParameters{}),
+      HasSubstr("write closure: open"));
+  EXPECT_THAT(
+      WordsOf(
+          {.positions = ring.points, .triangles = ring.triangles, .closure = Closure::kPeriodicU},
+          AutoParameters{}),
+      HasSubstr("parameters: torus"));
 }
 
 // Two thirds of a sphere, as a scan: it folds over every plane, and its triangles are laid out. The

@@ -84,6 +84,29 @@ TEST(Sphere, PolesOfWhatIsNoSphereAreItsOwn) {
   }
 }
 
+// Coordinates of any surface over the angles, outliers apart.
+TEST(Sphere, PolesOfAnySurfaceAreWhereItsPointsLead) {
+  const auto place = [](const Vec2& uv) -> Vec3 {
+    const double t = std::numbers::pi * uv.y(), a = 2 * std::numbers::pi * uv.x();
+    const Vec2 from = std::sin(t) * Vec2(std::cos(a), std::sin(a));
+    return {5 * from.x() + std::cos(t), from.y() - 2 * from.x() * from.y(), 0};
+  };
+  Random random(5);
+  std::vector<Vec2> uv;
+  std::vector<Vec3> points;
+  for (int k = 0; k < 20000; ++k) {
+    const Vec3 d = Direction(random);
+    uv.emplace_back(Turns(d.y(), d.x()), std::acos(d.z()) / std::numbers::pi);
+    points.push_back(place(uv.back()));
+    if (k % 10 == 0) {
+      points.back() += Vec3(0, 3, 1);
+    }
+  }
+  const Poles poles = PolesAmong(points, uv);
+  EXPECT_LT((poles[0] - Vec3(1, 0, 0)).norm(), 1e-4);
+  EXPECT_LT((poles[1] - Vec3(-1, 0, 0)).norm(), 1e-4);
+}
+
 TEST(Sphere, TheWidestRayIsWhereNothingIs) {
   const PolarSphere sphere{.centre = kCentre, .axis = kAxis, .radius_mm = 30};
   Random random(3);

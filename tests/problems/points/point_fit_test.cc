@@ -20,6 +20,7 @@
 #include "problems/points/residual_files.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
+#include "tests/testing/closed_shapes.h"
 #include "tests/testing/point_csv.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
@@ -408,6 +409,51 @@ TEST(PointFit, ASphereIsFittedByEveryPlan) {
     EXPECT_LT((*result.poles)[0].gap_mm, 0.02);
     EXPECT_EQ(result.fit.residual_mm.size(), 3000u);
   }
+}
+
+PointTable MeshTable(const TriMesh& mesh) {
+  PointTable table;
+  table.positions = mesh.points;
+  table.triangles = mesh.triangles;
+  return table;
+}
+
+// A bent one, which no rays from a centre meet once each; also where (u,v) are moved.
+TEST(PointFit, ABeanIsFoundBelowItsNoiseAlsoAtItsPoles) {
+  constexpr double kNoise = 1e-3;
+  const testing::ClosedShape bean = testing::Bean();
+  const PointTable table = MeshTable(testing::MeshOf(bean, 10000, kNoise));
+  for (const int rounds : {0, 2}) {
+    PointFitOptions options;
+    options.closure = Closure::kPeriodicU;
+    options.sigma = true;
+    options.fit.plan = AutoPlan{.relaxation_rounds = rounds};
+    const PointFit result = FitPoints(table, options, {});
+    EXPECT_EQ(result.parameters, "mesh");
+    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
+    const HSplineSurface& surface = result.fit.surface;
+    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1).rms, 0.4 * kNoise);
+    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1.0 / 18).rms, kNoise);
+    EXPECT_LT(testing::ErrorsOf(surface, bean, 17.0 / 18, 1).rms, kNoise);
+    ASSERT_TRUE(result.poles);
+    for (const PoleGap& pole : *result.poles) {
+      EXPECT_LT(pole.gap_mm, kNoise);
+      EXPECT_LT((pole.place - bean.FootOf(pole.place)).norm(), kNoise);
+    }
+    EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
+  }
+}
+
+TEST(PointFit, AClosedMeshGivesTheSameBytesForAnyNumberOfThreads) {
+  const PointTable table = MeshTable(testing::MeshOf(testing::EllipsoidWithEars(), 3000, 1e-3));
+  PointFitOptions options;
+  options.closure = Closure::kPeriodicU;
+  options.parameters = MeshParameters{};
+  RunContext two_threads;
+  two_threads.threads = 2;
+  const PointFit one = FitPoints(table, options, {}), two = FitPoints(table, options, two_threads);
+  EXPECT_EQ(one.fit.uv, two.fit.uv);
+  EXPECT_EQ(one.fit.residual_mm, two.fit.residual_mm);
 }
 
 // At a hundred million mm, digits of a hundredth of a micrometre are left.
