@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -14,6 +15,8 @@
 
 namespace semblance {
 namespace {
+
+std::string_view NameOfMap(MeshMap map) { return EnumNames(map)[static_cast<std::size_t>(map)]; }
 
 TriMesh MeshOf(const Scan& points) {
   return {.points = {points.positions.begin(), points.positions.end()},
@@ -38,25 +41,7 @@ Parametrisation OnSphere(const Scan& points) {
           .poles = poles};
 }
 
-}  // namespace
-
-Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh) {
-  if (points.triangles.empty()) {
-    FailParameters(
-        "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces, "
-        "or take 'plane', 'cylinder' or 'sphere'");
-  }
-  if (points.closure == Closure::kPeriodicU) {
-    return OnSphere(points);
-  }
-  MeshLayout layout = LayOut(MeshOf(points), mesh.map);
-  const std::string_view map = EnumNames(layout.map)[static_cast<std::size_t>(layout.map)];
-  MapCandidate laid{.how = fmt::format("the mesh laid out by {}", map), .at = std::move(layout.at)};
-  laid.faults = MapFaultsOf(points, laid);
-  if (laid.faults.folded > kMostFaults) {
-    FailParameters(fmt::format("{} folds {} of it; take another map (mean_value does not fold)",
-                               laid.how, PercentText(laid.faults.folded)));
-  }
+Parametrisation FromPlaces(MapCandidate laid) {
   Parametrisation result{.uv = std::move(laid.at),
                          .source = ParameterSource::kMesh,
                          .how = std::move(laid.how),
@@ -64,6 +49,43 @@ Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh) {
   Normalise(0, "the mesh's u", result.uv);
   Normalise(1, "the mesh's v", result.uv);
   return result;
+}
+
+}  // namespace
+
+Parametrisation FromLayout(PointLayout layout) {
+  if (!layout.fault.empty()) {
+    FailParameters("triangles between the points make no open sheet: " + layout.fault);
+  }
+  std::string how = fmt::format("the points triangulated and laid out by {}, with {} corners",
+                                NameOfMap(layout.map), layout.corners);
+  if (layout.far_off > 0) {
+    how += fmt::format("; {} of the points lie off the triangles", layout.far_off);
+  }
+  return FromPlaces({.how = std::move(how), .at = std::move(layout.at), .faults = layout.faults});
+}
+
+Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh) {
+  if (points.triangles.empty() && points.closure != Closure::kOpen) {
+    FailParameters(
+        "type 'mesh' makes triangles of its own for open sheets alone; with closure: periodic_u "
+        "give a PLY, OBJ, STL or OFF with faces, or take 'sphere' or 'cylinder'");
+  }
+  if (points.triangles.empty()) {
+    return FromLayout(LayOutPoints(points.positions, mesh.map));
+  }
+  if (points.closure == Closure::kPeriodicU) {
+    return OnSphere(points);
+  }
+  MeshLayout layout = LayOut(MeshOf(points), mesh.map);
+  MapCandidate laid{.how = fmt::format("the mesh laid out by {}", NameOfMap(layout.map)),
+                    .at = std::move(layout.at)};
+  laid.faults = MapFaultsOf(points, laid);
+  if (laid.faults.folded > kMostFaults) {
+    FailParameters(fmt::format("{} folds {} of it; take another map (mean_value does not fold)",
+                               laid.how, PercentText(laid.faults.folded)));
+  }
+  return FromPlaces(std::move(laid));
 }
 
 }  // namespace semblance

@@ -48,11 +48,16 @@ Parametrisation ParametriseBy(const Scan& points, const AutoParameters&) {
   if (MayBeTaken(planes.back(), FoldRule::kRefuse)) {
     return TakePlane(std::move(planes.back()));
   }
-  if (points.triangles.empty()) {
-    FailParameters(fmt::format("the points fold over every plane: {}; {}", FaultsText(planes),
-                               OtherThanPlane()));
+  if (!points.triangles.empty()) {
+    return ParametriseBy(points, MeshParameters{});
   }
-  return ParametriseBy(points, MeshParameters{});
+  PointLayout layout = LayOutPoints(points.positions, MeshParameters{}.map);
+  if (!layout.fault.empty()) {
+    FailParameters(fmt::format(
+        "the points fold over every plane: {}; and triangles between them make no open sheet: {}",
+        FaultsText(planes), layout.fault));
+  }
+  return FromLayout(std::move(layout));
 }
 
 void CheckTriangles(const Scan& points) {
