@@ -78,6 +78,13 @@ DistanceQuantiles QuantilesOf(const FitResult& fit) {
 
 namespace {
 
+// A place on a seam has one vertex in the triangles, so that normals do not break there.
+int VertexAt(const FitGrid& grid, int i, int j) {
+  const bool across_u = grid.closure != Closure::kOpen && i == grid.columns - 1,
+             across_v = grid.closure == Closure::kPeriodicUv && j == grid.rows - 1;
+  return (across_u ? 0 : i) + grid.columns * (across_v ? 0 : j);
+}
+
 // Two per cell, but for those that are trimmed away.
 std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
   std::vector<Triangle> triangles;
@@ -89,7 +96,8 @@ std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
   };
   for (int j = 0; j + 1 < grid.rows; ++j) {
     for (int i = 0; i + 1 < grid.columns; ++i) {
-      const int a = i + grid.columns * j, b = a + 1, c = a + grid.columns, d = c + 1;
+      const int a = VertexAt(grid, i, j), b = VertexAt(grid, i + 1, j),
+                c = VertexAt(grid, i, j + 1), d = VertexAt(grid, i + 1, j + 1);
       add({a, b, d});
       add({a, d, c});
     }
@@ -100,7 +108,12 @@ std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
 }  // namespace
 
 FitGrid GridOf(const FitResult& fit, int threads) {
-  FitGrid grid{.columns = kGrid, .rows = kGrid, .mesh = {}, .rms_mm = {}, .kept = {}};
+  FitGrid grid{.columns = kGrid,
+               .rows = kGrid,
+               .closure = fit.surface.shape().closure,
+               .mesh = {},
+               .rms_mm = {},
+               .kept = {}};
   std::vector<Vec2> uv;
   for (int j = 0; j < grid.rows; ++j) {
     for (int i = 0; i < grid.columns; ++i) {
@@ -125,6 +138,7 @@ void TrimGrid(const TrimmedTo& trim, int threads, FitGrid& grid) {
 FitGrid Halved(const FitGrid& grid) {
   FitGrid half{.columns = (grid.columns + 1) / 2,
                .rows = (grid.rows + 1) / 2,
+               .closure = grid.closure,
                .mesh = {},
                .rms_mm = {},
                .kept = {}};

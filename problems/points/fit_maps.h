@@ -9,6 +9,7 @@
 #include "fitting/plan/fit_result.h"
 #include "fitting/problem/fit_schedule.h"
 #include "problems/points/fit_trim.h"
+#include "surfaces/hspline/hspline_shape.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
@@ -21,10 +22,11 @@ DistanceQuantiles QuantilesOf(const FitResult& fit);
 
 // The surface over a grid of (u,v), with the points' distances near each vertex.
 struct FitGrid {
-  int columns = 0, rows = 0;   // of vertices, from (0,0) to (1,1); row by row
-  TriMesh mesh;                // mm
-  std::vector<double> rms_mm;  // of the points around the vertex; NaN: none
-  std::vector<char> kept;      // of a trimmed surface: whether the vertex is part of it; else empty
+  int columns = 0, rows = 0;         // of vertices, from (0,0) to (1,1); row by row
+  Closure closure = Closure::kOpen;  // triangles meet across a seam in its first vertices
+  TriMesh mesh;                      // mm
+  std::vector<double> rms_mm;        // of the points around the vertex; NaN: none
+  std::vector<char> kept;  // of a trimmed surface: whether the vertex is part of it; else empty
 };
 FitGrid GridOf(const FitResult& fit, int threads);
 // Leaves out the triangles that have more than one vertex beyond the distance.

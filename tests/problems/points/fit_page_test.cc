@@ -63,6 +63,18 @@ TEST(FitMaps, TheGridIsTheSurfaceAndHoldsTheDistances) {
   EXPECT_GT(largest, fit.fit.point_rms_mm);
 }
 
+TEST(FitMaps, TheGridIsClosedAsTheSurfaceIs) {
+  const auto border_edges = [](Closure closure) {
+    FitResult fit = FitPoints(Points(30), Adaptive(0.01, 0), {}).fit;
+    fit.surface = testing::PlainStart({.patches_u = 4, .patches_v = 4, .closure = closure});
+    return BorderEdges(GridOf(fit, 1).mesh).size();
+  };
+  const std::size_t open = border_edges(Closure::kOpen);
+  EXPECT_EQ(open % 4, 0U);
+  EXPECT_EQ(border_edges(Closure::kPeriodicU), open / 2);
+  EXPECT_EQ(border_edges(Closure::kPeriodicUv), 0U);
+}
+
 TEST(FitMaps, QuantilesAreThoseOfAllFigures) {
   for (const int count : {1, 2, 3, 20, 21, 40, 1000}) {
     PointFit fit = FitPoints(Points(30), Adaptive(0.01, 0), {});
