@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <sstream>
 
 #include "problems/bust/bust_model.h"
@@ -18,6 +19,7 @@
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/pipeline/make_face.h"
 #include "problems/pipeline/stage_key.h"
+#include "problems/prior/feature_rules.h"
 #include "problems/subject/network_file.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/csv.h"
@@ -131,6 +133,17 @@ void LookAtMap(const DepthMap& map) {
   InterpolateDepth(map, {point, up, dowels, DowelNetwork{}}, {});
 }
 
+// Notes on rules that do not apply, as a run tells them.
+Lines NotesOnRules(const Experiment& experiment, const Case& subject, StageCache& loaded,
+                   const RunContext& context) {
+  std::shared_ptr<const LoadedPrior> prior;
+  if (AsksPrior(WayToFace(experiment))) {
+    prior = GivenPrior(experiment, LoadTemplate(experiment.face_template), loaded, context);
+  }
+  return NotesOnRules(experiment.rules, subject.points, subject.basis.sites.has_value(),
+                      prior ? &prior->face : nullptr);
+}
+
 bool NamesAFile(const Experiment& experiment) {
   return !NamedFiles(experiment.face_template).empty() || !NamedFiles(experiment.prior).empty() ||
          !NamedFiles(experiment.bust).empty() || !NamedFiles(experiment.face).empty();
@@ -223,12 +236,13 @@ CheckFindings InputCheck::LookAtFace(const Experiment& experiment) {
 
 CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
   if (IsMade(experiment) && UsesAllLandmarks(experiment) && experiment.sites.empty() &&
-      experiment.rules.points.empty()) {
+      experiment.rules.points.empty() && !AsksForRule(experiment.rules)) {
     return {};  // its landmarks lie on its bone
   }
   const std::string key =
       StageKey("case", experiment.subject, experiment.landmarks, experiment.tissue,
-               experiment.sites, experiment.network, experiment.rules, WayToFace(experiment));
+               experiment.sites, experiment.network, experiment.rules, WayToFace(experiment),
+               experiment.face_template, experiment.prior);
   return Once(key, [&](CheckFindings& found) {
     const auto subject = loaded_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
       return LoadSubject(experiment.subject, context_);
@@ -236,7 +250,11 @@ CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
     if (!IsMade(experiment)) {
       found.warnings = CheckSubject(*subject, experiment.landmarks);
     }
-    CheckFaceOptions(experiment, MakeCase(*subject, experiment));
+    const Case made = MakeCase(*subject, experiment);
+    CheckFaceOptions(experiment, made);
+    for (const std::string& note : NotesOnRules(experiment, made, loaded_, context_)) {
+      AddNew(note, found.warnings);
+    }
   });
 }
 

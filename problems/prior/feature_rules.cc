@@ -272,6 +272,11 @@ std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules) {
   return faults;
 }
 
+bool AsksForRule(const FeatureRules& rules) {
+  return std::ranges::any_of(EntriesOf(rules),
+                             [](const RuleEntry& rule) { return IsAskedFor(rule.use); });
+}
+
 std::vector<std::string> MistakesOfRulePoints(const FeatureRules& rules, const MeshQuery& skull,
                                               const Similarity* skull_from_average,
                                               const PlaceOptions& options) {

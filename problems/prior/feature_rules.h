@@ -95,6 +95,9 @@ const std::vector<std::string>& RulePointCodes();
 // An unknown name under `points`, as "points.NAME".
 std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules);
 
+// Whether a rule is asked for (use: true), wherever its points are.
+bool AsksForRule(const FeatureRules& rules);
+
 // What is wrong with `points` on a subject's skull, a line each: one that is further from the bone
 // than a landmark may be (options.max_distance_mm), and one on the other side of the head than its
 // name says, as when _l and _r are exchanged. skull_from_average: as MarksOfRules; null where the

@@ -105,6 +105,18 @@ TEST_F(InputCheckTest, WhatRulesAndSitesSayOfAPhantomIsLookedAt) {
               Contains(HasSubstr("rounds: `face: placed` does not look at it")));
 }
 
+TEST_F(InputCheckTest, ARuleThatDoesNotApplyIsTold) {
+  const std::string base =
+      fmt::format("base: {}/phantom.yaml\nsubject: {{type: phantom, rings: 20}}\n", kConfigs);
+  const std::string asked = "rules: {mouth_width: {use: true}}\n";
+  const auto lacks =
+      Contains(HasSubstr("rules.mouth_width is on, and it lacks uc_l, uc_r under rules.points"));
+  EXPECT_THAT(Look(base + asked + "template: ict\nface: prior\n").warnings, lacks);
+  EXPECT_THAT(Look(base + asked + "face: fit\n").warnings,
+              Contains(HasSubstr("rules.mouth_width is on, and the face asks no prior")));
+  EXPECT_THAT(Look(base + "template: ict\nface: prior\n").warnings, IsEmpty());
+}
+
 TEST_F(InputCheckTest, AKnownDepthIsOneWhereTheTableHasNone) {
   const CheckFindings found = Look(fmt::format(
       "base: {0}/phantom.yaml\ntissue: {{depths: table, table: {0}/tables/t_table_2023.yaml, "
