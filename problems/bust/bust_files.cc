@@ -62,7 +62,7 @@ std::string MaterialName(const std::string& material) {
   return material.empty() ? "skin" : material;
 }
 
-// Of its material, or the colours of its points.
+// Of its material; the colours of its points stay beside it.
 void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
   piece.name = MaterialName(material);
   piece.colour = PlainColour(obj);
@@ -70,7 +70,6 @@ void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
     const Vec3& c = found->second.colour;
     piece.colour = {c.x(), c.y(), c.z()};
     piece.texture = found->second.texture;
-    piece.colours.clear();
   }
   if (obj.texture.empty()) {
     piece.uv.clear();

@@ -33,8 +33,10 @@
 namespace semblance {
 namespace {
 
+using ::testing::DoubleNear;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Pointwise;
 using ::testing::ThrowsMessage;
 
 // The head that the program carries, with few triangles.
@@ -265,6 +267,23 @@ class ObjBust : public ::testing::Test {
   static nlohmann::json JsonOf(const std::string& glb) {
     return nlohmann::json::parse(glb.substr(20, Word(glb, 12)));
   }
+  // COLOR_0 of a part of the GLB: linear red, green, blue and opacity of each point, 0..1.
+  static std::vector<double> ColoursOf(const std::string& glb, const nlohmann::json& part) {
+    if (!part["attributes"].contains("COLOR_0")) {
+      return {};
+    }
+    const nlohmann::json json = JsonOf(glb);
+    const auto& accessor = json["accessors"][part["attributes"]["COLOR_0"].get<int>()];
+    const auto& view = json["bufferViews"][accessor["bufferView"].get<int>()];
+    const std::size_t at = 28 + Word(glb, 12) + view["byteOffset"].get<std::size_t>();
+    std::vector<double> colours;
+    for (std::size_t k = 0; k < 2 * accessor["count"].get<std::size_t>(); ++k) {
+      const std::uint32_t two = Word(glb, at + 4 * k);
+      colours.push_back((two & 0xffff) / 65535.0);
+      colours.push_back((two >> 16) / 65535.0);
+    }
+    return colours;
+  }
   const testing::ScratchFolder folder_;
 };
 
@@ -356,6 +375,32 @@ TEST_F(ObjBust, ATextureIsAPngOrAJpeg) {
   }
 }
 
+// COLOR_0 of the four points where each is 1 0.5 0: red is full, green 128 of 255 of sRGB.
+std::vector<double> OrangePoints() {
+  std::vector<double> colours;
+  for (int point = 0; point < 4; ++point) {
+    colours.insert(colours.end(), {1.0, 0.2158605, 0.0, 1.0});
+  }
+  return colours;
+}
+
+TEST_F(ObjBust, HasTheColoursOfItsPointsBesideItsMaterials) {
+  Write("skin.png", kPng);
+  Write("head.mtl", "newmtl face\nKd 0 1 0\nnewmtl cloth\nmap_Kd skin.png\n");
+  WriteObj("mtllib head.mtl\n", "usemtl face\nf 1 2 3 4\nusemtl cloth\nf 1 2 3 4\n", " 1 0.5 0");
+  const std::string glb = Files().at("bust.glb");
+  const auto json = JsonOf(glb);
+  const auto& parts = json["meshes"][0]["primitives"];
+  ASSERT_EQ(parts.size(), 2u);
+  for (const auto& part : parts) {
+    EXPECT_THAT(ColoursOf(glb, part), Pointwise(DoubleNear(1e-5), OrangePoints()));
+    const auto& look = json["materials"][part["material"].get<int>()];
+    EXPECT_EQ(look["pbrMetallicRoughness"].contains("baseColorTexture"), look["name"] == "cloth");
+    EXPECT_EQ(look["pbrMetallicRoughness"]["baseColorFactor"] == nlohmann::json({0, 1, 0, 1}),
+              look["name"] == "face");
+  }
+}
+
 TEST_F(ObjBust, WithoutMaterialsHasASkin) {
   WriteObj("# mine\n", "f 1 2 3 4\n", " 1 0.5 0");
   const auto files = Files();
@@ -365,15 +410,8 @@ TEST_F(ObjBust, WithoutMaterialsHasASkin) {
   EXPECT_THAT(files.at("bust.mtl"), ::testing::StartsWith("newmtl skin\nKd 1 1 1\n"));
   const auto json = JsonOf(files.at("bust.glb"));
   EXPECT_EQ(json["materials"][0]["name"], "skin");
-  const auto& part = json["meshes"][0]["primitives"][0];
-  ASSERT_TRUE(part["attributes"].contains("COLOR_0"));
-  const int colour = part["attributes"]["COLOR_0"];
-  EXPECT_EQ(json["accessors"][colour]["count"], 4);
-  const std::string& glb = files.at("bust.glb");
-  const int view = json["accessors"][colour]["bufferView"];
-  const std::size_t at = 28 + Word(glb, 12) + json["bufferViews"][view]["byteOffset"].get<int>();
-  EXPECT_EQ(Word(glb, at) & 0xffff, 65535u);  // red is full, green 128 of 255 of sRGB
-  EXPECT_NEAR((Word(glb, at) >> 16) / 65535.0, 0.2158605, 1e-5);
+  EXPECT_THAT(ColoursOf(files.at("bust.glb"), json["meshes"][0]["primitives"][0]),
+              Pointwise(DoubleNear(1e-5), OrangePoints()));
   // Without colours it is of the colour of skin; a name of a material stays.
   WriteObj("", "f 1 2 3\nusemtl hair\nf 1 3 4\n");
   EXPECT_THAT(Files().at("bust.obj"), HasSubstr("usemtl skin\nf 1 2 3\nusemtl hair\nf 1 3 4\n"));
