@@ -292,7 +292,7 @@ class TreeBuilder : public YAML::EventHandler {
 // The state of one loading: what has been read so far, for cycles and for the order of errors.
 struct Loading {
   ConfigErrors& errors;
-  int next_order = 0;
+  int next_order = 0;                             // how many files have been read
   std::vector<std::filesystem::path> chain = {};  // the files that lie above, canonical
 };
 
@@ -312,8 +312,8 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
   if (std::find(loading.chain.begin(), loading.chain.end(), canonical) != loading.chain.end()) {
     return fail(fmt::format("'{}' would be its own base", base.text));
   }
-  if (loading.chain.size() > kDeepestConfig) {
-    return fail(fmt::format("more than {} bases of bases", kDeepestConfig));
+  if (loading.next_order > static_cast<int>(kDeepestConfig)) {
+    return fail(fmt::format("more than {} bases, with theirs", kDeepestConfig));
   }
   std::string text;
   try {
@@ -322,6 +322,18 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
     return fail(fmt::format("{}; paths are relative to this file", e.what()));
   }
   return LoadDocument(text, base_file, loading);
+}
+
+// One base, or a list of them: each lies over those before it.
+ConfigNode LoadBases(const ConfigNode& bases, const std::filesystem::path& file, Loading& loading) {
+  if (!bases.IsList() || bases.items.empty()) {
+    return LoadBase(bases, file, loading);
+  }
+  ConfigNode tree = ConfigNode::Map();
+  for (const ConfigNode& base : bases.items) {
+    tree = MergeTrees(std::move(tree), LoadBase(base, file, loading));
+  }
+  return tree;
 }
 
 ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file,
@@ -343,10 +355,12 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
   if (entry == tree.entries.end()) {
     return tree;
   }
-  const ConfigNode base = std::move(entry->value);
+  const ConfigNode bases = std::move(entry->value);
   tree.entries.erase(entry);
   loading.chain.push_back(std::filesystem::weakly_canonical(file));
-  return MergeTrees(LoadBase(base, file, loading), tree);
+  ConfigNode below = LoadBases(bases, file, loading);
+  loading.chain.pop_back();
+  return MergeTrees(std::move(below), tree);
 }
 
 // One override laid over `tree`. `order` puts its errors among those of other sources.

@@ -10,9 +10,9 @@
 // keys, tabs, a second document. All errors are reported at once, one per line, as
 //     file:line:column: path: what; did you mean 'x'?
 //
-// `base: other.yaml` at the top lays the file over another one: maps merge key by key, lists and
-// scalars replace, a variant of another `type` replaces wholly. Bases may have bases. Paths are
-// relative to the file they are written in.
+// `base: other.yaml` at the top lays the file over another one, `base: [a.yaml, b.yaml]` over
+// b.yaml and that over a.yaml: maps merge key by key, lists and scalars replace, a variant of
+// another `type` replaces wholly. Bases may have bases. Paths are relative to their own file.
 //
 // Overrides ("a.b[0].c=v", v in YAML) come last and name themselves in errors: `--set a.b=c: ...`.
 // Paths in them are relative to the current folder. They reach into default lists and variants too.

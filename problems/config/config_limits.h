@@ -6,7 +6,7 @@
 
 namespace semblance {
 
-// Maps and lists within each other, steps of a path, bases of bases.
+// Maps and lists within each other, steps of a path, bases with theirs.
 inline constexpr std::size_t kDeepestConfig = 64;
 // Of one map; they are looked for one by one.
 inline constexpr int kMostKeys = 10'000;

@@ -173,8 +173,12 @@ std::string SchemaText(const ConfigType& type) {
   schema.update(TypeSchema(type, FieldInfo{}));
   if (type.kind == Kind::kStruct && !schema["properties"].contains("base")) {
     schema["properties"]["base"] = {
-        {"type", "string"},
-        {"description", "file that this one is laid over, relative to this file"}};
+        {"type", Json::array({"string", "array"})},
+        {"items", {{"type", "string"}}},
+        {"minItems", 1},
+        {"description",
+         "file that this one is laid over, relative to this file; of a list, each lies over those "
+         "before it"}};
   }
   return schema.dump(2) + "\n";
 }

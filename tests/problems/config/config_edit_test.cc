@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Bases, overrides, resolved text, reference and schema.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -81,6 +82,28 @@ TEST_F(ConfigFiles, ABaseLiesBelowKeyByKey) {
                                 {"a", 1.0}, {"b", std::nullopt}, {"c", 3.0}}));
 }
 
+TEST_F(ConfigFiles, OfSeveralBasesEachLiesOverThoseBeforeIt) {
+  Write("sub/shared.yaml", "count: 9\n");
+  Write("sub/first.yaml", "base: shared.yaml\nlabel: first\nskull: f.ply\nemitter: flat\n");
+  Write("second.yaml", "base: sub/shared.yaml\nlabel: second\nemitter: {type: thesis, decay: 3}\n");
+  const Options options = ReadConfig<Options>(
+      Write("top.yaml", "base: [sub/first.yaml, second.yaml]\nlast: {level: 3}\n"));
+  EXPECT_EQ(options.label, "second");
+  EXPECT_EQ(options.count, 9);  // both may have a base of their own, and the same one
+  EXPECT_EQ(options.skull, folder_ / "sub" / "f.ply");
+  EXPECT_EQ(options.emitter, decltype(Options::emitter)(Thesis{3}));
+  EXPECT_EQ(options.last.level, 3);
+}
+
+// Each file names the next one twice: 2^70 files, if all were read.
+TEST_F(ConfigFiles, BasesAreNotReadWithoutEnd) {
+  for (int k = 0; k < 70; ++k) {
+    Write(fmt::format("{}.yaml", k), fmt::format("base: [{0}.yaml, {0}.yaml]\n", k + 1));
+  }
+  Write("70.yaml", "count: 1\n");
+  EXPECT_THAT(ErrorsOf(folder_ / "0.yaml"), HasSubstr("base: more than 64 bases, with theirs"));
+}
+
 TEST_F(ConfigFiles, AnotherTypeReplacesAVariantWholly) {
   Write("base.yaml", "emitter: {type: flat, rings: 7}\n");
   const auto other = Write("other.yaml", "base: base.yaml\nemitter: {type: thesis}\n");
@@ -104,8 +127,12 @@ TEST_F(ConfigFiles, BadBasesAreErrorsWithTheirPlace) {
                                 ":1:8: count: 0 is out of range; allowed is 1 to 100\n" +
                                 lost.string() + ":2:7: base: " + (folder_ / "none.yaml").string() +
                                 ": no such file; paths are relative to this file");
-  EXPECT_THAT(ErrorsOf(Write("list.yaml", "base: [a]\n")),
-              HasSubstr("expected the path of a file"));
+  for (const char* no_file : {"base: []\n", "base: {a: b}\n", "base: [[a]]\n", "base: [\"\"]\n"}) {
+    EXPECT_THAT(ErrorsOf(Write("list.yaml", no_file)), HasSubstr("expected the path of a file"));
+  }
+  EXPECT_THAT(
+      ErrorsOf(Write("list.yaml", "base: [lost.yaml, other.yaml]\n")),
+      HasSubstr("list.yaml:1:19: base: " + (folder_ / "other.yaml").string() + ": no such"));
   Write("wrong.yaml", "count: x\n");
   EXPECT_EQ(ErrorsOf(Write("over.yaml", "base: wrong.yaml\n")),
             (folder_ / "wrong.yaml").string() + ":1:8: count: expected a whole number, found 'x'");
@@ -319,6 +346,7 @@ TEST(OptionsSchema, IsJsonAndHasEveryPathOfTheReference) {
   }
   EXPECT_EQ(count, 26);
   EXPECT_TRUE(paths.contains("base"));
+  EXPECT_EQ(schema["properties"]["base"]["type"], nlohmann::json({"string", "array"}));
   const auto& radius = schema["properties"]["radius_mm"];
   EXPECT_EQ(radius["type"], "number");
   EXPECT_EQ(radius["minimum"], 0);

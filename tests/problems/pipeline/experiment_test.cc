@@ -11,6 +11,7 @@
 
 #include "problems/face_template/template_io.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/pipeline/stage_key.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
@@ -114,6 +115,30 @@ TEST(Experiment, APriorThatIsAskedNamesItsFiles) {
 }
 
 TEST(Experiment, TheDefaultsFitTogether) { EXPECT_THAT(FaultsBetween(Experiment{}), IsEmpty()); }
+
+// configs/published.yaml over a subject: the way of the thesis, and the subject's own depths.
+TEST(Experiment, ThePublishedWayIsOneBaseAway) {
+  const testing::ScratchFolder folder;
+  const std::string configs = SEMBLANCE_SOURCE_DIR "/configs/";
+  const Experiment demo = ReadConfig<Experiment>(configs + "demo.yaml");
+  const Experiment published = ReadConfigText<Experiment>(
+      fmt::format("base: [{0}demo.yaml, {0}published.yaml]\n", configs), folder / "e.yaml");
+  EXPECT_THAT(FaultsBetween(published), IsEmpty());
+  EXPECT_EQ(StageKey("", published.subject), StageKey("", demo.subject));
+  EXPECT_EQ(StageKey("", published.tissue), StageKey("", demo.tissue));
+  EXPECT_TRUE(std::holds_alternative<FormulaTemplate>(published.face_template));
+  EXPECT_TRUE(std::holds_alternative<FittedTemplate>(WayToFace(published)));
+  EXPECT_TRUE(std::holds_alternative<Barycentric>(published.interp));
+  EXPECT_TRUE(std::holds_alternative<RestoreFeatures>(published.fit.features));
+  EXPECT_TRUE(std::holds_alternative<NoRelaxation>(published.fit.relaxation));
+  EXPECT_EQ(published.seeds.weight, 1);
+  const std::vector<ScheduleStep> steps = StepsOf(published.fit.plan), thesis = PublishedSchedule();
+  ASSERT_EQ(steps.size(), thesis.size());
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    EXPECT_EQ(steps[k].level, thesis[k].level);
+    EXPECT_EQ(steps[k].fraction, thesis[k].fraction);
+  }
+}
 
 TEST(Experiment, AStepAtALevelThatTheFaceLacksIsToldAtItsLine) {
   EXPECT_EQ(Faults("template: {type: formula, max_level: 2}\n"
