@@ -36,14 +36,16 @@ struct Scene {
   double lowest = kNaN, highest = kNaN;
 };
 
-Scene Split(FitTarget all) {
+constexpr std::size_t kTenth = 9;  // that is held out where one is
+
+Scene Split(FitTarget all, std::size_t tenth = kTenth) {
   Scene scene;
   for (std::size_t k = 0; k < all.points.size(); ++k) {
     FitPoint& p = all.points[k];
     p.position.head<2>() = p.uv;  // a height field, as the peers see it
     scene.lowest = std::fmin(scene.lowest, p.position.z());
     scene.highest = std::fmax(scene.highest, p.position.z());
-    (k % 10 == 9 ? scene.held : scene.fitted.points).push_back(p);
+    (k % 10 == tenth ? scene.held : scene.fitted.points).push_back(p);
   }
   return scene;
 }
@@ -63,7 +65,7 @@ Scene SheetScene() {
 // The front of a head's skin down to 200 mm below its top, as distances from a vertical axis over
 // angle and height; of what lies behind each other, as in airways, the outermost. None
 // without the mesh, which lies beside the project.
-std::optional<Scene> FaceScene(const std::string& person) {
+std::optional<FitTarget> FacePoints(const std::string& person) {
   constexpr double kDown_mm = 200, kSide_deg = 55, kCell_mm = 2, kSkin_mm = 1;
   const std::filesystem::path path =
       std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "../shared/data" / person / "skin.ply";
@@ -101,7 +103,7 @@ std::optional<Scene> FaceScene(const std::string& person) {
   std::erase_if(face.points, [&](const FitPoint& p) {
     return p.position.z() < farthest.at(cell_of(p)) - kSkin_mm;
   });
-  return Split(std::move(face));
+  return face;
 }
 
 double RmsAt(const std::vector<FitPoint>& points, const Height& height) {
@@ -227,23 +229,40 @@ void RunSheet() {
   Print("fit.sheet_gap_max_vs_range_of_mba", mba.largest_mm, kNaN, kNaN, "1");
 }
 
+// A tenth is a few dozen points at steps; all ten in turn are every point once. MBA with the number
+// of levels that is best for each tenth.
+void RunAllTenths(const std::string& person, const FitTarget& face) {
+  double ours = 0, mba = 0;
+  for (std::size_t tenth = 0; tenth < 10; ++tenth) {
+    const Scene scene = Split(face, tenth);
+    const auto count = static_cast<double>(scene.held.size());
+    ours += std::pow(MeasureApart([&] { return FitUntold(scene); }).rms_mm, 2) * count;
+    mba += std::pow(BestMba(scene).rms_mm, 2) * count;
+  }
+  const auto count = static_cast<double>(face.points.size());
+  Print("fit.untuned.skin_" + person + "_each_tenth_rms_vs_mba", std::sqrt(ours / count),
+        std::sqrt(mba / count), 1 / 1.1, "mm");
+}
+
 // Against the peer that is best on the very points held out.
 void RunFaces() {
   for (const std::string person : {"vhm", "cthead", "cranium"}) {
     const std::string name = "fit.untuned.skin_" + person + "_heldout_rms_vs_best_peer";
-    const std::optional<Scene> scene = FaceScene(person);
-    if (!scene) {
+    const std::optional<FitTarget> face = FacePoints(person);
+    if (!face) {
       fmt::print(stderr, "no skin of {}: {} is skipped\n", person, name);
       continue;
     }
-    const Measured ours = MeasureApart([&] { return FitUntold(*scene); });
-    const Measured mba = BestMba(*scene), fitpack = BestFitpack(*scene);
+    const Scene scene = Split(*face);
+    const Measured ours = MeasureApart([&] { return FitUntold(scene); });
+    const Measured mba = BestMba(scene), fitpack = BestFitpack(scene);
     PrintScene(name, ours, std::fmin(mba.rms_mm, fitpack.rms_mm), 1 / 1.1);
     fmt::print(stderr,
                "{}: {} points; ours {:.3f} mm in {:.2f} s, MBA {:.3f} in {:.2f}, FITPACK "
                "{:.3f} in {:.1f}\n",
-               person, scene->fitted.points.size(), ours.rms_mm, ours.seconds, mba.rms_mm,
+               person, scene.fitted.points.size(), ours.rms_mm, ours.seconds, mba.rms_mm,
                mba.seconds, fitpack.rms_mm, fitpack.seconds);
+    RunAllTenths(person, *face);
   }
 }
 
