@@ -28,7 +28,7 @@ PolarSphere SphereFor(const SphereParameters& asked, std::span<const Vec3> point
   if (!axis.allFinite()) {
     FailParameters("the sphere's axis is not finite; give three numbers");
   }
-  const PolarSphere sphere = SphereThrough(points, axis.isZero(0) ? OddAxisOf(principal) : axis);
+  PolarSphere sphere = SphereThrough(points, axis.isZero(0) ? OddAxisOf(principal) : axis);
   if (!sphere.centre.allFinite() || !(sphere.radius_mm > 0)) {
     FailParameters(
         "no sphere goes near the points, which lie on a plane or in one place; give u and v");

@@ -67,10 +67,10 @@ std::string_view LineFrom(std::span<const std::string_view> lines, const YAML::M
 bool ClosesQuote(std::string_view line) {
   const char quote = line.front();
   for (std::size_t k = 1; k < line.size(); ++k) {
-    if (quote == '"' && line[k] == '\\') {
-      ++k;  // what is escaped closes nothing
-    } else if (line[k] == quote && quote == '\'' && line.substr(k + 1).starts_with(quote)) {
-      ++k;  // '' stands for one
+    const bool escapes = quote == '"' && line[k] == '\\';  // what follows closes nothing
+    const bool stands_for_one = quote == '\'' && line.substr(k).starts_with("''");
+    if (escapes || stands_for_one) {
+      ++k;
     } else if (line[k] == quote) {
       return true;
     }
