@@ -131,9 +131,34 @@ def scan(draw):
         for i in range(n - 1):
             a = n * j + i
             faces += [f"3 {a} {a + 1} {a + n + 1}", f"3 {a} {a + n + 1} {a + n}"]
+    return ply(points, faces)
+
+
+def ply(points, faces):
     head = ["ply", "format ascii 1.0", f"element vertex {len(points)}", "property double x", "property double y", "property double z",
             f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
     return "\n".join(head + points + faces) + "\n"
+
+
+def closed_scan(draw):
+    """A ball of triangles, for a mesh that closes: 11 circles of 12 points between two poles."""
+    n, circles = 12, 11
+
+    def point(theta, phi):
+        r = 1 + draw.gauss(0, 0.01)
+        return f"{r * math.sin(theta) * math.cos(phi):.6f} {r * math.sin(theta) * math.sin(phi):.6f} {r * math.cos(theta):.6f}"
+
+    points = [point(0, 0), point(math.pi, 0)]
+    points += [point(math.pi * (j + 1) / (circles + 1), 2 * math.pi * i / n) for j in range(circles) for i in range(n)]
+    faces = []
+    for i in range(n):
+        k = (i + 1) % n
+        last = 2 + n * (circles - 1)
+        faces += [f"3 0 {2 + i} {2 + k}", f"3 1 {last + k} {last + i}"]
+        for j in range(circles - 1):
+            a = 2 + n * j
+            faces += [f"3 {a + i} {a + n + i} {a + n + k}", f"3 {a + i} {a + n + k} {a + k}"]
+    return ply(points, faces)
 
 
 def ring(draw):
@@ -216,6 +241,7 @@ class Runner:
             (self.folder / "scan.ply").write_text(scan(draw))
             (self.folder / "ring.csv").write_text(ring(draw))
             (self.folder / "ball.csv").write_text(ball(draw))
+            (self.folder / "closed.ply").write_text(closed_scan(draw))
             return {"configs": self.configs, "first": first}
         code, said, _ = call([self.program, "run", "base.yaml", "--out", "first", "--quiet"], self.folder)
         if code != 0:
@@ -229,7 +255,8 @@ class Runner:
     def write(self, tree):
         parameters = tree.get("parameters")
         kind = parameters.get("type") if isinstance(parameters, dict) else parameters
-        self.points = {"mesh": "scan.ply", "sphere": "ball.csv", "torus": "ring.csv"}.get(kind, "points.csv")
+        mesh = "closed.ply" if tree.get("closure") == "periodic_u" else "scan.ply"
+        self.points = {"mesh": mesh, "sphere": "ball.csv", "torus": "ring.csv"}.get(kind, "points.csv")
         (self.folder / "case.yaml").write_text(yaml({"base": "base.yaml", **tree}))
 
     def check(self, trees):
