@@ -62,7 +62,8 @@ std::string MaterialName(const std::string& material) {
   return material.empty() ? "skin" : material;
 }
 
-// Of its material; the colours of its points stay beside it.
+// Of its material. The colours of its points stay beside a plain one; beside a picture, which most
+// often has them too, they would show twice.
 void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
   piece.name = MaterialName(material);
   piece.colour = PlainColour(obj);
@@ -70,6 +71,9 @@ void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
     const Vec3& c = found->second.colour;
     piece.colour = {c.x(), c.y(), c.z()};
     piece.texture = found->second.texture;
+    if (!piece.texture.empty()) {
+      piece.colours.clear();
+    }
   }
   if (obj.texture.empty()) {
     piece.uv.clear();
