@@ -44,19 +44,40 @@ void SumUp(const GridLayout& finer, const std::vector<double>& of_finer, double 
   }
 }
 
-// vertices^T form vertices.
-SEMBLANCE_WIDE double QuadraticForm(const double* form, const double* vertices) {
-  double sums[16] = {};
+// Of patches side by side: where the first one's sixteen vertices begin, row by row.
+using PatchRows = std::array<const double*, 4>;
+
+SEMBLANCE_INLINE Wider FormOfEight(const Matrix16& form, const PatchRows& rows, int first) {
+  Wider vertices[16];
   for (int k = 0; k < 16; ++k) {
-    for (int l = 0; l < 16; ++l) {
-      sums[l] += form[16 * k + l] * vertices[k];
+    vertices[k] = EightAt(rows[k / 4] + first + k % 4);
+  }
+  Wider sum = {};
+  for (int k = 0; k < 16; ++k) {
+    Wider row = 0.5 * form(k, k) * vertices[k];
+    for (int l = k + 1; l < 16; ++l) {
+      row += form(k, l) * vertices[l];
     }
+    sum += vertices[k] * row;
   }
-  double sum = 0;
-  for (int l = 0; l < 16; ++l) {
-    sum += sums[l] * vertices[l];
+  return 2 * sum;
+}
+
+// The sum of vertices^T form vertices over patches side by side. The last eight may reach into the
+// room behind a row.
+SEMBLANCE_WIDE double SumOfForms(const Matrix16& form, const PatchRows& rows, int count) {
+  constexpr int kBlock = GridLayout::kBlock;
+  Wider sum = {};
+  int first = 0;
+  for (; first + kBlock <= count; first += kBlock) {
+    sum += FormOfEight(form, rows, first);
   }
-  return sum;
+  double all = SumOfEight(sum);
+  const Wider rest = first < count ? FormOfEight(form, rows, first) : Wider{};
+  for (int k = 0; k < count - first; ++k) {
+    all += rest[k];
+  }
+  return all;
 }
 
 // Of a patch; the halo must be filled.
@@ -225,20 +246,30 @@ double NestedSolve::MakeEnergyDiagonals() {
   return sum;
 }
 
+// visit(i, j, count): of leaves of a level side by side.
+template <class Visit>
+void NestedSolve::ForEachLeafRun(int level, const Visit& visit) const {
+  const std::vector<char>& leaves = levels_[level].leaves;
+  const PatchGrid& grid = (*space_)[level].layout.grid;
+  for (int j = 0; (*space_)[level].leaves && j < grid.patches_v; ++j) {
+    const char* const row = leaves.data() + (*space_)[level].layout.Patch(0, j);
+    const char* const end = row + grid.patches_u;
+    for (const char* at = std::find(row, end, 1); at != end;) {
+      const char* const behind = std::find(at, end, 0);
+      visit(static_cast<int>(at - row), j, static_cast<int>(behind - at));
+      at = std::find(behind, end, 1);
+    }
+  }
+}
+
 // Adds to the matrices what form_of(system) is, once per leaf.
 template <class FormOf>
 void NestedSolve::AddToLeaves(const FormOf& form_of) {
   for (int level = 0; level <= Finest(); ++level) {
     LevelSystem& system = levels_[level];
-    const GridLayout& layout = (*space_)[level].layout;
     const Matrix16 form = form_of(system);
-    for (int j = 0; (*space_)[level].leaves && j < layout.grid.patches_v; ++j) {
-      for (int i = 0; i < layout.grid.patches_u; ++i) {
-        if (system.leaves[layout.Patch(i, j)] != 0) {
-          system.matrix.AddPatch(i, j, form);
-        }
-      }
-    }
+    ForEachLeafRun(level,
+                   [&](int i, int j, int count) { system.matrix.AddPatches(i, j, count, form); });
   }
 }
 
@@ -380,47 +411,38 @@ double NestedSolve::SumOfSquares() {
   return sum;
 }
 
-// visit(level, vertices): the sixteen of each leaf, channel by channel.
-template <class Visit>
-void NestedSolve::ForEachLeafOfSolution(const Visit& visit) {
-  Absolute(solution_);
-  std::array<double, 16> vertices;
-  for (int level = 0; level <= Finest(); ++level) {
-    const LevelSystem& system = levels_[level];
-    const GridLayout& layout = (*space_)[level].layout;
-    for (int j = 0; (*space_)[level].leaves && j < layout.grid.patches_v; ++j) {
-      for (int i = 0; i < layout.grid.patches_u; ++i) {
-        for (int c = 0; system.leaves[layout.Patch(i, j)] != 0 && c < points_.channels; ++c) {
-          Gather(absolute_[level], c, i, j, vertices);
-          visit(level, vertices.data());
-        }
-      }
-    }
-  }
-}
-
-// Of the solution, at weight 1.
-double NestedSolve::Energy() {
+// Over the leaves of a level and all channels. The displacements must be there.
+double NestedSolve::SumOverLeaves(int level, const Matrix16& form) const {
   double sum = 0;
-  ForEachLeafOfSolution([&](int level, const double* vertices) {
-    sum += QuadraticForm(levels_[level].energy.data(), vertices);
+  ForEachLeafRun(level, [&](int i, int j, int count) {
+    for (int c = 0; c < points_.channels; ++c) {
+      const GridValues& values = absolute_[level];
+      sum += SumOfForms(form,
+                        {values.Row(c, j) + i, values.Row(c, j + 1) + i, values.Row(c, j + 2) + i,
+                         values.Row(c, j + 3) + i},
+                        count);
+    }
   });
   return sum;
 }
 
+// Of the solution, at weight 1.
+double NestedSolve::Energy() {
+  Absolute(solution_);
+  return Sum([&](int level) { return SumOverLeaves(level, levels_[level].energy); });
+}
+
 BendingSums NestedSolve::Bending() {
-  std::vector<std::array<ElementStiffness, 6>> forms;
+  Absolute(solution_);
+  BendingSums sums{};
   for (int level = 0; level <= Finest(); ++level) {
     const PatchGrid& grid = (*space_)[level].layout.grid;
-    forms.push_back(
-        BendingStiffnesses(lengths_mm_.x() / grid.patches_u, lengths_mm_.y() / grid.patches_v));
-  }
-  BendingSums sums{};
-  ForEachLeafOfSolution([&](int level, const double* vertices) {
+    const std::array<ElementStiffness, 6> forms =
+        BendingStiffnesses(lengths_mm_.x() / grid.patches_u, lengths_mm_.y() / grid.patches_v);
     for (std::size_t k = 0; k < sums.size(); ++k) {
-      sums[k] += QuadraticForm(forms[level][k].data(), vertices);
+      sums[k] += SumOverLeaves(level, forms[k]);
     }
-  });
+  }
   return sums;
 }
 

@@ -90,11 +90,12 @@ class NestedSolve {
   void ForEachPatch(int level, const Visit& visit) const;
   double MakeDataDiagonals(std::vector<std::vector<double>> shares);
   double MakeEnergyDiagonals();
+  template <class Visit>
+  void ForEachLeafRun(int level, const Visit& visit) const;
   template <class FormOf>
   void AddToLeaves(const FormOf& form_of);
   void Invert();
-  template <class Visit>
-  void ForEachLeafOfSolution(const Visit& visit);
+  double SumOverLeaves(int level, const Matrix16& form) const;
   void Multiply(const NestedValues& x, NestedValues& product);
   void Absolute(const NestedValues& x);
   double Energy();

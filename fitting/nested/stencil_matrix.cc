@@ -123,6 +123,42 @@ void StencilMatrix::AddPatch(int i, int j, const Matrix16& matrix) {
   }
 }
 
+SEMBLANCE_WIDE void AddToAll(double value, int count, double* numbers) {
+  for (int k = 0; k < count; ++k) {
+    numbers[k] += value;
+  }
+}
+
+// To the entries of `count` vertices side by side, in one run.
+void StencilMatrix::AddAlong(int row, int column, int count, int slot, double value) {
+  const std::size_t run = RunWith(row, column);
+  double* const entries = entries_.data() + starts_[run] + kBefore + column - runs_[run].begin +
+                          static_cast<std::size_t>(slot) * Length(runs_[run]);
+  AddToAll(value, count, entries);
+}
+
+// Vertex by vertex of the patches from behind, so that each entry takes them in the order of
+// AddPatch.
+void StencilMatrix::AddPatches(int i, int j, int count, const Matrix16& matrix) {
+  const int columns = layout_.grid.Columns(), rows = layout_.grid.Rows();
+  for (int b = 0; b < 4; ++b) {
+    const int row = j + b < rows ? j + b : j + b - rows;
+    for (int a = 3; a >= 0; --a) {
+      const int before_seam = std::clamp(columns - (i + a), 0, count);
+      const int k = a + 4 * b;
+      for (int l = k; l < 16; ++l) {
+        const int slot = Slot(l % 4 - a, l / 4 - b);
+        if (before_seam > 0) {
+          AddAlong(row, i + a, before_seam, slot, matrix(k, l));
+        }
+        if (before_seam < count) {
+          AddAlong(row, (i + a + before_seam) % columns, count - before_seam, slot, matrix(k, l));
+        }
+      }
+    }
+  }
+}
+
 void StencilMatrix::AddProduct(const GridValues& x, GridValues& y) const {
   const AddRunOf add = AddRunFor(x.channels());
   for (std::size_t r = 0; r < runs_.size(); ++r) {

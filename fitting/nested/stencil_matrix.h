@@ -21,6 +21,8 @@ class StencilMatrix {
   const GridRuns& runs() const { return runs_; }
   // Adds a patch's matrix over its sixteen vertices [a + 4 b]; its upper triangle is read.
   void AddPatch(int i, int j, const Matrix16& matrix);
+  // The same matrix for each of `count` patches side by side, from (i, j) on.
+  void AddPatches(int i, int j, int count, const Matrix16& matrix);
   // y += A x. The halo of x must be filled; y gathers in its halo too. Of 1 to 4 channels.
   void AddProduct(const GridValues& x, GridValues& y) const;
 
@@ -32,6 +34,7 @@ class StencilMatrix {
   static constexpr int Slot(int di, int dj) { return dj == 0 ? di : 4 + 7 * (dj - 1) + di + 3; }
   static std::size_t Length(const GridRun& run) { return kBefore + run.size() + kBehind; }
   std::size_t RunWith(int row, int column) const;
+  void AddAlong(int row, int column, int count, int slot, double value);
 
   GridLayout layout_;
   GridRuns runs_;
