@@ -32,6 +32,7 @@ constexpr double kFewNew = 0.005;      // of the vertices: not worth a round
 constexpr double kDense = 1.25;        // points for a patch of the next level
 constexpr double kCheapDense = 0.3;    // the same where all patches together are few
 constexpr std::size_t kCheap = 50000;  // points
+constexpr int kQuick = 10000;          // vertices: solves take no time to speak of
 constexpr double kSure = 1;            // standard errors of a correlation
 // Of the extent. What is left below it is rounding: the mean square is a difference of sums.
 constexpr double kRounding = 1e-8;
@@ -80,6 +81,7 @@ struct Snapshot {
   NestedSpace space;
   NestedSolve::Packed solution;
   double weight = kNaN;
+  double known = kNaN;  // weight for all points, where a search by as good as all has found it
   BendingMetric metric;
   double held_square = kNaN;
   int round = -1;
@@ -128,6 +130,11 @@ class NestedFitter {
     every_ = every;
     finest_seen_ = FinestByDensity(points_, every_, space_[0].layout, finest_);
   }
+
+  bool IsCheap() const { return points_.size() < kCheap; }
+  bool IsQuick() const { return space_.Vertices() < kQuick; }
+  // What a solve leaves of its gain; where it takes long, as much as the search can do with.
+  double PartLeft() const { return IsQuick() ? 0.01 : 0.1; }
 
   template <class Visit>
   void ForEachLooked(const Visit& visit) const {
@@ -191,7 +198,7 @@ class NestedFitter {
     PointChoice fitted = Fitted();
     const std::size_t count = fitted.Count(points_);
     solve_.Begin(space_, std::move(fitted), metric_);
-    NestedWeightSearch search(count, solve_, least_gain_);
+    NestedWeightSearch search(count, solve_, PartLeft(), least_gain_);
     if (std::isnan(weight_)) {
       search.Scan();
       search.Climb(4, search.Finish().weight);
@@ -200,6 +207,7 @@ class NestedFitter {
     }
     SearchLengths(search);
     const NestedWeight chosen = search.Finish();
+    between_ = search.Between();
     least_gain_ = search.least_gain();
     if (std::isnan(chosen.weight)) {
       Fail("no smoothness has a usable solve; give more points than a plane needs");
@@ -262,6 +270,7 @@ class NestedFitter {
       best_ = Snapshot{.space = space_,
                        .solution = solve_.Solution(),
                        .weight = weight_,
+                       .known = IsQuick() || every_ > 1 ? kNaN : between_,
                        .metric = metric_,
                        .held_square = held,
                        .round = static_cast<int>(report_.rounds.size()) - 1};
@@ -308,12 +317,11 @@ class NestedFitter {
   bool Densify() {
     const bool last_helped = best_->round == std::ssize(report_.rounds) - 1;
     const int level = FinestOfMost();
-    const bool cheap = points_.size() < kCheap;
     if ((densified_ && !last_helped) || level < space_.finest() - 1 ||
-        level >= std::min(cap_, cheap ? finest_ + 1 : finest_) || !ClosestAgree()) {
+        level >= std::min(cap_, IsCheap() ? finest_ + 1 : finest_) || !ClosestAgree()) {
       return false;
     }
-    const double least = cheap ? kCheapDense : kDense;
+    const double least = IsCheap() ? kCheapDense : kDense;
     if (level > 0 && HasFoundNothing() &&
         OverlayDense(points_, level - 1, least, space_) > kFewNew * space_.Vertices()) {
       return true;  // gaps of that level, where nothing could be found
@@ -368,9 +376,9 @@ class NestedFitter {
     weight_ = best.weight;
     metric_ = best.metric;
     DropOutliers(report_.held_out_rms_mm);
-    NestedWeight chosen = FitAll();
+    NestedWeight chosen = FitAll(best.known);
     if (DropOutliers(std::sqrt(chosen.score))) {
-      chosen = FitAll();
+      chosen = FitAll(best.known);
     }
     Report(chosen);
     NestedFitResult result{.surface = Surface(), .report = {}, .uv = {}, .residual_mm = {}};
@@ -428,13 +436,17 @@ class NestedFitter {
     return before != outlier_;
   }
 
-  NestedWeight FitAll() {
+  // known: the weight, or NaN where it is still to be found.
+  NestedWeight FitAll(double known) {
     PointChoice kept{.left_out = outlier_};
     const std::size_t count = kept.Count(points_);
     solve_.Begin(space_, std::move(kept), metric_);
-    NestedWeightSearch search(count, solve_, least_gain_);
-    search.Climb(2, weight_);
-    const NestedWeight chosen = search.Finish();
+    NestedWeightSearch search(count, solve_, PartLeft(), least_gain_);
+    if (std::isnan(known)) {
+      search.Climb(2, weight_);
+    }
+    const NestedWeight chosen =
+        IsQuick() ? search.Finish() : search.Settle(std::isnan(known) ? search.Between() : known);
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
     return chosen;
   }
@@ -543,6 +555,7 @@ class NestedFitter {
   int finest_seen_ = 0;              // level on which those show something
   std::vector<Residual> residuals_;  // of those that are looked at
   double weight_ = kNaN, least_gain_ = 0;
+  double between_ = kNaN;  // weight of the last search (NestedWeightSearch::Between)
   BendingMetric metric_ = BendingMetric::Identity();
   int finest_scanned_ = -1;  // level
   bool densified_ = false;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "fitting/least_squares/cross_validation_score.h"
@@ -15,6 +16,17 @@ constexpr double kSmoothest = 100;
 constexpr double kMostStretch = 16;
 
 }  // namespace
+
+double WeightBetween(const NestedWeight& rougher, const NestedWeight& middle,
+                     const NestedWeight& smoother) {
+  const double down = std::log(rougher.weight / middle.weight),
+               up = std::log(smoother.weight / middle.weight),
+               fall = std::log(rougher.score / middle.score) / down,
+               rise = std::log(smoother.score / middle.score) / up,
+               curvature = (rise - fall) / (up - down),
+               move = (curvature * up - rise) / (2 * curvature);
+  return curvature > 0 && down < move && move < up ? middle.weight * std::exp(move) : middle.weight;
+}
 
 // Of two that predict alike the smoother one, so that rounding chooses nothing.
 bool NestedWeightSearch::IsBetter(const NestedWeight& next) const {
@@ -33,9 +45,8 @@ NestedWeight NestedWeightSearch::Try(double weight) {
   steps_ += solve_.Solve(least_gain_);
   const double mean_square = std::max(solve_.MeanSquare(), 0.0);  // less is rounding
   const double trace = solve_.Trace();
-  constexpr double kGain = 0.01;
   constexpr double kLeast = 0.02;  // what is left is known no better by the trace of one probe
-  least_gain_ = kGain * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
+  least_gain_ = part_ * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
   at->second = {.weight = weight,
                 .score = CrossValidationScore(mean_square, trace, count_, kLeast),
                 .degrees_of_freedom = trace,
@@ -82,11 +93,11 @@ void NestedWeightSearch::Climb(double factor, double from) {
 
 void NestedWeightSearch::ClimbAnew(double factor, double from) {
   constexpr double kRough = 1e-3;
-  const double even = solve_.EvenWeight();
+  const double rough = kRough * solve_.EvenWeight();
   Climb(factor, from);
   const double before = best_.weight;
-  if (std::abs(std::log(before / (kRough * even))) > std::log(factor)) {
-    Try(kRough * even);
+  if (!(before > rough / factor && before < rough * std::pow(factor, 3))) {
+    Try(rough);
   }
   if (best_.weight != before) {
     Climb(factor, best_.weight);
@@ -142,6 +153,23 @@ void NestedWeightSearch::ScanStretches(double factor) {
     TryMetric(MetricOf({.stretch = kStretch, .direction_deg = k * kTurn_deg}),
               [&] { ClimbAnew(factor, weight); });
   }
+}
+
+double NestedWeightSearch::Between() const {
+  const auto best = tried_.find(best_.weight);
+  if (best == tried_.end() || best == tried_.begin() || std::next(best) == tried_.end()) {
+    return best_.weight;
+  }
+  return WeightBetween(std::prev(best)->second, best->second, std::next(best)->second);
+}
+
+NestedWeight NestedWeightSearch::Settle(double weight) {
+  constexpr double kFiner = 0.2;
+  least_gain_ *= kFiner;
+  best_ = {};
+  tried_.clear();
+  Try(weight);
+  return Finish();
 }
 
 NestedWeight NestedWeightSearch::Finish() {
