@@ -17,6 +17,7 @@ namespace {
 class Triangulation {
  public:
   Triangulation(const HSplineShape& shape, const std::set<DomainCell>& cells) : shape_(shape) {
+    vertices_.reserve(cells.size());
     for (const DomainCell& cell : cells) {
       const std::array<std::int64_t, 3> box = Box(cell);
       for (int k = 0; k < 4; ++k) {

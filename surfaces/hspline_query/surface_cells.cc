@@ -79,11 +79,14 @@ void SplitToChord(const HSplineSurface& surface, const DomainCell& cell, double 
   }
 }
 
-// Splits the cell that covers `fine` until it is coarser by at most one level.
+// Splits the cell that covers `fine`, if one does, until it is coarser by at most one level.
 void RefineAt(const DomainCell& fine, std::set<DomainCell>& cells, std::vector<DomainCell>& open) {
-  for (int up = 2; up <= fine.level; ++up) {
+  for (int up = 0; up <= fine.level; ++up) {
     const DomainCell cell{fine.level - up, fine.i >> up, fine.j >> up};
-    if (cells.erase(cell) > 0) {
+    if (up < 2 && cells.contains(cell)) {
+      return;
+    }
+    if (up >= 2 && cells.erase(cell) > 0) {
       for (const DomainCell& child : ChildrenOf(cell)) {
         cells.insert(child);
         open.push_back(child);
