@@ -56,25 +56,4 @@ void ForgetLastPoints(std::size_t added, std::span<const double> weights, FitRes
   }
 }
 
-std::array<PoleGap, 2> PoleGapsOf(const HSplineSurface& surface) {
-  constexpr int kPerPatch = 4, kFewest = 256;
-  const HSplineShape& shape = surface.shape();
-  const int count = std::max(kPerPatch * shape.PatchesU(shape.max_level), kFewest);
-  std::array<PoleGap, 2> gaps;
-  for (const int pole : {0, 1}) {
-    std::vector<Vec3> edge;
-    edge.reserve(static_cast<std::size_t>(count));
-    for (int k = 0; k < count; ++k) {
-      edge.push_back(surface.Point(Vec2((k + 0.5) / count, pole)));
-    }
-    PoleGap& gap = gaps[pole];
-    gap.place = std::accumulate(edge.begin(), edge.end(), Vec3(Vec3::Zero())) / count;
-    gap.gap_mm = 0;
-    for (const Vec3& p : edge) {
-      gap.gap_mm = std::max(gap.gap_mm, (p - gap.place).norm());
-    }
-  }
-  return gaps;
-}
-
 }  // namespace semblance

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surface whose edges v = 0 and v = 1 are one place each: held together there, and measured.
+// A surface whose edges v = 0 and v = 1 are one place each: held together there.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 
 #include "fitting/parameters/sphere.h"
 #include "fitting/plan/fit_result.h"
-#include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {
 
@@ -22,12 +20,5 @@ std::size_t AddPolePoints(const Poles& poles, OwnedPoints& points);
 // Takes what was added, the last ones, out of what is told of the points.
 //   weights: of the others; or none.
 void ForgetLastPoints(std::size_t added, std::span<const double> weights, FitResult& fit);
-
-// What an edge of the domain is that should be one place.
-struct PoleGap {
-  Vec3 place = Vec3::Constant(kNaN);  // mean of the edge, mm
-  double gap_mm = kNaN;               // how far the edge goes from it at most
-};
-std::array<PoleGap, 2> PoleGapsOf(const HSplineSurface& surface);
 
 }  // namespace semblance

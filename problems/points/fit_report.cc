@@ -156,7 +156,7 @@ Json MapJson(const PointFit& result) {
           {"collapsed_share", result.map_faults.collapsed}};
 }
 
-Json PolesJson(const std::array<PoleGap, 2>& poles) {
+Json PolesJson(const PoleGaps& poles) {
   Json json = Json::array();
   for (const int v : {0, 1}) {
     const Vec3& at = poles[v].place;

@@ -12,7 +12,6 @@
 #include "fitting/fit.h"
 #include "fitting/parameters/parametrise.h"
 #include "fitting/plan/fit_faults.h"
-#include "fitting/plan/pole_points.h"
 #include "fitting/relaxation/foot_moves.h"
 #include "fitting/solve/attribute_fit.h"
 #include "fitting/solve/surface_sigma.h"
@@ -25,6 +24,7 @@
 #include "problems/points/point_table.h"
 #include "problems/points/surface_join.h"
 #include "surfaces/base/auto_or.h"
+#include "surfaces/hspline_query/surface_poles.h"
 
 namespace semblance {
 
@@ -116,7 +116,7 @@ struct PointFit {
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
-  std::optional<std::array<PoleGap, 2>> poles = {};  // on a sphere, at v = 0 and v = 1
+  std::optional<PoleGaps> poles = {};   // on a sphere, at v = 0 and v = 1
   // Its point_rms_mm: each point counts as much as any other. The weights of its smoothness: as the
   // written terms have them.
   FitResult fit;

@@ -16,6 +16,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/surface_cells.h"
+#include "surfaces/hspline_query/surface_poles.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/hspline_query/trimmed_tessellation.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -149,10 +150,8 @@ namespace {
 
 std::string EncodePly(const PointFit& result, Tessellation tessellation, double chord_mm,
                       int threads) {
-  for (const int v : {0, 1}) {
-    if (result.poles) {
-      JoinEdge(tessellation, v, (*result.poles)[v].place);
-    }
+  if (result.poles) {
+    JoinPoles(*result.poles, tessellation);
   }
   MeshAttributes attributes = AttributesOf(result, tessellation.uv, threads);
   attributes.normals = std::move(tessellation.normals);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <pugixml.hpp>
 
 #include "problems/pipeline/experiment_config.h"
@@ -15,6 +16,8 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/base64.h"
 #include "surfaces/base/error.h"
+#include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "tests/testing/scratch_folder.h"
@@ -132,6 +135,50 @@ TEST_F(ExportFile, AMeshGoesToEveryFormatOfMeshes) {
   EXPECT_EQ(Values(vtu, "height_mm"),
             PlyVertexScalar(ReadFileBytes(sphere), "scalar_height_mm", ""));
   EXPECT_EQ(DocumentOf(Export(sphere, ".glb"))["nodes"][0]["name"], "sphere");
+}
+
+// A tube whose ends are so wide.
+HSplineSurface Tube(double end_mm) {
+  const HSplineShape shape{
+      .patches_u = 8, .patches_v = 6, .max_level = 0, .closure = Closure::kPeriodicU};
+  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      const double turn = 2 * std::numbers::pi * i / net.columns,
+                   angle = std::numbers::pi * (j - 1) / shape.patches_v,
+                   radius = end_mm + std::sin(angle);
+      net.vertices.emplace_back(radius * std::cos(turn), radius * std::sin(turn), -std::cos(angle));
+    }
+  }
+  return {shape, net};
+}
+
+// As surface.ply of a fit is: each pole of a closed surface is one vertex. An open tube stays open.
+TEST_F(ExportFile, WhatClosesAtPolesIsWatertightInEveryFormatOfMeshes) {
+  const fs::path closed = scratch_ / "closed.hspline.json", open = scratch_ / "open.hspline.json";
+  WriteHSpline(closed, Tube(0.002));
+  WriteHSpline(open, Tube(0.2));
+  for (const char* extension : {".ply", ".obj", ".off", ".stl"}) {
+    const fs::path file = scratch_ / (std::string("written") + extension);
+    const auto edges_of = [&](const fs::path& from) {
+      WriteFileAtomically(file, Export(from, extension));
+      return CheckEdges(ReadMesh(file));
+    };
+    const EdgeReport edges = edges_of(closed);
+    EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0) << extension;
+    EXPECT_GT(edges_of(open).boundary, 10) << extension;
+  }
+  const std::size_t count = ReadMesh(scratch_ / "written.stl").points.size();
+  EXPECT_EQ(TessellateToChord(Tube(0.2), 0.1).mesh.points.size(), count);
+  pugi::xml_document vtp;
+  ASSERT_TRUE(vtp.load_string(Export(closed, ".vtp").c_str()));
+  const Json glb = DocumentOf(Export(closed, ".glb"));
+  WriteFileAtomically(scratch_ / "written.ply", Export(closed, ".ply"));
+  const std::size_t corners = ReadMesh(scratch_ / "written.ply").points.size();
+  EXPECT_EQ(Values(vtp, "mean_curvature_per_mm").size(), corners);
+  EXPECT_EQ(glb["accessors"][glb["meshes"][0]["primitives"][0]["attributes"]["POSITION"].get<int>()]
+               ["count"],
+            corners);
 }
 
 TEST_F(ExportFile, ASceneThatIsNoneIsRefusedInOurWords) {
