@@ -21,7 +21,11 @@ MapFaults MapFaultsOf(const Scan& points, const MapCandidate& candidate) {
   if (points.triangles.empty()) {
     return by_points;
   }
-  const MapFaults by_triangles = FaultsOfTriangles(map, points.triangles);
+  MapFaults by_triangles = FaultsOfTriangles(map, points.triangles);
+  if (by_triangles.Sum() > kMostFaults) {
+    const MapFaults beyond_noise = FaultsBeyondNoise(map, points.triangles);
+    by_triangles = beyond_noise.Sum() < by_triangles.Sum() ? beyond_noise : by_triangles;
+  }
   return {.folded = std::max(by_points.folded, by_triangles.folded),
           .collapsed = std::max(by_points.collapsed, by_triangles.collapsed),
           .mirrored = by_triangles.mirrored};

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -304,6 +305,88 @@ class Prober {
   std::size_t most_probes_;
 };
 
+// Of triangles; on the map negative where they run clockwise.
+struct MappedArea {
+  double in_space = 0, on_map = 0;
+
+  MappedArea& operator+=(const MappedArea& other) {
+    in_space += other.in_space;
+    on_map += other.on_map;
+    return *this;
+  }
+};
+
+double AreaInSpace(std::span<const Vec3> positions, const Triangle& t) {
+  const Vec3& p = positions[t[0]];
+  return (positions[t[1]] - p).cross(positions[t[2]] - p).norm() / 2;
+}
+
+double AreaOnMap(const PlaneMap& map, const Triangle& t) {
+  const Vec2 a = Way(map.at[t[0]], map.at[t[1]], map.period_mm),
+             b = Way(map.at[t[0]], map.at[t[2]], map.period_mm);
+  return (a.x() * b.y() - a.y() * b.x()) / 2;
+}
+
+class FaultSum {
+ public:
+  // weight: how much of the surface it stands for.
+  void Add(const MappedArea& area, double weight) {
+    if (std::abs(area.on_map) < kLeastArea * area.in_space) {
+      collapsed_ += weight;
+    } else {
+      turned_[area.on_map > 0 ? 1 : 0] += weight;
+    }
+  }
+  MapFaults Faults() const {
+    const double all = turned_[0] + turned_[1] + collapsed_;
+    return all > 0 ? MapFaults{.folded = std::min(turned_[0], turned_[1]) / all,
+                               .collapsed = collapsed_ / all,
+                               .mirrored = turned_[0] > turned_[1]}
+                   : MapFaults{};
+  }
+
+ private:
+  double turned_[2] = {0, 0}, collapsed_ = 0;
+};
+
+// Of a point: two rings of triangles around it, the nearer ones more often, and its share of those
+// that it is a corner of.
+struct PointAreas {
+  MappedArea around;
+  double own_mm2 = 0;
+};
+
+std::vector<PointAreas> AreasAround(std::span<const Vec3> positions,
+                                    std::span<const Triangle> triangles,
+                                    std::span<const double> on_map) {
+  constexpr int kRings = 2;
+  std::vector<PointAreas> points(positions.size());
+  for (std::size_t k = 0; k < triangles.size(); ++k) {
+    const MappedArea area{AreaInSpace(positions, triangles[k]), on_map[k]};
+    for (const std::int32_t corner : triangles[k]) {
+      points[corner].around += area;
+      points[corner].own_mm2 += area.in_space / 3;
+    }
+  }
+  std::vector<MappedArea> wider(positions.size());
+  for (int ring = 0; ring < kRings; ++ring) {
+    std::ranges::fill(wider, MappedArea());
+    for (const Triangle& t : triangles) {
+      MappedArea sum;
+      for (const std::int32_t corner : t) {
+        sum += points[corner].around;
+      }
+      for (const std::int32_t corner : t) {
+        wider[corner] += sum;
+      }
+    }
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      points[k].around = wider[k];
+    }
+  }
+  return points;
+}
+
 }  // namespace
 
 MapFaults FaultsOfPoints(const PlaneMap& map) {
@@ -320,24 +403,41 @@ MapFaults FaultsOfPoints(const PlaneMap& map) {
 }
 
 MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> triangles) {
-  double turned[2] = {0, 0}, collapsed = 0;  // areas
+  FaultSum sum;
   for (const Triangle& t : triangles) {
-    const Vec3& p = map.positions[t[0]];
-    const double area = (map.positions[t[1]] - p).cross(map.positions[t[2]] - p).norm();
-    const Vec2 a = Way(map.at[t[0]], map.at[t[1]], map.period_mm),
-               b = Way(map.at[t[0]], map.at[t[2]], map.period_mm);
-    const double on_map = a.x() * b.y() - a.y() * b.x();
-    if (std::abs(on_map) < kLeastArea * area) {
-      collapsed += area;
-    } else {
-      turned[on_map > 0 ? 1 : 0] += area;
-    }
+    const MappedArea area{AreaInSpace(map.positions, t), AreaOnMap(map, t)};
+    sum.Add(area, area.in_space);
   }
-  const double all = turned[0] + turned[1] + collapsed;
-  return all > 0 ? MapFaults{.folded = std::min(turned[0], turned[1]) / all,
-                             .collapsed = collapsed / all,
-                             .mirrored = turned[0] > turned[1]}
-                 : MapFaults{};
+  return sum.Faults();
+}
+
+MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> triangles) {
+  std::vector<double> on_map;
+  on_map.reserve(triangles.size());
+  for (const Triangle& t : triangles) {
+    on_map.push_back(AreaOnMap(map, t));
+  }
+  FaultSum sum;
+  for (const PointAreas& point : AreasAround(map.positions, triangles, on_map)) {
+    sum.Add(point.around, point.own_mm2);
+  }
+  return sum.Faults();
+}
+
+double SqueezedShare(std::span<const Vec3> positions, std::span<const Triangle> triangles,
+                     std::span<const double> on_map) {
+  constexpr double kMuch = 0.1;  // of what is left of all
+  const std::vector<PointAreas> points = AreasAround(positions, triangles, on_map);
+  const double all = std::accumulate(on_map.begin(), on_map.end(), 0.0);
+  double in_space = 0, squeezed = 0;
+  for (const PointAreas& point : points) {
+    in_space += point.own_mm2;
+  }
+  for (const auto& [around, own_mm2] : points) {
+    const double left = all < 0 ? -around.on_map : around.on_map;
+    squeezed += left * in_space < kMuch * std::abs(all) * around.in_space ? own_mm2 : 0;
+  }
+  return in_space > 0 ? squeezed / in_space : 0;
 }
 
 }  // namespace semblance

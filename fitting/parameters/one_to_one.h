@@ -38,4 +38,15 @@ MapFaults FaultsOfPoints(const PlaneMap& map);
 // turns over against the others. Exact, but for places that two sheets with one orientation share.
 MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> triangles);
 
+// The same, each point judged by two rings of triangles around it together: noise turns triangles,
+// and those beside them make up for it. So few points tell what folds there, and near a fold half
+// of it.
+MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> triangles);
+
+// The share of the area that is turned over, or of which less than a tenth of what is left of all
+// is left; judged likewise.
+//   on_map: the area of each triangle on the map, in any unit; negative where it runs clockwise.
+double SqueezedShare(std::span<const Vec3> positions, std::span<const Triangle> triangles,
+                     std::span<const double> on_map);
+
 }  // namespace semblance

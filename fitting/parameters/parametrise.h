@@ -22,7 +22,7 @@ namespace semblance {
 // What goes round in u and closes at both ends of the cylinder gets those of a sphere, unless it
 // folds over that. Where every plane folds the mesh is laid out, or, of points without triangles,
 // one that is made for them; and so is a closed mesh that goes round in u, where it folds over the
-// sphere.
+// sphere. Triangles that the plane or the sphere squeezes are laid out where that squeezes less.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };

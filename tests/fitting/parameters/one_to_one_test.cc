@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "surfaces/base/random.h"
 #include "tests/testing/grid_mesh.h"
 #include "tests/testing/point_sets.h"
 #include "tests/testing/scattered_data.h"
@@ -136,6 +137,40 @@ TEST(OneToOne, TrianglesTellTheShareThatIsTurnedOver) {
     p.y() *= -1;
   }
   EXPECT_TRUE(FaultsOfTriangles({mesh.points, at}, mesh.triangles).mirrored);
+}
+
+// Triangles whose corners are off by a third of an edge and more; four tenths of a sheet that is
+// folded back are told as before.
+TEST(OneToOne, WhatNoiseTurnsIsNoFold) {
+  TriMesh mesh = testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 60);
+  Random random(3);
+  std::vector<Vec2> above, folded;
+  for (Vec3& p : mesh.points) {
+    folded.emplace_back(p.x() <= 0.6 ? p.x() : 1.2 - p.x(), p.y());
+    p += 0.35 / 60 * Vec3(random.Normal(), random.Normal(), random.Normal());
+    above.emplace_back(p.x(), p.y());
+  }
+  EXPECT_GT(FaultsOfTriangles({mesh.points, above}, mesh.triangles).folded, 0.02);
+  EXPECT_LT(FaultsBeyondNoise({mesh.points, above}, mesh.triangles).Sum(), 1e-3);
+  EXPECT_NEAR(FaultsBeyondNoise({mesh.points, folded}, mesh.triangles).folded, 0.4, 0.02);
+}
+
+// A sheet with a strip of which a twentieth of the width is left.
+TEST(OneToOne, TheSqueezedShareIsThatOfTheArea) {
+  const TriMesh mesh =
+      testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 50);
+  std::vector<double> on_map;
+  for (const Triangle& t : mesh.triangles) {
+    const double x = TriangleCentroid(mesh, t).x();
+    on_map.push_back((x > 0.4 && x < 0.6 ? 0.05 : 1) * TriangleAreaVector(mesh, t).z());
+  }
+  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
+  for (double& area : on_map) {
+    area *= -3;
+  }
+  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
+  on_map.assign(mesh.triangles.size(), 0.1);
+  EXPECT_EQ(SqueezedShare(mesh.points, mesh.triangles, on_map), 0);
 }
 
 TEST(OneToOne, OfAFewPointsNothingIsSaid) { EXPECT_EQ(FromAbove(OnSphere, 20).Faults().Sum(), 0); }

@@ -411,6 +411,61 @@ TEST(Parametrise, AClosedMeshThatFoldsOverTheSphereIsLaidOutOnOne) {
   EXPECT_THAT(WordsOf(scan, MeshParameters{}), HasSubstr("write closure: periodic_u"));
 }
 
+// An ellipsoid with a thin flat lobe on either side, which rays meet at a flat angle.
+testing::ClosedShape WithLobes(double length) {
+  testing::ClosedShape shape = testing::EllipsoidWithEars();
+  for (testing::FieldBump& bump : shape.bumps) {
+    const double side = bump.centre.x() < 0 ? -1 : 1,
+                 out = (std::abs(bump.centre.x()) - 0.45) / 0.55 * length;
+    if (bump.centre.x() != 0) {
+      bump.centre = Vec3(side * (0.45 + 0.55 * out), -0.35 * out * out, 0.2);
+      bump.width.z() = 0.2 + 0.15 * out;
+    }
+  }
+  return shape;
+}
+
+// Of triangles that fold little over the sphere, or leave little room there, and are laid out with
+// more; noise that turns triangles is no reason.
+TEST(Parametrise, AClosedMeshIsLaidOutWhereTheSphereSqueezesIt) {
+  const auto source_of = [](const testing::ClosedShape& shape, double noise) {
+    const TriMesh mesh = testing::MeshOf(shape, 4000, noise);
+    return Parametrise(Scan{.positions = mesh.points,
+                            .triangles = mesh.triangles,
+                            .closure = Closure::kPeriodicU})
+        .source;
+  };
+  const testing::ClosedShape stone{.name = "stone",
+                                   .bumps = {{.width = Vec3(1, 1.2, 0.9), .height = 2.7}}};
+  EXPECT_EQ(source_of(stone, 0), ParameterSource::kSphere);
+  EXPECT_EQ(source_of(stone, 0.02), ParameterSource::kSphere);
+  EXPECT_EQ(source_of(WithLobes(0.3), 0), ParameterSource::kSphere);
+  EXPECT_EQ(source_of(WithLobes(0.65), 0), ParameterSource::kMesh);
+  EXPECT_EQ(source_of(WithLobes(0.65), 1e-3), ParameterSource::kMesh);
+}
+
+// A wave that breaks along a part of its crest, by one in a hundred of its area, and noisy scans.
+TEST(Parametrise, AnOpenMeshIsLaidOutWhereThePlaneSqueezesIt) {
+  const auto wave = [](double height) {
+    return [=](const Vec2& uv) -> Vec3 {
+      const double t = 2 * std::numbers::pi * (2 * uv.x() - 1), q = (uv.y() - 0.5) / 0.2,
+                   a = height * std::exp(-q * q);
+      return {t - a * std::sin(t), 12 * uv.y(), -a * std::cos(t)};
+    };
+  };
+  const auto source_of = [](const auto& surface, double noise) {
+    TriMesh mesh = testing::GridMesh(surface, 80);
+    Random random(3);
+    for (Vec3& p : mesh.points) {
+      p += noise * Vec3(random.Normal(), random.Normal(), random.Normal());
+    }
+    return Parametrise(Scan{.positions = mesh.points, .triangles = mesh.triangles}).source;
+  };
+  EXPECT_EQ(source_of(wave(0.8), 0), ParameterSource::kPlane);
+  EXPECT_EQ(source_of(wave(1.2), 0), ParameterSource::kMesh);
+  EXPECT_EQ(source_of(wave(0.5), 0.05), ParameterSource::kPlane);
+}
+
 TEST(Parametrise, AMeshThatIsNotClosedDoesNotGoRound) {
   const TriMesh plate = testing::Plate(10, 8), ring = testing::RingMesh(20);
   EXPECT_THAT(
