@@ -47,7 +47,7 @@ const std::map<std::string, Layers> kRooms = {
     {"interp",
      {{"dowels"}, {"on_surface"}, {"kriging"}, {"schemes"}, {"stacking"}, {kHall}, {"evaluation"}}},
     {"fitting",
-     {{"closed_mesh", "least_squares", "problem", "triangulation"},
+     {{"closed_mesh", "folds", "least_squares", "problem", "triangulation"},
       {"parameters", "shape_model", "space"},
       {"terms"},
       {"nested", "solve"},

@@ -1,156 +1,34 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/parameters/one_to_one.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
 
+#include "fitting/folds/map_samples.h"
+#include "fitting/folds/turned_samples.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
 
-constexpr std::size_t kMostLooked = 60000;
 constexpr std::size_t kMostMeans = 2000;
-constexpr int kNeighbours = 16, kWithItself = kNeighbours + 1;
-constexpr int kFewestSamples = 32;
 constexpr double kLeastArea = 1.0 / 40;  // of what a place has in space
-
-struct Sample {
-  Vec3 position = Vec3::Zero();
-  Vec2 at = Vec2::Zero();
-};
-
-// The shorter way round.
-Vec2 Way(const Vec2& from, const Vec2& to, const Vec2& period_mm) {
-  Vec2 way = to - from;
-  for (const int c : {0, 1}) {
-    if (period_mm[c] > 0) {
-      way[c] -= period_mm[c] * std::round(way[c] / period_mm[c]);
-    }
-  }
-  return way;
-}
-
-std::vector<std::uint32_t> Looked(std::size_t count) {
-  const std::size_t every = std::max<std::size_t>((count + kMostLooked - 1) / kMostLooked, 1);
-  std::vector<std::uint32_t> looked;
-  for (std::size_t k = 0; k < count; k += every) {
-    looked.push_back(static_cast<std::uint32_t>(k));
-  }
-  return looked;
-}
-
-// Means over the cubes of a lattice, ordered by their places.
-std::vector<Sample> CubeMeans(const PlaneMap& map, std::span<const std::uint32_t> looked,
-                              const Vec3& corner, double edge_mm) {
-  using Cube = std::array<std::int64_t, 3>;
-  std::vector<std::pair<Cube, std::uint32_t>> cubes;
-  cubes.reserve(looked.size());
-  for (const std::uint32_t k : looked) {
-    const Vec3 place = (map.positions[k] - corner) / edge_mm;
-    cubes.push_back({{static_cast<std::int64_t>(place.x()), static_cast<std::int64_t>(place.y()),
-                      static_cast<std::int64_t>(place.z())},
-                     k});
-  }
-  std::sort(cubes.begin(), cubes.end());
-  std::vector<Sample> means;
-  for (std::size_t begin = 0, end = 0; begin < cubes.size(); begin = end) {
-    const Vec2& first = map.at[cubes[begin].second];
-    Sample sum;
-    for (; end < cubes.size() && cubes[end].first == cubes[begin].first; ++end) {
-      sum.position += map.positions[cubes[end].second];
-      sum.at += Way(first, map.at[cubes[end].second], map.period_mm);
-    }
-    const double count = static_cast<double>(end - begin);
-    means.push_back({sum.position / count, first + sum.at / count});
-  }
-  return means;
-}
-
-std::vector<Sample> Thinned(const PlaneMap& map) {
-  std::vector<Sample> samples;
-  for (const std::uint32_t k : Looked(map.positions.size())) {
-    samples.push_back({map.positions[k], map.at[k]});
-  }
-  return samples;
-}
-
-// Means of neighbours, over which noise is less.
-std::vector<Sample> Averaged(const PlaneMap& map) {
-  constexpr double kFirst = 1.0 / 64, kLarger = 1.25;  // edges of cubes, of the extent
-  const std::vector<std::uint32_t> looked = Looked(map.positions.size());
-  Box3 box;
-  for (const std::uint32_t k : looked) {
-    box.extend(map.positions[k]);
-  }
-  for (double edge_mm = kFirst * box.diagonal().norm();; edge_mm *= kLarger) {
-    std::vector<Sample> samples = CubeMeans(map, looked, box.min(), edge_mm);
-    if (samples.size() <= kMostMeans) {
-      return samples;
-    }
-  }
-}
-
-using Nearest = std::array<std::uint32_t, kWithItself>;  // itself first
-
-// Of `count` samples those that are nearest to `own`, in order. square(n): of a distance.
-template <class Square>
-Nearest NearestBy(std::uint32_t count, std::uint32_t own, const Square& square) {
-  std::array<std::pair<double, std::uint32_t>, kWithItself> best;
-  best.fill({std::numeric_limits<double>::infinity(), own});
-  best[0].first = -1;
-  for (std::uint32_t n = 0; n < count; ++n) {
-    const double next = square(n);
-    if (n != own && next < best.back().first) {
-      int at = kNeighbours;
-      for (; best[at - 1].first > next; --at) {
-        best[at] = best[at - 1];
-      }
-      best[at] = {next, n};
-    }
-  }
-  Nearest nearest;
-  for (int k = 0; k < kWithItself; ++k) {
-    nearest[k] = best[k].second;
-  }
-  return nearest;
-}
-
-// Whether a sample and those around it lie on a sheet: noise and outliers do not.
-bool LiesOnSheet(const std::vector<Sample>& samples, const Nearest& nearest) {
-  constexpr double kThick = 0.15, kFar = 9, kFlat = 0.02;
-  Vec3 mean = Vec3::Zero();
-  for (int n = 1; n < kWithItself; ++n) {
-    mean += samples[nearest[n]].position / kNeighbours;
-  }
-  Mat3 moments = Mat3::Zero();
-  for (int n = 1; n < kWithItself; ++n) {
-    const Vec3 off = samples[nearest[n]].position - mean;
-    moments += off * off.transpose() / kNeighbours;
-  }
-  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(moments);
-  const Vec3& squares = eigen.eigenvalues();
-  const double off = (samples[nearest[0]].position - mean).dot(eigen.eigenvectors().col(0));
-  return squares[0] < kThick * squares[1] && off * off < kFar * (squares[0] + kFlat * squares[1]);
-}
 
 // Of a sample: itself and the 16 others that are nearest on the map, and in space.
 struct Neighbourhood {
-  Nearest on_map{}, in_space{};
+  NearestSamples on_map{}, in_space{};
   double spacing_mm = kNaN;  // of the 4th in space
 };
 
 class Prober {
  public:
-  Prober(std::vector<Sample> samples, const Vec2& period_mm, std::size_t most_probes)
+  Prober(std::vector<MapSample> samples, const Vec2& period_mm, std::size_t most_probes)
       : period_mm_(period_mm), samples_(std::move(samples)), most_probes_(most_probes) {}
 
   MapFaults Run() const {
@@ -182,8 +60,8 @@ class Prober {
     std::vector<Neighbourhood> probes;
     for (std::size_t k = 0; Count() >= kFewestSamples && k < samples_.size(); k += every) {
       const auto own = static_cast<std::uint32_t>(k);
-      Neighbourhood probe{.in_space = InSpace(own)};
-      if (LiesOnSheet(samples_, probe.in_space)) {
+      Neighbourhood probe{.in_space = NearestInSpace(samples_, own)};
+      if (PlaneAround(samples_, probe.in_space).is_sheet) {
         probe.on_map = NearestBy(Count(), own, [&](std::uint32_t n) {
           return Way(samples_[own].at, samples_[n].at, period_mm_).squaredNorm();
         });
@@ -194,17 +72,11 @@ class Prober {
     return probes;
   }
 
-  Nearest InSpace(std::uint32_t own) const {
-    return NearestBy(Count(), own, [&](std::uint32_t n) {
-      return (samples_[own].position - samples_[n].position).squaredNorm();
-    });
-  }
-
   // By the second moments of those that are nearest in space. Those on a line of a scanner, with
   // noise across it, say nothing.
   bool IsCollapsed(const Neighbourhood& probe) const {
     constexpr double kOnLine = 0.08;  // of the largest variance of two, the other
-    const Sample& own = samples_[probe.in_space[0]];
+    const MapSample& own = samples_[probe.in_space[0]];
     Eigen::Matrix2d on_map = Eigen::Matrix2d::Zero();
     Mat3 in_space = Mat3::Zero();
     for (const std::uint32_t n : probe.in_space) {
@@ -220,11 +92,11 @@ class Prober {
   }
 
   // Which samples of a neighbourhood are connected in space; numbered from that of the sample.
-  std::array<int, kWithItself> ClustersOf(const Neighbourhood& probe, double link_mm) const {
-    std::array<int, kWithItself> cluster;
+  std::array<int, kNearWithItself> ClustersOf(const Neighbourhood& probe, double link_mm) const {
+    std::array<int, kNearWithItself> cluster;
     cluster.fill(-1);
     int count = 0;
-    for (int first = 0; first < kWithItself; ++first) {
+    for (int first = 0; first < kNearWithItself; ++first) {
       std::vector<int> open;
       if (cluster[first] < 0) {
         cluster[first] = count++;
@@ -233,7 +105,7 @@ class Prober {
       while (!open.empty()) {
         const int a = open.back();
         open.pop_back();
-        for (int b = 0; b < kWithItself; ++b) {
+        for (int b = 0; b < kNearWithItself; ++b) {
           const Vec3 apart = PositionOf(probe, a) - PositionOf(probe, b);
           if (cluster[b] < 0 && apart.squaredNorm() < link_mm * link_mm) {
             cluster[b] = cluster[a];
@@ -251,7 +123,7 @@ class Prober {
 
   bool IsFolded(const Neighbourhood& probe, double spacing_mm) const {
     constexpr double kLink = 3;
-    const std::array<int, kWithItself> cluster = ClustersOf(probe, kLink * spacing_mm);
+    const std::array<int, kNearWithItself> cluster = ClustersOf(probe, kLink * spacing_mm);
     const int last = *std::max_element(cluster.begin(), cluster.end());
     for (int other = 1; other <= last; ++other) {
       if (AreMixed(probe, cluster, other) && IsSheet(probe, cluster, 0) &&
@@ -263,26 +135,27 @@ class Prober {
   }
 
   // Enough samples of a cluster, and nearly all of them on a sheet of their own.
-  bool IsSheet(const Neighbourhood& probe, const std::array<int, kWithItself>& cluster,
+  bool IsSheet(const Neighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
                int which) const {
     constexpr int kFewest = 3;
     int count = 0, on_sheet = 0;
-    for (int n = 0; n < kWithItself; ++n) {
+    for (int n = 0; n < kNearWithItself; ++n) {
       if (cluster[n] == which) {
         ++count;
-        on_sheet += LiesOnSheet(samples_, InSpace(probe.on_map[n])) ? 1 : 0;
+        on_sheet +=
+            PlaneAround(samples_, NearestInSpace(samples_, probe.on_map[n])).is_sheet ? 1 : 0;
       }
     }
     return on_sheet >= kFewest && 3 * on_sheet >= 2 * count;
   }
 
   // Whether a cluster and that of the sample lie among each other on the map, and not side by side.
-  bool AreMixed(const Neighbourhood& probe, const std::array<int, kWithItself>& cluster,
+  bool AreMixed(const Neighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
                 int other) const {
     constexpr double kApart = 0.5;
     Vec2 mean[2] = {Vec2::Zero(), Vec2::Zero()};
     double squares[2] = {0, 0}, count[2] = {0, 0};
-    for (int n = 0; n < kWithItself; ++n) {
+    for (int n = 0; n < kNearWithItself; ++n) {
       if (cluster[n] == 0 || cluster[n] == other) {
         const int which = cluster[n] == 0 ? 0 : 1;
         const Vec2 way =
@@ -301,7 +174,7 @@ class Prober {
   }
 
   Vec2 period_mm_;
-  std::vector<Sample> samples_;
+  std::vector<MapSample> samples_;
   std::size_t most_probes_;
 };
 
@@ -390,16 +263,27 @@ std::vector<PointAreas> AreasAround(std::span<const Vec3> positions,
 }  // namespace
 
 MapFaults FaultsOfPoints(const PlaneMap& map) {
-  constexpr std::size_t kProbes = 500, kFineProbes = 300;
+  constexpr std::size_t kProbes = 500, kFineProbes = 300, kFewerMeans = 1000, kPerMean = 6;
+  constexpr double kMostly = 0.5;
   const std::size_t count = map.positions.size();
-  const MapFaults fine =
-      Prober(Thinned(map), map.period_mm, count > kMostMeans ? kFineProbes : kProbes).Run();
-  if (count <= kMostMeans) {
-    return fine;
+  const bool many = count > kMostMeans;
+  const std::vector<MapSample> points = ThinnedSamples(map);
+  const std::vector<MapSample> most = many ? MeanSamples(map, kMostMeans) : points;
+  MapFaults faults = Prober(points, map.period_mm, many ? kFineProbes : kProbes).Run();
+  if (many) {
+    const MapFaults of_means = Prober(most, map.period_mm, kProbes).Run();
+    // Points of a scanner's line are closer together than its noise: alone they stand like a wall.
+    faults = {.folded = std::max(faults.folded, of_means.folded), .collapsed = of_means.collapsed};
   }
-  const MapFaults coarse = Prober(Averaged(map), map.period_mm, kProbes).Run();
-  // Points of a scanner's line are closer together than its noise: alone they stand like a wall.
-  return {.folded = std::max(fine.folded, coarse.folded), .collapsed = coarse.collapsed};
+  const TurnedSamples of_most = FindTurned(most, map.period_mm);
+  faults.folded = std::max(faults.folded, of_most.turned);
+  // Where noise is as wide as the points are apart, only means over more of them lie on sheets.
+  if (const std::size_t fewer = std::min(kFewerMeans, count / kPerMean);
+      of_most.on_sheet < kMostly && fewer >= kFewestSamples) {
+    const TurnedSamples of_few = FindTurned(MeanSamples(map, fewer), map.period_mm);
+    faults.folded = std::max(faults.folded, of_few.turned);
+  }
+  return faults;
 }
 
 MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> triangles) {

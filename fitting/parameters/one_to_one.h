@@ -5,17 +5,11 @@
 
 #include <span>
 
+#include "fitting/folds/plane_map.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
-
-// Both in mm, so that lengths can be compared.
-struct PlaneMap {
-  std::span<const Vec3> positions;
-  std::span<const Vec2> at;       // one per position
-  Vec2 period_mm = Vec2::Zero();  // along each coordinate; 0: the map does not go round
-};
 
 // Shares of the surface, 0 to 1.
 struct MapFaults {
@@ -31,7 +25,8 @@ struct MapFaults {
 // sheets, three times the samples' spacing apart in space or more, that the map mixes; two on two
 // sides of a line are a cliff. Noise and outliers are no sheets. Of more than 2000 points the means
 // alone tell what has collapsed, for points of a scanner's line stand like a wall in their noise.
-// Of fewer than 32 points nothing is said.
+// Samples that the map turns over against those beside them (turned_samples.h) are folded too. Of
+// fewer than 32 points nothing is said.
 MapFaults FaultsOfPoints(const PlaneMap& map);
 
 // The same by the triangles over the points, as shares of their area: folded are those that the map

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "surfaces/base/random.h"
+#include "tests/testing/bent_sheets.h"
 #include "tests/testing/grid_mesh.h"
 #include "tests/testing/point_sets.h"
 #include "tests/testing/scattered_data.h"
@@ -171,6 +172,51 @@ TEST(OneToOne, TheSqueezedShareIsThatOfTheArea) {
   EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
   on_map.assign(mesh.triangles.size(), 0.1);
   EXPECT_EQ(SqueezedShare(mesh.points, mesh.triangles, on_map), 0);
+}
+
+// The axis of a tube that bends leaves it: its near side is few points widely spread over many of
+// the far side.
+TEST(OneToOne, ATubeThatBendsAwayFromItsAxisFoldsAroundIt) {
+  const auto bent = [](double bend, int count) {
+    Random random(1);
+    Cloud cloud{.positions = {}, .at = {}, .period_mm = Vec2(0.6 * std::numbers::pi, 0)};
+    for (int k = 0; k < count; ++k) {
+      const double turn = 2 * std::numbers::pi * random.Uniform(), along = 2 * random.Uniform() - 1,
+                   angle = bend / 2 * along, r = 2 / bend + 0.15 * std::cos(turn);
+      const Vec3 p(r * std::cos(angle) - 2 / bend + bend / 12, 0.15 * std::sin(turn),
+                   r * std::sin(angle));
+      cloud.positions.push_back(p);
+      cloud.at.emplace_back(0.3 * std::atan2(p.y(), p.x()), p.z());
+    }
+    return cloud.Faults();
+  };
+  for (const int count : {1500, 10000}) {
+    EXPECT_LT(bent(0.2, count).Sum(), kNone) << count;
+    EXPECT_GT(bent(1.6, count).folded, 0.02) << count;
+    EXPECT_GT(bent(2.5, count).folded, 0.06) << count;
+  }
+}
+
+// Noise of one to three spacings leaves a height field what it is, and a roll what that is.
+TEST(OneToOne, ARollIsToldFromNoiseAsWideAsItsSpacing) {
+  for (const int count : {2000, 20000}) {
+    for (const double noise : {1.0, 2.0, 3.0}) {
+      const double width = noise / std::sqrt(count);
+      const auto flat = [](const Vec2& uv) -> Vec3 { return {uv.x(), uv.y(), 0.2 * uv.x()}; };
+      EXPECT_LT(FromAbove(flat, count, width).Faults().Sum(), kNone) << count << " " << noise;
+    }
+  }
+  for (const double noise : {0.3, 1.0}) {
+    Cloud above, along;
+    above.positions = along.positions =
+        testing::ScatterOver(testing::SpiralRoll, {.count = 20000, .noise = noise}).positions;
+    for (const Vec3& p : above.positions) {
+      above.at.emplace_back(p.x(), p.y());
+      along.at.emplace_back(p.x(), p.z());
+    }
+    EXPECT_GT(above.Faults().folded, 0.4) << noise;
+    EXPECT_GT(along.Faults().Sum(), 0.02) << noise;
+  }
 }
 
 TEST(OneToOne, OfAFewPointsNothingIsSaid) { EXPECT_EQ(FromAbove(OnSphere, 20).Faults().Sum(), 0); }
