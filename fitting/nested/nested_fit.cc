@@ -181,14 +181,17 @@ class NestedFitter {
     Find(Residuals(), /*noise_mm=*/0);
   }
 
+  LeastSpread Least(double noise_mm) const {
+    constexpr double kAtBorders = 10;  // rounding lets the smoothness show, more so there
+    return {.noise_mm = noise_mm, .rounding_mm = kAtBorders * rounding_mm_};
+  }
+
   // Returns how many there are. What is told of points is told of those of mean weight among the
   // others.
   int Find(const ResidualsBetween& residuals, double noise_mm) {
-    constexpr double kAtBorders = 10;  // rounding lets the smoothness show, more so there
-    const LeastSpread least{.noise_mm = noise_mm, .rounding_mm = kAtBorders * rounding_mm_};
     // Gross errors bend the first surface so that some of them are not far from it.
     const OutlierTail tail = report_.rounds.empty() ? OutlierTail::kGoes : OutlierTail::kStays;
-    const int count = FindOutliers(points_, every_, residuals, least, tail, outlier_);
+    const int count = FindOutliers(points_, every_, residuals, Least(noise_mm), tail, outlier_);
     points_.TakeMeanWeight(outlier_);
     return count;
   }
@@ -380,6 +383,9 @@ class NestedFitter {
     if (DropOutliers(std::sqrt(chosen.score))) {
       chosen = FitAll(best.known);
     }
+    if (SparePointsAtSteps(std::sqrt(chosen.score))) {
+      FitAll(weight_);
+    }
     Report(chosen);
     NestedFitResult result{.surface = Surface(), .report = {}, .uv = {}, .residual_mm = {}};
     Measure(result);
@@ -422,18 +428,29 @@ class NestedFitter {
     report_.neighbour_correlation = neighbours.Value();
   }
 
+  // Of all points, at the last solution; until the next.
+  template <class Ask>
+  auto AskOfResiduals(const Ask& ask) {
+    NestedResiduals residuals(solve_);
+    return ask([&](std::size_t begin, std::size_t end) { return residuals.Of(begin, end); });
+  }
+
   // Whether others than before are outliers.
   bool DropOutliers(double noise_mm) {
     if (plan_.outliers == OutlierRule::kKeep) {
       return false;
     }
     const std::vector<char> before = outlier_;
-    NestedResiduals residuals(solve_);
-    const ResidualsBetween between = [&](std::size_t begin, std::size_t end) {
-      return residuals.Of(begin, end);
-    };
-    Find(between, noise_mm);
+    AskOfResiduals([&](const ResidualsBetween& residuals) { return Find(residuals, noise_mm); });
     return before != outlier_;
+  }
+
+  // Whether some are outliers no more. They take part when smoothness is chosen and noise is known,
+  // for a step would be smoothed over with all the rest, and passes for noise.
+  bool SparePointsAtSteps(double noise_mm) {
+    return AskOfResiduals([&](const ResidualsBetween& residuals) {
+      return SpareSheets(points_, residuals, Least(noise_mm), outlier_) > 0;
+    });
   }
 
   // known: the weight, or NaN where it is still to be found.
@@ -442,11 +459,13 @@ class NestedFitter {
     const std::size_t count = kept.Count(points_);
     solve_.Begin(space_, std::move(kept), metric_);
     NestedWeightSearch search(count, solve_, PartLeft(), least_gain_);
+    NestedWeight chosen;
     if (std::isnan(known)) {
       search.Climb(2, weight_);
+      chosen = IsQuick() ? search.Finish() : search.Settle(search.Between());
+    } else {
+      chosen = search.Settle(known);
     }
-    const NestedWeight chosen =
-        IsQuick() ? search.Finish() : search.Settle(std::isnan(known) ? search.Between() : known);
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
     return chosen;
   }

@@ -19,6 +19,17 @@ constexpr double kAlike = 0.5;
 constexpr double kTells = 4;      // standard deviations of a point that it can tell from none
 constexpr double kMostVotes = 4;  // of a point, in those of most
 
+// A point stands on a sheet if so many of those nearest to it are within a part of its own distance
+// from the surface of it.
+struct SheetRule {
+  int nearest, least;
+  double within;
+};
+// Of gross errors one in fifty does by chance by the first, and many do by the second.
+constexpr SheetRule kSurely = {.nearest = 8, .least = 2, .within = 0.1},
+                    kPerhaps = {.nearest = 20, .least = 2, .within = 0.2};
+constexpr double kOnSheets = 0.1;  // of the outliers: there are steps
+
 class OutlierSearch {
  public:
   OutlierSearch(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
@@ -52,6 +63,31 @@ class OutlierSearch {
     return changed;
   }
 
+  // If more than chance does of those that were found surely stand on a sheet, those that perhaps
+  // do are outliers no more. Returns how many.
+  int SpareSheets(std::vector<char>& found) {
+    const std::vector<char> before = found;
+    before_ = &before;
+    std::vector<std::ptrdiff_t> outliers;
+    for (std::ptrdiff_t k = 0; k < count_; ++k) {
+      if (found[k] != 0) {
+        outliers.push_back(k);
+      }
+    }
+    if (outliers.empty() || ShareOnSheets(outliers) <= kOnSheets) {
+      return 0;
+    }
+    int spared = 0;
+    for (const std::ptrdiff_t k : outliers) {
+      LookAround(k);
+      if (IsOnSheet(k, Left(k), Off(k), kPerhaps)) {
+        found[k] = 0;
+        ++spared;
+      }
+    }
+    return spared;
+  }
+
  private:
   static constexpr std::ptrdiff_t kBlocksAtOnce = 512;
 
@@ -63,11 +99,43 @@ class OutlierSearch {
 
   const NestedResidual& ResidualOf(std::ptrdiff_t k) const { return residuals_[k - first_]; }
 
+  // The points that share a block's median.
+  static std::ptrdiff_t Around(std::ptrdiff_t begin) {
+    return std::max<std::ptrdiff_t>(begin - kBlock / 2, 0);
+  }
+  std::ptrdiff_t Behind(std::ptrdiff_t end) const { return std::min(end + kBlock / 2, count_); }
+
+  void LookAround(std::ptrdiff_t k) {
+    const std::ptrdiff_t begin = k - k % kBlock, end = std::min(begin + kBlock, count_);
+    Read(begin, end);
+    Look(Around(begin), Behind(end));
+  }
+
+  // Of the outliers (some of many) less of those that would where others are, as far off as they
+  // are here: gross errors agree by chance, the more so if all are off by the same, and one place
+  // is then as good as another.
+  double ShareOnSheets(const std::vector<std::ptrdiff_t>& outliers) {
+    constexpr std::size_t kAsked = 300;
+    const std::size_t each = std::max<std::size_t>(outliers.size() / kAsked, 1);
+    int asked = 0, on_sheets = 0;
+    for (std::size_t n = 0; n < outliers.size(); n += each) {
+      const std::ptrdiff_t here = outliers[n],
+                           there = outliers[(n + outliers.size() / 2) % outliers.size()];
+      LookAround(here);
+      const Vec3 left = Left(here);
+      const double off = Off(here);
+      on_sheets += IsOnSheet(here, left, off, kSurely) ? 1 : 0;
+      LookAround(there);
+      on_sheets -= IsOnSheet(there, left, off, kSurely) ? 1 : 0;
+      ++asked;
+    }
+    return static_cast<double>(on_sheets) / asked;
+  }
+
   // Whether it changes anything.
   bool PassBlock(std::ptrdiff_t begin, std::vector<char>& found) {
-    const std::ptrdiff_t end = std::min(begin + kBlock, count_),
-                         around = std::max<std::ptrdiff_t>(begin - kBlock / 2, 0),
-                         behind = std::min(end + kBlock / 2, count_);
+    const std::ptrdiff_t end = std::min(begin + kBlock, count_), around = Around(begin),
+                         behind = Behind(end);
     const bool calm = points_.weight.empty() && IsCalm(around, behind);
     if (!calm) {
       Look(around, behind);
@@ -195,24 +263,46 @@ class OutlierSearch {
     return std::sqrt(apart) < kAlike * Off(a);
   }
 
-  // Among the points that stand next to it along the curve, but for those that cannot tell.
-  bool HasCompany(std::ptrdiff_t k) {
-    const double off = Off(k);
+  // Of the points that stand next to it along the curve those nearest to it, but for some.
+  template <class Counts>
+  std::span<const std::pair<double, std::ptrdiff_t>> Nearest(std::ptrdiff_t k, int most,
+                                                             const Counts& counts) {
     near_.clear();
     const std::ptrdiff_t end = std::min(k + kWindow + 1, count_);
     for (std::ptrdiff_t q = std::max<std::ptrdiff_t>(k - kWindow, 0); q < end; ++q) {
-      if (q != k && off > kTells * NoiseOf(q)) {
+      if (q != k && counts(q)) {
         const double dx = points_.X(q * every_) - points_.X(k * every_),
                      dy = points_.Y(q * every_) - points_.Y(k * every_);
         near_.emplace_back(dx * dx + dy * dy, q);
       }
     }
-    const std::ptrdiff_t nearest = std::min<std::ptrdiff_t>(kNearest, std::ssize(near_));
+    const std::ptrdiff_t nearest = std::min<std::ptrdiff_t>(most, std::ssize(near_));
     std::partial_sort(near_.begin(), near_.begin() + nearest, near_.end());
-    const auto alike = std::count_if(near_.begin(), near_.begin() + nearest, [&](const auto& n) {
-      return (*before_)[n.second] == 0 && Alike(k, n.second);
-    });
-    return 2 * alike >= nearest;
+    return std::span(near_).first(nearest);
+  }
+
+  // Among those that can tell.
+  bool HasCompany(std::ptrdiff_t k) {
+    const double off = Off(k);
+    const auto nearest =
+        Nearest(k, kNearest, [&](std::ptrdiff_t q) { return off > kTells * NoiseOf(q); });
+    const auto alike = std::ranges::count_if(
+        nearest, [&](const auto& n) { return (*before_)[n.second] == 0 && Alike(k, n.second); });
+    return 2 * alike >= std::ssize(nearest);
+  }
+
+  Vec3 Left(std::ptrdiff_t k) const {
+    const std::array<double, 3>& e = ResidualOf(k).along;
+    return {e[0], e[1], e[2]};
+  }
+
+  // Whether some of those nearest to point k stand where it would, were `left` left of it.
+  bool IsOnSheet(std::ptrdiff_t k, const Vec3& left, double off, const SheetRule& rule) {
+    const Vec3 place = points_.value[k * every_] - Left(k) + left;
+    const auto nearest = Nearest(k, rule.nearest, [](std::ptrdiff_t) { return true; });
+    return std::ranges::count_if(nearest, [&](const auto& n) {
+             return (points_.value[n.second * every_] - place).norm() < rule.within * off;
+           }) >= rule.least;
   }
 
   const NestedPoints& points_;
@@ -305,6 +395,11 @@ int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsB
   }
   Become(far, outlier);
   return count;
+}
+
+int SpareSheets(const NestedPoints& points, const ResidualsBetween& residuals,
+                const LeastSpread& least, std::vector<char>& outlier) {
+  return OutlierSearch(points, /*every=*/1, residuals, least, kFar).SpareSheets(outlier);
 }
 
 }  // namespace semblance

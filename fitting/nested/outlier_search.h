@@ -46,4 +46,12 @@ enum class OutlierTail { kStays, kGoes };
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
                  const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier);
 
+// At a step, where one sheet of points goes behind another, a smooth surface is far from points of
+// both, beside which others stand. Where more than a tenth of the outliers that FindOutliers has
+// found, beyond what chance does, have two of the eight points nearest to them within a tenth of
+// their distance from the surface, those with two of twenty within a fifth become none. Returns how
+// many.
+int SpareSheets(const NestedPoints& points, const ResidualsBetween& residuals,
+                const LeastSpread& least, std::vector<char>& outlier);
+
 }  // namespace semblance

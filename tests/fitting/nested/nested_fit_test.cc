@@ -163,6 +163,32 @@ TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
   EXPECT_GT(ErrorAgainst(FrankePoint, kept.surface, 100).rms, 1e-2);
 }
 
+// A wall between two sheets. A surface that is smooth everywhere is far from the points beside it.
+Vec3 StepPoint(const Vec2& uv) {
+  const double edge = 0.5 + 0.2 * std::sin(7 * uv.y());
+  return {uv.x(), uv.y(), 0.02 * std::sin(9 * uv.x()) + (uv.x() < edge ? 0 : 1)};
+}
+
+TEST(NestedFit, PointsAtAStepAreNoOutliers) {
+  const NestedFitResult fit = FitAuto(Heights(StepPoint, 4000, 1e-3));
+  EXPECT_LE(fit.report.outliers.size(), 10u);
+}
+
+// So many that as often as not two of eight neighbours are among them, by chance.
+TEST(NestedFit, GrossErrorsOfOneSizeAreNoSheet) {
+  FitTarget target = Heights(FrankePoint, 10000, 1e-3);
+  Random random(9);
+  std::size_t gross = 0;
+  for (FitPoint& p : target.points) {
+    const bool is = random.Uniform() < 0.15;
+    p.position.z() += is ? 0.7 : 0;
+    gross += is ? 1 : 0;
+  }
+  const NestedFitResult fit = FitAuto(target);
+  EXPECT_NEAR(static_cast<double>(fit.report.outliers.size()), static_cast<double>(gross),
+              0.1 * static_cast<double>(gross));
+}
+
 // Each with weight 1 / sigma^2. rough: whether a point is twenty times as far off as others.
 template <class IsRough>
 FitTarget OfTwoKinds(int count, const IsRough& rough) {
