@@ -27,13 +27,14 @@ using Indices = std::vector<std::uint32_t>;
 
 constexpr int kMostRounds = 24;
 constexpr std::size_t kFewestLooked = 100000, kPointsPerVertex = 24;
-constexpr double kAsGood = 1.001;      // of the mean square held out
-constexpr double kFewNew = 0.005;      // of the vertices: not worth a round
-constexpr double kDense = 1.25;        // points for a patch of the next level
-constexpr double kCheapDense = 0.3;    // the same where all patches together are few
-constexpr std::size_t kCheap = 50000;  // points
-constexpr int kQuick = 10000;          // vertices: solves take no time to speak of
-constexpr double kSure = 1;            // standard errors of a correlation
+constexpr double kAsGood = 1.001;            // of the mean square held out
+constexpr double kFewNew = 0.005;            // of the vertices: not worth a round
+constexpr double kDense = 1.25;              // points for a patch of the next level
+constexpr double kCheapDense = 0.3;          // the same where all patches together are few
+constexpr std::size_t kCheap = 50000;        // points
+constexpr int kQuick = 10000;                // vertices: solves take no time to speak of
+constexpr double kSure = 1;                  // standard errors of a correlation
+constexpr std::size_t kPatchesPerPoint = 4;  // of a level: more take time
 // Of the extent. What is left below it is rounding: the mean square is a difference of sums.
 constexpr double kRounding = 1e-8;
 
@@ -57,7 +58,7 @@ bool IsHeld(std::uint32_t k) {
 int FinestByDensity(const NestedPoints& points, std::size_t every, const GridLayout& level0,
                     int finest) {
   constexpr double kPointsPerPatch = 1.3;
-  constexpr std::size_t kMostPatchesPerPoint = 4;
+  constexpr std::size_t kFewPatches = 1 << 20;
   const std::size_t count = (points.size() + every - 1) / every;
   GridLayout layout = level0;
   for (int level = 1; level <= finest; ++level) {
@@ -70,7 +71,7 @@ int FinestByDensity(const NestedPoints& points, std::size_t every, const GridLay
       last = patch;
     }
     if (static_cast<double>(count) < kPointsPerPatch * static_cast<double>(occupied) ||
-        layout.Patches() > kMostPatchesPerPoint * count) {
+        layout.Patches() > std::max(kPatchesPerPoint * count, kFewPatches)) {
       return level - 1;
     }
   }
@@ -299,6 +300,29 @@ class NestedFitter {
     return kSdOfMedian[points_.channels] * std::sqrt(UpperMedian(squares));
   }
 
+  // Where points are crowded, levels of far more patches than points are asked one after another,
+  // as long as the surface comes nearer to the points held out.
+  int FinestAsked() const {
+    const std::size_t few = kPatchesPerPoint * (points_.size() / every_);
+    const int next = space_.finest() + (HasComeNearer() ? 2 : 0);
+    GridLayout layout = space_[0].layout;
+    int level = 0;
+    for (; level < finest_seen_; ++level) {
+      layout = layout.Finer();
+      if (level >= next && layout.Patches() > few) {
+        break;
+      }
+    }
+    return level;
+  }
+
+  bool HasComeNearer() const {
+    constexpr double kPlainly = 0.98;
+    const std::vector<NestedRound>& rounds = report_.rounds;
+    return rounds.size() < 2 ||
+           rounds.back().held_out_rms_mm < kPlainly * rounds[rounds.size() - 2].held_out_rms_mm;
+  }
+
   bool Refine() {
     Indices fitted;
     std::vector<Residual> residuals;
@@ -310,7 +334,7 @@ class NestedFitter {
     });
     const int vertices = space_.Vertices();
     const UnresolvedDetail detail =
-        FindUnresolvedDetail(points_, space_, finest_seen_, fitted, residuals);
+        FindUnresolvedDetail(points_, space_, FinestAsked(), fitted, residuals);
     const int added = OverlayDetail(detail, space_);
     return added > kFewNew * vertices || Densify();
   }

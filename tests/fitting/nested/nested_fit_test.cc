@@ -163,6 +163,18 @@ TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
   EXPECT_GT(ErrorAgainst(FrankePoint, kept.surface, 100).rms, 1e-2);
 }
 
+// As of a mesh whose layout squeezes most of it: nothing is seen of the rest of the domain.
+TEST(NestedFit, PointsInACornerOfTheDomainAreFollowedAsFarAsTheyTell) {
+  constexpr double kCorner = 1.0 / 32;
+  FitTarget target = Heights(FrankePoint, 3000, 0);
+  for (FitPoint& p : target.points) {
+    p.uv *= kCorner;
+  }
+  const NestedFitResult fit = FitAuto(target);
+  EXPECT_GE(fit.surface.shape().max_level, 6);
+  EXPECT_LT(fit.report.held_out_rms_mm, 1e-3);
+}
+
 // A wall between two sheets. A surface that is smooth everywhere is far from the points beside it.
 Vec3 StepPoint(const Vec2& uv) {
   const double edge = 0.5 + 0.2 * std::sin(7 * uv.y());
