@@ -63,14 +63,13 @@ class OutlierSearch {
     return changed;
   }
 
-  // If more than chance does of those that were found surely stand on a sheet, those that perhaps
-  // do are outliers no more. Returns how many.
-  int SpareSheets(std::vector<char>& found) {
-    const std::vector<char> before = found;
+  // If more than chance does of those found before surely stand on a sheet, those that perhaps do
+  // are outliers no more. Returns how many.
+  int SpareSheets(const std::vector<char>& before, std::vector<char>& found) {
     before_ = &before;
     std::vector<std::ptrdiff_t> outliers;
     for (std::ptrdiff_t k = 0; k < count_; ++k) {
-      if (found[k] != 0) {
+      if (before[k] != 0) {
         outliers.push_back(k);
       }
     }
@@ -399,7 +398,8 @@ int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsB
 
 int SpareSheets(const NestedPoints& points, const ResidualsBetween& residuals,
                 const LeastSpread& least, std::vector<char>& outlier) {
-  return OutlierSearch(points, /*every=*/1, residuals, least, kFar).SpareSheets(outlier);
+  const std::vector<char> before = outlier;
+  return OutlierSearch(points, /*every=*/1, residuals, least, kFar).SpareSheets(before, outlier);
 }
 
 }  // namespace semblance
