@@ -28,7 +28,8 @@ using Indices = std::vector<std::uint32_t>;
 constexpr int kMostRounds = 24;
 constexpr std::size_t kFewestLooked = 100000, kPointsPerVertex = 24;
 constexpr double kAsGood = 1.001;            // of the mean square held out
-constexpr double kFewNew = 0.005;            // of the vertices: not worth a round
+constexpr double kFewNew = 0.007;            // of the vertices: not worth a round
+constexpr double kFewMore = 0.02;            // the same after a round that gained nothing
 constexpr double kDense = 1.25;              // points for a patch of the next level
 constexpr double kCheapDense = 0.3;          // the same where all patches together are few
 constexpr std::size_t kCheap = 50000;        // points
@@ -304,7 +305,7 @@ class NestedFitter {
   // as long as the surface comes nearer to the points held out.
   int FinestAsked() const {
     const std::size_t few = kPatchesPerPoint * (points_.size() / every_);
-    const int next = space_.finest() + (HasComeNearer() ? 2 : 0);
+    const int next = space_.finest() + (HasComeNearer() ? 1 : 0);
     GridLayout layout = space_[0].layout;
     int level = 0;
     for (; level < finest_seen_; ++level) {
@@ -336,7 +337,7 @@ class NestedFitter {
     const UnresolvedDetail detail =
         FindUnresolvedDetail(points_, space_, FinestAsked(), fitted, residuals);
     const int added = OverlayDetail(detail, space_);
-    return added > kFewNew * vertices || Densify();
+    return added > (HasComeNearer() ? kFewNew : kFewMore) * vertices || Densify();
   }
 
   // Where most patches show detail, what is finer than the points can tell apart still helps

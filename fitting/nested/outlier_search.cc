@@ -63,28 +63,24 @@ class OutlierSearch {
     return changed;
   }
 
-  // If more than chance does of those found before surely stand on a sheet, those that perhaps do
-  // are outliers no more. Returns how many.
-  int SpareSheets(const std::vector<char>& before, std::vector<char>& found) {
-    before_ = &before;
+  // Of the outliers that were found those that perhaps stand on a sheet, if more than chance does
+  // surely do.
+  std::vector<std::ptrdiff_t> OnSheets(const std::vector<char>& found) {
+    before_ = &found;
     std::vector<std::ptrdiff_t> outliers;
     for (std::ptrdiff_t k = 0; k < count_; ++k) {
-      if (before[k] != 0) {
+      if (found[k] != 0) {
         outliers.push_back(k);
       }
     }
     if (outliers.empty() || ShareOnSheets(outliers) <= kOnSheets) {
-      return 0;
+      return {};
     }
-    int spared = 0;
-    for (const std::ptrdiff_t k : outliers) {
+    std::erase_if(outliers, [&](std::ptrdiff_t k) {
       LookAround(k);
-      if (IsOnSheet(k, Left(k), Off(k), kPerhaps)) {
-        found[k] = 0;
-        ++spared;
-      }
-    }
-    return spared;
+      return !IsOnSheet(k, Left(k), Off(k), kPerhaps);
+    });
+    return outliers;
   }
 
  private:
@@ -398,8 +394,12 @@ int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsB
 
 int SpareSheets(const NestedPoints& points, const ResidualsBetween& residuals,
                 const LeastSpread& least, std::vector<char>& outlier) {
-  const std::vector<char> before = outlier;
-  return OutlierSearch(points, /*every=*/1, residuals, least, kFar).SpareSheets(before, outlier);
+  const std::vector<std::ptrdiff_t> on_sheets =
+      OutlierSearch(points, /*every=*/1, residuals, least, kFar).OnSheets(outlier);
+  for (const std::ptrdiff_t k : on_sheets) {
+    outlier[k] = 0;
+  }
+  return static_cast<int>(on_sheets.size());
 }
 
 }  // namespace semblance
