@@ -81,6 +81,12 @@ AddRunOf AddRunFor(int channels) {
   return kAll[channels - 1];
 }
 
+SEMBLANCE_WIDE void AddToAll(double value, int count, double* numbers) {
+  for (int k = 0; k < count; ++k) {
+    numbers[k] += value;
+  }
+}
+
 }  // namespace
 
 StencilMatrix::StencilMatrix(const GridLayout& layout, GridRuns runs)
@@ -120,12 +126,6 @@ void StencilMatrix::AddPatch(int i, int j, const Matrix16& matrix) {
         entries[Slot(l % 4 - a, l / 4 - b) * length] += matrix(k, l);
       }
     }
-  }
-}
-
-SEMBLANCE_WIDE void AddToAll(double value, int count, double* numbers) {
-  for (int k = 0; k < count; ++k) {
-    numbers[k] += value;
   }
 }
 
