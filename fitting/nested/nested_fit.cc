@@ -408,7 +408,9 @@ class NestedFitter {
     if (DropOutliers(std::sqrt(chosen.score))) {
       chosen = FitAll(best.known);
     }
+    const double mean_weight = points_.mean_weight;
     if (SparePointsAtSteps(std::sqrt(chosen.score))) {
+      chosen.mean_square *= mean_weight / points_.mean_weight;  // of a point of mean weight
       FitAll(weight_);
     }
     Report(chosen);
@@ -453,7 +455,7 @@ class NestedFitter {
     report_.neighbour_correlation = neighbours.Value();
   }
 
-  // Of all points, at the last solution; until the next.
+  // ask(residuals): of all points, at the last solution.
   template <class Ask>
   auto AskOfResiduals(const Ask& ask) {
     NestedResiduals residuals(solve_);
@@ -470,12 +472,14 @@ class NestedFitter {
     return before != outlier_;
   }
 
-  // Whether some are outliers no more. They take part when smoothness is chosen and noise is known,
-  // for a step would be smoothed over with all the rest, and passes for noise.
+  // Whether some are outliers no more. They take part once smoothness is chosen and noise is known:
+  // before, a step would make all the rest too smooth and pass for noise.
   bool SparePointsAtSteps(double noise_mm) {
-    return AskOfResiduals([&](const ResidualsBetween& residuals) {
-      return SpareSheets(points_, residuals, Least(noise_mm), outlier_) > 0;
+    const int spared = AskOfResiduals([&](const ResidualsBetween& residuals) {
+      return SpareSheets(points_, residuals, Least(noise_mm), outlier_);
     });
+    points_.TakeMeanWeight(outlier_);
+    return spared > 0;
   }
 
   // known: the weight, or NaN where it is still to be found.
