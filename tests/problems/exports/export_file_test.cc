@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <pugixml.hpp>
 
 #include "problems/pipeline/experiment_config.h"
@@ -22,6 +21,7 @@
 #include "surfaces/mesh_files/read_ply.h"
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {
@@ -137,27 +137,11 @@ TEST_F(ExportFile, AMeshGoesToEveryFormatOfMeshes) {
   EXPECT_EQ(DocumentOf(Export(sphere, ".glb"))["nodes"][0]["name"], "sphere");
 }
 
-// A tube whose ends are so wide.
-HSplineSurface Tube(double end_mm) {
-  const HSplineShape shape{
-      .patches_u = 8, .patches_v = 6, .max_level = 0, .closure = Closure::kPeriodicU};
-  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
-  for (int j = 0; j < net.rows; ++j) {
-    for (int i = 0; i < net.columns; ++i) {
-      const double turn = 2 * std::numbers::pi * i / net.columns,
-                   angle = std::numbers::pi * (j - 1) / shape.patches_v,
-                   radius = end_mm + std::sin(angle);
-      net.vertices.emplace_back(radius * std::cos(turn), radius * std::sin(turn), -std::cos(angle));
-    }
-  }
-  return {shape, net};
-}
-
 // As surface.ply of a fit is: each pole of a closed surface is one vertex. An open tube stays open.
 TEST_F(ExportFile, WhatClosesAtPolesIsWatertightInEveryFormatOfMeshes) {
   const fs::path closed = scratch_ / "closed.hspline.json", open = scratch_ / "open.hspline.json";
-  WriteHSpline(closed, Tube(0.002));
-  WriteHSpline(open, Tube(0.2));
+  WriteHSpline(closed, testing::DrawnTube(0.002, 0));
+  WriteHSpline(open, testing::DrawnTube(0.2, 0));
   for (const char* extension : {".ply", ".obj", ".off", ".stl"}) {
     const fs::path file = scratch_ / (std::string("written") + extension);
     const auto edges_of = [&](const fs::path& from) {
@@ -169,7 +153,7 @@ TEST_F(ExportFile, WhatClosesAtPolesIsWatertightInEveryFormatOfMeshes) {
     EXPECT_GT(edges_of(open).boundary, 10) << extension;
   }
   const std::size_t count = ReadMesh(scratch_ / "written.stl").points.size();
-  EXPECT_EQ(TessellateToChord(Tube(0.2), 0.1).mesh.points.size(), count);
+  EXPECT_EQ(TessellateToChord(testing::DrawnTube(0.2, 0), 0.1).mesh.points.size(), count);
   pugi::xml_document vtp;
   ASSERT_TRUE(vtp.load_string(Export(closed, ".vtp").c_str()));
   const Json glb = DocumentOf(Export(closed, ".glb"));

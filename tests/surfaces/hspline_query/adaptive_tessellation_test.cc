@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "surfaces/base/error.h"
@@ -149,20 +148,8 @@ TEST(AdaptiveTessellation, ChordsThatCannotBeAreRefused) {
   EXPECT_THROW(TessellateToChord(surface, 1e-15), InputError);
 }
 
-// A tube whose ends are drawn together to nearly a point each.
 TEST(JoinEdge, ATubeWithBothEdgesJoinedIsClosed) {
-  const HSplineShape shape{
-      .patches_u = 8, .patches_v = 6, .max_level = 0, .closure = Closure::kPeriodicU};
-  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
-  for (int j = 0; j < net.rows; ++j) {
-    for (int i = 0; i < net.columns; ++i) {
-      const double turn = 2 * std::numbers::pi * i / net.columns,
-                   angle = std::numbers::pi * (j - 1) / shape.patches_v;
-      net.vertices.emplace_back(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn),
-                                0.01 * (i % 2) - std::cos(angle));
-    }
-  }
-  const HSplineSurface surface(shape, net);
+  const HSplineSurface surface = testing::DrawnTube(0, 0.01);
   Tessellation t = TessellateToChord(surface, 1e-3);
   EXPECT_GT(CheckEdges(t.mesh).boundary, 10);
   const Tessellation untouched = t;
