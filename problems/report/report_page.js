@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a page of a report does by itself. A click on a column's head sorts the table by it, a second one turns the
-// order round; a field above long tables filters them; a link into a folded part opens it.
+// Behaviour of a report page. A click on the head of a column sorts the table, and a second click reverses the order. A
+// field above long tables filters their rows. A link into a folded part opens that part.
 'use strict';
 (() => {
   const number = (text) => {
@@ -39,9 +39,9 @@
     }
   }
 
-  // Rows that hold every word that is typed, in any cell.
-  const filterOf = (table) => {
-    const field = document.createElement('input'), told = document.createElement('span');
+  // Adds a field that shows only the rows with every typed word, in any cell.
+  const addFilter = (table) => {
+    const field = document.createElement('input'), count = document.createElement('span');
     field.type = 'search';
     field.placeholder = 'show rows with ...';
     field.setAttribute('aria-label', `filter: ${table.caption ? table.caption.textContent : 'rows'}`);
@@ -53,18 +53,18 @@
         row.hidden = !words.every((word) => texts[k].includes(word));
         shown += row.hidden ? 0 : 1;
       });
-      told.textContent = words.length ? ` ${shown} of ${rows.length}` : '';
+      count.textContent = words.length ? ` ${shown} of ${rows.length}` : '';
     };
     field.addEventListener('input', filter);
     const label = document.createElement('label');
     label.className = 'filter';
-    label.append(field, told);
+    label.append(field, count);
     table.parentElement.before(label);
     return {clear: () => { field.value = ''; filter(); }};
   };
-  const filters = Array.from(document.querySelectorAll('table[data-filter]')).map(filterOf);
+  const filters = Array.from(document.querySelectorAll('table[data-filter]')).map(addFilter);
 
-  // On a phone a tap shows a picture as large as it was made, in a box of its own that scrolls; another one takes it back.
+  // On a phone a tap shows a picture at full size in a box that scrolls. Another tap shrinks it again.
   for (const picture of document.querySelectorAll('figure > svg.plot, figure > img')) {
     const box = document.createElement('div');
     box.className = 'picture';
@@ -75,7 +75,7 @@
     });
   }
 
-  // Folded parts.
+  // Opens the folded part that holds the target of a link.
   const reveal = () => {
     const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
     if (!target) { return; }
@@ -94,7 +94,7 @@
   });
   reveal();
 
-  // Where the contents stand above the page, they open on demand.
+  // On a narrow screen the contents are above the page and stay closed until opened.
   const contents = document.querySelector('nav details');
   if (contents) {
     const narrow = matchMedia('(max-width: 76rem)');

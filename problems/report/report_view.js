@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The 3-D view of a report: canvases side by side under one camera, and the panel that rules them.
+// The 3-D view of a report: canvases with one common camera, and the panel that controls them.
 'use strict';
 (() => {
   const root = document.getElementById('view3d');
-  // What there is to look at instead: a run's page has pictures, a study's leads to its trials.
+  // Points to the alternative: the page of a run has pictures, the page of a study does not.
   const instead = () => document.querySelector('figure img') ? 'The pictures on this page show the same from fixed sides.'
-                                                             : 'All else on this page does without.';
+                                                             : 'The rest of this page does not need it.';
   if (!SemblanceGuides.canShow()) {
     const words = document.createElement('p');
     words.className = 'no-view';
-    words.textContent = 'There is no 3-D view here: WebGL is off in this browser, or this machine has none. '
+    words.textContent = 'There is no 3-D view here, because WebGL is off in this browser or not available on this machine. '
         + instead();
     root.replaceChildren(words);
     return;
@@ -21,7 +21,7 @@
     return made;
   };
 
-  // What the first look shows: the head, else the face as glass over bone and dowels.
+  // The first view shows the head, or else the face, translucent, over bone and depth markers.
   const headed = scenes.every((scene) => scene.layers.some((layer) => layer.id === 'bust'));
   const SHOWN = headed ? ['skull', 'dowels', 'bust'] : ['skull', 'dowels', 'face'];
   const OPACITY = {face: 0.6, implicit: 0.6, skin: 0.5};
@@ -40,7 +40,7 @@
     drawLegends();
   };
 
-  // How far each face lies outside the other view's; the faces are then shown, and not the heads over them.
+  // Colours each face by its distance outside the other view's face. Shows the faces and hides the heads over them.
   const showDifference = () => {
     const faces = stages.map((stage) => stage.layers && stage.layers.get('face'));
     if (!shared.difference || faces.length < 2 || !faces.every(Boolean)) { return; }
@@ -57,7 +57,7 @@
     updateAll();
   };
 
-  // Canvases: two where there is something to compare.
+  // Canvases: two if there are scenes to compare.
   const frames = element('div', {className: 'view3d-frames'});
   const makeFrame = (name, first) => {
     const canvas = element('canvas', {tabIndex: 0});
@@ -126,7 +126,7 @@
   const drawCompass = () => SemblanceGuides.drawCompass(compass, shared.camera.camera, scenes[0].axes);
   const legendOf = (map) => SemblanceGuides.legendOf(map, shared.range_mm);
 
-  // A legend for each map that is on show.
+  // A legend for each visible map.
   const drawLegends = () => {
     const used = new Set();
     for (const [id, layer] of labels) {

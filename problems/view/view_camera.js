@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One camera for all views of a report, so that they are linked: it goes round a point, z up. Frame: LPS, +x the
+// One camera for all views of a report, so that the views move together. It orbits a point, z up. Frame: LPS, +x the
 // subject's left, +y back, +z up.
 'use strict';
 class SemblanceCamera {
   // onChange is called after each move.
   constructor(box, onChange) {
-    this.angle = 22;  // degrees across the shorter side: a long lens, as portraits are taken
+    this.angle = 22;  // degrees across the shorter side; a long lens, as for portraits
     this.camera = new THREE.PerspectiveCamera(this.angle, 1, 1, 5000);
     this.camera.up.set(0, 0, 1);
-    this.reach = 1.85;  // times the extent: how far away it stands at first
+    this.reach = 1.85;  // initial distance, in extents of the box
     this.onChange = onChange;
     this.goRound(box);
     this.look(0, 0);
   }
 
-  // From the next look on.
+  // Orbits this box from the next look on.
   goRound(box) {
     this.centre = box.getCenter(new THREE.Vector3());
     this.extent = box.getSize(new THREE.Vector3()).length();
@@ -26,11 +26,11 @@ class SemblanceCamera {
     this.distance = this.reach * this.extent;
     this.turn = turn;
     this.rise = rise;
-    this.isShifted = false;  // moved or zoomed since
+    this.isShifted = false;  // true once someone moved or zoomed
     this.update();
   }
 
-  // From the same side; not if someone has chosen what to see.
+  // Looks from the same side again, unless someone moved or zoomed.
   lookAgain() { if (!this.isShifted) { this.look(this.turn, this.rise); } }
 
   rotate(right, up) {
@@ -39,7 +39,7 @@ class SemblanceCamera {
     this.update();
   }
 
-  // Shares of the picture's height.
+  // Moves the target by shares of the picture's height.
   pan(right, up) {
     const height = 2 * this.distance * Math.tan(this.camera.fov * Math.PI / 360);
     const axes = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
@@ -67,9 +67,9 @@ class SemblanceCamera {
     this.onChange();
   }
 
-  // Drag turns; with the right button, shift or two fingers it shifts; wheel and pinch zoom; arrow keys turn.
-  // wheel: 'always' zooms; 'asked' leaves the wheel to the page until the canvas is clicked, and again once the pointer
-  // has left it; with Ctrl held, and on a full screen, it zooms too.
+  // A drag turns the view. A drag with the right button, shift or two fingers shifts it. Wheel and pinch zoom. Arrow
+  // keys turn. With wheel 'always' the wheel always zooms. With 'asked' it zooms between a click on the canvas and the
+  // pointer leaving it, and with Ctrl or in full screen; otherwise the wheel scrolls the page.
   attach(canvas, {wheel = 'always'} = {}) {
     const fingers = new Map();
     let asked = wheel === 'always';

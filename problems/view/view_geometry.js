@@ -1,41 +1,41 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The 3-D view of a report: from a scene's blobs to three.js objects, and from millimetres to colours.
+// Converts a scene's blobs (view_mesh.h) to three.js objects, and millimetres to colours.
 'use strict';
 const SemblanceGeometry = (() => {
   const NO_VALUE = -32768;
 
-  const bytesOf = (base64) => {
+  const decodeBytes = (base64) => {
     const text = atob(base64), bytes = new Uint8Array(text.length);
     for (let k = 0; k < text.length; ++k) { bytes[k] = text.charCodeAt(k); }
     return bytes.buffer;
   };
 
-  const pointsOf = (blob) => {
-    const numbers = new Uint16Array(bytesOf(blob.points)), positions = new Float32Array(numbers.length);
+  const decodePoints = (blob) => {
+    const numbers = new Uint16Array(decodeBytes(blob.points)), positions = new Float32Array(numbers.length);
     for (let k = 0; k < numbers.length; ++k) { positions[k] = blob.low[k % 3] + blob.step * numbers[k]; }
     return positions;
   };
 
-  const indexOf = (base64, points) => {
-    const bytes = bytesOf(base64);
+  const decodeIndex = (base64, points) => {
+    const bytes = decodeBytes(base64);
     return points <= 65536 ? new Uint16Array(bytes) : new Uint32Array(bytes);
   };
 
-  // A mesh, or lines; its normals are those of the decimated triangles, smoothed.
+  // A mesh with smooth normals of its simplified triangles, or lines.
   const geometryOf = (blob) => {
-    const geometry = new THREE.BufferGeometry(), positions = pointsOf(blob);
+    const geometry = new THREE.BufferGeometry(), positions = decodePoints(blob);
     geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
     geometry.setIndex(new THREE.BufferAttribute(
-        indexOf(blob.triangles || blob.segments, positions.length / 3), 1));
+        decodeIndex(blob.triangles || blob.segments, positions.length / 3), 1));
     if (blob.triangles) { geometry.computeVertexNormals(); }
     return geometry;
   };
 
-  // One number in mm a vertex, NaN where there is none.
+  // One number in mm per vertex. NaN where there is no value.
   const valuesOf = (blob) =>
-      Float32Array.from(new Int16Array(bytesOf(blob.values)), (n) => n === NO_VALUE ? NaN : n / 100);
+      Float32Array.from(new Int16Array(decodeBytes(blob.values)), (n) => n === NO_VALUE ? NaN : n / 100);
 
-  // range_mm, where given, takes the place of both ends of a map about 0.
+  // The ends of a colour map. range_mm, if given, replaces both ends of a map around 0.
   const domainOf = (map, range_mm) =>
       map.low_mm < 0 && range_mm ? [-range_mm, range_mm] : [map.low_mm, map.high_mm];
 
@@ -56,8 +56,8 @@ const SemblanceGeometry = (() => {
     return new THREE.BufferAttribute(colours, 3);
   };
 
-  // How far each vertex of a surface lies outside (+) or inside (-) another: from the other's nearest vertex along its
-  // normal, in mm; NaN beyond `reach`. Good to a fraction of the triangles' size.
+  // The distance in mm of each vertex outside (+) or inside (-) another surface, measured from the other surface's
+  // nearest vertex along its normal. NaN beyond `reach`. Accurate to a fraction of the triangles' size.
   const outsideOf = (geometry, other, reach) => {
     const from = geometry.attributes.position.array, to = other.attributes.position.array, normals = other.attributes.normal.array;
     const cell = reach / 2, cells = new Map();
@@ -86,7 +86,7 @@ const SemblanceGeometry = (() => {
 
   const vector = (numbers) => new THREE.Vector3().fromArray(numbers);
 
-  // Rods and balls are many: all have the triangles of one.
+  // Scenes have many rods and balls, so all share one geometry.
   const once = (make) => { let made = null; return () => made || (made = make()); };
   const rod = once(() => new THREE.CylinderBufferGeometry(1, 1, 1, 12)), sphere = once(() => new THREE.SphereBufferGeometry(1, 16, 12));
 

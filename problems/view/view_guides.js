@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What helps to read a 3-D view: a compass that names the head's sides, and the legend of a colour map.
+// Aids for reading a 3-D view: a compass with the names of the head's sides, and the legend of a colour map.
 'use strict';
 const SemblanceGuides = (() => {
   const element = (tag, properties, ...children) => {
@@ -8,8 +8,7 @@ const SemblanceGuides = (() => {
     return made;
   };
 
-  // compass: a square canvas, drawn in its own colour of text.
-  // names: of +x, -x, +y, -y, +z and -z.
+  // Draws on a square canvas in its text colour. `names` are those of +x, -x, +y, -y, +z and -z.
   const HEAD = ['left', 'right', 'back', 'front', 'up', 'down'];
   const drawCompass = (compass, camera, names = HEAD) => {
     const pen = compass.getContext('2d'), middle = compass.width / 2;
@@ -29,20 +28,20 @@ const SemblanceGuides = (() => {
       pen.moveTo(middle, middle);
       pen.lineTo(x, y);
       pen.stroke();
-      // The names of what points away would lie under the others'; what points sideways is named beside its end.
+      // Axes that point away have no name, because it would lie under others. Sideways axes are named at their ends.
       const sideways = Math.abs(at.x) > 0.2, reach = sideways ? 60 : 86;
       pen.textAlign = sideways ? (at.x > 0 ? 'left' : 'right') : 'center';
       if (at.z > -0.3 && at.z < 0.93) { pen.fillText(name, middle + reach * at.x, middle - reach * at.y); }
     }
   };
 
-  // Three figures; very small and large numbers with a power of ten, as 1.2e-5.
+  // Three figures. Very small and very large numbers have a power of ten, e.g. 1.2e-5.
   const figureOf = (value, scaled) => {
     const is_plain = value === 0 || !scaled || (Math.abs(value) >= 1e-3 && Math.abs(value) < 1e5);
     return `${!is_plain ? value.toExponential(1) : scaled ? +value.toPrecision(3) : +value.toFixed(2)}`.replaceAll('-', '\u2212');
   };
 
-  // range_mm: as SemblanceGeometry.domainOf takes it.
+  // The legend of a colour map. range_mm: see SemblanceGeometry.domainOf.
   const legendOf = (map, range_mm) => {
     const [low, high] = SemblanceGeometry.domainOf(map, range_mm);
     const bar = element('div', {className: 'view3d-bar'});
@@ -52,14 +51,14 @@ const SemblanceGuides = (() => {
       const value = (low + (high - low) * k / 4) * (map.scale || 1), sign = low < 0 && value > 0 ? '+' : '';
       return sign + figureOf(value, Boolean(map.scale));
     });
-    const is_long = figures.some((figure) => figure.length > 5);  // there is no room for five of them
+    const is_long = figures.some((figure) => figure.length > 5);  // five would not fit
     for (const figure of is_long ? [figures[0], figures[2], figures[4]] : figures) { ticks.append(element('span', {textContent: figure})); }
     const none = element('i', {style: `background:${map.no_data}`});
     return element('div', {className: 'view3d-legend'}, element('div', {textContent: `${map.title} (mm)`}),
                    bar, ticks, element('small', {}, none, 'no data'));
   };
 
-  // Whether this browser can show the view at all, and words for a reader where it cannot.
+  // True if this browser has WebGL.
   const canShow = () => {
     try {
       const canvas = document.createElement('canvas');

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measuring in the 3-D view, the same in a report and at the workbench: distances, tissue depth, pinned labels, a
-// clipping plane, full screen.
+// Measuring in the 3-D view of reports and of the workbench: distances, tissue depth, pinned labels, a clipping plane
+// and full screen.
 'use strict';
 const SemblanceSurface = (() => {
-  // A heap of [distance, vertex], nearest first.
+  // A binary heap of [distance, vertex], nearest first.
   class Heap {
     constructor() { this.items = []; }
     push(item) {
@@ -30,7 +30,8 @@ const SemblanceSurface = (() => {
 
   const distance = (a, b) => a.distanceTo(b);
 
-  // The distance at c of a wave that reached a and b at the times s and t: spherical, if it came through between them.
+  // The arrival at c of a wave that reached a and b at the distances s and t. If the straight way crosses the edge ab,
+  // the wave is spherical; otherwise it goes round by a or b.
   const through = (a, b, c, s, t) => {
     const along = b.clone().sub(a), length = along.length();
     const round = Math.min(s + distance(a, c), t + distance(b, c));
@@ -46,8 +47,8 @@ const SemblanceSurface = (() => {
   const cornersOf = (geometry, triangle) => [0, 1, 2].map((k) => geometry.index.array[3 * triangle + k]);
   const vertexOf = (geometry, v) => new THREE.Vector3().fromArray(geometry.attributes.position.array, 3 * v);
 
-  // From hit to hit on one surface, in mm; Infinity if no way leads there. way: points along it, roughly.
-  // Fast marching with waves that are spherical within each triangle: exact on a plane, some percent long elsewhere.
+  // The length in mm from hit to hit along one surface, Infinity if they are not connected, and an approximate way.
+  // Fast marching with spherical waves in each triangle: exact on a plane, a few percent too long elsewhere.
   const alongSurface = (geometry, from, to) => {
     const index = geometry.index.array, vertices = geometry.attributes.position.count;
     const first = new Int32Array(vertices + 1), times = new Float64Array(vertices).fill(Infinity);
@@ -91,7 +92,8 @@ const SemblanceSurface = (() => {
     return {length, way: wayDown(geometry, {times, came, first, trianglesAt}, from, to, last)};
   };
 
-  // From `to` down the slope of the times to `from`, triangle by triangle; where a slope leads back, on by a corner.
+  // Follows the slope of the arrival times from `to` down to `from`, triangle by triangle. If the slope leads back, the
+  // way continues through a corner.
   const wayDown = (geometry, field, from, to, last) => {
     const {times, came, first, trianglesAt} = field, way = [to.point];
     const around = (v) => Array.from(trianglesAt.subarray(first[v], first[v + 1]));
@@ -121,13 +123,13 @@ const SemblanceSurface = (() => {
     return [...way, from.point];
   };
 
-  // Where the steepest way down from a point of a triangle leaves it: {point, edge}.
+  // The place {point, edge} where the steepest descent from a point of a triangle leaves the triangle.
   const exitOf = (geometry, corners, times, point) => {
     const [a, b, c] = corners.map((v) => vertexOf(geometry, v)), [ta, tb, tc] = corners.map((v) => times[v]);
     const e1 = b.clone().sub(a), e2 = c.clone().sub(a), n = e1.clone().cross(e2), size = n.lengthSq();
     if (!(size > 0)) { return null; }
     const down = e2.clone().cross(n).multiplyScalar(ta - tb).add(n.clone().cross(e1).multiplyScalar(ta - tc)).divideScalar(size);
-    // Shares of the corners at the point, and how they change along the way.
+    // Barycentric coordinates at the point, and their change along the way.
     const sharesOf = (way) => {
       const share2 = n.dot(e1.clone().cross(way)) / size, share1 = n.dot(way.clone().cross(e2)) / size;
       return [-share1 - share2, share1, share2];
@@ -146,7 +148,7 @@ const SemblanceSurface = (() => {
 })();
 
 class SemblanceMeasure {
-  // stages: those that are measured on, all under one camera. draw: draws them all soon. box: of what is shown, in mm.
+  // stages: the canvases to measure on, all with one camera. draw(): draws them soon. box: the bounds of the scene, in mm.
   constructor(stages, draw, box) {
     this.stages = stages;
     this.draw = draw;
@@ -159,7 +161,7 @@ class SemblanceMeasure {
     for (const stage of stages) { this.attach(stage); }
   }
 
-  // A click is a press that does not travel: a drag turns the head.
+  // A press that does not move is a click. A drag turns the head.
   attach(stage) {
     let press = null;
     stage.overlay = document.createElement('div');
@@ -178,7 +180,7 @@ class SemblanceMeasure {
     const surfaces = [...stage.layers.values()].filter(({layer}) => layer.mesh).map(({layer}) => layer.id);
     const hit = stage.hit(event, this.tool === 'depth' ? ['skull', 'depth'] : surfaces);
     if (!hit || !hit.object.geometry || !hit.object.geometry.index || hit.faceIndex === undefined) {
-      this.say(this.tool === 'depth' ? 'Depth is asked of bone: show the skull and click on it.' : 'There is no surface there.');
+      this.setStatus(this.tool === 'depth' ? 'Depth is measured from bone: show the skull and click on it.' : 'There is no surface there.');
       return;
     }
     if (this.tool === 'distance') { this.distance(stage, hit); }
@@ -190,7 +192,7 @@ class SemblanceMeasure {
     const start = this.pending;
     if (!start || start.stage !== stage) {
       this.pending = {stage, hit};
-      this.say('Now click the second point.');
+      this.setStatus('Now click the second point.');
       return;
     }
     this.pending = null;
@@ -202,8 +204,8 @@ class SemblanceMeasure {
     this.mark(stage, hit.point, `${straight.toFixed(this.digits)} mm${along}`, isFinite(length) ? way : [start.hit.point, hit.point]);
   }
 
-  // The first point of a surface on the ray, from whichever side: glass is drawn, and met, from outside alone.
-  static meets(ray, object) {
+  // The first point of a surface on the ray, from either side. Translucent surfaces are one-sided otherwise.
+  static firstHit(ray, object) {
     const {material} = object, side = material.side;
     material.side = THREE.DoubleSide;
     const [first] = ray.intersectObject(object);
@@ -211,7 +213,7 @@ class SemblanceMeasure {
     return first;
   }
 
-  // From bone along its normal to each face that is shown.
+  // Measures from bone along its normal to each visible face.
   depth(stage, hit) {
     const geometry = hit.object.geometry, normals = geometry.attributes.normal.array, normal = new THREE.Vector3();
     for (const v of [hit.face.a, hit.face.b, hit.face.c]) { normal.add(new THREE.Vector3().fromArray(normals, 3 * v)); }
@@ -221,7 +223,7 @@ class SemblanceMeasure {
     let end = hit.point.clone().addScaledVector(normal, 5);
     for (const id of ['face', 'skin', 'implicit']) {
       const found = stage.layers.get(id);
-      const far = found && found.object.visible ? SemblanceMeasure.meets(ray, found.object) : null;
+      const far = found && found.object.visible ? SemblanceMeasure.firstHit(ray, found.object) : null;
       if (far) {
         parts.push(`${found.layer.label.toLowerCase()} ${far.distance.toFixed(1)} mm`);
         if (parts.length === 1) { end = far.point; }
@@ -232,7 +234,7 @@ class SemblanceMeasure {
 
   label(stage, hit) {
     const text = (this.text.value || '').trim();
-    if (!text) { this.say('Write the label first.'); this.text.focus(); return; }
+    if (!text) { this.setStatus('Write the label first.'); this.text.focus(); return; }
     this.mark(stage, hit.point, text, []);
   }
 
@@ -259,7 +261,7 @@ class SemblanceMeasure {
     stage.extra.add(group);
     stage.overlay.append(label);
     this.marks.push(made);
-    this.say(text);
+    this.setStatus(text);
     this.draw();
   }
 
@@ -280,13 +282,13 @@ class SemblanceMeasure {
     }
   }
 
-  say(words) { if (this.status) { this.status.textContent = words; } }
+  setStatus(words) { if (this.status) { this.status.textContent = words; } }
 
   setTool(tool) {
     this.tool = this.tool === tool ? 'none' : tool;
     this.pending = null;
     for (const [name, button] of this.buttons) { button.setAttribute('aria-pressed', String(name === this.tool)); }
-    this.say({none: '', distance: 'Click two points of one surface.', depth: 'Click on bone.',
+    this.setStatus({none: '', distance: 'Click two points of one surface.', depth: 'Click on bone.',
               label: 'Write a label, then click where it belongs.'}[this.tool]);
   }
 
@@ -331,12 +333,12 @@ class SemblanceMeasure {
     slider.addEventListener('input', () => { this.clip.at = Number(slider.value); this.applyClip(); });
     flip.addEventListener('change', () => { this.clip.flipped = flip.checked; this.applyClip(); });
     const clear = made('button', {type: 'button', textContent: 'Clear'});
-    clear.addEventListener('click', () => { for (const mark of [...this.marks]) { this.remove(mark); } this.say(''); });
+    clear.addEventListener('click', () => { for (const mark of [...this.marks]) { this.remove(mark); } this.setStatus(''); });
     const full = made('button', {type: 'button', textContent: 'Full screen'});
     full.addEventListener('click', () => {
       if (document.fullscreenElement) { document.exitFullscreen(); } else { fullScreenOf.requestFullscreen(); }
     });
-    const hasBone = this.stages.some((stage) => !stage.description.axes);  // depth is asked of bone, which heads have
+    const hasBone = this.stages.some((stage) => !stage.description.axes);  // only scenes of heads have bone
     return [made('div', {className: 'view3d-buttons'}, tool('distance', 'Distance'), hasBone ? tool('depth', 'Depth') : '',
                  tool('label', 'Pin'), clear, full),
             made('label', {className: 'view3d-choice'}, 'label ', this.text), this.status,

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// When the 3-D view is drawn, and how finely: once for all that changes before the next frame. Where a full picture takes
-// long, as without a graphics card, coarser ones are drawn while something moves, and the full one once it rests.
+// Schedules the drawing of the 3-D view: once per frame for all changes. If a full picture takes long, e.g. without a
+// graphics card, coarser pictures are drawn while something moves, and a full one when it rests.
 'use strict';
 class SemblancePace {
-  static QUICK_MS = 50;    // a full picture that takes no longer is drawn each time
+  static QUICK_MS = 50;    // a full picture that takes no longer is always drawn in full
   static LEAST_SHARE = 0.5;  // of the full resolution, across and down
-  static REST_MS = 250;    // without a change, then it rests
+  static REST_MS = 250;    // without a change until the view counts as resting
 
-  // stages(): those to draw. beside(): draws what goes with them.
-  constructor(stages, beside) {
+  // stages(): the canvases to draw. drawExtras(): draws the compass and similar.
+  constructor(stages, drawExtras) {
     this.stages = stages;
-    this.beside = beside;
-    this.isBusy = () => false;  // whether the next change is on its way
-    this.full_ms = 0;           // what the last full picture took that was timed
+    this.drawExtras = drawExtras;
+    this.isBusy = () => false;  // true while another change is coming
+    this.full_ms = 0;           // duration of the last timed full picture
     this.timed_at = -Infinity;
     this.due = false;
-    this.isFull = false;        // nothing moves, and the picture is a full one
+    this.isFull = false;        // the picture is a full one and nothing moves
   }
 
   soon() {
@@ -28,7 +28,7 @@ class SemblancePace {
     });
   }
 
-  // Of the full resolution, while something moves.
+  // The share of the full resolution to draw while something moves.
   share() {
     const {QUICK_MS, LEAST_SHARE} = SemblancePace;
     return this.full_ms > QUICK_MS ? Math.max(LEAST_SHARE, Math.sqrt(QUICK_MS / this.full_ms)) : 1;
@@ -38,7 +38,7 @@ class SemblancePace {
     clearTimeout(this.rest);
     const start = performance.now();
     for (const stage of this.stages()) { stage.draw(share); }
-    this.beside();
+    this.drawExtras();
     if (share < 1) {
       this.rest = setTimeout(() => this.settle(), SemblancePace.REST_MS);
     } else {
@@ -55,7 +55,7 @@ class SemblancePace {
     }
   }
 
-  // Waiting for the picture holds the page up: where pictures are quick, it is done once a second at most.
+  // Waiting for the picture blocks the page, so quick pictures are timed at most once a second.
   time(start) {
     if (this.full_ms <= SemblancePace.QUICK_MS && start - this.timed_at < 1000) { return; }
     for (const stage of this.stages()) { stage.finish(); }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One canvas of the 3-D view with one scene on it.
+// One canvas of the 3-D view with one scene.
 'use strict';
 class SemblanceStage {
-  // shared: what the panel says, of all stages, and drawSoon(), which draws them all (SemblancePace); see report_view.js.
+  // shared: the state that the panel sets for all stages, and drawSoon(), which draws them all (SemblancePace); see
+  // report_view.js.
   constructor(canvas, tip, shared) {
     this.canvas = canvas;
     this.tip = tip;
@@ -10,7 +11,7 @@ class SemblanceStage {
     // The buffer is kept so that a picture can be saved at any time.
     this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
     this.paper();
-    // Dark or light, as the page.
+    // Follows the page between dark and light.
     window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.paper(); this.shared.drawSoon(); });
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
     this.draft = new SemblanceDraft(this.renderer);
@@ -20,20 +21,20 @@ class SemblanceStage {
       end: new THREE.MeshPhongMaterial({color: 0x1d2126, shininess: 25}),
       residual: new THREE.MeshPhongMaterial({color: 0x7b1fa2, shininess: 25}),
     };
-    this.extra = new THREE.Group();  // what others draw
+    this.extra = new THREE.Group();  // objects of other scripts
     this.afterDraw = [];             // called after each picture
     canvas.addEventListener('pointermove', (event) => this.point(event));
     canvas.addEventListener('pointerleave', () => { this.tip.hidden = true; });
   }
 
-  // The canvas lies on the colour that its style gives it; without one, on white.
+  // Uses the background colour of the canvas's style, or white.
   paper() {
     const colour = getComputedStyle(this.canvas).backgroundColor;
     const none = !colour || colour === 'transparent' || colour === 'rgba(0, 0, 0, 0)';
     this.renderer.setClearColor(new THREE.Color(none ? '#ffffff' : colour));
   }
 
-  // Lights go with the camera: what is looked at is lit.
+  // Lights move with the camera, so that visible surfaces are lit.
   lights() {
     const group = new THREE.Group();
     const add = (colour, strength, x, y, z) => {
@@ -57,7 +58,7 @@ class SemblanceStage {
     this.update();
   }
 
-  // Adds a layer, in place of one of the same name.
+  // Adds a layer, or replaces the layer of the same id.
   put(layer, blobs) {
     const former = this.layers.get(layer.id);
     const object = layer.mesh ? this.surface(layer, blobs) : layer.lines ? this.lines(layer, blobs)
@@ -81,7 +82,7 @@ class SemblanceStage {
     const material = new THREE.MeshPhongMaterial({side: THREE.DoubleSide, shininess: 12, specular: 0x222222});
     const mesh = new THREE.Mesh(SemblanceGeometry.geometryOf(blobs[layer.mesh]), material);
     mesh.userData.values = layer.values && SemblanceGeometry.valuesOf(blobs[layer.values]);
-    for (const part of layer.parts || []) {  // eyes: of one colour, never glass
+    for (const part of layer.parts || []) {  // e.g. eyes: one colour, never translucent
       const wet = new THREE.MeshPhongMaterial({color: part.colour, shininess: 120, specular: 0x999999});
       const eye = new THREE.Mesh(SemblanceGeometry.geometryOf(blobs[part.mesh]), wet);
       eye.raycast = () => {};
@@ -95,7 +96,7 @@ class SemblanceStage {
                                   new THREE.LineBasicMaterial({color: layer.colour}));
   }
 
-  // Rods from base to end point, and from there to the fitted face, drawn `exaggeration` times as long.
+  // Draws depth markers: a rod from base to tip, and one from the tip towards the face, `exaggeration` times as long.
   dowels(layer, object, exaggeration) {
     const {vector, cylinder, ball} = SemblanceGeometry;
     object.clear ? object.clear() : object.remove(...object.children);
@@ -108,13 +109,13 @@ class SemblanceStage {
       }
       const residual = dowel.on_face ? `, face ${dowel.residual_mm.toFixed(2)} mm off` : dowel.fitted === 'not told' ? '' : ', not fitted';
       for (const part of parts) {
-        part.userData.text = `${dowel.name || `dowel ${dowel.site}`}: depth ${dowel.depth_mm.toFixed(2)} mm${residual}`;
+        part.userData.text = `${dowel.name || `depth marker ${dowel.site}`}: depth ${dowel.depth_mm.toFixed(2)} mm${residual}`;
         object.add(part);
       }
     }
   }
 
-  // Takes over what the panel says.
+  // Applies the state of the panel.
   update() {
     for (const {layer, object} of this.layers.values()) {
       const state = this.shared.layers.get(layer.id);
@@ -130,10 +131,10 @@ class SemblanceStage {
       }
       if (layer.mesh) { this.paint(layer, object); }
     }
-    this.shared.drawSoon();  // once for all that changes before the next picture: without a graphics card each takes long
+    this.shared.drawSoon();  // one picture for all changes
   }
 
-  // What a surface is coloured by: {values, map}, or nothing. A difference from another stage goes before its own map.
+  // The values and map that colour a surface, or null. A difference from another stage takes precedence.
   mapOf(layer, mesh) {
     const {values, difference} = mesh.userData;
     if (difference && this.shared.difference) { return {values: difference, map: this.description.maps.error}; }
@@ -145,21 +146,21 @@ class SemblanceStage {
     if (mapped) {
       mesh.geometry.setAttribute('color', SemblanceGeometry.coloursOf(mapped.values, mapped.map, this.shared.range_mm));
     }
-    // Colours that carry numbers are shown matte.
+    // Colours that stand for numbers are matte.
     mesh.material.specular.set(mapped ? 0x000000 : 0x222222);
     mesh.material.vertexColors = mapped ? THREE.VertexColors : THREE.NoColors;
     mesh.material.color.set(mapped ? '#ffffff' : layer.colour);
     mesh.material.side = mesh.material.transparent ? THREE.FrontSide : THREE.DoubleSide;
   }
 
-  // share: of the full resolution, which a saved picture has; see SemblancePace.
+  // Draws at a share of the full resolution; see SemblancePace. Saved pictures have the full one.
   draw(share = 1) {
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     if (!this.scene || !this.shared.camera || width === 0 || height === 0) { return; }
     const camera = this.shared.camera.camera, size = this.renderer.getSize(new THREE.Vector2());
     if (size.x !== width || size.y !== height) { this.renderer.setSize(width, height, false); }
     camera.aspect = width / height;
-    // A narrow canvas shows as much as a square one.
+    // A narrow canvas shows at least as much as a square one.
     const half = Math.tan(this.shared.camera.angle * Math.PI / 360) / Math.min(1, camera.aspect);
     camera.fov = 360 / Math.PI * Math.atan(half);
     camera.updateProjectionMatrix();
@@ -168,13 +169,13 @@ class SemblanceStage {
     for (const act of this.afterDraw) { act(); }
   }
 
-  // Waits until what was drawn is there: a pixel is read.
+  // Waits for the picture by reading a pixel.
   finish() {
     const pen = this.renderer.getContext();
     pen.readPixels(0, 0, 1, 1, pen.RGBA, pen.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
-  // What of the visible layers `ids` (all if none are named) lies under the pointer; null if nothing does.
+  // The first hit under the pointer among the visible layers `ids` (default: all), or null.
   hit(event, ids) {
     if (!this.scene || !this.shared.camera) { return null; }
     const box = this.canvas.getBoundingClientRect();
@@ -189,7 +190,7 @@ class SemblanceStage {
         .find(({point}) => planes.every((plane) => plane.distanceToPoint(point) >= 0)) || null;
   }
 
-  // Says what is under the pointer.
+  // Shows a tip about the surface under the pointer.
   point(event) {
     if (event.buttons || !this.scene) { this.tip.hidden = true; return; }
     const box = this.canvas.getBoundingClientRect(), hit = this.hit(event);
