@@ -8,98 +8,86 @@
 #include <utility>
 #include <vector>
 
-#include "problems/plots/svg_plot.h"
 #include "problems/report/plain_names.h"
-#include "problems/report/report.h"
+#include "problems/report/report_kit.h"
 #include "surfaces/base/csv.h"
 
 namespace semblance {
 namespace {
 
-std::string Called(const ComparedTreatment& treatment) {
+std::string FullLabel(const ComparedTreatment& treatment) {
   return fmt::format("{}: {}", treatment.study, treatment.label);
 }
 
 std::string Direction(const StudyComparison& comparison) { return comparison.preference.InWords(); }
 
-std::string IntervalText(const Interval& interval) {
-  return std::isfinite(interval.low)
-             ? fmt::format("{} to {}", TableNumber(interval.low), TableNumber(interval.high))
-             : "";
-}
-
 ReportTable TreatmentTable(const StudyComparison& comparison) {
   ReportTable table{
       fmt::format("{} over {} that all studies have; {}", WordsOfMetric(comparison.metric),
                   Counted(std::ssize(comparison.subjects), "subject"), Direction(comparison)),
-      {"study", "treatment", "subjects", "mean", "sd", "95 % of the mean"},
-      {}};
+      {"study", "treatment", "subjects", "mean", "sd", "95 % of the mean"}};
   for (const ComparedTreatment& t : comparison.treatments) {
-    table.rows.push_back({t.study, t.label, std::to_string(t.summary.n),
-                          TableNumber(t.summary.mean), TableNumber(t.summary.sd),
-                          IntervalText(t.summary.mean_95)});
+    table.AddRow(t.study, t.label, t.summary.n, t.summary.mean, t.summary.sd,
+                 IntervalText(t.summary.mean_95));
   }
   return table;
 }
 
 ReportTable PairTable(const StudyComparison& comparison) {
   ReportTable table{
-      "Each treatment of the later studies less its reference, over the subjects that both have" +
+      "Each treatment of the later studies minus its reference, over the subjects that both have" +
           comparison.preference.OfWhat(),
       {"treatment", "reference", "subjects", "mean difference", "95 % interval", "worse in",
-       "p, Holm"},
-      {}};
+       "p, Holm"}};
   for (const TreatmentPair& pair : comparison.pairs) {
-    table.rows.push_back(
-        {Called(pair.other), Called(pair.reference), std::to_string(pair.difference.n),
-         TableNumber(pair.difference.mean), IntervalText(pair.difference.mean_95),
-         fmt::format("{} of {}", pair.worse, pair.difference.n), TableNumber(pair.p_holm)});
+    table.AddRow(FullLabel(pair.other), FullLabel(pair.reference), pair.difference.n,
+                 pair.difference.mean, IntervalText(pair.difference.mean_95),
+                 fmt::format("{} of {}", pair.worse, pair.difference.n), pair.p_holm);
   }
   return table;
 }
 
-ReportImage BoxesOf(const StudyComparison& comparison) {
+ReportImage MetricBoxes(const StudyComparison& comparison) {
   std::vector<BoxRow> rows;
   for (const ComparedTreatment& treatment : comparison.treatments) {
-    BoxRow row{Called(treatment), {}, {}};
+    BoxRow row{FullLabel(treatment), {}, {}};
     for (const auto& [subject, value] : treatment.by_subject) {
       row.values.push_back(value);
       row.names.push_back(subject);
     }
     rows.push_back(std::move(row));
   }
-  return {BoxPlotSvg(rows, WordsOfMetric(comparison.metric)),
-          "One dot per subject; box: quartiles and median.",
-          "box plot of the metric, one row per treatment of each study"};
+  return SubjectBoxPlot(rows, WordsOfMetric(comparison.metric),
+                        "box plot of the metric, one row per treatment of each study");
 }
 
-Report ReportOf(const StudyComparison& comparison) {
-  Report report{.title = fmt::format("{} compared", fmt::join(comparison.studies, ", ")),
-                .subtitle = fmt::format("{}, paired by subject; {}",
-                                        WordsOfMetric(comparison.metric), Direction(comparison)),
-                .notes = comparison.notes,
-                .main_images = {BoxesOf(comparison)},
-                .tiles = {},
-                .sections = {},
-                .footer = fmt::format("semblance {}", SEMBLANCE_VERSION)};
+Report MakeReport(const StudyComparison& comparison) {
+  Report report{
+      .title = fmt::format("{} compared", fmt::join(comparison.studies, ", ")),
+      .subtitle = fmt::format("{}, paired by subject; {}", WordsOfMetric(comparison.metric),
+                              Direction(comparison)),
+      .notes = comparison.notes,
+      .main_images = {MetricBoxes(comparison)},
+  };
   report.sections.push_back(
       {.heading = "Differences",
        .paragraphs =
-           {"A treatment's reference is the one of the same name in the first study, "
-            "else the best of the first study. p is of Wilcoxon's signed ranks; below six "
-            "subjects there is no test."},
+           {"The reference of a treatment is the one of the same name in the first study, else "
+            "the best of the first study. p comes from Wilcoxon's signed-rank test, which needs "
+            "six subjects."},
        .tables = {PairTable(comparison)}});
   report.sections.push_back({.heading = "Treatments", .tables = {TreatmentTable(comparison)}});
   return report;
 }
 
 std::string PairText(const TreatmentPair& pair) {
-  const std::string names = fmt::format("{} less {}", Called(pair.other), Called(pair.reference));
+  const std::string names =
+      fmt::format("{} minus {}", FullLabel(pair.other), FullLabel(pair.reference));
   if (pair.difference.n == 0) {
     return fmt::format("{}: no subject was done with both\n", names);
   }
   const std::string interval = IntervalText(pair.difference.mean_95);
-  return fmt::format("{}: {:+.3f}{}, better of {} and worse of {} of {} subjects{}\n", names,
+  return fmt::format("{}: {:+.3f}{}, better for {} and worse for {} of {} subjects{}\n", names,
                      pair.difference.mean, interval.empty() ? "" : fmt::format(" ({})", interval),
                      pair.better, pair.worse, pair.difference.n,
                      std::isfinite(pair.p_holm) ? fmt::format(", p = {:.3g}", pair.p_holm) : "");
@@ -112,7 +100,7 @@ std::string ComparisonText(const StudyComparison& comparison) {
       fmt::format("{} over {}; {}\n", comparison.metric,
                   Counted(std::ssize(comparison.subjects), "subject"), Direction(comparison));
   for (const ComparedTreatment& t : comparison.treatments) {
-    text += fmt::format("  {}: {}\n", Called(t), TableNumber(t.summary.mean));
+    text += fmt::format("  {}: {}\n", FullLabel(t), TableNumber(t.summary.mean));
   }
   for (const TreatmentPair& pair : comparison.pairs) {
     text += PairText(pair);
@@ -148,7 +136,7 @@ std::string ComparedCsv(const StudyComparison& comparison) {
 void WriteComparison(const StudyComparison& comparison, OutputFolder& folder) {
   folder.Write("pairs.csv", PairsCsv(comparison));
   folder.Write("values.csv", ComparedCsv(comparison));
-  folder.Write("report.html", ReportHtml(ReportOf(comparison)));
+  folder.Write("report.html", ReportHtml(MakeReport(comparison)));
 }
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `semblance export`: what a run has made, as a file of another program.
+// `semblance export`: the results of a run as files for other programs.
 #pragma once
 
 #include <filesystem>
@@ -9,17 +9,21 @@
 namespace semblance {
 
 struct ExportOptions {
-  std::string extension;           // of the file that is wanted, in any case
-  std::optional<double> chord_mm;  // of an H-spline's triangles; empty: the default of EncodeFace
+  std::string extension;           // of the wanted file, in upper or lower case
+  std::optional<double> chord_mm;  // chord error of an H-spline's triangles; empty: EncodeFace's
   int threads = 1;
 };
 
-// By what `from` is:
-// - an H-spline (.json): EncodeFace (face_export.h);
-// - a mesh (.ply .obj .off .stl): EncodeCarriedMesh, so that a .vtp, .vtu, .ply or .glb carries
-//   what the vertices of a PLY carry;
-// - the folder of a run: RunGlb, a .glb with skull, face and dowels.
-// Throws InputError for an extension or a chord error that does not go with it, and as these.
+// The bytes of the exported file. `from` decides the kind:
+// - An H-spline (.json) becomes a file of EncodeFace (face_export.h).
+// - A mesh (.ply .obj .off .stl) becomes a mesh of another format. The formats .vtp, .vtu and .ply
+//   keep all values of a PLY's vertices, .glb keeps colours and normals, .obj, .off and .stl keep
+//   the shape alone.
+// - The folder of a run becomes a .glb in metres, +y up, with the nodes `skull` (simplified, from
+//   scene.json), `face` (face.ply with the colours of its values) and `dowels`, with one child
+//   `dowel SITE` per dowel: a rod from bone to tip.
+// Throws InputError for an extension or a chord error that does not fit the kind, and IoError if a
+// file is missing or is not that of a run.
 std::string ExportedBytes(const std::filesystem::path& from, const ExportOptions& options);
 
 }  // namespace semblance

@@ -130,7 +130,11 @@ std::string TemplateText(const TemplateFit& fit, const TemplateFitOptions& optio
   text += SitesInWords(fit);
   text += fmt::format("folds: {}\ntolerance of {} mm: {}\n", fit.folds, options.tolerance_mm,
                       fit.met ? "met" : "not met; finer levels, or a finer mesh, come closer");
-  return text;
+  return text + fmt::format(
+                    "template.png, from left to right: skin and face from the front, skin and face "
+                    "from the side, and the distance of the face from the skin, from blue ({0} mm "
+                    "inside) to red ({0} mm outside)\n",
+                    kColoured_mm);
 }
 
 Image TemplatePicture(const TemplateFit& fit, const OuterHead& head, int threads) {
@@ -149,9 +153,7 @@ Image TemplatePicture(const TemplateFit& fit, const OuterHead& head, int threads
                                        picture(skin, View::kSide, Lighting::kStudio),
                                        picture(shown, View::kSide, Lighting::kStudio),
                                        picture(distance, View::kFront, Lighting::kEven)};
-  return ContactSheet(pictures, {.title = "Template: skin and H-spline face",
-                                 .captions = {"skin", "face", "skin", "face", "face to skin"},
-                                 .legend = Legend{colours, "outside (+) or inside (-) the skin"}});
+  return ContactSheet(pictures);
 }
 
 }  // namespace semblance

@@ -9,9 +9,9 @@
 
 #include "problems/pictures/lighting.h"
 #include "problems/pictures/pictures.h"
-#include "problems/pictures/stroke_font.h"
 #include "problems/subject/phantom.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/base64.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -42,14 +42,12 @@ bool NumbersTouch(const Numbered& a, const Numbered& b) {
   return a.left == b.left && std::abs(a.x - b.x) < kWide && std::abs(a.y - b.y) < kHigh;
 }
 
-void Mark(Image& image, const Numbered& mark) {
-  Disc(image, mark.x, mark.y, 5, HexColour(0xffffff));
-  Disc(image, mark.x, mark.y, 4, HexColour(0xb3261e));
-  DrawText(image, mark.x + (mark.left ? -9 : 9), mark.y + 5, std::to_string(mark.number),
-           {.cap_height_px = 11,
-            .stroke = 0.15,
-            .colour = HexColour(0x16304f),
-            .anchor = mark.left ? Anchor::kRight : Anchor::kLeft});
+std::string MarkSvg(const Numbered& mark) {
+  return fmt::format(
+      "<circle cx=\"{0:.1f}\" cy=\"{1:.1f}\" r=\"4.5\" fill=\"#b3261e\" stroke=\"#fff\"/>"
+      "<text x=\"{2:.1f}\" y=\"{3:.1f}\" text-anchor=\"{4}\">{5}</text>\n",
+      mark.x, mark.y, mark.x + (mark.left ? -9 : 9), mark.y + 5, mark.left ? "end" : "start",
+      mark.number);
 }
 
 Numbered MarkOf(const Site& site, const Vec3& point, const Camera& camera, View view) {
@@ -76,14 +74,21 @@ std::vector<Numbered> MarksSeenFrom(View view, const Phantom& phantom, const Cam
   return marks;
 }
 
-Image SeenFrom(View view, const Phantom& phantom, const Box3& region, int threads) {
+// One view as a group of the drawing, its left edge at x, with a caption below.
+std::string ViewSvg(View view, const char* caption, int x, const Phantom& phantom,
+                    const Box3& region, int threads) {
   const Camera camera = CameraFor(view, region, static_cast<double>(kWidth) / kHeight);
-  Image image =
+  const Image image =
       Render({{SkullObject(phantom.skull)}}, camera, {.width = kWidth, .height = kHeight}, threads);
+  std::string svg = fmt::format(
+      "<g transform=\"translate({} 0)\">\n<image width=\"{}\" height=\"{}\" "
+      "href=\"data:image/png;base64,{}\"/>\n<text x=\"{}\" y=\"{}\" "
+      "text-anchor=\"middle\">{}</text>\n",
+      x, kWidth, kHeight, Base64(EncodePng(image)), kWidth / 2, kHeight + 22, caption);
   for (const Numbered& mark : MarksSeenFrom(view, phantom, camera)) {
-    Mark(image, mark);
+    svg += MarkSvg(mark);
   }
-  return image;
+  return svg + "</g>\n";
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -205,14 +210,18 @@ const Site& KnownSite(std::string_view code) {
 
 }  // namespace
 
-Image SitePicture(int threads) {
+std::string SitePictureSvg(int threads) {
+  constexpr int kGap = 16;
   const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 120});
   Box3 region = Bounds(phantom.skull);
   region.extend(Vec3(region.min() - Vec3(0, 15, 0)));  // room for the numbers before the face
-  const std::array views = {SeenFrom(View::kFront, phantom, region, threads),
-                            SeenFrom(View::kSide, phantom, region, threads)};
-  return ContactSheet(views,
-                      {.title = "", .captions = {"front", "left side"}, .legend = std::nullopt});
+  return fmt::format(
+             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
+             "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"14\" "
+             "fill=\"#16304f\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
+             2 * kWidth + kGap, kHeight + 34) +
+         ViewSvg(View::kFront, "front", 0, phantom, region, threads) +
+         ViewSvg(View::kSide, "left side", kWidth + kGap, phantom, region, threads) + "</svg>\n";
 }
 
 SiteSketch MakeSiteSketch(int threads) {

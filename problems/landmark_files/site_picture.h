@@ -12,8 +12,9 @@
 
 namespace semblance {
 
-// The skull from the front and from its left, with the standard sites by their numbers.
-Image SitePicture(int threads);
+// The skull from the front and from its left as an SVG file that embeds the rendered pictures, with
+// the standard sites as dots and their numbers as text.
+std::string SitePictureSvg(int threads);
 
 // A skull and its sites, kept to draw a picture for each of them. The further sites are where their
 // definition puts them between others, for a phantom has none.

@@ -66,7 +66,7 @@ const pictureOf = (code) => {
 // Its picture is made when it is opened first.
 const allSites = element('details', {ontoggle: () => {
   if (allSites.open && allSites.children.length === 1) {
-    allSites.append(element('img', {src: 'api/sites.png', alt: 'the sites on a made-up skull, by number'}));
+    allSites.append(element('img', {src: 'api/sites.svg', alt: 'the sites on a made-up skull, by number'}));
   }
 }}, element('summary', {textContent: 'All sites by their numbers'}));
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From millimetres to colours, and the legend that says which is which.
+// Colours for values in millimetres.
 #pragma once
 
 #include <span>
@@ -21,30 +21,27 @@ struct ColourMap {
 
 inline constexpr Colour kNoDataColour = {0.56, 0.56, 0.56};
 
-// Dark violet over blue and green to yellow; luminance rises all the way, so it survives a grey
-// print. Throws InputError unless low_mm < high_mm, both finite.
+// Dark violet over blue and green to yellow. Luminance rises all the way, so the map survives a
+// grey print. Throws InputError unless low_mm < high_mm, both finite.
 ColourMap SequentialMap(double low_mm, double high_mm);
 
 // Blue (-range_mm) over white (0) to red (+range_mm). Throws InputError unless range_mm is positive
 // and finite.
 ColourMap DivergingMap(double range_mm);
 
-// kNoDataColour for NaN.
+// Returns kNoDataColour for NaN.
 Colour ColourAt(const ColourMap& map, double value_mm);
 std::vector<Colour> ColoursAt(const ColourMap& map, std::span<const double> values_mm);
 
-// Round numbers from low_mm to high_mm, about `wanted` of them (1, 2 or 5 times a power of ten
-// apart).
-std::vector<double> Ticks(const ColourMap& map, int wanted);
+// Evenly spaced colours from low_mm to high_mm as "#rrggbb", for pages that interpolate linearly
+// between them. There are 33, which are close enough for straight lines.
+std::vector<std::string> ColourSteps(const ColourMap& map);
 
+// The key to a picture whose colours stand for numbers. Reports draw it below the picture.
 struct Legend {
   ColourMap map;
-  std::string title;          // what is shown; " (mm)" is added
-  bool shows_no_data = true;  // with a swatch for "no data"
+  std::string title;          // the quantity shown, without its unit (mm)
+  bool shows_no_data = true;  // adds a swatch for "no data"
 };
-
-// A horizontal colour bar with ticks, centred in columns [x, x + width), rows [y, y + height).
-// The lettering grows with the height; 84 gives small print.
-void DrawLegend(Image& image, const Legend& legend, int x, int y, int width, int height);
 
 }  // namespace semblance

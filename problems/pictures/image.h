@@ -25,10 +25,10 @@ void Fields(Visitor& visit, Colour& o) {
   visit(FieldInfo{.name = "b", .min = 0, .max = 1, .doc = "blue"}, o.b);
 }
 
-// 0xrrggbb.
+// Takes 0xrrggbb.
 Colour HexColour(std::uint32_t rrggbb);
 
-// "#rrggbb".
+// Returns "#rrggbb".
 std::string HexText(const Colour& colour);
 
 struct Image {
@@ -37,24 +37,24 @@ struct Image {
   std::vector<std::uint8_t> rgb;  // sRGB, 3 bytes per pixel, row by row from the top left
 };
 
-// A picture of one colour; width, height >= 1, else InputError.
+// A picture of one colour. Throws InputError unless both sides are at least 1.
 Image MakeImage(int width, int height, const Colour& colour);
 
-// Moves a pixel towards `colour` by `coverage` (0..1); a pixel outside the picture is left out.
+// Mixes `colour` into a pixel by `coverage` (0..1). Does nothing outside the picture.
 void BlendPixel(Image& image, int x, int y, const Colour& colour, double coverage);
 
-// Columns [x, x + width), rows [y, y + height), clipped to the picture.
+// Fills columns [x, x + width) and rows [y, y + height), clipped to the picture.
 void FillRectangle(Image& image, int x, int y, int width, int height, const Colour& colour);
 
-// Copies `picture` with its top left corner at column x, row y, clipped.
+// Copies `picture` with its top left corner to column x, row y, clipped.
 void Paste(Image& onto, const Image& picture, int x, int y);
 
-// small: a quarter of the time of libpng's default, and a tenth more bytes. quick: half the time of
-// that, and a fifth more bytes; of flat colours up to a third.
+// kSmall takes a quarter of the time of libpng's default effort and gives 10 % more bytes. kQuick
+// takes half the time of kSmall and gives 20 % more bytes, for flat colours up to a third more.
 enum class PngEffort { kSmall, kQuick };
 
-// The bytes of a PNG file: the same picture gives the same bytes (no time, no comment). Throws
-// InputError for a picture without pixels.
+// The bytes of a PNG file. The same picture gives the same bytes, because the file holds no time
+// and no comment. Throws InputError for a picture without pixels.
 std::string EncodePng(const Image& image, PngEffort effort = PngEffort::kSmall);
 
 }  // namespace semblance

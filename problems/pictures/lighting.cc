@@ -11,7 +11,8 @@
 namespace semblance {
 namespace {
 
-constexpr int kSkyLights = 26;  // in one set of directions, so that pictures share its depth maps
+// Trades smooth shadows against time: each light costs a depth map, which all pictures share.
+constexpr int kSkyLights = 26;
 
 // Directions spread evenly over the sphere (Fibonacci lattice); z is up.
 Vec3 SphereDirection(int i, int count) {
@@ -30,7 +31,7 @@ struct SoftBox {
   bool is_key = false;
 };
 
-// Lights on a disc of the given radius (of the unit distance) around the direction, on a spiral.
+// Adds lights on a spiral over a disc around the direction. The radius is relative to the distance.
 void AddSoftBox(const SoftBox& box, const Mat3& view, std::vector<Light>& lights) {
   const Vec3 towards = box.towards.normalized();
   const Vec3 u = towards.unitOrthogonal(), v = towards.cross(u);
@@ -44,7 +45,7 @@ void AddSoftBox(const SoftBox& box, const Mat3& view, std::vector<Light>& lights
   }
 }
 
-// A sky all round; top and bottom of the view: radiance, relative.
+// Adds a sky on all sides. `top` and `bottom` are the relative radiances above and below the view.
 void AddDome(int count, double strength, double top, double bottom, const Mat3& view,
              std::vector<Light>& lights) {
   for (int i = 0; i < count; ++i) {
@@ -56,7 +57,9 @@ void AddDome(int count, double strength, double top, double bottom, const Mat3& 
   }
 }
 
-std::vector<Light> LightsOf(Lighting lighting, const Mat3& view) {
+// The strengths of the studio lights are a matter of taste: key from the upper left, a weak fill
+// from the right, a rim light from behind.
+std::vector<Light> PlaceLights(Lighting lighting, const Mat3& view) {
   std::vector<Light> lights;
   if (lighting == Lighting::kEven) {
     AddSoftBox({.towards = {0, 0, 1}, .strength = 0.55}, view, lights);
@@ -94,8 +97,8 @@ Mat3 ViewTowards(const Vec3& to_viewer) {
   return view;
 }
 
-ShadowMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const ShadowMaps& all,
-                const Vec3& to_light) {
+ShadowMap RenderShadowMap(const FlatScene& flat, const std::vector<bool>& casts,
+                          const ShadowMaps& all, const Vec3& to_light) {
   const double diameter = std::max(all.box.diagonal().norm(), 1e-9);
   const int size = all.texels;
   ShadowMap map{.projection = {.view_from_world = ViewTowards(to_light),
@@ -124,13 +127,15 @@ ShadowMap MapOf(const FlatScene& flat, const std::vector<bool>& casts, const Sha
   return map;
 }
 
-// How much of each colour passes `thickness_mm` of matter; half at scatter_mm, little far beyond.
-Rgb Passed(float thickness_mm, const Rgb& scatter_mm) {
+// The share of each colour that passes `thickness_mm` of matter: half at scatter_mm, falling with
+// the square of the thickness. A smooth stand-in for scattering below the skin.
+Rgb TransmittedShare(float thickness_mm, const Rgb& scatter_mm) {
   const Rgb ratio = thickness_mm / scatter_mm;
   return 1 / (1 + ratio * ratio);
 }
 
-// Between the four texels around the point: 1 in the open, towards 0 behind matter.
+// The share of light that arrives, interpolated between the four texels around the point: 1 in the
+// open, towards 0 behind matter.
 Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
   const RasterPoint at = map.projection * p;
   const float texel_mm = static_cast<float>(1 / map.projection.samples_per_mm);
@@ -146,7 +151,8 @@ Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
     const int dx = k & 1, dy = k >> 1;
     const float weight = (dx != 0 ? fx : 1 - fx) * (dy != 0 ? fy : 1 - fy);
     const float thickness = at.depth - map.depth[(y + dy) * map.texels + x + dx] - texel_mm;
-    sum += thickness > 0 ? Rgb(weight * Passed(thickness, scatter_mm)) : Rgb::Constant(weight);
+    sum += thickness > 0 ? Rgb(weight * TransmittedShare(thickness, scatter_mm))
+                         : Rgb::Constant(weight);
   }
   return sum;
 }
@@ -162,7 +168,7 @@ void LightVertex(const Material& material, const std::vector<Light>& lights,
     if (wrapped <= 0) {
       continue;
     }
-    // From a little above the surface, so that it does not shade itself.
+    // Starts 1.5 texels above the surface, so that the surface does not shade itself.
     const Vec3 above = vertex.position + 1.5 / maps[i]->projection.samples_per_mm * vertex.normal;
     const Rgb through = LightThrough(*maps[i], above, scatter);
     vertex.light += wrapped * through * lights[i].irradiance;
@@ -172,8 +178,8 @@ void LightVertex(const Material& material, const std::vector<Light>& lights,
   vertex.key = key_all > 0 ? key_seen / key_all : 0;
 }
 
-// Of the vertices that cast shadows; a point where there are none.
-Box3 BoxOfCasters(const FlatScene& flat, const std::vector<bool>& casts) {
+// The box of the vertices that cast shadows, or the origin if there are none.
+Box3 BoundCasters(const FlatScene& flat, const std::vector<bool>& casts) {
   Box3 box;
   for (std::size_t v = 0; v < flat.vertices.size(); ++v) {
     if (casts[flat.object_of_vertex[v]]) {
@@ -186,12 +192,13 @@ Box3 BoxOfCasters(const FlatScene& flat, const std::vector<bool>& casts) {
 }  // namespace
 
 std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world) {
-  std::vector<Light> lights = LightsOf(lighting, view_from_world);
+  std::vector<Light> lights = PlaceLights(lighting, view_from_world);
   Rgb facing = Rgb::Zero();
   for (const Light& light : lights) {
     const double cosine = view_from_world.row(2).dot(light.to_light);
     facing += static_cast<float>(std::max(0.0, cosine)) * light.irradiance;
   }
+  // 0.86 leaves room for highlights below white.
   const float exposure = lighting == Lighting::kEven ? 1.0F : 0.86F;
   for (Light& light : lights) {
     light.irradiance *= exposure / facing;
@@ -205,7 +212,7 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
   for (const SceneObject& object : scene.objects) {
     casts.push_back(object.opacity >= 1);
   }
-  const Box3 box = BoxOfCasters(flat, casts);
+  const Box3 box = BoundCasters(flat, casts);
   if (!maps.of_direction.empty() && (maps.box.min() != box.min() || maps.box.max() != box.max())) {
     throw std::logic_error("shadows of a scene with other meshes");
   }
@@ -221,7 +228,7 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
     }
   }
   ParallelFor(missing.size(), threads, 1, [&](std::size_t i) {
-    *missing[i].second = MapOf(flat, casts, maps, missing[i].first);
+    *missing[i].second = RenderShadowMap(flat, casts, maps, missing[i].first);
   });
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
     if (!flat.is_seen.empty() && !flat.is_seen[v]) {

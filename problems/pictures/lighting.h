@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The light at every vertex of a scene: a few dozen lights, each with a depth map of what is in its
-// way, summed up once per picture.
+// The light at every vertex of a scene, summed once per picture over a few dozen lights. Each light
+// has a depth map of the surfaces nearest to it, which gives soft shadows.
 #pragma once
 
 #include <array>
@@ -17,13 +17,13 @@ using Rgb = Eigen::Array3f;  // linear light
 
 struct Light {
   Vec3 to_light = Vec3::Zero();  // unit
-  Rgb irradiance = Rgb::Zero();  // of a surface that faces it
-  bool is_key = false;           // its highlight is drawn
+  Rgb irradiance = Rgb::Zero();  // on a surface that faces the light
+  bool is_key = false;           // only key lights cause highlights
 };
 
-// Lights placed relative to the camera, but for a sky all round, whose directions are those of the
-// world in every picture. Under kEven a surface that faces the viewer and lies in no
-// shadow receives exactly 1, under kStudio a little less, which leaves room for highlights.
+// The lights of a picture. They move with the camera, except for a sky whose directions are fixed
+// in the world. A surface that faces the viewer outside all shadows receives exactly 1 under kEven,
+// and a little less under kStudio, which leaves room for highlights.
 std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world);
 
 struct SceneVertex {
@@ -31,7 +31,7 @@ struct SceneVertex {
   Vec3 normal;    // unit, or zero
   Rgb albedo = Rgb::Zero();
   Rgb light = Rgb::Zero();  // all lights, with shadows
-  float key = 0;            // 0..1, how much of the key light arrives
+  float key = 0;            // 0..1, the share of the key light that arrives
 };
 
 struct SceneTriangle {
@@ -44,28 +44,27 @@ struct FlatScene {
   std::vector<SceneVertex> vertices;
   std::vector<SceneTriangle> triangles;
   std::vector<int> object_of_vertex;
-  std::vector<bool> is_seen;  // one per vertex; none: all are
+  std::vector<bool> is_seen;  // one per vertex; empty: all are seen
 };
 
-// What is nearest to a light, seen from it.
+// The depth of the nearest surface as seen from a light.
 struct ShadowMap {
   Projection projection;
   int texels = 0;            // along a side
-  std::vector<float> depth;  // row by row; infinite where nothing is
+  std::vector<float> depth;  // row by row; infinite where there is no surface
 };
 
-// Those that several pictures of the same opaque meshes have in common.
+// The shadow maps that several pictures of the same opaque meshes share.
 struct ShadowMaps {
-  // Along a side of each. Light is known at vertices and spread between them, so few vertices need
-  // few texels.
+  // Texels along a side. Light is computed at vertices and interpolated between them, so a mesh
+  // with few vertices needs few texels.
   int texels = 512;
   std::map<std::array<double, 3>, ShadowMap> of_direction;  // to the light
-  Box3 box;                                                 // of what casts these shadows
+  Box3 box;                                                 // of the opaque vertices
 };
 
-// Sets light and key of every vertex that is seen. Only opaque objects cast shadows. maps: of the
-// same opaque meshes; those that are missing are added. Throws std::logic_error if they are of
-// others.
+// Sets light and key of every vertex that is seen. Only opaque objects cast shadows. Adds missing
+// maps to `maps`. Throws std::logic_error if `maps` belongs to other meshes.
 void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
                    ShadowMaps& maps, FlatScene& flat);
 

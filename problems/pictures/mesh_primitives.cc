@@ -29,7 +29,7 @@ TriMesh MakeCylinder(const Vec3& from, const Vec3& to, double radius_mm, int sid
   const Vec3 axis = (to - from) / length;
   const Vec3 u = axis.unitOrthogonal(), v = axis.cross(u);
   TriMesh mesh;
-  // Rim points are doubled, so that the wall and the caps keep a crease when shaded smoothly.
+  // Rim points are doubled, so that smooth shading keeps a crease between wall and caps.
   for (const Vec3& end : {from, to, from, to}) {
     for (int i = 0; i < sides; ++i) {
       mesh.points.push_back(end + radius_mm * OnCircle(u, v, i, sides));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which samples of a grid a triangle covers. Points sit on a fixed grid of 1/256 sample and the
-// edges are tested in integers, so neighbours leave no holes and every machine agrees.
+// Rasterisation: the samples of a grid that a triangle covers. Points are rounded to 1/256 sample
+// and edges are tested in integers, so neighbouring triangles leave no holes and every machine
+// gives the same result.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +32,7 @@ struct Projection {
   }
 
  private:
-  // Far beyond every grid a point is held back, which keeps the edge products within 64 bits.
+  // Clamps points far outside the grid (at 2^20 samples), so edge products stay within 64 bits.
   static std::int32_t Steps(double samples) {
     const double steps = std::clamp(samples * kSubsamples, -268435456.0, 268435456.0);
     return static_cast<std::int32_t>(steps + (steps < 0 ? -0.5 : 0.5));
@@ -45,21 +46,21 @@ struct Coverage {
   bool is_front = true;  // the corners run counter-clockwise in the picture
 };
 
-// Twice the area of p, q and the place (x, y), in steps.
-inline std::int64_t CrossOf(const RasterPoint& p, const RasterPoint& q, std::int64_t x,
-                            std::int64_t y) {
+// Twice the signed area of the triangle p, q, (x, y), in steps.
+inline std::int64_t Cross(const RasterPoint& p, const RasterPoint& q, std::int64_t x,
+                          std::int64_t y) {
   return (q.x - std::int64_t{p.x}) * (y - p.y) - (q.y - std::int64_t{p.y}) * (x - p.x);
 }
 
-// Where in a triangle with an area a place is, in steps; of a sample's centre, what VisitSamples
-// tells.
+// The barycentric coordinates of the place (x, y), in steps, in a triangle with nonzero area. At
+// the centre of a sample the result equals the Coverage that VisitSamples passes.
 inline Coverage CoverageAt(const RasterPoint& a, const RasterPoint& b, const RasterPoint& c,
                            std::int64_t x, std::int64_t y) {
-  const std::int64_t area = CrossOf(a, b, c.x, c.y), sign = area > 0 ? 1 : -1;
+  const std::int64_t area = Cross(a, b, c.x, c.y), sign = area > 0 ? 1 : -1;
   const double scale = 1.0 / static_cast<double>(sign * area);
   Coverage at{.x = static_cast<int>(x / kSubsamples), .y = static_cast<int>(y / kSubsamples)};
-  at.a = scale * static_cast<double>(sign * CrossOf(b, c, x, y));
-  at.b = scale * static_cast<double>(sign * CrossOf(c, a, x, y));
+  at.a = scale * static_cast<double>(sign * Cross(b, c, x, y));
+  at.b = scale * static_cast<double>(sign * Cross(c, a, x, y));
   at.c = 1 - at.a - at.b;
   at.depth = static_cast<float>(at.a * a.depth + at.b * b.depth + at.c * c.depth);
   at.is_front = sign < 0;  // y runs down
@@ -71,8 +72,8 @@ struct SampleWindow {
   int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 
-// Calls visit(Coverage) for each sample centre of the window inside or on the triangle, row by row.
-// A triangle without area covers nothing.
+// Calls visit(Coverage), row by row, for each sample centre of the window that lies inside or on
+// the edge of the triangle. A triangle without area covers nothing.
 template <class Visit>
 void VisitSamples(const RasterPoint& a, const RasterPoint& b, const RasterPoint& c,
                   const SampleWindow& window, Visit&& visit) {
@@ -86,7 +87,7 @@ void VisitSamples(const RasterPoint& a, const RasterPoint& b, const RasterPoint&
   if (x0 > x1 || y0 > y1) {
     return;
   }
-  const std::int64_t area = CrossOf(a, b, c.x, c.y);
+  const std::int64_t area = Cross(a, b, c.x, c.y);
   if (area == 0) {
     return;
   }
@@ -97,7 +98,7 @@ void VisitSamples(const RasterPoint& a, const RasterPoint& b, const RasterPoint&
   const std::int64_t step_c = -step_a - step_b;
   for (int y = y0; y <= y1; ++y) {
     const std::int64_t px = x0 * kSubsamples + kHalf, py = y * kSubsamples + kHalf;
-    std::int64_t ea = sign * CrossOf(b, c, px, py), eb = sign * CrossOf(c, a, px, py);
+    std::int64_t ea = sign * Cross(b, c, px, py), eb = sign * Cross(c, a, px, py);
     std::int64_t ec = sign * area - ea - eb;
     for (int x = x0; x <= x1; ++x, ea += step_a, eb += step_b, ec += step_c) {
       if ((ea | eb | ec) >= 0) {

@@ -17,10 +17,10 @@
 namespace semblance {
 namespace {
 
-constexpr int kBandRows = 16;  // pixel rows that are drawn together
+constexpr int kBandRows = 16;  // pixel rows per task of a thread
 constexpr std::int64_t kHalfSample = kSubsamples / 2;
 
-Rgb LinearOf(const Colour& c) {
+Rgb LinearColour(const Colour& c) {
   return {static_cast<float>(LinearFromSrgb(c.r)), static_cast<float>(LinearFromSrgb(c.g)),
           static_cast<float>(LinearFromSrgb(c.b))};
 }
@@ -44,8 +44,9 @@ void CheckObject(const SceneObject& object, std::size_t index) {
   for (std::size_t t = 0; t < object.mesh.triangles.size(); ++t) {
     for (const std::int32_t corner : object.mesh.triangles[t]) {
       if (corner < 0 || static_cast<std::size_t>(corner) >= points) {
-        throw InputError(fmt::format("scene object {}: triangle {} names point {} of {}", index, t,
-                                     corner, points));
+        throw InputError(
+            fmt::format("scene object {}: triangle {} has the index {}, but there are {} points",
+                        index, t, corner, points));
       }
     }
   }
@@ -76,8 +77,9 @@ FlatScene Flatten(const Scene& scene) {
     for (std::size_t v = 0; v < normals.size(); ++v) {
       const Colour& colour =
           object.vertex_colours.empty() ? object.material.colour : object.vertex_colours[v];
-      flat.vertices.push_back(
-          {.position = object.mesh.points[v], .normal = normals[v], .albedo = LinearOf(colour)});
+      flat.vertices.push_back({.position = object.mesh.points[v],
+                               .normal = normals[v],
+                               .albedo = LinearColour(colour)});
     }
     for (const Triangle& t : object.mesh.triangles) {
       flat.triangles.push_back({{base + t[0], base + t[1], base + t[2]}, static_cast<int>(i)});
@@ -87,9 +89,9 @@ FlatScene Flatten(const Scene& scene) {
   return flat;
 }
 
-// Highlights run softly into white.
+// Compresses bright light, so that highlights approach white smoothly.
 Rgb Shoulder(const Rgb& colour) {
-  constexpr float kBegin = 0.62F;
+  constexpr float kBegin = 0.62F;  // linear light below this stays as it is
   const Rgb over = (colour - kBegin).max(0.0F) / (1 - kBegin);
   return colour.min(kBegin) + (1 - kBegin) * over / (1 + over);
 }
@@ -103,7 +105,7 @@ void SetPixel(Image& image, int x, int y, const Rgb& linear) {
 
 struct Layer {
   std::vector<float> depth;
-  std::vector<std::int32_t> triangle;  // -1: none
+  std::vector<std::int32_t> triangle;  // index, or -1 for none
 
   explicit Layer(std::size_t samples = 0)
       : depth(samples, std::numeric_limits<float>::infinity()), triangle(samples, -1) {}
@@ -119,7 +121,7 @@ struct Layers {
   Layer opaque, sheer;
 };
 
-// All that the bands share, set up once a picture.
+// The data that all bands share, prepared once per picture. Bands are painted independently.
 class Painter {
  public:
   Painter(const Scene& scene, const Camera& camera, const RenderOptions& options,
@@ -143,7 +145,7 @@ class Painter {
                 [&](std::size_t v) { points_[v] = projection_ * flat_.vertices[v].position; });
     FillBands();
     layers_.resize(Bands());
-    ParallelFor(Bands(), threads, 1, [&](std::size_t band) { layers_[band] = Seen(band); });
+    ParallelFor(Bands(), threads, 1, [&](std::size_t band) { layers_[band] = FindNearest(band); });
     MarkSeen();
     LightVertices(scene, lights_, threads, shadows, flat_);
   }
@@ -161,7 +163,7 @@ class Painter {
   }
 
  private:
-  // Rows of samples of a band.
+  // The rows of samples in a band.
   int FirstRow(std::size_t band) const {
     return static_cast<int>(band) * kBandRows * options_.supersampling;
   }
@@ -170,8 +172,8 @@ class Painter {
     return std::min(FirstRow(band) + kBandRows * s, s * options_.height);
   }
 
-  // What is nearest at each sample of a band.
-  Layers Seen(std::size_t band) const {
+  // The nearest triangles at each sample of a band.
+  Layers FindNearest(std::size_t band) const {
     const int columns = options_.supersampling * options_.width;
     const int first = FirstRow(band), end = EndRow(band);
     const auto samples = static_cast<std::size_t>(columns) * (end - first);
@@ -195,7 +197,7 @@ class Painter {
     }
   }
 
-  // The corners of what is seen: most of a head is hidden, and needs no light.
+  // Marks the corners of visible triangles. Most of a head is hidden and needs no light.
   void MarkSeen() {
     flat_.is_seen.assign(flat_.vertices.size(), false);
     for (const Layers& layers : layers_) {
@@ -209,7 +211,7 @@ class Painter {
     }
   }
 
-  // A triangle is listed in each band of rows that its box meets.
+  // Lists a triangle in each band of rows that its bounding box meets.
   void FillBands() {
     const int rows = kBandRows * options_.supersampling;
     triangles_of_band_.resize((options_.height + kBandRows - 1) / kBandRows);
@@ -225,7 +227,8 @@ class Painter {
     }
   }
 
-  // Half-way between viewer and key light (Blinn 1977); the same everywhere, both being far away.
+  // The direction half-way between viewer and key light (Blinn 1977). It is constant, because both
+  // are far away.
   void SetHighlight() {
     for (const Light& light : lights_) {
       if (light.is_key) {
@@ -236,7 +239,7 @@ class Painter {
     half_way_ = (half_way_.normalized() + to_viewer_).normalized();
   }
 
-  // That of all samples of a pixel, nothing sheer before it; -1: there is none.
+  // The triangle that fills all samples of a pixel with no translucent surface in front, or -1.
   std::int32_t OnlyTriangle(const Layers& seen, int first_row, int column, int row) const {
     const int s = options_.supersampling, columns = s * options_.width;
     const std::size_t first = static_cast<std::size_t>(s * row - first_row) * columns + s * column;
@@ -250,7 +253,8 @@ class Painter {
     return triangle;
   }
 
-  // The mean over the samples of a pixel; over a triangle alone that of its middle.
+  // The mean over the samples of a pixel. A pixel within one triangle is shaded once, at its
+  // middle.
   Rgb PixelLight(const Layers& seen, int first_row, int column, int row,
                  const Rgb& background) const {
     const int s = options_.supersampling;
@@ -258,11 +262,11 @@ class Painter {
       return Shade(only, (2 * column + 1) * s * kHalfSample, (2 * row + 1) * s * kHalfSample)
           .colour;
     }
-    return MeanOfSamples(seen, first_row, column, row, background);
+    return AverageSamples(seen, first_row, column, row, background);
   }
 
-  Rgb MeanOfSamples(const Layers& seen, int first_row, int column, int row,
-                    const Rgb& background) const {
+  Rgb AverageSamples(const Layers& seen, int first_row, int column, int row,
+                     const Rgb& background) const {
     const auto& [opaque, sheer] = seen;
     const int s = options_.supersampling, columns = s * options_.width;
     Rgb sum = Rgb::Zero();
@@ -285,7 +289,8 @@ class Painter {
 
   Rgb Background(int row) const {
     const float t = (static_cast<float>(row) + 0.5F) / static_cast<float>(options_.height);
-    return (1 - t) * LinearOf(options_.background_top) + t * LinearOf(options_.background_bottom);
+    return (1 - t) * LinearColour(options_.background_top) +
+           t * LinearColour(options_.background_bottom);
   }
 
   struct Shaded {
@@ -293,7 +298,7 @@ class Painter {
     float alpha = 1;
   };
 
-  // x, y: in steps.
+  // Shades a triangle at the place (x, y), in steps.
   Shaded Shade(std::int32_t triangle, std::int64_t x, std::int64_t y) const {
     const SceneTriangle& t = flat_.triangles[triangle];
     const Coverage at =
@@ -334,9 +339,9 @@ class Painter {
     return static_cast<float>(material.gloss * value);
   }
 
-  // The back of a surface, seen through a hole: dimmed, without shadows.
+  // The light on the back of a surface, seen through a hole: dimmed, without shadows.
   Rgb LightInside(const Vec3& normal) const {
-    constexpr float kDimmed = 0.45F;
+    constexpr float kDimmed = 0.45F;  // dark enough to look like an inside
     Rgb sum = Rgb::Zero();
     for (const Light& light : lights_) {
       sum += static_cast<float>(std::max(0.0, -normal.dot(light.to_light))) * light.irradiance;
@@ -407,8 +412,9 @@ Camera CameraFor(View view, const Box3& region, double aspect) {
   camera.view_from_world.row(1) = up.transpose();
   camera.view_from_world.row(2) = to_viewer.transpose();
   camera.centre = region.center();
-  const Vec3 extent =
-      (camera.view_from_world * region.sizes().asDiagonal()).rowwise().norm();  // of the ellipsoid
+  const Vec3 extent = (camera.view_from_world * region.sizes().asDiagonal())
+                          .rowwise()
+                          .norm();  // extents of the ellipsoid
   camera.height_mm = std::max(kMargin * std::max(extent.y(), extent.x() / aspect), 1e-6);
   return camera;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures of triangle meshes by a z-buffer in software: no window system, the same bytes for any
-// number of threads.
+// Pictures of triangle meshes by a z-buffer in software. Rendering needs no window system and gives
+// the same bytes for any number of threads.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@ struct ShadowMaps;
 
 struct Material {
   Colour colour = {0.8, 0.8, 0.8};    // of the vertices, unless they have their own
-  double wrap = 0;                    // 0..1: how far light creeps round the terminator
-  Vec3 scatter_mm = {0.6, 0.6, 0.6};  // red, green, blue: thickness that light half passes; > 0
+  double wrap = 0;                    // 0..1: how far light reaches past the terminator
+  Vec3 scatter_mm = {0.6, 0.6, 0.6};  // red, green, blue: thickness that half the light passes; > 0
   double gloss = 0;                   // 0..1: strength of the highlight
   int gloss_log2 = 5;                 // its sharpness: the cosine to the power 2^gloss_log2
 };
@@ -33,8 +33,8 @@ struct SceneObject {
   TriMesh mesh;
   Material material;
   std::vector<Colour> vertex_colours = {};  // one per vertex, or none: material.colour
-  // Seen face on; at a slant more, as through a thin sheet: 1 - (1 - opacity)^(1 / cos). Behind the
-  // nearest surface with opacity < 1 only opaque ones are seen.
+  // The opacity seen face on. At a slant it grows as in a thin sheet: 1 - (1 - opacity)^(1 / cos).
+  // Only opaque surfaces are visible behind the nearest surface with opacity < 1.
   double opacity = 1;
 };
 
@@ -42,7 +42,7 @@ struct Scene {
   std::vector<SceneObject> objects;
 };
 
-// Orthographic.
+// An orthographic camera.
 struct Camera {
   Mat3 view_from_world = Mat3::Identity();  // rows: right, up, towards the viewer
   Vec3 centre = Vec3::Zero();               // at the middle of the picture, mm
@@ -54,25 +54,25 @@ constexpr auto EnumNames(View) {
   return std::to_array<std::string_view>({"front", "three_quarter", "side"});
 }
 
-// The camera that frames `region` with a small margin in a picture of width / height `aspect`: the
-// box itself from front and side, and the ellipsoid in it, which is nearer to a head, from between.
-// front: from -y, the subject's left on the right of the picture; three_quarter: 40 degrees round
-// to the subject's left; side: from +x, the face looks to the left. +z is up in all. Throws
-// InputError for an empty region.
+// The camera that frames `region` with a small margin in a picture of width / height `aspect`. From
+// front and side it frames the box itself; from between it frames the ellipsoid in the box, which
+// is closer to a head. kFront looks from -y (the subject's left is on the right of the picture),
+// kThreeQuarter from 40 degrees round to the subject's left, kSide from +x (the face looks to the
+// left). +z is up in all. Throws InputError for an empty region.
 Camera CameraFor(View view, const Box3& region, double aspect);
 
-// studio: key, fill and rim light with soft shadows. even: no highlights and little shadow; a
-// surface that faces the viewer has exactly its own colour.
+// kStudio: key, fill and rim light with soft shadows. kEven: no highlights and little shadow, so
+// that a surface that faces the viewer has exactly its own colour.
 enum class Lighting { kStudio, kEven };
 constexpr auto EnumNames(Lighting) { return std::to_array<std::string_view>({"studio", "even"}); }
 
 struct RenderOptions {
-  int width = 800;                                 // pixels
-  int height = 800;                                // pixels
-  int supersampling = 2;                           // samples along each side of a pixel
-  Lighting lighting = Lighting::kStudio;           // even for colours that mean numbers
-  Colour background_top = {0.98, 0.985, 0.99};     // sRGB
-  Colour background_bottom = {0.89, 0.90, 0.915};  // sRGB
+  int width = 800;
+  int height = 800;
+  int supersampling = 2;
+  Lighting lighting = Lighting::kStudio;
+  Colour background_top = {0.98, 0.985, 0.99};
+  Colour background_bottom = {0.89, 0.90, 0.915};
 };
 
 template <class Visitor>
@@ -92,13 +92,12 @@ void Fields(Visitor& visit, RenderOptions& o) {
 }
 
 // Throws InputError for options out of range, a camera without height, a point that is not finite,
-// a triangle that names a point which is not there, an opacity outside 0..1 or colours that are not
+// a triangle with the index of a missing point, an opacity outside 0..1, or colours that are not
 // one per vertex. An empty scene shows the background. threads >= 1; the picture does not depend on
 // it.
 Image Render(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads);
-// The same scene from several sides: the shadows of the sky are found once for all of them, and for
-// later scenes whose opaque meshes are the same, which hand the same `shadows` on
-// (problems/pictures/lighting.h).
+// Renders the scene from several sides. The sky's shadow maps are computed once for all cameras.
+// Later calls with the same opaque meshes reuse them through `shadows` (lighting.h).
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
                              const RenderOptions& options, ShadowMaps& shadows, int threads);
 

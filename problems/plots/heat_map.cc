@@ -8,26 +8,29 @@
 #include <limits>
 
 #include "problems/pictures/colour_map.h"
-#include "problems/plots/escape_html.h"
 #include "problems/plots/svg_parts.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
-constexpr double kLabels = 250, kRow = 26, kHead = 110, kMostWidth = 900, kWidest = 84;
-constexpr double kRoomForNumber = 40, kMargin = 10;
+// Sizes in pixels: labels on the left, height of a row, names of the columns, whole map, widest
+// cell.
+constexpr double kLabels = 250, kRow = 26, kHead = 110, kLargestWidth = 900, kWidestCell = 84;
+constexpr double kNumberWidth = 40;  // a narrower cell shows no number
+constexpr double kMargin = 10;
 
 struct Limits {
   double low = std::numeric_limits<double>::infinity(), high = -low;
 };
 
-Limits LimitsOf(const HeatMap& map) {
+Limits FindLimits(const HeatMap& map) {
   Limits limits;
   for (const auto& row : map.values) {
     if (row.size() != map.columns.size()) {
-      throw InputError(fmt::format("map '{}': a row has {} values for {} columns", map.title,
-                                   row.size(), map.columns.size()));
+      throw InputError(
+          fmt::format("map '{}': a row has {} values for {} columns; give one per column",
+                      map.title, row.size(), map.columns.size()));
     }
     for (const double value : row) {
       if (std::isfinite(value)) {
@@ -38,14 +41,14 @@ Limits LimitsOf(const HeatMap& map) {
   return limits;
 }
 
-// Slanted, so that long names have room.
+// The name of a column, slanted so that long names have room.
 std::string ColumnName(double x, const std::string& name) {
   std::string text = svg::Text(0, 0, svg::Shortened(name), "start");
   return fmt::format("<g transform=\"translate({:.2f} {:.2f}) rotate(-40)\">{}{}</g>\n", x,
                      kHead - 8, text, svg::Title(name));
 }
 
-// As many digits behind the point as the largest number needs to have three in all.
+// Writes every number with the decimals that give the largest one three significant figures.
 std::string NumberText(double value, const Limits& limits) {
   const double largest = std::max(std::abs(limits.low), std::abs(limits.high));
   if (!(largest >= 1e-3 && largest < 1e5)) {
@@ -59,7 +62,7 @@ std::string Cell(const HeatMap& map, std::size_t r, std::size_t c, const Limits&
                  double width) {
   const double value = map.values[r][c], x = kLabels + width * static_cast<double>(c),
                y = kHead + kRow * static_cast<double>(r);
-  const std::string where = fmt::format("{} | {}: ", map.rows[r], map.columns[c]);
+  const std::string place = fmt::format("{} | {}: ", map.rows[r], map.columns[c]);
   if (!std::isfinite(value)) {
     return svg::Text(x + width / 2, y + kRow / 2 + 5, "–", "middle");
   }
@@ -70,29 +73,30 @@ std::string Cell(const HeatMap& map, std::size_t r, std::size_t c, const Limits&
       "<rect class=\"cell\" x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
       "fill=\"{}\">{}</rect>\n",
       x, y, width - 1, kRow - 1, HexText(ColourAt(colours, share)),
-      svg::Title(fmt::format("{}{:.6g}", where, value)));
-  if (width >= kRoomForNumber) {
+      svg::Title(fmt::format("{}{:.6g}", place, value)));
+  if (width >= kNumberWidth) {
     text += fmt::format(
         "<text class=\"in-cell\" x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"middle\" font-size=\"12\" "
         "fill=\"{}\" pointer-events=\"none\">{}</text>\n",
         x + width / 2, y + kRow / 2 + 4, share > 0.6 ? "#000" : "#fff", NumberText(value, limits));
   }
-  const bool leads = r < map.links.size() && c < map.links[r].size() && !map.links[r][c].empty();
-  return leads ? fmt::format("<a href=\"{}\">{}</a>\n", EscapeHtml(map.links[r][c]), text) : text;
+  const bool has_link = r < map.links.size() && c < map.links[r].size() && !map.links[r][c].empty();
+  return has_link ? fmt::format("<a href=\"{}\">{}</a>\n", EscapeHtml(map.links[r][c]), text)
+                  : text;
 }
 
 }  // namespace
 
 std::string HeatMapSvg(const HeatMap& map) {
-  const Limits limits = LimitsOf(map);
+  const Limits limits = FindLimits(map);
   const auto columns = static_cast<double>(std::max<std::size_t>(1, map.columns.size()));
-  const double width = std::min(kWidest, (kMostWidth - kLabels - 60) / columns);
+  const double width = std::min(kWidestCell, (kLargestWidth - kLabels - 60) / columns);
   const double bottom = kHead + kRow * static_cast<double>(map.rows.size());
   const std::string ends = limits.low <= limits.high ? fmt::format(": {:.4g} dark to {:.4g} yellow",
                                                                    limits.low, limits.high)
                                                      : "";
   const double all = kLabels + width * columns + 60,
-               title = kMargin + svg::WidthOf(map.title + ends) + kMargin;
+               title = kMargin + svg::TextWidth(map.title + ends) + kMargin;
   std::string text = svg::Open(bottom + 34, std::max(all, title));
   for (std::size_t c = 0; c < map.columns.size(); ++c) {
     text += ColumnName(kLabels + width * (static_cast<double>(c) + 0.4), map.columns[c]);

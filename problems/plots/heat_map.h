@@ -9,14 +9,14 @@ namespace semblance {
 
 struct HeatMap {
   std::vector<std::string> rows, columns;
-  std::vector<std::vector<double>> values;           // [row][column]; NaN where there is none
-  std::string title;                                 // what the numbers are
-  std::vector<std::vector<std::string>> links = {};  // [row][column]: where a cell leads; or none
+  std::vector<std::vector<double>> values;           // [row][column]; NaN for no value
+  std::string title;                                 // the quantity of the numbers
+  std::vector<std::vector<std::string>> links = {};  // [row][column]: target of the cell's link
 };
 
-// The smallest number is dark, the largest yellow; a cell says its number where there is room, and
-// wherever the pointer rests. A cell without a number is empty, with a dash. Throws InputError for
-// a row that has another number of values than there are columns.
+// The smallest number is dark, the largest yellow. A cell shows its number if there is room, and
+// always when the pointer rests on it. A cell without a number is empty, with a dash. Throws
+// InputError if a row does not have one value per column.
 std::string HeatMapSvg(const HeatMap& map);
 
 }  // namespace semblance

@@ -2,17 +2,16 @@
 #include "problems/plots/svg_parts.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "problems/plots/escape_html.h"
-
 namespace semblance {
 namespace {
 
-// To so many bytes, and no character halved.
+// Shortens a text to `most` bytes without cutting a UTF-8 character in half.
 std::string CutTo(const std::string& text, std::size_t most) {
   if (text.size() <= most) {
     return text;
@@ -24,6 +23,43 @@ std::string CutTo(const std::string& text, std::size_t most) {
 }
 
 }  // namespace
+
+std::string EscapeHtml(std::string_view text) {
+  std::string html;
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    switch (c) {
+      case '&':
+        html += "&amp;";
+        break;
+      case '<':
+        html += "&lt;";
+        break;
+      case '>':
+        html += "&gt;";
+        break;
+      case '"':
+        html += "&quot;";
+        break;
+      case '\'':
+        html += "&#39;";
+        break;
+      case '\t':
+      case '\n':
+        html += c;
+        break;
+      case '\r':
+        break;
+      default:
+        if (code < 0x20 || code == 0x7F) {
+          html += "\uFFFD";
+        } else {
+          html += c;
+        }
+    }
+  }
+  return html;
+}
 
 namespace svg {
 
@@ -48,7 +84,7 @@ std::string Text(double x, double y, const std::string& text, const char* anchor
       anchor, EscapeHtml(text));
 }
 
-double WidthOf(const std::string& text) { return 7.5 * static_cast<double>(text.size()); }
+double TextWidth(const std::string& text) { return 7.5 * static_cast<double>(text.size()); }
 
 std::string Dot(double x, double y, double radius, const std::string& title, const char* colour) {
   return fmt::format(
@@ -62,8 +98,8 @@ std::string Title(const std::string& text) {
 }
 
 std::string Shortened(const std::string& label) {
-  constexpr std::size_t kMost = 40;
-  if (label.size() <= kMost) {
+  constexpr std::size_t kLongest = 40;  // characters that fit beside a plot
+  if (label.size() <= kLongest) {
     return label;
   }
   std::vector<std::string> parts;
@@ -73,7 +109,7 @@ std::string Shortened(const std::string& label) {
     begin = end + 2;
   }
   for (std::string& part : parts) {
-    part = CutTo(part, std::max<std::size_t>(kMost / parts.size(), 5) - 2);
+    part = CutTo(part, std::max<std::size_t>(kLongest / parts.size(), 5) - 2);
   }
   return fmt::format("{}", fmt::join(parts, ", "));
 }

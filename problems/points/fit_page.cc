@@ -12,33 +12,26 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/plots/histogram.h"
+#include "problems/plots/svg_plot.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/join_report.h"
 #include "problems/report/plain_names.h"
-#include "problems/report/report.h"
+#include "problems/report/report_kit.h"
 
 namespace semblance {
 namespace {
 
-// What several parts of the page tell of; none where no plan had one.
+// Used by several parts of the page. None if no plan has a tolerance.
 using Tolerance = std::optional<ToleranceReport>;
-
-std::string Figure(double value) {
-  return std::isfinite(value) ? fmt::format("{:.3g}", value) : "";
-}
 
 std::size_t VerticesOf(const HSplineSurface& surface) {
   return surface.Net(0).vertices.size() + surface.Offsets().size();
 }
 
 std::vector<std::string> Notes(const PointFit& result, const Tolerance& tolerance) {
-  std::vector<std::string> notes;
-  for (const std::string& fault : result.Faults()) {
-    notes.push_back("The result is not usable: " + fault);
-  }
+  std::vector<std::string> notes = FaultNotes(result.Faults());
   if (tolerance) {
     notes.push_back(ToleranceText(*tolerance));
   }
@@ -60,13 +53,14 @@ std::vector<std::string> Notes(const PointFit& result, const Tolerance& toleranc
 std::vector<ReportTile> Tiles(const PointFit& result, const Tolerance& tolerance) {
   std::vector<ReportTile> tiles = {
       {"points", std::to_string(result.fit.residual_mm.size()), "", "(u,v): " + result.parameters},
-      {"RMS distance", Figure(result.fit.point_rms_mm), "mm", "of the points from the surface"},
-      {"median", Figure(result.distance.median_mm), "mm", ""},
-      {"95th percentile", Figure(result.distance.p95_mm), "mm", ""},
-      {"largest", Figure(result.distance.max_mm), "mm", ""},
+      {"RMS distance", TableFigures(result.fit.point_rms_mm), "mm",
+       "of the points from the surface"},
+      {"median", TableFigures(result.distance.median_mm), "mm", ""},
+      {"95th percentile", TableFigures(result.distance.p95_mm), "mm", ""},
+      {"largest", TableFigures(result.distance.max_mm), "mm", ""},
       {"control vertices", std::to_string(VerticesOf(result.fit.surface)), "", ""}};
   if (std::isfinite(result.weighted_rms_mm)) {
-    tiles.insert(tiles.begin() + 2, {"weighted RMS", Figure(result.weighted_rms_mm), "mm",
+    tiles.insert(tiles.begin() + 2, {"weighted RMS", TableFigures(result.weighted_rms_mm), "mm",
                                      "points count by their weights, as in the fit"});
   }
   if (tolerance) {
@@ -76,7 +70,7 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Tolerance& tolerance
   }
   if (result.fit.automatic) {
     tiles.push_back(
-        {"noise", Figure(result.fit.automatic->noise_mm), "mm",
+        {"noise", TableFigures(result.fit.automatic->noise_mm), "mm",
          fmt::format(
              "a coordinate{}, as found; {} left out",
              result.fit.automatic->weighted ? " of a point of mean weight" : "",
@@ -91,10 +85,11 @@ ReportSection DistanceSection(const PointFit& result, const Tolerance& tolerance
   if (tolerance) {
     marks.push_back({tolerance->tolerance_mm, "tolerance"});
   }
-  return {.heading = "How far the points are off",
-          .images = {{HistogramSvg(result.fit.residual_mm, marks, "distance (mm)"),
-                      "All points by their distance from the surface at their (u,v), outliers too.",
-                      "histogram of the points' distances"}}};
+  return {.heading = "Distances of the points",
+          .images = {
+              {HistogramSvg(result.fit.residual_mm, marks, "distance (mm)"),
+               "All points, including outliers, by their distance from the surface at their (u,v).",
+               "histogram of the points' distances"}}};
 }
 
 ReportTable CellsTable(const std::vector<FitCell>& cells) {
@@ -111,14 +106,13 @@ ReportTable CellsTable(const std::vector<FitCell>& cells) {
     level.squares += cell.sum_squares_mm2;
     level.largest = std::max(level.largest, cell.largest_mm);
   }
-  ReportTable table{"Cells of the surface by level, each a polynomial of its own; outliers apart",
-                    {"level", "cells", "of the domain (%)", "points", "RMS (mm)", "largest (mm)"},
-                    {}};
+  ReportTable table{
+      "Cells of the surface by level, without outliers; each cell is one polynomial patch",
+      {"level", "cells", "of the domain (%)", "points", "RMS (mm)", "largest (mm)"}};
   for (const auto& [number, level] : levels) {
-    table.rows.push_back({std::to_string(number), std::to_string(level.cells),
-                          fmt::format("{:.1f}", 100 * level.area), std::to_string(level.points),
-                          level.points > 0 ? Figure(std::sqrt(level.squares / level.points)) : "",
-                          level.points > 0 ? Figure(level.largest) : ""});
+    table.AddRow(number, level.cells, TablePercent(level.area), level.points,
+                 level.points > 0 ? TableFigures(std::sqrt(level.squares / level.points)) : "",
+                 level.points > 0 ? TableFigures(level.largest) : "");
   }
   return table;
 }
@@ -130,14 +124,12 @@ ReportTable WorstTable(std::vector<FitCell> cells) {
   std::ranges::stable_sort(cells, std::ranges::greater(), &FitCell::largest_mm);
   cells.resize(std::min(cells.size(), kMost));
   ReportTable table{"The cells with the farthest points",
-                    {"u", "v", "level", "points", "RMS (mm)", "largest (mm)"},
-                    {}};
+                    {"u", "v", "level", "points", "RMS (mm)", "largest (mm)"}};
   for (const FitCell& cell : cells) {
-    table.rows.push_back({fmt::format("{:.4g} to {:.4g}", cell.u, cell.u + cell.width),
-                          fmt::format("{:.4g} to {:.4g}", cell.v, cell.v + cell.height),
-                          std::to_string(cell.level), std::to_string(cell.points),
-                          Figure(std::sqrt(cell.sum_squares_mm2 / cell.points)),
-                          Figure(cell.largest_mm)});
+    table.AddRow(fmt::format("{:.4g} to {:.4g}", cell.u, cell.u + cell.width),
+                 fmt::format("{:.4g} to {:.4g}", cell.v, cell.v + cell.height), cell.level,
+                 cell.points, TableFigures(std::sqrt(cell.sum_squares_mm2 / cell.points)),
+                 TableFigures(cell.largest_mm));
   }
   return table;
 }
@@ -145,33 +137,27 @@ ReportTable WorstTable(std::vector<FitCell> cells) {
 ReportTable RoundsTable(const FitResult& fit, std::string_view weighted) {
   ReportTable table{fmt::format("Round by round{}", weighted),
                     {"round", "finest level", "RMS before (mm)", "RMS after (mm)", "vertices free",
-                     "weight of smoothness", "steps of the solver", "solver"},
-                    {}};
+                     "weight of smoothness", "steps of the solver", "solver"}};
   for (const LevelSummary& level : fit.levels) {
-    table.rows.push_back({std::to_string(table.rows.size() + 1), std::to_string(level.level),
-                          Figure(level.rms_before_mm), Figure(level.rms_after_mm),
-                          level.free_vertices < 0 ? "" : std::to_string(level.free_vertices),
-                          Figure(level.auto_weight),
-                          level.iterations < 0 ? "" : std::to_string(level.iterations),
-                          level.solver});
+    table.AddRow(table.rows.size() + 1, level.level, TableFigures(level.rms_before_mm),
+                 TableFigures(level.rms_after_mm),
+                 level.free_vertices < 0 ? "" : std::to_string(level.free_vertices),
+                 TableFigures(level.auto_weight),
+                 level.iterations < 0 ? "" : std::to_string(level.iterations), level.solver);
   }
   return table;
 }
 
 ReportTable AutoTable(const AutoReport& report, std::string_view weighted) {
   ReportTable table{
-      fmt::format("What was tried, and what it would have predicted of the points held out{}",
-                  weighted),
+      fmt::format("Rounds of the automatic choice, and their error at held-out points{}", weighted),
       {"round", "finest level", "vertices", "degrees of freedom", "weight", "RMS (mm)",
-       "held out (mm)", "outliers"},
-      {}};
+       "held out (mm)", "outliers"}};
   for (const NestedRound& round : report.rounds) {
     const bool chosen = static_cast<int>(table.rows.size()) == report.chosen_round;
-    table.rows.push_back({fmt::format("{}{}", table.rows.size() + 1, chosen ? " (taken)" : ""),
-                          fmt::format("{}", round.finest), fmt::format("{}", round.vertices),
-                          Figure(round.degrees_of_freedom), Figure(round.weight),
-                          Figure(round.rms_mm), Figure(round.held_out_rms_mm),
-                          fmt::format("{}", round.outliers)});
+    table.AddRow(fmt::format("{}{}", table.rows.size() + 1, chosen ? " (taken)" : ""), round.finest,
+                 round.vertices, TableFigures(round.degrees_of_freedom), TableFigures(round.weight),
+                 TableFigures(round.rms_mm), TableFigures(round.held_out_rms_mm), round.outliers);
   }
   return table;
 }
@@ -208,21 +194,26 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
     report.notes.push_back(TrimText(*trim.report) + ", in surface.ply and here");
   }
   report.scenes = FitScene(grid);
-  report.scenes_note = "Thinned out for looking; surface.hspline.json is exact.";
+  report.scenes_note = "Simplified for display; surface.hspline.json is exact.";
   report.main_images = {
-      {SurfacePng(grid, threads), "", "the surface, and the points' distances in colours on it"}};
+      {SurfacePng(grid, threads),
+       "Left: the surface. Right: the surface, coloured by the distance of the points.",
+       "the surface, and the points' distances in colours on it",
+       {DistanceLegend(grid)}}};
   report.tiles = Tiles(result, tolerance);
   report.sections = {
       DistanceSection(result, tolerance),
-      {.heading = "Where it was refined",
-       .images = {{DomainPng(grid, cells),
-                   "The domain: u to the right, v upwards. Grey: no point there.",
-                   "points' distances and levels of the cells over the domain"}},
+      {.heading = "Refinement",
+       .images =
+           {{DomainPng(grid, cells),
+             "The domain, u to the right and v upwards. Left: distance of the points; grey has "
+             "no points. Right: cells of the surface; brighter cells are finer.",
+             "points' distances and levels of the cells over the domain",
+             {DistanceLegend(grid)}}},
        .tables = {CellsTable(cells), WorstTable(cells)}},
       RoundsSection(result.fit, std::isfinite(result.weighted_rms_mm)),
       {.heading = "All options", .preformatted = WriteConfig(options), .folded = true}};
-  report.footer =
-      fmt::format("semblance {}; {}: SHA-256 {}", SEMBLANCE_VERSION, source.name, source.sha256);
+  report.footer = fmt::format("{}: SHA-256 {}", source.name, source.sha256);
   return ReportHtml(report);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// report.html of `semblance fit`: one file that needs no other.
+// report.html of `semblance fit`.
 #pragma once
 
 #include <optional>

@@ -13,8 +13,8 @@
 
 #include "problems/pictures/lighting.h"
 #include "problems/pictures/pictures.h"
-#include "problems/report/scene_blobs.h"
 #include "problems/report/scene_json.h"
+#include "problems/view/view_mesh.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {
@@ -90,10 +90,6 @@ RenderOptions Options(Lighting lighting) {
   return options;
 }
 
-Legend DistanceLegend(const FitGrid& grid) {
-  return {.map = DistanceColours(grid), .title = "distance of the points"};
-}
-
 Image DistancePicture(const FitGrid& grid) {
   const ColourMap map = DistanceColours(grid);
   Image image = MakeImage(kPixels, kPixels, {1, 1, 1});
@@ -140,12 +136,16 @@ ColourMap DistanceColours(const FitGrid& grid) {
   return SequentialMap(0, high > 0 ? high : 1);
 }
 
+Legend DistanceLegend(const FitGrid& grid) {
+  return {.map = DistanceColours(grid), .title = "distance of the points"};
+}
+
 std::string SurfacePng(const FitGrid& fine, int threads) {
   const FitGrid grid = Halved(fine);  // the lights of all would cost four times as much
   const Camera camera = CameraOf(grid.mesh);
   Scene plain, mapped;
   plain.objects = {{.mesh = grid.mesh, .material = PlasticMaterial({0.62, 0.70, 0.78})}};
-  mapped.objects = {MappedObject(grid.mesh, grid.rms_mm, DistanceColours(grid))};
+  mapped.objects = {MappedObject(grid.mesh, grid.rms_mm, DistanceColours(fine))};
   ShadowMaps shadows;    // of one mesh
   shadows.texels = 256;  // several from a vertex to the next of 71
   const auto render = [&](const Scene& scene, Lighting lighting) {
@@ -153,19 +153,12 @@ std::string SurfacePng(const FitGrid& fine, int threads) {
   };
   const std::array<Image, 2> pictures = {render(plain, Lighting::kStudio),
                                          render(mapped, Lighting::kEven)};
-  return EncodePng(ContactSheet(pictures, {.title = "",
-                                           .captions = {"the surface", "distance of the points"},
-                                           .legend = DistanceLegend(grid)}),
-                   PngEffort::kQuick);
+  return EncodePng(ContactSheet(pictures), PngEffort::kQuick);
 }
 
 std::string DomainPng(const FitGrid& grid, const std::vector<FitCell>& cells) {
   const std::array<Image, 2> pictures = {DistancePicture(grid), LevelPicture(cells)};
-  return EncodePng(
-      ContactSheet(pictures, {.title = "",
-                              .captions = {"distance over (u,v)", "cells: the brighter, the finer"},
-                              .legend = DistanceLegend(grid)}),
-      PngEffort::kQuick);
+  return EncodePng(ContactSheet(pictures), PngEffort::kQuick);
 }
 
 namespace {
@@ -196,10 +189,6 @@ std::string FitScene(const FitGrid& grid) {
   }
   SceneBlobs blobs;
   const std::string mesh = blobs.AddMesh(shown.mesh);
-  Json colours = Json::array();
-  for (int k = 0; k <= 32; ++k) {
-    colours.push_back(HexText(ColourAt(map, map.high_mm * k / 32)));
-  }
   Json scene = {
       {"label", "surface"},
       {"facts", Json::array()},
@@ -211,7 +200,7 @@ std::string FitScene(const FitGrid& grid) {
           {"high_mm", 100},
           {"scale", scale},
           {"no_data", HexText(kNoDataColour)},
-          {"colours", colours}}}}},
+          {"colours", ColourSteps(map)}}}}},
       {"layers",
        {{{"id", "distance"},
          {"label", "Surface by distance"},

@@ -12,6 +12,8 @@ namespace semblance {
 
 // From 0 to what 98 % of the grid's distances are below.
 ColourMap DistanceColours(const FitGrid& grid);
+// The legend of these colours, for the page that shows SurfacePng or DomainPng.
+Legend DistanceLegend(const FitGrid& grid);
 
 // PNG: the surface from obliquely above, or from between front and side where it goes round: as it
 // is, and by the points' distances.

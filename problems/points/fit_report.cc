@@ -16,9 +16,8 @@
 #include "problems/points/join_report.h"
 #include "problems/points/residual_files.h"
 #include "problems/points/surface_ply.h"
-#include "problems/report/fit_json.h"
 #include "problems/report/plain_names.h"
-#include "problems/report/timing_json.h"
+#include "problems/report/result_json.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/hspline_files/hspline_json.h"
 

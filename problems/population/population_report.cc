@@ -14,13 +14,13 @@
 #include "problems/plots/heat_map.h"
 #include "problems/plots/svg_plot.h"
 #include "problems/population/dense_mesh.h"
-#include "problems/report/report.h"
+#include "problems/report/report_kit.h"
 #include "problems/subject/sites.h"
 
 namespace semblance {
 namespace {
 
-std::string WayInWords(const std::string& name) {
+std::string WayText(const std::string& name) {
   constexpr std::array<std::array<const char*, 2>, 4> kWords = {
       {{"mean", "mean of the others"},
        {"person", "given sex, build, age, body mass"},
@@ -30,7 +30,7 @@ std::string WayInWords(const std::string& name) {
   return at == kWords.end() ? "table " + name : (*at)[1];
 }
 
-const Foresight* BestOf(const PopulationResult& result) {
+const Foresight* BestWay(const PopulationResult& result) {
   const auto best = std::ranges::min_element(
       result.foresights, {}, [](const Foresight& way) { return way.scores.mae_mm; });
   return best == result.foresights.end() ? nullptr : &*best;
@@ -46,13 +46,13 @@ std::vector<ReportTile> Tiles(const PopulationResult& result) {
        : result.file.outliers.leave_out ? "left out"
                                         : "listed, not left out"},
       {"correlations", fmt::format("{:.0f}", 100 * (1 - result.joint.shrinkage)), "%",
-       "the subjects' own; the rest is a model's"}};
+       "from the subjects; the rest is from a model"}};
   if (!result.foresights.empty() && result.foresights[0].scores.points > 0) {
     tiles.push_back({"a subject left out",
                      fmt::format("{:.2f}", result.foresights[0].scores.mae_mm), "mm",
                      "mean absolute error of the others' mean"});
-    tiles.push_back({"at best", fmt::format("{:.2f}", BestOf(result)->scores.mae_mm), "mm",
-                     WayInWords(BestOf(result)->name)});
+    tiles.push_back({"at best", fmt::format("{:.2f}", BestWay(result)->scores.mae_mm), "mm",
+                     WayText(BestWay(result)->name)});
   }
   return tiles;
 }
@@ -60,30 +60,26 @@ std::vector<ReportTile> Tiles(const PopulationResult& result) {
 ReportTable ForesightTable(const PopulationResult& result) {
   ReportTable table{
       .caption = "Each subject predicted by the others, mm",
-      .header = {"way", "depths", "MAE", "RMSE", "bias", "CRPS", "interval score", "within 50 %",
-                 "90 %", "95 %", "sd stated", "MAE less the mean's, 95 %"},
-      .rows = {}};
+      .header = {"prediction", "depths", "MAE", "RMSE", "bias", "CRPS", "interval score",
+                 "within 50 %", "90 %", "95 %", "sd stated", "MAE minus that of the mean, 95 %"}};
   for (const Foresight& way : result.foresights) {
     const DepthScores& s = way.scores;
     const SampleSummary& d = way.against_mean_mm;
-    table.rows.push_back(
-        {WayInWords(way.name), std::to_string(s.points), TableNumber(s.mae_mm),
-         TableNumber(s.rmse_mm), TableNumber(s.bias_mm), TableNumber(s.crps_mm),
-         TableNumber(s.interval_score_90_mm), TableNumber(s.coverage_50),
-         TableNumber(s.coverage_90), TableNumber(s.coverage_95), TableNumber(s.mean_sd_mm),
-         std::isfinite(d.mean_95.low)
-             ? fmt::format("{:+.3f} ({:+.3f} to {:+.3f})", d.mean, d.mean_95.low, d.mean_95.high)
-         : std::isfinite(d.mean) ? fmt::format("{:+.3f}", d.mean)
-                                 : ""});
+    table.AddRow(WayText(way.name), s.points, s.mae_mm, s.rmse_mm, s.bias_mm, s.crps_mm,
+                 s.interval_score_90_mm, s.coverage_50, s.coverage_90, s.coverage_95, s.mean_sd_mm,
+                 std::isfinite(d.mean_95.low) ? fmt::format("{:+.3f} ({:+.3f} to {:+.3f})", d.mean,
+                                                            d.mean_95.low, d.mean_95.high)
+                 : std::isfinite(d.mean)      ? fmt::format("{:+.3f}", d.mean)
+                                              : "");
   }
   return table;
 }
 
-// One row per way: each subject's mean absolute error, or how often the stated sd held.
+// One row per way of predicting: the mean absolute error of each subject.
 std::vector<BoxRow> ErrorRows(const PopulationResult& result) {
   std::vector<BoxRow> rows;
   for (const Foresight& way : result.foresights) {
-    BoxRow& row = rows.emplace_back(BoxRow{WayInWords(way.name), {}, {}});
+    BoxRow& row = rows.emplace_back(BoxRow{WayText(way.name), {}, {}});
     for (std::size_t k = 0; k < way.mae_mm.size(); ++k) {
       if (std::isfinite(way.mae_mm[k])) {
         row.values.push_back(way.mae_mm[k]);
@@ -94,6 +90,7 @@ std::vector<BoxRow> ErrorRows(const PopulationResult& result) {
   return rows;
 }
 
+// One row per way that states a standard deviation: its coverage.
 std::vector<BoxRow> CoverageRows(const PopulationResult& result) {
   std::vector<BoxRow> rows;
   for (const Foresight& way : result.foresights) {
@@ -103,7 +100,7 @@ std::vector<BoxRow> CoverageRows(const PopulationResult& result) {
       sds.push_back(depth.sd_mm);
     }
     if (way.scores.stated > 0) {
-      rows.push_back({WayInWords(way.name), Coverage(errors, sds), {}});
+      rows.push_back({WayText(way.name), Coverage(errors, sds), {}});
     }
   }
   return rows;
@@ -112,18 +109,18 @@ std::vector<BoxRow> CoverageRows(const PopulationResult& result) {
 ReportSection ForesightSection(const PopulationResult& result) {
   ReportSection section{.heading = "How well a person is predicted"};
   section.paragraphs = {fmt::format(
-      "Each subject is left out, the table is found from the others, and the subject's depths are "
-      "compared with it, at the sites that every way predicts.{}",
+      "Each subject is left out and predicted from the others. Its depths are compared with the "
+      "prediction at the sites that every way predicts.{}",
       result.file.known.empty() ? ""
-                                : fmt::format(" The few measured depths are those at {}, which "
-                                              "with their other sides are in no score.",
+                                : fmt::format(" The few measured depths are those at {}. These "
+                                              "sites and their mirror sites are in no score.",
                                               fmt::join(result.file.known, ", ")))};
   section.tables = {ForesightTable(result)};
-  section.images = {{BoxPlotSvg(ErrorRows(result), "mean absolute error of a subject, mm"),
-                     "One dot per subject.", "box plot of each subject's mean absolute error"}};
+  section.images = {SubjectBoxPlot(ErrorRows(result), "mean absolute error of a subject, mm",
+                                   "box plot of each subject's mean absolute error")};
   if (const auto rows = CoverageRows(result); !rows.empty()) {
     section.images.push_back({CalibrationPlotSvg(rows, "share within the stated interval"),
-                              "On the diagonal the stated deviation is right; below it, too bold.",
+                              "A line on the diagonal is calibrated, below it overconfident.",
                               "calibration of the stated deviations"});
   }
   return section;
@@ -131,13 +128,11 @@ ReportSection ForesightSection(const PopulationResult& result) {
 
 ReportSection TableSection(const PopulationResult& result) {
   ReportTable table{.caption = "Tissue depths, mm (table.yaml)",
-                    .header = {"site", "name", "mean", "sd", "subjects"},
-                    .rows = {},
-                    .filter = true};
+                    .header = {"site", "name", "mean", "sd", "subjects"}};
   for (const TissueRow& row : result.table.rows) {
     const TissueCell& cell = row.values.at("adult");
-    table.rows.push_back({row.site, row.name, TableNumber(cell.mean.value_or(kNaN)),
-                          TableNumber(cell.sd.value_or(kNaN)), std::to_string(cell.n.value_or(0))});
+    table.AddRow(row.site, row.name, cell.mean.value_or(kNaN), cell.sd.value_or(kNaN),
+                 cell.n.value_or(0));
   }
   HeatMap map{.rows = result.joint.names,
               .columns = result.joint.names,
@@ -149,52 +144,52 @@ ReportSection TableSection(const PopulationResult& result) {
   }
   return {
       .heading = "The table and its correlations",
-      .paragraphs = {fmt::format("{:.1f} % of each correlation is the model's: {}.",
-                                 100 * result.joint.shrinkage, "what so many subjects leave open")},
-      .images = {{HeatMapSvg(map), "Over people: sites, then what else is known of a person.",
+      .paragraphs = {fmt::format("{:.1f} % of each correlation comes from the model, because so "
+                                 "many subjects do not determine it alone.",
+                                 100 * result.joint.shrinkage)},
+      .images = {{HeatMapSvg(map),
+                  "Correlations over people: first the sites, then the other facts about a person.",
                   "heat map of correlations between sites"}},
       .tables = {table}};
 }
 
 ReportSection OutlierSection(const PopulationResult& result) {
   ReportTable table{.caption = "Depths and subjects unlike the others",
-                    .header = {"subject", "site", "depth (mm)", "expected (mm)", "z"},
-                    .rows = {},
-                    .filter = true};
+                    .header = {"subject", "site", "depth (mm)", "expected (mm)", "z"}};
   for (const Outlier& outlier : result.outliers) {
-    table.rows.push_back({result.subjects[outlier.subject].person.name,
-                          outlier.site.empty() ? "all of it" : SiteInWords(outlier.site),
-                          TableNumber(outlier.depth_mm), TableNumber(outlier.expected_mm),
-                          TableNumber(outlier.z)});
+    table.AddRow(result.subjects[outlier.subject].person.name,
+                 outlier.site.empty() ? "all sites" : SiteInWords(outlier.site), outlier.depth_mm,
+                 outlier.expected_mm, outlier.z);
   }
   ReportSection section{.heading = "Outliers"};
   if (table.rows.empty()) {
     section.paragraphs = {result.LooksForOutliers()
                               ? std::string("None was found.")
-                              : fmt::format("They are looked for from {} subjects on: a median of "
-                                            "fewer says nothing.",
+                              : fmt::format("The search needs at least {} subjects, because a "
+                                            "median of fewer is meaningless.",
                                             kFewestForOutliers)};
     return section;
   }
   section.paragraphs = {
       result.file.outliers.leave_out
           ? "They are left out of the table, the modes (whole subjects) and the scores."
-          : "They are listed alone; outliers.leave_out takes them out of all else."};
+          : "They are only listed. outliers.leave_out would leave them out of the table."};
   section.tables = {std::move(table)};
   return section;
 }
 
-std::string MapPicture(const DenseMesh& mesh, const std::vector<double>& by_cell,
-                       const Legend& legend, const std::string& title) {
+ReportImage MapImage(const DenseMesh& mesh, const std::vector<double>& by_cell,
+                     const Legend& legend, std::string caption, std::string alt) {
   constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
   const RenderOptions options{.width = 300, .height = 330, .lighting = Lighting::kEven};
-  return EncodePng(RenderViews({{MappedObject(mesh.mesh, OnVertices(mesh, by_cell), legend.map)}},
-                               Bounds(mesh.mesh), kViews, {title, {}, legend}, options,
-                               /*threads=*/1));
+  const Image sheet =
+      RenderViews({{MappedObject(mesh.mesh, OnVertices(mesh, by_cell), legend.map)}},
+                  Bounds(mesh.mesh), kViews, options, /*threads=*/1);
+  return {EncodePng(sheet), std::move(caption), std::move(alt), {legend}};
 }
 
 ReportSection DenseSection(const PopulationResult& result) {
-  constexpr double kDeepest_mm = 25, kWidest_mm = 6, kLargest_mm = 5;
+  constexpr double kDeepest_mm = 25, kWidest_mm = 6, kLargest_mm = 5;  // ends of the colour maps
   ReportSection section{.heading = "Depth all over the skull"};
   const DenseMesh mesh = MeshOf(result.dense);
   if (mesh.mesh.triangles.empty()) {
@@ -202,39 +197,37 @@ ReportSection DenseSection(const PopulationResult& result) {
     return section;
   }
   section.paragraphs = {
-      "The generic face's (u,v), laid on each skull by its landmarks; the places are the subjects' "
-      "mean, in the frame of an average skull. A mode is what one standard deviation of it adds."};
+      "The (u,v) grid of the generic face is laid on each skull by its landmarks. Positions are "
+      "means "
+      "over the subjects, in the frame of an average skull. The map of a mode shows the change of "
+      "depth by one standard deviation of the mode."};
   section.images = {
-      {MapPicture(mesh, result.dense.mean_mm, {SequentialMap(0, kDeepest_mm), "mean depth"}, ""),
-       "", "mean depth over the skull"},
-      {MapPicture(mesh, result.dense.sd_mm, {SequentialMap(0, kWidest_mm), "standard deviation"},
-                  ""),
-       "", "standard deviation of depth over the skull"}};
+      MapImage(mesh, result.dense.mean_mm, {SequentialMap(0, kDeepest_mm), "mean depth"},
+               "Mean depth.", "mean depth over the skull"),
+      MapImage(mesh, result.dense.sd_mm, {SequentialMap(0, kWidest_mm), "standard deviation"},
+               "Standard deviation of the depth.", "standard deviation of depth over the skull")};
   for (std::size_t k = 0; k < result.dense.modes_mm.size(); ++k) {
-    section.images.push_back(
-        {MapPicture(
-             mesh, result.dense.modes_mm[k], {DivergingMap(kLargest_mm), "change of depth"},
-             fmt::format("mode {}: {:.1f} % of the variance", k + 1, 100 * result.dense.share[k])),
-         "", fmt::format("mode {} of depth over the skull", k + 1)});
+    section.images.push_back(MapImage(
+        mesh, result.dense.modes_mm[k], {DivergingMap(kLargest_mm), "change of depth"},
+        fmt::format("Mode {}: {:.1f} % of the variance.", k + 1, 100 * result.dense.share[k]),
+        fmt::format("mode {} of depth over the skull", k + 1)));
   }
   return section;
 }
 
 ReportSection SubjectSection(const PopulationResult& result) {
   ReportTable table{.caption = "Subjects",
-                    .header = {"subject", "status", "landmarks", "sites", "why"},
-                    .rows = {},
-                    .filter = true};
+                    .header = {"subject", "status", "landmarks", "sites", "reason"}};
   for (const MeasuredSubject& subject : result.subjects) {
     const auto sites = std::ranges::count_if(
         subject.depths.sites, [](const SiteDepth& site) { return std::isfinite(site.depth_mm); });
-    table.rows.push_back({subject.person.name, subject.status,
-                          subject.status != "done"  ? ""
-                          : subject.depths.proposed ? "proposed"
-                                                    : "placed",
-                          std::to_string(sites), subject.reason});
+    table.AddRow(subject.person.name, subject.status,
+                 subject.status != "done"  ? ""
+                 : subject.depths.proposed ? "proposed"
+                                           : "placed",
+                 sites, subject.reason);
   }
-  return {.heading = "Who was measured", .tables = {table}, .folded = true};
+  return {.heading = "Subjects", .tables = {table}, .folded = true};
 }
 
 }  // namespace
@@ -252,7 +245,6 @@ std::string PopulationReport(const PopulationResult& result) {
   report.sections.push_back(DenseSection(result));
   report.sections.push_back(OutlierSection(result));
   report.sections.push_back(SubjectSection(result));
-  report.footer = "semblance " SEMBLANCE_VERSION;
   return ReportHtml(report);
 }
 

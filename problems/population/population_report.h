@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a population came to, as a page.
+// The report of a population, as one page.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace semblance {
 
-// HTML with its pictures inside; nothing in it depends on time or machine.
+// Returns HTML that contains its pictures. Nothing in it depends on time or machine.
 std::string PopulationReport(const PopulationResult& result);
 
 }  // namespace semblance

@@ -62,14 +62,14 @@ int Page(const LandmarkArguments& a) {
   for (const std::string& table : a.tables) {
     tables.push_back(ReadTissueTable(table));
   }
-  const fs::path page = fs::path(a.out) / "sites.md", picture = fs::path(a.out) / "sites.png";
+  const fs::path page = fs::path(a.out) / "sites.md", picture = fs::path(a.out) / "sites.svg";
   if (!a.force && (fs::exists(page) || fs::exists(picture))) {
     throw IoError(
-        fmt::format("{}: sites.md or sites.png exists; add --force to replace it", a.out));
+        fmt::format("{}: sites.md or sites.svg exists; add --force to replace it", a.out));
   }
   fs::create_directories(a.out);
   WriteFileAtomically(page, SitePage(tables, picture.filename().string()));
-  WriteFileAtomically(picture, EncodePng(SitePicture(/*threads=*/1)));
+  WriteFileAtomically(picture, SitePictureSvg(/*threads=*/1));
   fmt::print("{}\n", page.string());
   return kDone;
 }
@@ -77,7 +77,7 @@ int Page(const LandmarkArguments& a) {
 void DeclarePage(CLI::App& page, CommandLine& line) {
   LandmarkArguments& a = *Bind(page, line, &Page);
   page.add_option("TABLES", a.tables, "tissue tables to say which sites they have")->required();
-  page.add_option("--out", a.out, "folder for sites.md and sites.png")->required();
+  page.add_option("--out", a.out, "folder for sites.md and sites.svg")->required();
   page.add_flag("--force", a.force, "replace them where they are");
 }
 

@@ -14,7 +14,7 @@
 #include "problems/command_line/exit_code.h"
 #include "problems/command_line/shard.h"
 #include "problems/compare/comparison_files.h"
-#include "problems/compare/rank_agreement.h"
+#include "problems/compare/study_comparison.h"
 #include "problems/config/terminal_text.h"
 #include "problems/output/staged_folder.h"
 #include "problems/study/study_run.h"

@@ -14,6 +14,7 @@
 #include "problems/python/bindings.h"
 #include "problems/python/interruptible.h"
 #include "problems/python/option_text.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/run.h"
 #include "problems/study/study_run.h"

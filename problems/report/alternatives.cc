@@ -32,18 +32,18 @@ bool IsName(const std::string& name) {
   });
 }
 
-// Settings are read as if they stood in a file of that folder.
-void StartPathsAt(const fs::path& folder, ConfigNode& node) {
+// Makes relative paths of settings start at `folder`, as if a file of that folder held them.
+void SetPathBase(const fs::path& folder, ConfigNode& node) {
   if (node.location.source && !node.location.source->has_lines) {
     auto source = std::make_shared<ConfigSource>(*node.location.source);
     source->folder = folder;
     node.location.source = std::move(source);
   }
   for (ConfigNode::Entry& entry : node.entries) {
-    StartPathsAt(folder, entry.value);
+    SetPathBase(folder, entry.value);
   }
   for (ConfigNode& item : node.items) {
-    StartPathsAt(folder, item);
+    SetPathBase(folder, item);
   }
 }
 
@@ -51,19 +51,19 @@ Experiment Read(const std::string& text, const Alternative& alternative, const f
                 ConfigErrors& errors) {
   ConfigNode tree = LoadConfigTextTree(text, "alternative " + alternative.name, alternative.set,
                                        ConfigTreeOf(Experiment{}), errors);
-  StartPathsAt(fs::current_path() / folder, tree);
+  SetPathBase(fs::current_path() / folder, tree);
   auto experiment = ReadConfigTree<Experiment>(tree, errors);
   experiment.title += " (" + alternative.name + ")";
   return experiment;
 }
 
-bool OfOneSkull(const Experiment& a, const Experiment& b) {
+bool HaveSameSubject(const Experiment& a, const Experiment& b) {
   Experiment with_other_subject = a;
   with_other_subject.subject = b.subject;
   return WriteConfig(with_other_subject) == WriteConfig(a);
 }
 
-// Faults of one alternative are told where the configuration has it.
+// Reports faults of one alternative at its place in the configuration.
 class AlternativeFaults {
  public:
   AlternativeFaults(const ConfigNode& tree, std::size_t index, const Alternative& alternative,
@@ -77,7 +77,7 @@ class AlternativeFaults {
 
   void Add(const ConfigErrors& of_settings) {
     for (const ConfigFault& fault : of_settings.faults()) {
-      errors_.Add(LocationOf(tree_, at_ + SettingOf(fault)), Name(),
+      errors_.Add(LocationOf(tree_, at_ + SettingPath(fault)), Name(),
                   fault.path + (fault.path.empty() ? "" : ": ") + fault.what);
     }
   }
@@ -85,8 +85,8 @@ class AlternativeFaults {
  private:
   std::string Name() const { return fmt::format("{} '{}'", at_, alternative_.name); }
 
-  // ".set[1]": what the fault is of; empty where no setting is by itself at fault.
-  std::string SettingOf(const ConfigFault& fault) const {
+  // The path of the faulty setting, e.g. ".set[1]". Empty if no single setting is at fault.
+  std::string SettingPath(const ConfigFault& fault) const {
     for (std::size_t k = 0; k < alternative_.set.size(); ++k) {
       if (fault.location.source && fault.location.source->name == "--set " + alternative_.set[k]) {
         return fmt::format(".set[{}]", k);
@@ -101,7 +101,7 @@ class AlternativeFaults {
   ConfigErrors& errors_;
 };
 
-// Those of `lines` that are not among `known`, with the alternative's name.
+// Adds the lines that `known` does not hold, with the alternative's name.
 void AddNamed(const std::string& name, const std::vector<std::string>& lines,
               const std::vector<std::string>& known, std::vector<std::string>& named) {
   for (const std::string& line : lines) {
@@ -111,7 +111,7 @@ void AddNamed(const std::string& name, const std::vector<std::string>& lines,
   }
 }
 
-// What of a result the comparison needs; the rest is let go.
+// The parts of a result that the comparison needs. The rest of the result is freed.
 struct Answer {
   std::string name;
   Scene scene;
@@ -122,7 +122,7 @@ struct Answer {
   Json json;
 };
 
-std::set<std::string> SitesOf(const RunResult& result) {
+std::set<std::string> DowelSites(const RunResult& result) {
   std::set<std::string> sites;
   for (const Dowel& dowel : result.subject.dowels_on_bone) {
     sites.insert(dowel.site);
@@ -130,7 +130,7 @@ std::set<std::string> SitesOf(const RunResult& result) {
   return sites;
 }
 
-std::set<std::string> LandmarksOf(const RunResult& result) {
+std::set<std::string> LandmarkSites(const RunResult& result) {
   std::set<std::string> landmarks;
   for (const auto& [site, point] : result.subject.points) {
     landmarks.insert(site);
@@ -138,14 +138,14 @@ std::set<std::string> LandmarksOf(const RunResult& result) {
   return landmarks;
 }
 
-Answer AnswerOf(const std::string& name, const std::vector<std::string>& set,
-                const RunResult& result) {
+Answer MakeAnswer(const std::string& name, const std::vector<std::string>& set,
+                  const RunResult& result) {
   Answer answer{.name = name,
                 .scene = HeadScene(result),
                 .face = result.face.mesh,
                 .normals = result.face.normals,
-                .sites = SitesOf(result),
-                .landmarks = LandmarksOf(result),
+                .sites = DowelSites(result),
+                .landmarks = LandmarkSites(result),
                 .json = {{"name", name}, {"set", set}, {"usable", result.usable()}}};
   answer.json["dowels"] = answer.sites.size();
   answer.json["face"] = nullptr;
@@ -160,8 +160,9 @@ Answer AnswerOf(const std::string& name, const std::vector<std::string>& set,
   return answer;
 }
 
-// How far each vertex lies outside the run's own face; none where the two have no common (u,v).
-std::vector<double> Outside(const Answer& answer, const Answer& own) {
+// The distance of each vertex outside the run's own face, in mm. Empty if the two meshes have
+// different triangles.
+std::vector<double> OutsideDistances(const Answer& answer, const Answer& own) {
   std::vector<double> outside;
   if (answer.face.triangles == own.face.triangles) {
     for (std::size_t v = 0; v < own.face.points.size(); ++v) {
@@ -196,7 +197,7 @@ void Compare(std::vector<Answer>& answers) {
     Json left_out = Json::array();
     std::ranges::set_difference(wanted, answer.sites, std::back_inserter(left_out));
     answer.json["left_out"] = left_out;
-    answer.json["difference"] = DifferenceJson(Outside(answer, own), own.face);
+    answer.json["difference"] = DifferenceJson(OutsideDistances(answer, own), own.face);
   }
 }
 
@@ -205,7 +206,6 @@ class ComparedPictures {
   ComparedPictures(const std::vector<Answer>& answers, OutputFolder& folder, int threads)
       : answers_(answers), folder_(folder), threads_(threads) {
     for (const Answer& answer : answers) {
-      sheet_.captions.push_back(answer.name);
       faces_.extend(Bounds(answer.face));
       for (const SceneObject& object : answer.scene.objects) {
         heads_.extend(Bounds(object.mesh));
@@ -218,21 +218,18 @@ class ComparedPictures {
     for (const Answer& answer : answers_) {
       pictures.push_back(Picture(answer.scene, view, heads_, Lighting::kStudio));
     }
-    Write(std::string(EnumNames(View{})[static_cast<int>(view)]), pictures, sheet_);
+    Write(std::string(EnumNames(View{})[static_cast<int>(view)]), pictures);
   }
 
   void WriteDifferences() {
-    const Legend legend{ErrorColours(), "outside (+) or inside (-) this run's own face"};
-    Sheet sheet = sheet_;
-    sheet.legend = legend;
     std::vector<Image> pictures;
     for (const Answer& answer : answers_) {
-      std::vector<double> outside = Outside(answer, answers_.front());
+      std::vector<double> outside = OutsideDistances(answer, answers_.front());
       outside.resize(answer.face.points.size(), kNaN);
-      pictures.push_back(Picture({{MappedObject(answer.face, outside, legend.map)}}, View::kFront,
-                                 faces_, Lighting::kEven));
+      pictures.push_back(Picture({{MappedObject(answer.face, outside, ErrorColours())}},
+                                 View::kFront, faces_, Lighting::kEven));
     }
-    Write("difference", pictures, sheet);
+    Write("difference", pictures);
   }
 
  private:
@@ -241,15 +238,14 @@ class ComparedPictures {
     return Render(scene, CameraFor(view, region, aspect),
                   {.width = kWidth, .height = kHeight, .lighting = lighting}, threads_);
   }
-  void Write(const std::string& name, const std::vector<Image>& pictures, const Sheet& sheet) {
+  void Write(const std::string& name, const std::vector<Image>& pictures) {
     folder_.Write(fmt::format("pictures/alternatives_{}.png", name),
-                  EncodePng(ContactSheet(pictures, sheet)));
+                  EncodePng(ContactSheet(pictures)));
   }
 
   const std::vector<Answer>& answers_;
   OutputFolder& folder_;
   int threads_;
-  Sheet sheet_{.title = "", .captions = {}, .legend = std::nullopt};
   Box3 heads_, faces_;
 };
 
@@ -267,20 +263,19 @@ std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const 
     const Alternative& alternative = experiment.alternatives[k];
     AlternativeFaults faults(tree, k, alternative, errors);
     if (!IsName(alternative.name)) {
-      faults.Add(
-          "this is not the name of a folder; take 1 to 60 letters, digits, '_', '-' and '+'");
+      faults.Add("this is not the name of a folder; use 1 to 60 letters, digits, '_', '-' and '+'");
     } else if (!names.insert(alternative.name).second) {
-      faults.Add("the name appears twice; give each alternative one of its own");
+      faults.Add("the name appears twice; give each alternative its own name");
     }
     ConfigErrors of_settings;
     result.push_back({alternative.name, Read(text, alternative, folder, of_settings)});
     faults.Add(of_settings);
     if (!result.back().experiment.alternatives.empty()) {
-      faults.Add("it sets alternatives of its own; set them beside it");
+      faults.Add("it sets alternatives of its own; list them next to it instead");
     }
-    if (of_settings.faults().empty() && !OfOneSkull(own, result.back().experiment)) {
+    if (of_settings.faults().empty() && !HaveSameSubject(own, result.back().experiment)) {
       faults.Add(
-          "it sets another `subject`, and alternatives are of one skull; take a study to compare "
+          "it sets another `subject`, but all alternatives share one skull; use a study to compare "
           "skulls");
     }
   }
@@ -307,7 +302,7 @@ std::vector<std::string> RunAlternatives(const Experiment& experiment,
   if (named.empty()) {
     return faults;
   }
-  std::vector<Answer> answers = {AnswerOf("this run", {}, own)};
+  std::vector<Answer> answers = {MakeAnswer("this run", {}, own)};
   for (std::size_t k = 0; k < named.size(); ++k) {
     const RunResult result = Run(named[k].experiment, context, &cache);
     OutputFolder below(folder.Root() / "alternatives" / named[k].name, WhenNotEmpty::kReplaceFiles);
@@ -315,7 +310,7 @@ std::vector<std::string> RunAlternatives(const Experiment& experiment,
     for (const std::string& fault : result.Faults()) {
       faults.push_back(fmt::format("alternative '{}': {}", named[k].name, fault));
     }
-    answers.push_back(AnswerOf(named[k].name, experiment.alternatives[k].set, result));
+    answers.push_back(MakeAnswer(named[k].name, experiment.alternatives[k].set, result));
   }
   Compare(answers);
   Json json = Json::array();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Other answers to the same skull (Experiment::alternatives), beside a run's own.
+// Alternatives of a run (Experiment::alternatives): the same skull with other options.
 #pragma once
 
 #include <filesystem>
@@ -19,27 +19,29 @@ struct NamedExperiment {
   Experiment experiment;  // without alternatives of its own
 };
 
-// folder: of the configuration, empty for the working folder; relative paths in what alternatives
-// set start there. tree: what the experiment was read from, for the lines of faults. Throws
-// ConfigError with a line for each fault of each alternative: a name that appears twice or is no
-// name of a folder, a setting that is none, another skull.
+// The experiments of all alternatives. Relative paths in the settings of alternatives start at
+// `folder`, the folder of the configuration (empty: the working folder). `tree` is the
+// configuration as read, which gives faults their lines. Throws ConfigError with a line for each
+// fault of each alternative: a name that appears twice or cannot name a folder, a setting that does
+// not exist, another skull.
 std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment,
                                             const std::filesystem::path& folder,
                                             const ConfigNode& tree);
 
-// What is found of the alternatives' inputs beside `own`, which is what is found of the
-// experiment's; each line names its alternative.
+// Checks the inputs of the alternatives. Returns the findings that `own`, the findings of the
+// experiment itself, does not hold. Each line names its alternative.
 CheckFindings LookAtAlternatives(const std::vector<NamedExperiment>& named,
                                  const CheckFindings& own, InputCheck& inputs);
 
-// Makes each alternative and writes it into alternatives/NAME below the folder, as WriteRun does.
-// Then, for the report of the run itself: alternatives.json (what is otherwise, the errors where
-// the truth is known, how far each face lies outside the run's own, which landmarks and which sites
-// of the run's own dowels have no dowel, notes) and pictures/alternatives_front.png,
-// _three_quarter.png, _side.png and _difference.png, the run's own first, all under one camera.
-// Nothing without alternatives. What they share with the run is taken from `cache`. Returns the
-// faults of those that are not usable. Throws as Run does.
-// named: AlternativesOf(experiment, ...).
+// Runs each alternative of `named` (from AlternativesOf) and writes it into alternatives/NAME below
+// the folder, as WriteRun does. Stages that an alternative shares with the run come from `cache`.
+// Then writes for the report of the run, with the run's own answer first and all pictures under one
+// camera:
+// - alternatives.json: the changed options, the errors if the truth is known, how far each face
+// lies
+//   outside the run's own, the landmarks and the run's own sites that have no dowel, and notes;
+// - pictures/alternatives_front.png, _three_quarter.png, _side.png and _difference.png.
+// Does nothing without alternatives. Returns the faults of unusable alternatives. Throws as Run.
 std::vector<std::string> RunAlternatives(const Experiment& experiment,
                                          const std::vector<NamedExperiment>& named,
                                          const RunResult& own, StageCache& cache,

@@ -20,8 +20,8 @@ const std::map<std::string_view, std::string_view>& Words() {
       {"cell_mm", "cell of the grid (mm)"},
       {"corner_evaluations", "evaluations at cells' corners"},
       {"crossed_cells", "cells that the surface crosses"},
-      {"decimation_ended_by", "thinning out ended by"},
-      {"decimation_error_mm", "error of thinning out (mm)"},
+      {"decimation_ended_by", "simplification ended by"},
+      {"decimation_error_mm", "error of simplification (mm)"},
       {"dowel_rms_mm", "RMS distance of the depth markers (mm)"},
       {"dowels", "depth markers"},
       {"dropped_components", "loose pieces dropped"},
@@ -35,16 +35,16 @@ const std::map<std::string_view, std::string_view>& Words() {
       {"outside", "bone vertices outside the network"},
       {"point_rms_mm", "RMS distance of all fitted points (mm)"},
       {"points", "fitted points"},
-      {"restored_features", "details of eyes, nose and mouth given back"},
+      {"restored_features", "restored details of eyes, nose and mouth"},
       {"seeds", "extra points taken from the first face"},
       {"seeds_folded", "extra points left out: folded"},
       {"seeds_masked", "extra points left out: at eyes, nose and mouth"},
       {"seeds_missed", "extra points left out: nothing there"},
       {"sharpest_crease_deg", "sharpest crease between markers (°)"},
-      {"template_scale", "size against the generic face"},
+      {"template_scale", "size relative to the generic face"},
       {"triangles", "triangles"},
-      {"triangles_dense", "triangles before thinning out"},
-      {"usable", "result can be used"},
+      {"triangles_dense", "triangles before simplification"},
+      {"usable", "result is usable"},
       {"vertices", "bone vertices"},
   };
   return kWords;
@@ -56,7 +56,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kUnits = 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kSides = {
     {{"_l", ", left"}, {"_r", ", right"}}};
 
-// The words of a list of pairs; empty where there are none.
+// The words for a key in a list of pairs. Empty if the list does not hold the key.
 template <std::size_t N>
 std::string_view Find(const std::array<std::pair<std::string_view, std::string_view>, N>& pairs,
                       std::string_view key) {
@@ -73,15 +73,15 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kMeasures
      {"within_2_5mm", "share within 2.5 mm"},
      {"mean_signed_mm", "mean signed distance (mm)"}}};
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kOfWhat = {
+constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kObjects = {
     {{"face", "of the recovered face"},
      {"implicit_face", "of the first face"},
      {"fit", "of the fit"},
      {"depth_truth", "of the depths from the true ones"},
      {"cross_validation", "at markers left out"}}};
 
-// Underscores as blanks, the unit in brackets, the side in words.
-std::string Spelt(std::string_view key) {
+// Spells a key with blanks, the unit in brackets and the side in words.
+std::string SpellKey(std::string_view key) {
   std::string words(key), unit;
   for (const auto& [ending, side] : kSides) {
     if (key.ends_with(ending) && key.size() > ending.size()) {
@@ -102,17 +102,17 @@ std::string Spelt(std::string_view key) {
 
 std::string WordsOfKey(std::string_view key) {
   const auto found = Words().find(key);
-  return found == Words().end() ? Spelt(key) : std::string(found->second);
+  return found == Words().end() ? SpellKey(key) : std::string(found->second);
 }
 
 std::string WordsOfMetric(std::string_view path) {
   const std::string_view last = path.substr(path.rfind('.') == path.npos ? 0 : path.rfind('.') + 1);
-  const std::string_view of_what = Find(kOfWhat, path.substr(0, path.find('.')));
+  const std::string_view object = Find(kObjects, path.substr(0, path.find('.')));
   const std::string_view measure = Find(kMeasures, last);
-  if (of_what.empty() || measure.empty()) {
+  if (object.empty() || measure.empty()) {
     return std::string(path);
   }
-  return fmt::format("{} {} ({})", measure, of_what, path);
+  return fmt::format("{} {} ({})", measure, object, path);
 }
 
 std::string WordsOfMeasure(std::string_view key) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files that every report carries; CMake puts their text into the program.
+// The style sheet and scripts that every report contains. CMake embeds their text in the program.
 #pragma once
 
 #include <string_view>
@@ -8,8 +8,8 @@ namespace semblance {
 
 std::string_view ReportStyle();        // report.css
 std::string_view ReportPageScript();   // report_page.js
-std::string_view ReportViewScript();   // report_view.js and the files it is made of
-std::string_view ReportPartsScript();  // those files alone, for other pages
+std::string_view ReportViewScript();   // report_view.js and the view_*.js files that it needs
+std::string_view ReportPartsScript();  // the view_*.js files alone, for other pages
 std::string_view ThreeScript();        // three.js; empty if the program was built without it
 
 }  // namespace semblance

@@ -6,20 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
-#include "fitting/problem/seeding.h"
-#include "fitting/relaxation/dowel_mesh.h"
 #include "problems/bust/bust_files.h"
-#include "problems/metrics/face_metrics_json.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
-#include "problems/report/depth_json.h"
-#include "problems/report/fit_json.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/run_report.h"
 #include "problems/report/scene_json.h"
-#include "problems/report/timing_json.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline_files/hspline_json.h"
@@ -31,130 +25,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json ImplicitJson(const ImplicitFace& face) {
-  return {{"cell_mm", face.cell_mm},
-          {"emitters", face.emitters},
-          {"emitters_per_square_depth", face.emitters_per_square_depth},
-          {"triangles_dense", face.dense.triangles.size()},
-          {"triangles", face.mesh.triangles.size()},
-          {"decimation_error_mm", face.decimation.error_mm},
-          {"decimation_ended_by", EnumNames(face.decimation.stop)[int(face.decimation.stop)]},
-          {"dropped_components", face.dropped_components},
-          {"crossed_cells", face.counts.active_cells},
-          {"corner_evaluations", face.counts.corner_evaluations},
-          {"edge_evaluations", face.counts.edge_evaluations},
-          {"emitter_evaluations", face.counts.emitter_evaluations},
-          {"bound_evaluations", face.counts.bound_evaluations}};
-}
-
-// What relaxation has to keep whole: the network of dowels and seeds in (u,v).
-void AddNetwork(const RunResult& result, Json& json) {
-  std::vector<Vec2> uv;
-  for (const FitPoint& p : result.target.points) {
-    uv.push_back(p.uv);
-  }
-  const DowelMesh mesh(result.placed.surface, uv);
-  int prevented = 0;
-  for (const RelaxationSummary& step : result.fit.relaxations) {
-    prevented += step.flips_prevented;
-  }
-  json["sharpest_crease_deg"] = SharpestCrease_deg(result.fit.surface, mesh, result.fit.uv);
-  json["flips"] = mesh.Flips(result.fit.uv);
-  json["flips_prevented"] = prevented;
-}
-
-Json FitJson(const RunResult& result) {
-  Json json = {{"dowel_rms_mm", result.fit.dowel_rms_mm},
-               {"point_rms_mm", result.fit.point_rms_mm},
-               {"points", result.target.points.size()},
-               {"seeds", result.seeding.points.size()},
-               {"seeds_masked", result.seeding.masked},
-               {"seeds_missed", result.seeding.missed},
-               {"seeds_folded", result.seeding.folded},
-               {"template_scale", result.face_from_template.scale},
-               {"restored_features", result.fit.restored_features},
-               {"feature_distortion", FeaturesToJson(result.features)},
-               {"usable", result.fit.usable}};
-  AddNetwork(result, json);
-  json.update(StepsToJson(result.fit));
-  return json;
-}
-
-Json UncertaintyJson(const RunResult& result) {
-  if (!result.uncertainty) {
-    return nullptr;
-  }
-  const FaceUncertainty& u = *result.uncertainty;
-  Json json = {{"sigma_median_mm", u.median_mm},
-               {"sigma_p95_mm", u.p95_mm},
-               {"prior_sd", u.prior_sd},
-               {"depth_length_mm", u.depth_length_mm},
-               {"depth_signal_mm", u.depth_signal_mm},
-               {"samples", u.samples.size()},
-               {"terms_left_out", u.left_out}};
-  json["coverage_90"] = result.truth ? Json(result.truth->sigma.at_90) : Json(nullptr);
-  json["coverage_90_of"] = result.truth ? Json(result.truth->sigma.of_part) : Json(nullptr);
-  json["coverage_area_cm2"] = result.truth ? Json(result.truth->sigma.area_cm2) : Json(nullptr);
-  json["coverage"] = result.truth ? Json(result.truth->sigma.curve) : Json(nullptr);
-  json["scores"] = result.truth ? ScoresToJson(result.truth->sigma.scores) : Json(nullptr);
-  return json;
-}
-
-// What the prior made of the dowels and the implicit face.
-Json PriorJson(const ShapeEstimate& estimate) {
-  const auto rms = [](auto&& values) {
-    double sum = 0;
-    for (const double value : values) {
-      sum += value * value;
-    }
-    return std::sqrt(sum / static_cast<double>(std::size(values)));
-  };
-  return {{"coefficients",
-           std::vector<double>(estimate.coefficients.begin(), estimate.coefficients.end())},
-          {"coefficients_rms", rms(estimate.coefficients)},
-          {"scale", estimate.subject_from_model.scale},
-          {"field_rms_mm", estimate.field_rms_mm},
-          {"sigma_rms_mm", rms(estimate.sigma_mm)},
-          {"dowels", estimate.tip_residual_mm.size()},
-          {"dowel_rms_mm", rms(estimate.tip_residual_mm)},
-          {"surface_points", estimate.surface_points},
-          {"rounds", estimate.rounds},
-          {"last_move_mm", estimate.last_move_mm},
-          {"usable", estimate.usable}};
-}
-
-Json BustJson(const Bust& bust) {
-  return {{"scale", bust.subject_from_model.scale},
-          {"on_face", bust.on_face},
-          {"face_rms_mm", bust.face_rms_mm},
-          {"on_skull", bust.on_skull},
-          {"skull_rms_mm", bust.skull_rms_mm},
-          {"turned_over", bust.turned_over},
-          {"released", bust.released}};
-}
-
-// The rules that took part, each with what it left.
-Json RulesJson(const std::vector<AppliedRule>& rules) {
-  Json json = Json::array();
-  for (const AppliedRule& rule : rules) {
-    json.push_back({{"rule", rule.rule},
-                    {"point", rule.point},
-                    {"coordinate", rule.coordinate},
-                    {"source", rule.source},
-                    {"sd_mm", rule.sd_mm},
-                    {"residual_mm", rule.residual_mm}});
-  }
-  return json;
-}
-
-// Where a dowel stands in the fit's target; -1 if it is not fitted.
+// The index of a site's dowel in the fit's target. -1 if it is not fitted.
 int TargetIndex(const FitTarget& target, const std::string& site) {
   const auto found = std::find_if(target.points.begin(), target.points.end(),
                                   [&](const FitPoint& p) { return p.label == site; });
   return found == target.points.end() ? -1 : static_cast<int>(found - target.points.begin());
 }
 
-std::string RoleOf(const Dowel& dowel) {
+std::string RoleName(const Dowel& dowel) {
   return dowel.role == PointRole::kInserted ? "inserted" : "landmark";
 }
 
@@ -168,7 +46,7 @@ std::string DowelsCsv(const RunResult& result) {
     const Vec3 tip = d.Tip();
     csv.Row(d.site, d.base.x(), d.base.y(), d.base.z(), d.direction.x(), d.direction.y(),
             d.direction.z(), d.depth_mm, d.sd_mm, tip.x(), tip.y(), tip.z(), uv.x(), uv.y(),
-            index < 0 ? kNaN : result.fit.residual_mm[index], RoleOf(d));
+            index < 0 ? kNaN : result.fit.residual_mm[index], RoleName(d));
   }
   return csv.Text();
 }
@@ -196,8 +74,8 @@ std::vector<std::array<std::uint8_t, 3>> Bytes(const std::vector<Colour>& colour
   return bytes;
 }
 
-// A mesh with one value per vertex: as colours for people's eyes, as `quality` for MeshLab, as
-// `scalar_...` for CloudCompare and Blender.
+// A mesh with one value per vertex: as colours, as `quality` for MeshLab, and as `scalar_...` for
+// CloudCompare and Blender.
 std::string MappedPly(const TriMesh& mesh, const std::string& scalar,
                       const std::vector<double>& values, const ColourMap& map,
                       const std::vector<VertexScalar>& more = {}) {
@@ -208,8 +86,8 @@ std::string MappedPly(const TriMesh& mesh, const std::string& scalar,
   return EncodeMesh(mesh, ".ply", attributes);
 }
 
-// How far each vertex of a reconstructed mesh lies outside the true skin; distance to the skull
-// where the skin is not known. more: further values of each vertex.
+// A reconstructed mesh with the signed distance of each vertex to the true skin, or the distance to
+// the skull if the skin is not known. `more` holds further values of each vertex.
 std::string ReconstructionPly(const TriMesh& mesh, const RunResult& result,
                               const std::vector<VertexScalar>& more, const RunContext& context) {
   if (!result.truth) {
@@ -219,7 +97,7 @@ std::string ReconstructionPly(const TriMesh& mesh, const RunResult& result,
                 [&](std::size_t v) { gap[v] = skull.Closest(mesh.points[v]).distance_mm; });
     return MappedPly(mesh, "scalar_depth_mm", gap, DepthColours(), more);
   }
-  return MappedPly(mesh, "scalar_error_mm", SignedErrorOf(mesh, result, context), ErrorColours(),
+  return MappedPly(mesh, "scalar_error_mm", SignedErrors(mesh, result, context), ErrorColours(),
                    more);
 }
 
@@ -232,22 +110,13 @@ void WriteSamples(const FaceUncertainty& uncertainty, OutputFolder& folder) {
   }
 }
 
-// 0 observed, 1 mirrored, 2 inferred: of the bone under each vertex.
+// The origin of the bone under each vertex: 0 observed, 1 mirrored, 2 inferred.
 VertexScalar OriginScalar(const TriMesh& mesh, const RunResult& result, const RunContext& context) {
   VertexScalar scalar{"scalar_origin", {}};
   for (const BoneOrigin origin : OriginUnder(mesh, result.shell, result.origin, context.threads)) {
     scalar.values.push_back(static_cast<double>(origin));
   }
   return scalar;
-}
-
-Json BoneJson(const RunResult& result) {
-  const auto area_cm2 = AreaByOrigin_cm2(result.shell, result.origin);
-  Json json;
-  for (std::size_t k = 0; k < area_cm2.size(); ++k) {
-    json[fmt::format("{}_cm2", EnumNames(BoneOrigin{})[k])] = area_cm2[k];
-  }
-  return json;
 }
 
 void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext& context) {
@@ -273,7 +142,7 @@ void WriteMeshes(const RunResult& result, OutputFolder& folder, const RunContext
                          {OriginScalar(result.shell, result, context)}));
 }
 
-// What went in, and what it was made with.
+// The inputs by their hashes, and the versions of program and libraries.
 Json Provenance(const Experiment& experiment, const RunResult& result) {
   Json json = {{"program", "semblance"},
                {"version", SEMBLANCE_VERSION},
@@ -306,36 +175,10 @@ std::string ManifestJson(Json provenance, const OutputFolder& folder) {
 
 }  // namespace
 
-Json ResultJson(const Experiment& experiment, const RunResult& result) {
-  Json json = {{"title", experiment.title},
-               {"subject", result.subject.name},
-               {"usable", result.usable()},
-               {"faults", result.Faults()}};
-  json["face"] = result.truth
-                     ? ScoreToJson(result.truth->face, result.truth->details, result.truth->skin)
-                     : Json(nullptr);
-  json["implicit_face"] = result.truth ? MetricsToJson(result.truth->implicit) : Json(nullptr);
-  json["bone"] = BoneJson(result);
-  json["depth"] = DepthToJson(result.depth, result.subject);
-  json["depth_truth"] = result.truth ? ComparisonToJson(result.truth->depth) : Json(nullptr);
-  json["implicit"] = ImplicitJson(result.implicit);
-  json["fit"] = FitJson(result);
-  if (result.prior) {
-    json["prior"] = PriorJson(*result.prior);
-    json["rules"] = RulesJson(result.rules);
-  }
-  if (result.bust) {
-    json["bust"] = BustJson(*result.bust);
-  }
-  json["uncertainty"] = UncertaintyJson(result);
-  json["notes"] = result.Notes();
-  return json;
-}
-
 void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,
               const RunContext& context) {
   context.Report("write");
-  std::filesystem::remove(folder.Root() / "manifest.json");  // of a run that is written over
+  std::filesystem::remove(folder.Root() / "manifest.json");  // left by an earlier run
   folder.Write("resolved.yaml", WriteConfig(experiment));
   folder.Write("result.json", ResultJson(experiment, result).dump(2) + "\n");
   folder.Write("dowels.csv", DowelsCsv(result));

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/report/run_pictures.h"
 
-#include <fmt/format.h>
-
 #include "problems/pictures/lighting.h"
 #include "problems/pictures/pictures.h"
 #include "problems/pictures/render.h"
@@ -15,11 +13,11 @@ namespace {
 constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
 constexpr int kWidth = 560, kHeight = 640;
 
-// What all pictures are framed to: skull, face and dowels.
+// The box that all pictures frame: skull, face and dowels.
 Box3 Region(const RunResult& result) {
   Box3 box = Bounds(result.face.mesh);
   box.extend(Bounds(result.shell));
-  if (result.bust) {  // its ears, not its shoulders
+  if (result.bust) {  // frames its ears, but not its shoulders
     const double chin_mm = box.min().z();
     for (const Vec3& point : result.bust->skin.points) {
       if (point.z() >= chin_mm) {
@@ -37,7 +35,7 @@ RenderOptions Options(Lighting lighting) {
   return {.width = kWidth, .height = kHeight, .lighting = lighting};
 }
 
-// What the sheets of one run share.
+// The state that the sheets of one run share.
 struct Album {
   const RunResult& result;
   OutputFolder& folder;
@@ -47,26 +45,26 @@ struct Album {
   ShadowMaps of_skull = {}, of_face = {}, of_skin = {};
 };
 
-// Returns the pictures on the sheet, one per side.
-std::vector<Image> WriteSheet(const char* name, const Scene& scene, const Sheet& sheet,
-                              Lighting lighting, ShadowMaps& shadows, Album& album) {
+// Writes the scene from all sides. Returns its picture from the front.
+Image WriteSheet(const char* name, const Scene& scene, Lighting lighting, ShadowMaps& shadows,
+                 Album& album) {
   std::vector<Image> sides =
       RenderAll(scene, album.cameras, Options(lighting), shadows, album.threads);
-  album.folder.Write(name, EncodePng(ContactSheet(sides, sheet)));
-  return sides;
+  album.folder.Write(name, EncodePng(ContactSheet(sides)));
+  return std::move(sides.front());
 }
 
 Scene SkullScene(const RunResult& result) {
   return {{SkullObject(result.subject.skull), DowelObject(result.subject.dowels_on_bone)}};
 }
 
-// Framed by itself. Returns the head from the front as the other pictures are framed.
+// Writes the head framed by itself. Returns it from the front in the frame of the other pictures.
 Image WriteBust(Album& album) {
   const Scene head = HeadScene(album.result);
   const RenderOptions options = Options(Lighting::kStudio);
   album.folder.Write("pictures/bust.png",
-                     EncodePng(RenderViews(head, Bounds(album.result.bust->skin), kViews,
-                                           {"", {}, std::nullopt}, options, album.threads)));
+                     EncodePng(RenderViews(head, Bounds(album.result.bust->skin), kViews, options,
+                                           album.threads)));
   return Render(head, album.cameras.front(), options, album.threads);
 }
 
@@ -86,36 +84,29 @@ Colour StatusColour(SkinStatus status) {
   return HexColour(0xc8c0b8);
 }
 
-// Green is scored, yellow masked, red inner, blue a lid; the rest is grey.
+// Green: scored, yellow: masked, red: inner, blue: a lid, grey: the rest.
 void WriteScoredSkin(Album& album) {
   const ScoredSkin& skin = album.result.truth->skin;
   SceneObject object = SkinObject(*album.result.subject.skin);
   for (const SkinStatus status : skin.status) {
     object.vertex_colours.push_back(StatusColour(status));
   }
-  WriteSheet("pictures/scored.png", {{object}}, {InWords(skin), {}, std::nullopt},
-             Lighting::kStudio, album.of_skin, album);
+  WriteSheet("pictures/scored.png", {{object}}, Lighting::kStudio, album.of_skin, album);
 }
 
-void WriteError(const char* name, const char* title, std::span<const double> signed_mm,
-                const Legend& legend, Album& album) {
-  WriteSheet(name, {{MappedObject(*album.result.subject.skin, signed_mm, legend.map)}},
-             {title, {}, legend}, Lighting::kEven, album.of_skin, album);
+void WriteError(const char* name, std::span<const double> signed_mm, Album& album) {
+  WriteSheet(name, {{MappedObject(*album.result.subject.skin, signed_mm, ErrorColours())}},
+             Lighting::kEven, album.of_skin, album);
 }
 
 // Returns the true skin from the front.
 Image WriteTruth(Album& album) {
-  std::vector<Image> skin =
-      WriteSheet("pictures/truth.png", {{SkinObject(*album.result.subject.skin)}},
-                 {"True skin", {}, std::nullopt}, Lighting::kStudio, album.of_skin, album);
+  Image skin = WriteSheet("pictures/truth.png", {{SkinObject(*album.result.subject.skin)}},
+                          Lighting::kStudio, album.of_skin, album);
   WriteScoredSkin(album);
-  const TruthComparison& truth = *album.result.truth;
-  WriteError("pictures/error.png", "Signed error on the true skin", truth.face.signed_mm,
-             {ErrorColours(), "recovered face outside (+) or inside (-) the true skin"}, album);
-  WriteError("pictures/error_implicit.png", "Signed error of the first face",
-             truth.implicit.signed_mm,
-             {ErrorColours(), "first face outside (+) or inside (-) the true skin"}, album);
-  return std::move(skin.front());
+  WriteError("pictures/error.png", album.result.truth->face.signed_mm, album);
+  WriteError("pictures/error_implicit.png", album.result.truth->implicit.signed_mm, album);
+  return skin;
 }
 
 SceneObject ByOrigin(SceneObject object, const RunResult& result, int threads) {
@@ -125,49 +116,40 @@ SceneObject ByOrigin(SceneObject object, const RunResult& result, int threads) {
   return object;
 }
 
-// Where any of it is invented: the shell, and the face over it.
+// Writes the shell, and the face over it, by the origin of the bone. Skipped if all bone is
+// observed.
 void WriteOrigin(Album& album) {
   const RunResult& result = album.result;
   const auto [observed, mirrored, inferred] = AreaByOrigin_cm2(result.shell, result.origin);
   if (mirrored + inferred == 0) {
     return;
   }
-  const std::string title = fmt::format(
-      "Bone: {:.0f} cm² observed, {:.0f} cm² mirrored (blue), {:.0f} cm² inferred (yellow)",
-      observed, mirrored, inferred);
   ShadowMaps of_shell;
   WriteSheet("pictures/origin.png", {{ByOrigin(SkullObject(result.shell), result, album.threads)}},
-             {title, {}, std::nullopt}, Lighting::kStudio, of_shell, album);
+             Lighting::kStudio, of_shell, album);
   WriteSheet("pictures/origin_face.png",
-             {{ByOrigin(SkinObject(result.face.mesh), result, album.threads)}},
-             {"The face, by the bone under it", {}, std::nullopt}, Lighting::kStudio, album.of_face,
-             album);
+             {{ByOrigin(SkinObject(result.face.mesh), result, album.threads)}}, Lighting::kStudio,
+             album.of_face, album);
 }
 
 void WriteDepth(Album& album) {
-  const Legend depth{DepthColours(), "tissue depth on the skull's shell"};
   ShadowMaps of_shell;
   WriteSheet("pictures/depth.png",
-             {{MappedObject(album.result.shell, album.result.depth.depth_mm, depth.map)}},
-             {"Interpolated tissue depth", {}, depth}, Lighting::kEven, of_shell, album);
+             {{MappedObject(album.result.shell, album.result.depth.depth_mm, DepthColours())}},
+             Lighting::kEven, of_shell, album);
 }
 
 // Returns the implicit surface from the front.
 Image WriteImplicit(Album& album) {
   ShadowMaps of_implicit;
-  return std::move(
-      WriteSheet("pictures/implicit.png", {{SkinObject(album.result.implicit.dense)}},
-                 {"First face, straight from the depths (implicit surface)", {}, std::nullopt},
-                 Lighting::kStudio, of_implicit, album)
-          .front());
+  return WriteSheet("pictures/implicit.png", {{SkinObject(album.result.implicit.dense)}},
+                    Lighting::kStudio, of_implicit, album);
 }
 
 void WriteFaceOverSkull(Album& album) {
   Scene over = SkullScene(album.result);
   over.objects.push_back(SkinObject(album.result.face.mesh, 0.55));
-  WriteSheet("pictures/face_over_skull.png", over,
-             {"Recovered face over skull and depth markers", {}, std::nullopt}, Lighting::kStudio,
-             album.of_skull, album);
+  WriteSheet("pictures/face_over_skull.png", over, Lighting::kStudio, album.of_skull, album);
 }
 
 void WriteSigma(Album& album) {
@@ -175,10 +157,9 @@ void WriteSigma(Album& album) {
   if (!uncertainty || uncertainty->sigma_mm.empty()) {
     return;
   }
-  const Legend sigma{SigmaColours(), "standard deviation along the normal"};
   WriteSheet("pictures/sigma.png",
-             {{MappedObject(album.result.face.mesh, uncertainty->sigma_mm, sigma.map)}},
-             {"How far the face may be off", {}, sigma}, Lighting::kEven, album.of_face, album);
+             {{MappedObject(album.result.face.mesh, uncertainty->sigma_mm, SigmaColours())}},
+             Lighting::kEven, album.of_face, album);
 }
 
 }  // namespace
@@ -211,8 +192,8 @@ ColourMap DepthColours() { return SequentialMap(0, 25); }
 ColourMap ErrorColours() { return DivergingMap(8); }
 ColourMap SigmaColours() { return SequentialMap(0, 6); }
 
-std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
-                                  const RunContext& context) {
+std::vector<double> SignedErrors(const TriMesh& mesh, const RunResult& result,
+                                 const RunContext& context) {
   const FaceRegion& region = result.truth->skin.region;
   const TriMesh skin = OuterSurface(*result.subject.skin, region);
   const std::vector<bool> comparable = ComparableTriangles(skin, region);
@@ -234,32 +215,22 @@ std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context) {
   context.Report("pictures");
   Album album{.result = result, .folder = folder, .threads = context.threads};
-  std::vector<Image> story;
-  Sheet sheet{.title = "", .captions = {}, .legend = std::nullopt};
-  const auto tell = [&](Image picture, const char* caption) {
-    story.push_back(std::move(picture));
-    sheet.captions.push_back(caption);
-  };
-  tell(WriteSheet("pictures/skull_dowels.png", SkullScene(result),
-                  {"Skull and dowels", {}, std::nullopt}, Lighting::kStudio, album.of_skull, album)
-           .front(),
-       "skull and depth markers");
+  std::vector<Image> overview = {WriteSheet("pictures/skull_dowels.png", SkullScene(result),
+                                            Lighting::kStudio, album.of_skull, album)};
   WriteDepth(album);
-  tell(WriteImplicit(album), "first face (implicit)");
-  tell(WriteSheet("pictures/face.png", {{SkinObject(result.face.mesh)}},
-                  {"Recovered face", {}, std::nullopt}, Lighting::kStudio, album.of_face, album)
-           .front(),
-       "recovered face");
+  overview.push_back(WriteImplicit(album));
+  overview.push_back(WriteSheet("pictures/face.png", {{SkinObject(result.face.mesh)}},
+                                Lighting::kStudio, album.of_face, album));
   if (result.bust) {
-    tell(WriteBust(album), "head");
+    overview.push_back(WriteBust(album));
   }
   WriteOrigin(album);
   WriteFaceOverSkull(album);
   WriteSigma(album);
   if (result.truth) {
-    tell(WriteTruth(album), "true skin");
+    overview.push_back(WriteTruth(album));
   }
-  folder.Write("pictures/overview.png", EncodePng(ContactSheet(story, sheet)));
+  folder.Write("pictures/overview.png", EncodePng(ContactSheet(overview)));
 }
 
 }  // namespace semblance

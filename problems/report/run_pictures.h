@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The pictures of a run, and the colour maps they share with its meshes.
+// The pictures of a run, and the colour maps that they share with its meshes.
 #pragma once
 
 #include <vector>
@@ -17,17 +17,18 @@ ColourMap ErrorColours();  // -8 to 8 mm
 ColourMap SigmaColours();  // 0 to 6 mm
 Colour OriginColour(BoneOrigin origin);
 
-// Signed distance of each vertex to the true skin, positive outside it; NaN where the nearest skin
-// is not scored. result.truth must be there.
-std::vector<double> SignedErrorOf(const TriMesh& mesh, const RunResult& result,
-                                  const RunContext& context);
+// The signed distance of each vertex to the true skin in mm, positive outside the skin. NaN where
+// the nearest skin is not scored. Requires result.truth.
+std::vector<double> SignedErrors(const TriMesh& mesh, const RunResult& result,
+                                 const RunContext& context);
 
-// The head with open eyes, where there is one; else the face.
+// The head with open eyes, or the face if the run made no head.
 Scene HeadScene(const RunResult& result);
 
-// pictures/overview.png and, from front, three quarters and side: skull_dowels, depth, implicit,
-// face, face_over_skull, where they are there bust and sigma, and, where the true skin is known,
-// truth and error (on the true skin).
+// Writes pictures/overview.png and, from front, three quarters and side, skull_dowels, depth,
+// implicit, face and face_over_skull. Writes bust, origin and sigma if the run has them, and truth,
+// scored and error (on the true skin) if the true skin is known. Captions and legends are in the
+// report (run_report.h), not in the pictures.
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context);
 
 }  // namespace semblance

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// report.html of a run, from the files of its folder alone.
+// report.html of a run, made from the files of its folder.
 #pragma once
 
 #include "problems/output/files.h"
 
 namespace semblance {
 
-// Builds report.html anew from result.json, resolved.yaml, dowels.csv, the pictures and, where it
-// is there, scene.json of a run's folder. Throws IoError if one is missing or cannot be read.
+// Writes report.html from result.json, resolved.yaml, dowels.csv, the pictures and, if it exists,
+// scene.json of the folder. Throws IoError if a required file is missing or cannot be read.
 void WriteReport(OutputFolder& folder);
 
 }  // namespace semblance

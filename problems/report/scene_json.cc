@@ -12,7 +12,6 @@
 
 #include "problems/report/plain_names.h"
 #include "problems/report/run_pictures.h"
-#include "problems/report/scene_blobs.h"
 #include "problems/view/view_mesh.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
@@ -23,20 +22,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kHeadTriangles = 50000;  // of a mesh with ears and lids
+constexpr int kHeadTriangles = 50000;  // more than kViewTriangles, for ears and lids
 
 Json MapJson(const ColourMap& map, const char* title) {
-  constexpr int kSteps = 32;  // close enough for straight lines between them
-  Json json = {{"title", title},
-               {"low_mm", map.low_mm},
-               {"high_mm", map.high_mm},
-               {"no_data", HexText(kNoDataColour)},
-               {"colours", Json::array()}};
-  for (int k = 0; k <= kSteps; ++k) {
-    json["colours"].push_back(
-        HexText(ColourAt(map, map.low_mm + (map.high_mm - map.low_mm) * k / kSteps)));
-  }
-  return json;
+  return {{"title", title},
+          {"low_mm", map.low_mm},
+          {"high_mm", map.high_mm},
+          {"no_data", HexText(kNoDataColour)},
+          {"colours", ColourSteps(map)}};
 }
 
 Json Numbers(const Vec3& p) {
@@ -44,7 +37,7 @@ Json Numbers(const Vec3& p) {
   return {rounded(p.x()), rounded(p.y()), rounded(p.z())};
 }
 
-// The meshes of a run, thinned out.
+// The simplified meshes of a run.
 struct ViewMeshes {
   TriMesh skull, shell, implicit, face, skin, bust;
 };
@@ -104,8 +97,8 @@ class SceneWriter {
         {{"id", id}, {"label", label}, {"colour", colour}, {"mesh", blobs_.AddMesh(mesh)}});
   }
 
-  // The bone in the colours of pictures/origin.png (mirrored blue, inferred yellow), where any of
-  // it was not observed.
+  // Adds the bone in the colours of pictures/origin.png (mirrored blue, inferred yellow). Skipped
+  // if all bone was observed.
   void Origin() {
     const auto part = [&](BoneOrigin origin) {
       std::vector<bool> keep;
@@ -132,7 +125,7 @@ class SceneWriter {
     Mesh(id, label, mesh, colour);
     if (result_.truth) {
       layers_.back()["map"] = "error";
-      layers_.back()["values"] = blobs_.AddValues(SignedErrorOf(mesh, result_, context_));
+      layers_.back()["values"] = blobs_.AddValues(SignedErrors(mesh, result_, context_));
     }
   }
 
@@ -148,7 +141,7 @@ class SceneWriter {
     }
   }
 
-  // The value of the nearest vertex of the mesh before it was thinned out.
+  // For each vertex of the simplified mesh, the value at the nearest vertex of the full mesh.
   std::vector<double> NearestValues(const TriMesh& thin, const TriMesh& full,
                                     const std::vector<double>& full_values) const {
     const MeshQuery query(full);
@@ -167,7 +160,7 @@ class SceneWriter {
     return values;
   }
 
-  // Colours the last layer.
+  // Colours the layer added last.
   void Map(const char* map, const std::vector<double>& values) {
     layers_.back()["map"] = map;
     layers_.back()["always_mapped"] = true;
@@ -257,7 +250,7 @@ std::string SceneJson(const RunResult& result, const RunContext& context) {
 
 namespace {
 
-// Each blob once.
+// Adds a scene. Blobs with equal names are stored once.
 void AddScene(const std::string& label, Json scene, Json& all) {
   for (auto& [name, blob] : scene["blobs"].items()) {
     all["blobs"][name] = std::move(blob);
@@ -267,16 +260,16 @@ void AddScene(const std::string& label, Json scene, Json& all) {
   all["scenes"].push_back(std::move(scene));
 }
 
-Json SceneOf(const SceneText& text) {
+Json ParseScene(const SceneText& text) {
   CheckJsonDepth(text.json);
   Json scene = Json::parse(text.json, nullptr, false);
   if (!scene.is_object() || !scene.contains("blobs") || !scene.contains("layers")) {
-    throw IoError(fmt::format("scene '{}': no scene of a run; run it again", text.label));
+    throw IoError(fmt::format("scene '{}': not the scene of a run; run it again", text.label));
   }
   return scene;
 }
 
-// Of the blobs that `all` has not.
+// The size of the blobs that `all` does not hold yet.
 std::size_t NewBytes(const Json& scene, const Json& all) {
   std::size_t bytes = 0;
   for (const auto& [name, blob] : scene["blobs"].items()) {
@@ -285,21 +278,21 @@ std::size_t NewBytes(const Json& scene, const Json& all) {
   return bytes;
 }
 
-Json NoScenes() { return {{"scenes", Json::array()}, {"blobs", Json::object()}}; }
+Json EmptyCollection() { return {{"scenes", Json::array()}, {"blobs", Json::object()}}; }
 
 }  // namespace
 
 std::string CollectScene(const std::string& label, Json scene) {
-  Json all = NoScenes();
+  Json all = EmptyCollection();
   AddScene(label, std::move(scene), all);
   return all.dump();
 }
 
 SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t limit_bytes) {
-  Json all = NoScenes();
+  Json all = EmptyCollection();
   std::size_t size = 0;
   for (const SceneText& text : scenes) {
-    Json scene = SceneOf(text);
+    Json scene = ParseScene(text);
     size += scenes.size() > 1 ? NewBytes(scene, all) : 0;
     if (!all["scenes"].empty() && size > limit_bytes) {
       break;

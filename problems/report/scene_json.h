@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the 3-D view of a report shows, as JSON: layers, and the geometry that they are drawn from.
+// The scenes of a report's 3-D view as JSON: layers and their geometry.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -10,27 +10,28 @@
 
 namespace semblance {
 
-// {label, facts, maps, layers, blobs} of one run. Layers, inner to outer: skull, dowels (base, tip,
-// the fitted face's point, depth and residual), depth on the skull's shell, implicit and H-spline
-// face with their signed error where the truth is known, true skin, one control net a level. Meshes
-// are decimated to tens of thousands of triangles, points rounded to 1/65535 of the longest side
-// (about 5 um), values to 0.01 mm. A blob is named by the hash of its content, so that scenes that
-// share a skull can share its bytes. The same run gives the same text.
+// {label, facts, maps, layers, blobs} of one run. Layers from inner to outer: skull, dowels (base,
+// tip, the fitted face's point, depth and residual), depth on the skull's shell, first and
+// recovered face with their signed error if the truth is known, head, uncertainty, true skin, and
+// one control net per level. Meshes are reduced to tens of thousands of triangles, points are
+// rounded to 1/65535 of the longest side (about 5 um) and values to 0.01 mm (view_mesh.h). A blob
+// is named by the hash of its content, so scenes can share the bytes of one skull. The same run
+// gives the same text.
 std::string SceneJson(const RunResult& result, const RunContext& context);
 
-// Several scenes as one {scenes, blobs}, each blob once; labels: one per scene, shown where one is
-// chosen. Scenes are taken in order while the whole stays below `limit_bytes`; at least one is.
-// Throws IoError for a text that is no scene.
+// Several scenes as one {scenes, blobs}, with each blob once. The label of a scene is its entry in
+// the selection list. Takes scenes in order while the whole stays below `limit_bytes`, but at least
+// one. Throws IoError for a text that is not a scene.
 struct SceneText {
   std::string label;
   std::string json;
 };
 struct SceneCollection {
   std::string json;
-  int count = 0;  // of scenes that were taken
+  int count = 0;  // scenes taken
 };
 SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t limit_bytes);
-// The same of a scene alone that is not yet a text.
+// The same for a single scene that is still JSON.
 std::string CollectScene(const std::string& label, nlohmann::ordered_json scene);
 
 }  // namespace semblance

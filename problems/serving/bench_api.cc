@@ -134,8 +134,8 @@ BenchReply Meshes(Bench& bench, const BenchRequest&) {
 BenchReply Sites(Bench&, const BenchRequest&) { return JsonReply(SitesJson()); }
 
 BenchReply SitesPicture(Bench&, const BenchRequest&) {
-  static const std::string kPicture = EncodePng(SitePicture(/*threads=*/1));
-  return {200, "image/png", kPicture, {}};
+  static const std::string kPicture = SitePictureSvg(/*threads=*/1);
+  return {200, "image/svg+xml", kPicture, {}};
 }
 
 std::string QueryText(const BenchRequest& request, const char* key) {
@@ -416,7 +416,7 @@ constexpr std::array kRoutes = {
     Route{"GET", "api/state", &State},
     Route{"GET", "api/schema", &Schema},
     Route{"GET", "api/sites", &Sites},
-    Route{"GET", "api/sites.png", &SitesPicture},
+    Route{"GET", "api/sites.svg", &SitesPicture},
     Route{"GET", "api/site.png", &SitePictureReply},
     Route{"GET", "api/files", &Files},
     Route{"GET", "api/meshes", &Meshes},

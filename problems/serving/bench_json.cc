@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/landmark_files/site_page.h"
-#include "problems/report/scene_blobs.h"
 #include "problems/subject/average_skull.h"
 #include "problems/subject/sites.h"
+#include "problems/view/view_mesh.h"
 #include "problems/workbench/bench_config.h"
 #include "surfaces/hspline_query/tessellate.h"
 

@@ -14,7 +14,7 @@ namespace semblance {
 // Landmarks with their checks, settings, values of all options, what can be undone, the job.
 std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::path& folder);
 
-// {mesh: {blobs of scene_blobs.h}, dowels, notes, finest_level, seconds}: null but of a coarse one.
+// {mesh: {blobs of view_mesh.h}, dowels, notes, finest_level, seconds}: null but of a coarse one.
 std::string FaceJson(const BenchFace& face);
 
 // {per_mm: three for pulls along x, y and z, each with the x, y and z of the vertices' ways as

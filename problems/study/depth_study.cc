@@ -10,8 +10,7 @@
 
 #include "problems/pictures/pictures.h"
 #include "problems/pipeline/experiment_config.h"
-#include "problems/report/depth_json.h"
-#include "problems/report/timing_json.h"
+#include "problems/report/result_json.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -256,22 +255,29 @@ std::string DepthText(const DepthResult& result) {
   return text + ScoresText(result);
 }
 
-std::string DepthPicture(const DepthResult& result, const std::string& title, int threads) {
+std::vector<Legend> DepthPictureLegends(bool has_truth) {
   constexpr double kDeepest_mm = 25, kWorst_mm = 4;
+  std::vector<Legend> legends = {{SequentialMap(0, kDeepest_mm), "interpolated tissue depth"}};
+  if (has_truth) {
+    legends.push_back({DivergingMap(kWorst_mm), "too deep (+) or not deep enough (-)"});
+  }
+  return legends;
+}
+
+std::string DepthPicture(const DepthResult& result, int threads) {
   constexpr std::array kViews = {View::kFront, View::kThreeQuarter};
   const RenderOptions options{.width = 420, .height = 480, .lighting = Lighting::kEven};
   const TriMesh& shell = result.stage->shell;
-  const Legend depth{SequentialMap(0, kDeepest_mm), "interpolated tissue depth"};
-  std::vector<Image> rows = {
-      RenderViews({{MappedObject(shell, result.stage->depth.depth_mm, depth.map)}}, Bounds(shell),
-                  kViews, {title, {}, depth}, options, threads)};
+  const std::vector<Legend> legends = DepthPictureLegends(result.truth.has_value());
+  const auto sheet = [&](std::span<const double> values_mm, const ColourMap& map) {
+    return RenderViews({{MappedObject(shell, values_mm, map)}}, Bounds(shell), kViews, options,
+                       threads);
+  };
+  std::vector<Image> sheets = {sheet(result.stage->depth.depth_mm, legends[0].map)};
   if (result.truth) {
-    const Legend error{DivergingMap(kWorst_mm), "too deep (+) or not deep enough (-)"};
-    rows.push_back(RenderViews(
-        {{MappedObject(shell, result.truth->along_direction.error_mm, error.map)}}, Bounds(shell),
-        kViews, {"error against the true skin", {}, error}, options, threads));
+    sheets.push_back(sheet(result.truth->along_direction.error_mm, legends[1].map));
   }
-  return EncodePng(ContactSheet(rows, {"", {}, std::nullopt}));
+  return EncodePng(ContactSheet(sheets));
 }
 
 void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputFolder& folder,
@@ -281,7 +287,7 @@ void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputF
   folder.Write("left_out.csv", LeftOutCsv(result));
   folder.Write("depth.ply", DepthPly(result));
   folder.Write("tips.ply", TipsPly(result));
-  folder.Write("depth.png", DepthPicture(result, experiment.title, context.threads));
+  folder.Write("depth.png", DepthPicture(result, context.threads));
   folder.Write("timing.json", TimingJson(result.times));
 }
 

@@ -13,7 +13,7 @@
 
 #include "interp/evaluation/cross_validation.h"
 #include "problems/output/files.h"
-#include "problems/pictures/image.h"
+#include "problems/pictures/colour_map.h"
 #include "problems/pipeline/depth_comparison.h"
 
 namespace semblance {
@@ -49,7 +49,9 @@ std::string LeftOutCsv(const DepthResult& result);
 
 // The depth on the skull's shell from two sides and, where the truth is known, the error against it
 // along the direction; as PNG.
-std::string DepthPicture(const DepthResult& result, const std::string& title, int threads);
+std::string DepthPicture(const DepthResult& result, int threads);
+// The legends of that picture, for a page that shows it.
+std::vector<Legend> DepthPictureLegends(bool has_truth);
 
 // What WriteDepth writes.
 inline constexpr std::array<std::string_view, 7> kDepthFiles = {

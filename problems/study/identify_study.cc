@@ -9,6 +9,7 @@
 
 #include "problems/face_template/template_source.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/tessellate.h"

@@ -14,6 +14,7 @@
 
 #include "problems/config/spelling_suggestion.h"
 #include "problems/metrics/face_region.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"

@@ -21,9 +21,9 @@
 #include "problems/output/file_hashes.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/scene_json.h"
-#include "problems/report/timing_json.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"
 #include "problems/study/search_run.h"
@@ -337,9 +337,7 @@ class StudyRunner {
       }
       output.Write("timing.json", TimingJson(result->times, cpu_s), Durability::kUnsynced);
       if (plan_.keep == TrialFiles::kView && trial.subject == plan_.trials.front().subject) {
-        const std::string title =
-            fmt::format("{}: {}", trial.subject, TreatmentLabel(plan_.axes, trial.values));
-        output.Write("depth.png", DepthPicture(*result, title, 1));
+        output.Write("depth.png", DepthPicture(*result, 1));
       }
     };
   }

@@ -58,7 +58,7 @@ class Database {
   sqlite3* database_ = nullptr;
 };
 
-// Puts rows into one table; compiled once, for a study has very many.
+// Inserts rows into one table. The statement is compiled once, because a study has many rows.
 class Inserter {
  public:
   Inserter(const Database& database, const char* table, int columns) : database_(database) {
@@ -72,7 +72,7 @@ class Inserter {
     statement_.reset(made);
   }
 
-  // Texts and numbers in the order of the table's columns; they live until it returns.
+  // Takes texts and numbers in the order of the table's columns.
   template <class... Values>
   void operator()(const Values&... values) {
     int column = 0;
@@ -101,7 +101,7 @@ class Inserter {
   std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement_{nullptr, &sqlite3_finalize};
 };
 
-// A table grows fastest in the order of its key.
+// Inserting in the order of the primary key is fastest.
 std::vector<std::size_t> OrderById(const std::vector<TrialRow>& trials) {
   std::vector<std::size_t> order(trials.size());
   std::iota(order.begin(), order.end(), std::size_t{0});

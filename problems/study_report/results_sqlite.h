@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A study's results as a database, for those who would rather ask than read.
+// The results of a study as an SQLite database.
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@ namespace semblance {
 //   study(title, plan, metric)                    one row
 //   axis(position, path)                          option paths, in the order of the study
 //   trial(id, position, subject, status, reason)  in the order of the plan
-//   setting(trial, axis, value)                   what a trial sets on an axis (axis.position)
+//   setting(trial, axis, value)                   a trial's value on an axis (axis.position)
 //   metric(trial, name, value)                    by dotted path in result.json
-//   tag(word)                                     of the study
-// Throws InputError if SQLite cannot make it.
+//   tag(word)                                     the tags of the study
+// Throws InputError if SQLite fails.
 std::string ResultsSqlite(const StudyResults& results);
 
 }  // namespace semblance

@@ -9,7 +9,7 @@
 #include <regex>
 #include <set>
 
-#include "problems/plots/axis_plot.h"
+#include "problems/plots/svg_plot.h"
 #include "problems/report/plain_names.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/report/report.h"
+#include "problems/report/report_kit.h"
 #include "problems/study/study_tables.h"
 
 namespace semblance {

@@ -12,7 +12,7 @@
 
 namespace semblance {
 
-double MeanOf(const Treatment& treatment) {
+double MeanOverSubjects(const Treatment& treatment) {
   double sum = 0;
   for (const auto& [subject, value] : treatment.by_subject) {
     sum += value;
@@ -37,7 +37,7 @@ std::vector<Treatment> Ranked(const StudyResults& results) {
   return treatments;
 }
 
-std::string BestFirst(const Preference& preference) {
+std::string RankingOrderText(const Preference& preference) {
   return preference.better == Better::kLower ? "best mean first"
          : preference.better == Better::kHigher
              ? "best mean first (higher is better)"
@@ -56,7 +56,7 @@ double MeanSeconds(const StudyResults& results, const Treatment& treatment) {
   return count > 0 ? sum / count : kNaN;
 }
 
-std::string WordsOfNames(const StudyResults& results) {
+std::string LabelPartsText(const StudyResults& results) {
   const bool has_titles = std::ranges::find(results.axes, "title") != results.axes.end();
   return results.axes.empty() || has_titles
              ? std::string()
@@ -64,23 +64,24 @@ std::string WordsOfNames(const StudyResults& results) {
 }
 
 std::string RankingText(const StudyResults& results) {
-  constexpr std::size_t kMost = 20;
+  constexpr std::size_t kLines = 20;
   std::vector<Treatment> ranked = Ranked(results);
   std::erase_if(ranked, [](const Treatment& t) { return t.by_subject.empty(); });
   if (ranked.empty()) {
     return {};
   }
   std::string text = fmt::format("{}, {}{}:\n", WordsOfMetric(results.metric),
-                                 BestFirst(results.preference), WordsOfNames(results));
-  for (std::size_t n = 0; n < std::min(ranked.size(), kMost); ++n) {
+                                 RankingOrderText(results.preference), LabelPartsText(results));
+  for (std::size_t n = 0; n < std::min(ranked.size(), kLines); ++n) {
     const double seconds = MeanSeconds(results, ranked[n]);
     const auto subjects = static_cast<long long>(ranked[n].by_subject.size());
-    text += fmt::format(
-        "{:>4}  {:>10.4g}  {}{}  {}\n", n + 1, MeanOf(ranked[n]), Counted(subjects, "subject"),
-        std::isfinite(seconds) ? fmt::format(", {:.1f} s", seconds) : "", ranked[n].label);
+    text += fmt::format("{:>4}  {:>10.4g}  {}{}  {}\n", n + 1, MeanOverSubjects(ranked[n]),
+                        Counted(subjects, "subject"),
+                        std::isfinite(seconds) ? fmt::format(", {:.1f} s", seconds) : "",
+                        ranked[n].label);
   }
-  if (ranked.size() > kMost) {
-    text += fmt::format("      and {} more in summary.csv\n", ranked.size() - kMost);
+  if (ranked.size() > kLines) {
+    text += fmt::format("      and {} more in summary.csv\n", ranked.size() - kLines);
   }
   return text;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which treatment of a study is best, and for how long each trial ran.
+// The treatments of a study in the order of its metric, and the time that they took.
 #pragma once
 
 #include <string>
@@ -9,26 +9,26 @@
 
 namespace semblance {
 
-// The metric's mean over subjects; NaN without one.
-double MeanOf(const Treatment& treatment);
+// The metric's mean over subjects. NaN without subjects.
+double MeanOverSubjects(const Treatment& treatment);
 
-// The treatments by the study's metric, best mean cost (Preference) first; those without values
-// last.
+// The treatments by the mean cost (Preference) of the study's metric, best first. Treatments
+// without values come last.
 std::vector<Treatment> Ranked(const StudyResults& results);
 
-// The mean wall time of the treatment's trials, of those that say it; NaN if none does. Work that
-// another trial did for one is not in it.
+// The mean wall time of the treatment's trials that have one. NaN if none has. It does not contain
+// work that another trial did for one of them.
 double MeanSeconds(const StudyResults& results, const Treatment& treatment);
 
-// "best mean first (higher is better)": how they are ranked.
-std::string BestFirst(const Preference& preference);
+// The order of the ranking in words, e.g. "best mean first (higher is better)".
+std::string RankingOrderText(const Preference& preference);
 
-// What the parts of a treatment's name are, for the head of a list of them: "; named by interp,
-// rounds". Empty where the study names its treatments itself, or has one alone.
-std::string WordsOfNames(const StudyResults& results);
+// An explanation of treatment labels for the head of a list, e.g. "; named by interp, rounds".
+// Empty if the study names its treatments itself or has only one.
+std::string LabelPartsText(const StudyResults& results);
 
-// A line per treatment for a terminal: rank, mean, subjects, seconds and label; the first twenty,
-// and how many more there are. Empty where no trial has a value.
+// One line per treatment for a terminal: rank, mean, subjects, seconds and label. Lists the first
+// twenty and counts the others. Empty if no trial has a value.
 std::string RankingText(const StudyResults& results);
 
 }  // namespace semblance

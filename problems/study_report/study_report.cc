@@ -12,30 +12,23 @@
 
 #include "problems/plots/svg_plot.h"
 #include "problems/report/plain_names.h"
-#include "problems/report/report.h"
+#include "problems/report/report_kit.h"
 #include "problems/report/scene_json.h"
+#include "problems/study/depth_study.h"
 #include "problems/study/trial_folder.h"
-#include "problems/study_report/identify_report.h"
 #include "problems/study_report/results_sqlite.h"
 #include "problems/study_report/search_report.h"
-#include "problems/study_report/study_charts.h"
 #include "problems/study_report/study_ranking.h"
-#include "problems/study_report/study_subtables.h"
+#include "problems/study_report/study_sections.h"
 #include "surfaces/base/parallel.h"
 
 namespace semblance {
 namespace {
 
-constexpr std::size_t kMostScenes = 40;  // in one list to choose from
-constexpr std::size_t kLongTable = 12;   // rows; longer ones can be filtered
-constexpr int kLeastSubjects = 6;        // two-sided, five subjects cannot reach p < 0.05
+constexpr std::size_t kLargestSceneCount = 40;  // entries of one selection list
+constexpr int kLeastSubjects = 6;  // five subjects cannot reach p < 0.05 in a two-sided test
 
-std::string IntervalText(const Interval& interval) {
-  return std::isfinite(interval.low) ? fmt::format("{:.3f} to {:.3f}", interval.low, interval.high)
-                                     : "";
-}
-
-std::vector<double> ValuesOf(const Treatment& treatment) {
+std::vector<double> CollectValues(const Treatment& treatment) {
   std::vector<double> values;
   for (const auto& [subject, value] : treatment.by_subject) {
     values.push_back(value);
@@ -43,27 +36,20 @@ std::vector<double> ValuesOf(const Treatment& treatment) {
   return values;
 }
 
-std::string Seconds(double seconds) {
-  return std::isfinite(seconds) ? fmt::format("{:.1f}", seconds) : "";
-}
-
-// Each treatment leads to the first of its trials.
+// Each treatment links to the first of its trials.
 ReportTable RankingTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportTable table{fmt::format("Treatments by {}, {}{}", WordsOfMetric(results.metric),
-                                BestFirst(results.preference), WordsOfNames(results)),
+                                RankingOrderText(results.preference), LabelPartsText(results)),
                     {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median",
-                     "min", "max", "mean seconds"},
-                    {}};
+                     "min", "max", "mean seconds"}};
   for (const Treatment& treatment : ranked) {
-    const SampleSummary s = Summarize(ValuesOf(treatment));
-    table.rows.push_back({treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "",
-                          std::to_string(s.n), TableNumber(s.mean), IntervalText(s.mean_95),
-                          TableNumber(s.sd), TableNumber(s.median), TableNumber(s.min),
-                          TableNumber(s.max), Seconds(MeanSeconds(results, treatment))});
+    const SampleSummary s = Summarize(CollectValues(treatment));
+    table.AddRow(treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "", s.n, s.mean,
+                 IntervalText(s.mean_95), s.sd, s.median, s.min, s.max,
+                 TableNumber(MeanSeconds(results, treatment), 1));
     table.links.push_back(
         treatment.trials.empty() ? "" : "#" + TrialAnchor(results.trials[treatment.trials[0]]));
   }
-  table.filter = table.rows.size() > kLongTable;
   return table;
 }
 
@@ -79,11 +65,10 @@ std::vector<double> Differences(const Treatment& treatment, const Treatment& bes
 }
 
 ReportTable PairsTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportTable table{fmt::format("Each treatment less the best ({}), paired by subject{}",
+  ReportTable table{fmt::format("Each treatment minus the best ({}), paired by subject{}",
                                 ranked[0].label, results.preference.OfWhat()),
                     {"treatment", "pairs", "mean difference", "95 % interval", "worse in",
-                     "Wilcoxon p", "p, Holm"},
-                    {}};
+                     "Wilcoxon p", "p, Holm"}};
   std::vector<double> p;
   for (std::size_t n = 1; n < ranked.size(); ++n) {
     const std::vector<double> d = Differences(ranked[n], ranked[0], results.preference);
@@ -93,10 +78,10 @@ ReportTable PairsTable(const StudyResults& results, const std::vector<Treatment>
     p.push_back(enough ? w.p : 1);
     const auto worse =
         std::ranges::count_if(d, [&](double x) { return results.preference.IsBetter(0, x); });
-    table.rows.push_back({ranked[n].label, std::to_string(s.n), TableNumber(s.mean),
-                          IntervalText(s.mean_95), fmt::format("{} of {}", worse, s.n),
-                          enough ? fmt::format("{:.4f}{}", w.p, w.exact ? "" : " (normal)") : "",
-                          enough ? "?" : ""});
+    table.AddRow(ranked[n].label, s.n, s.mean, IntervalText(s.mean_95),
+                 fmt::format("{} of {}", worse, s.n),
+                 enough ? fmt::format("{:.4f}{}", w.p, w.exact ? "" : " (normal)") : "",
+                 enough ? "to be adjusted" : "");
   }
   const std::vector<double> adjusted = Holm(p);
   for (std::size_t n = 0; n < table.rows.size(); ++n) {
@@ -106,8 +91,7 @@ ReportTable PairsTable(const StudyResults& results, const std::vector<Treatment>
   return table;
 }
 
-// The subjects that all treatments have, as a table for Friedman's test.
-// Less is better in it.
+// The costs of the subjects that all treatments have, for Friedman's test. Lower is better.
 std::vector<std::vector<double>> CompleteTable(const StudyResults& results,
                                                const std::vector<Treatment>& treatments) {
   std::vector<std::vector<double>> rows;
@@ -125,7 +109,8 @@ std::vector<std::vector<double>> CompleteTable(const StudyResults& results,
   return rows;
 }
 
-// Where all subjects agree, F grows without bound, and no table of F tells how likely that is.
+// If all subjects agree, F is infinite and has no p-value. The probability of identical orders
+// takes its place.
 std::string FriedmanWords(const FriedmanResult& f) {
   if (!std::isfinite(f.chi2)) {
     return fmt::format("In all {} subjects the {} treatments have the same value.", f.subjects,
@@ -134,27 +119,28 @@ std::string FriedmanWords(const FriedmanResult& f) {
   if (!std::isfinite(f.f)) {
     const double log10_p = (1 - f.subjects) * std::lgamma(f.treatments + 1.0) / std::log(10.0);
     return fmt::format(
-        "All {} subjects put the {} treatments in the same order. Were the treatments alike, each "
-        "order would be as likely as any other, and this would happen with a probability of {}.",
+        "All {} subjects put the {} treatments in the same order. If the treatments did not "
+        "differ, "
+        "each order would be equally likely, and this would happen with a probability of {}.",
         f.subjects, f.treatments,
         log10_p > -4 ? fmt::format("{:.2g}", std::pow(10, log10_p))
                      : fmt::format("10^{:.0f}", std::floor(log10_p)));
   }
   return fmt::format(
-      "Over {} subjects and {} treatments: Friedman's chi-square is {:.3f}; in Iman and "
-      "Davenport's form F = {:.3f}, p {}.",
+      "Over {} subjects and {} treatments, Friedman's chi-square is {:.3f}. In Iman and "
+      "Davenport's form, F = {:.3f}, p {}.",
       f.subjects, f.treatments, f.chi2, f.f,
       f.p < 1e-12 ? "below 1e-12" : fmt::format("= {:.2g}", f.p));
 }
 
-// Of two treatments or more.
+// Requires two treatments or more.
 ReportSection RankSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportSection section{.heading = "Do the treatments differ?"};
   const auto rows = CompleteTable(results, ranked);
   if (static_cast<int>(rows.size()) < kLeastSubjects) {
     section.paragraphs = {fmt::format(
         "{} {} a value for all {} treatments. That is too few for a test: at least {} "
-        "subjects are needed. The differences above stand for themselves.",
+        "subjects are needed. Only the differences above are available.",
         rows.empty() ? "No subject" : Counted(static_cast<long long>(rows.size()), "subject"),
         rows.size() < 2 ? "has" : "have", ranked.size(), kLeastSubjects)};
     return section;
@@ -166,14 +152,14 @@ ReportSection RankSection(const StudyResults& results, const std::vector<Treatme
   }
   section.images = {
       {RankPlotSvg(labels, f.critical_difference),
-       "Ranks within each subject, averaged. Treatments that a grey line joins cannot "
-       "be told apart at 5 % (Nemenyi).",
+       "Ranks within each subject, averaged. Treatments joined by a grey line do not differ "
+       "significantly at 5 % (Nemenyi).",
        "mean ranks of the treatments with the critical difference"}};
   section.paragraphs = {FriedmanWords(f)};
   return section;
 }
 
-// A trial leads to its own report, where it was kept, else to what it left.
+// The link of a trial: its own report if it was kept, else its trial.json.
 std::string TrialLink(const TrialRow& row, const std::filesystem::path& root) {
   for (const char* file : {"report.html", "trial.json"}) {
     if (std::filesystem::exists(TrialFolder(root, row.id) / file)) {
@@ -185,22 +171,20 @@ std::string TrialLink(const TrialRow& row, const std::filesystem::path& root) {
 
 ReportSection TrialsSection(const StudyResults& results, const std::filesystem::path& root) {
   ReportTable table{fmt::format("Every trial, with {}", WordsOfMetric(results.metric)),
-                    {"trial", "subject", "treatment", "status", "value", "seconds", "reason"},
-                    {}};
+                    {"trial", "subject", "treatment", "status", "value", "seconds", "reason"}};
   for (const TrialRow& row : results.trials) {
     const auto value = row.metrics.find(results.metric);
-    table.rows.push_back({row.id, row.subject, TreatmentLabel(results.axes, row.values), row.status,
-                          value == row.metrics.end() ? "" : TableNumber(value->second),
-                          Seconds(row.wall_s), row.reason});
+    table.AddRow(row.id, row.subject, TreatmentLabel(results.axes, row.values), row.status,
+                 value == row.metrics.end() ? kNaN : value->second, TableNumber(row.wall_s, 1),
+                 row.reason);
     table.ids.push_back(TrialAnchor(row));
     table.links.push_back(TrialLink(row, root));
   }
-  table.filter = table.rows.size() > kLongTable;
   return {.heading = "Trials", .tables = {table}, .folded = true};
 }
 
-// The mean of one curve of the trials over subjects, point by point, one row per treatment; of
-// subjects whose curve is as long as the first one's.
+// The mean of one curve over subjects, point by point, one row per treatment. Subjects whose curve
+// differs in length from the first one are left out.
 std::vector<BoxRow> MeanCurves(const StudyResults& results, const std::vector<Treatment>& ranked,
                                std::vector<double> TrialRow::*curve) {
   std::vector<BoxRow> rows;
@@ -228,7 +212,7 @@ std::vector<BoxRow> MeanCurves(const StudyResults& results, const std::vector<Tr
   return rows;
 }
 
-// One plot of stated against observed shares, where a treatment states a standard deviation.
+// Plots of stated against observed shares, for treatments that state a standard deviation.
 std::vector<ReportImage> CalibrationPlots(const StudyResults& results,
                                           const std::vector<Treatment>& ranked) {
   std::vector<ReportImage> plots;
@@ -237,19 +221,19 @@ std::vector<ReportImage> CalibrationPlots(const StudyResults& results,
     if (!rows.empty()) {
       plots.push_back(
           {CalibrationPlotSvg(rows, "share that the stated standard deviation should hold (%)"),
-           fmt::format("Calibration: share of {} within what the stated standard deviation should "
-                       "hold, averaged over subjects. On the grey line it is right; below, too "
-                       "bold; above, too cautious.",
+           fmt::format("Calibration: observed share of {} within the intervals of the stated "
+                       "standard deviation, averaged over subjects. A line on the grey line is "
+                       "calibrated, below it overconfident, above it too cautious.",
                        of_what),
            fmt::format("observed against stated share of {}, one line per treatment", of_what)});
     }
   };
   add(&TrialRow::depth_coverage, "the true depths over the scored bone");
-  add(&TrialRow::left_out_coverage, "the dowels that were left out");
+  add(&TrialRow::left_out_coverage, "the depth markers that were left out");
   return plots;
 }
 
-// One histogram a treatment that states a standard deviation.
+// One histogram per treatment that states a standard deviation.
 std::vector<ReportImage> PitPlots(const StudyResults& results,
                                   const std::vector<Treatment>& ranked) {
   std::vector<ReportImage> plots;
@@ -257,10 +241,10 @@ std::vector<ReportImage> PitPlots(const StudyResults& results,
     const auto rows = MeanCurves(results, ranked, histogram);
     if (!rows.empty()) {
       plots.push_back({HistogramsSvg(rows),
-                       fmt::format("Probability integral transform of {}: where in the stated "
-                                   "distribution they lie, averaged over subjects. Flat at the "
-                                   "grey line it is right; heaped up at both ends it is too bold, "
-                                   "in the middle too cautious, at one end biased.",
+                       fmt::format("Probability integral transform of {}: their position in the "
+                                   "stated distribution, averaged over subjects. Bars at the grey "
+                                   "line mean calibrated, a heap at both ends overconfident, in "
+                                   "the middle too cautious, at one end biased.",
                                    of_what),
                        fmt::format("histogram of the probability integral transform of {}, one "
                                    "per treatment",
@@ -279,14 +263,15 @@ ReportSection CurvesSection(const StudyResults& results, const std::vector<Treat
   if (!errors.empty()) {
     section.images.push_back(
         {QuantilePlotSvg(errors, "distance of the recovered face from the true skin (mm)"),
-         "Share of the scored skin within each distance, quantiles averaged over subjects, up to "
-         "95 %.",
+         "Share of the scored skin within each distance, up to 95 %. Quantiles are averaged over "
+         "subjects.",
          "cumulative distribution of the face's error, one line per treatment"});
   }
   if (!steps.empty()) {
     section.images.push_back(
         {ConvergencePlotSvg(steps, "RMS distance of the fitted points (mm)"),
-         "Convergence: after each step of the last round's schedule, averaged over subjects.",
+         "Convergence: the distance after each step of the last round's schedule, averaged over "
+         "subjects.",
          "root mean square distance by step of the schedule, one line per treatment"});
   }
   std::ranges::move(CalibrationPlots(results, ranked), std::back_inserter(section.images));
@@ -297,7 +282,7 @@ ReportSection CurvesSection(const StudyResults& results, const std::vector<Treat
 std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
   std::vector<BoxRow> rows;
   for (const Treatment& treatment : ranked) {
-    rows.push_back({treatment.label, ValuesOf(treatment), {}});
+    rows.push_back({treatment.label, CollectValues(treatment), {}});
     for (const auto& [subject, value] : treatment.by_subject) {
       rows.back().names.push_back(subject);
     }
@@ -305,10 +290,11 @@ std::vector<BoxRow> Boxes(const std::vector<Treatment>& ranked) {
   return rows;
 }
 
-// Of each subject in turn all treatments, the best first, so that the view compares them there.
+// The scenes subject by subject, best treatment first, so that the view compares treatments of one
+// subject.
 SceneCollection Scenes(const StudyResults& results, const std::vector<Treatment>& ranked,
                        const std::filesystem::path& root) {
-  constexpr std::size_t kLimit_bytes = 12'000'000;
+  constexpr std::size_t kLimit_bytes = 12'000'000;  // a page that browsers still open quickly
   std::vector<std::string> subjects;
   for (const TrialRow& row : results.trials) {
     if (std::find(subjects.begin(), subjects.end(), row.subject) == subjects.end()) {
@@ -321,7 +307,7 @@ SceneCollection Scenes(const StudyResults& results, const std::vector<Treatment>
       for (const std::size_t n : treatment.trials) {
         const TrialRow& row = results.trials[n];
         const std::filesystem::path file = root / "trials" / row.id / "scene.json";
-        if (row.subject == subject && scenes.size() < kMostScenes &&
+        if (row.subject == subject && scenes.size() < kLargestSceneCount &&
             std::filesystem::exists(file)) {
           scenes.push_back({fmt::format("{} | {}", treatment.label, subject), ReadFileBytes(file)});
         }
@@ -331,20 +317,24 @@ SceneCollection Scenes(const StudyResults& results, const std::vector<Treatment>
   return scenes.empty() ? SceneCollection{} : CollectScenes(scenes, kLimit_bytes);
 }
 
-// The depth maps that the trials left, best treatment first.
+// The depth maps of the trials, best treatment first.
 std::vector<ReportImage> DepthMaps(const StudyResults& results,
                                    const std::vector<Treatment>& ranked,
                                    const std::filesystem::path& root) {
+  const bool has_truth = std::ranges::any_of(results.trials, [](const TrialRow& row) {
+    return row.metrics.lower_bound("depth_truth.") != row.metrics.lower_bound("depth_truth/");
+  });
   std::vector<ReportImage> maps;
   for (const Treatment& treatment : ranked) {
     for (const std::size_t n : treatment.trials) {
       const TrialRow& row = results.trials[n];
       const std::filesystem::path file = root / "trials" / row.id / "depth.png";
-      if (maps.size() < kMostScenes && std::filesystem::exists(file)) {
+      if (maps.size() < kLargestSceneCount && std::filesystem::exists(file)) {
         maps.push_back(
             ReportImageFromFile(file, fmt::format("{}, {}", treatment.label, row.subject),
                                 fmt::format("tissue depth on the skull of {} by {}, and its error",
-                                            row.subject, treatment.label)));
+                                            row.subject, treatment.label),
+                                DepthPictureLegends(has_truth)));
       }
     }
   }
@@ -356,9 +346,8 @@ std::string SceneNote(const StudyResults& results, const SceneCollection& scenes
   return scenes.count == 0 || left == 0
              ? ""
              : fmt::format(
-                   "{} of {} trials are shown here, best treatments first, subject by subject, to "
-                   "keep "
-                   "this file small; each other one can be run by itself from its trial.json.",
+                   "To keep this file small, {} of {} trials are shown, subject by subject, best "
+                   "treatments first. Any other trial can be run by itself from its trial.json.",
                    scenes.count, results.Count("done"));
 }
 
@@ -370,7 +359,7 @@ std::vector<ReportTile> Tiles(const StudyResults& results, const std::vector<Tre
       {"missing", std::to_string(results.Count("missing")), "", "not run yet"}};
   if (!ranked.empty() && !ranked[0].by_subject.empty()) {
     tiles.push_back(
-        {"best mean", TableNumber(Summarize(ValuesOf(ranked[0])).mean), "", ranked[0].label});
+        {"best mean", TableNumber(Summarize(CollectValues(ranked[0])).mean), "", ranked[0].label});
   }
   return tiles;
 }
@@ -387,7 +376,7 @@ ReportSection TreatmentsSection(const StudyResults& results, const std::vector<T
   return section;
 }
 
-// What the metric says of the treatments; sections with nothing in them are left out.
+// The sections about the metric. Empty sections are left out.
 std::vector<ReportSection> MetricSections(const StudyResults& results,
                                           const std::vector<Treatment>& ranked,
                                           const std::vector<ReportImage>& maps) {
@@ -404,7 +393,7 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
   sections.push_back({.heading = "Subject by subject", .images = SubjectMap(results, ranked)});
   std::ranges::move(IdentifySections(results, ranked), std::back_inserter(sections));
   sections.push_back(
-      {.heading = "Behind the metric", .tables = Subtables(results, ranked), .folded = true});
+      {.heading = "Further tables", .tables = Subtables(results, ranked), .folded = true});
   sections.push_back(CurvesSection(results, ranked));
   sections.push_back({.heading = "Depth maps", .images = maps, .folded = true});
   std::erase_if(sections, [](const ReportSection& section) {
@@ -413,23 +402,23 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
   return sections;
 }
 
-// What is missing or failed stands before what was found.
+// Failed and missing trials come before other notes.
 std::vector<std::string> Notes(const StudyResults& results) {
   std::vector<std::string> notes;
   const int failed = results.Count("failed"), missing = results.Count("missing");
   if (failed > 0) {
     notes.push_back(
-        fmt::format("{} failed; the table of trials says why.", Counted(failed, "trial")));
+        fmt::format("{} failed; the table of trials has the reasons.", Counted(failed, "trial")));
   }
   if (missing > 0) {
-    notes.push_back(fmt::format("{} not run yet: what follows may still change.",
+    notes.push_back(fmt::format("{} not run yet, so the results may still change.",
                                 Counted(missing, "trial is", "trials are")));
   }
   notes.insert(notes.end(), results.notes.begin(), results.notes.end());
   return notes;
 }
 
-std::string ReportOf(const StudyResults& results, const std::filesystem::path& root) {
+std::string StudyPage(const StudyResults& results, const std::filesystem::path& root) {
   const std::vector<Treatment> ranked = Ranked(results);
   const SceneCollection scenes = Scenes(results, ranked, root);
   const std::vector<ReportImage> maps = DepthMaps(results, ranked, root);
@@ -440,9 +429,8 @@ std::string ReportOf(const StudyResults& results, const std::filesystem::path& r
       results.axes.empty() ? "subjects alone" : fmt::format("{}", fmt::join(results.axes, ", ")));
   report.tiles = Tiles(results, ranked);
   if (!ranked.empty() && !ranked[0].by_subject.empty()) {
-    report.main_images = {{BoxPlotSvg(Boxes(ranked), WordsOfMetric(results.metric)),
-                           "One dot per subject; box: quartiles and median.",
-                           "box plot of the metric, one row per treatment"}};
+    report.main_images = {SubjectBoxPlot(Boxes(ranked), WordsOfMetric(results.metric),
+                                         "box plot of the metric, one row per treatment")};
   }
   report.sections = MetricSections(results, ranked, maps);
   if (const auto search = ReadSearchResults(root, results)) {
@@ -452,7 +440,6 @@ std::string ReportOf(const StudyResults& results, const std::filesystem::path& r
   report.scenes_note = SceneNote(results, scenes);
   report.notes = Notes(results);
   report.sections.push_back(TrialsSection(results, root));
-  report.footer = "semblance " SEMBLANCE_VERSION;
   return ReportHtml(report);
 }
 
@@ -469,7 +456,7 @@ StudyResults WriteStudyTables(OutputFolder& folder) {
       Table{"trials.csv", [&] { return TrialsCsv(results); }},
       Table{"summary.csv", [&] { return SummaryCsv(results); }},
       Table{"results.sqlite", [&] { return ResultsSqlite(results); }},
-      Table{"report.html", [&] { return ReportOf(results, folder.Root()); }},
+      Table{"report.html", [&] { return StudyPage(results, folder.Root()); }},
   };
   ParallelFor(tables.size(), static_cast<int>(tables.size()), 1,
               [&](std::size_t n) { tables[n].text = tables[n].text_of(); });

@@ -21,6 +21,7 @@
 #include "problems/output/given_files.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/stage_cache.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
 #include "problems/subject/phantom.h"
@@ -394,7 +395,7 @@ TEST(Run, MirroredBoneIsToldDrawnAndKeptToTheFace) {
   EXPECT_THAT(result.at("notes").dump(), HasSubstr("the left side lacks"));
   EXPECT_THAT(result.at("notes").dump(), HasSubstr("im_l"));
   EXPECT_TRUE(files.contains("pictures/origin.png") && files.contains("pictures/origin_face.png"));
-  EXPECT_THAT(files.at("report.html"), HasSubstr("What of the bone was seen"));
+  EXPECT_THAT(files.at("report.html"), HasSubstr("Observed and invented bone"));
   const auto layers = nlohmann::json::parse(files.at("scene.json")).at("layers");
   const auto origin =
       std::ranges::find_if(layers, [](const auto& l) { return l["id"] == "origin"; });

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/compare/study_comparison.h"
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <string>
 #include <vector>
 
@@ -58,7 +58,7 @@ double Value(const NamedStudy& study, const std::string& treatment, const std::s
   return kNaN;
 }
 
-TEST(StudyComparison, ADifferenceIsTheMeanOverSubjectsThatBothHave) {
+TEST(StudyComparison, TheDifferenceIsAMeanOverCommonSubjects) {
   const NamedStudy a = Study("a", {"x", "y"}, 9, 1), b = Study("b", {"x"}, 7, 2);
   const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
   EXPECT_THAT(comparison.subjects, SizeIs(7));
@@ -80,7 +80,7 @@ TEST(StudyComparison, ADifferenceIsTheMeanOverSubjectsThatBothHave) {
               Contains(HasSubstr("a: left out, for they are not in all the studies: 2 subjects")));
 }
 
-TEST(StudyComparison, OfAStudyAndItsCopyNothingDiffersAndOrderTurnsTheSign) {
+TEST(StudyComparison, ACopyDoesNotDifferAndSwappingTurnsTheSign) {
   const NamedStudy a = Study("a", {"x", "y"}, 8, 1), b = Study("b", {"x", "y"}, 8, 2);
   NamedStudy copy = a;
   copy.name = "copy";
@@ -100,7 +100,7 @@ TEST(StudyComparison, OfAStudyAndItsCopyNothingDiffersAndOrderTurnsTheSign) {
   }
 }
 
-TEST(StudyComparison, AStrangerIsComparedWithTheBestOfTheFirst) {
+TEST(StudyComparison, AnUnknownLabelIsComparedWithTheBestOfTheFirst) {
   const NamedStudy a = Study("a", {"x", "y", "z"}, 8, 1), b = Study("b", {"other"}, 8, 2);
   const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
   ASSERT_THAT(comparison.pairs, SizeIs(1));
@@ -113,14 +113,14 @@ TEST(StudyComparison, AStrangerIsComparedWithTheBestOfTheFirst) {
 }
 
 // One trial of each treatment, and of one of them it failed.
-TEST(StudyComparison, ATreatmentThatNoSubjectHasInBothIsSaid) {
+TEST(StudyComparison, APairWithNoSubjectInCommonIsReported) {
   const NamedStudy a = Study("a", {"x", "y"}, 1, 1);
   NamedStudy b = a;
   b.name = "b";
   b.results.trials[1].status = "failed";
   b.results.trials[1].metrics.clear();
   const std::string text = ComparisonText(CompareStudies(std::vector{b, a}, {}));
-  EXPECT_THAT(text, HasSubstr("a: y less b: y: no subject was done with both"));
+  EXPECT_THAT(text, HasSubstr("a: y minus b: y: no subject was done with both"));
   EXPECT_THAT(text, Not(HasSubstr("nan")));
 }
 
@@ -132,7 +132,7 @@ TEST(StudyComparison, BelowSixSubjectsThereIsNoTest) {
   EXPECT_THAT(PairsCsv(comparison), ::testing::EndsWith(",,\n"));  // neither p nor p_holm
 }
 
-TEST(StudyComparison, WhatCannotBeComparedIsRefusedOrSaid) {
+TEST(StudyComparison, IncomparableStudiesAreRefused) {
   const NamedStudy a = Study("a", {"x"}, 3, 1);
   NamedStudy b = Study("b", {"x"}, 3, 2);
   EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector{a}, {}); }),
@@ -140,7 +140,7 @@ TEST(StudyComparison, WhatCannotBeComparedIsRefusedOrSaid) {
   EXPECT_THAT(WordsOf<InputError>([&] {
                 CompareStudies(std::vector{a, b}, {.metric = "face.nothing", .better = {}});
               }),
-              HasSubstr("a: no trial that is done has the number 'face.nothing'"));
+              HasSubstr("a: no finished trial has the number 'face.nothing'"));
   b.results.trials[0].metrics["face.area_cm2"] = 200;
   EXPECT_THAT(CompareStudies(std::vector{a, b}, {}).notes,
               Contains(HasSubstr("not measured on the same area")));
@@ -153,8 +153,8 @@ TEST(StudyComparison, WhatCannotBeComparedIsRefusedOrSaid) {
               HasSubstr("no subject in common"));
 }
 
-// Of a metric that is better higher, all is as of its negative that is better lower.
-TEST(StudyComparison, WhereHigherIsBetterAllIsTurnedRound) {
+// A metric with higher better gives the results of its negative with lower better.
+TEST(StudyComparison, HigherIsBetterReversesTheOrder) {
   constexpr const char* kShare = "face.within_2_5mm";
   NamedStudy a = Study("a", {"x", "y", "z"}, 8, 1), b = Study("b", {"y", "other"}, 8, 2);
   for (NamedStudy* study : {&a, &b}) {
@@ -185,9 +185,8 @@ TEST(StudyComparison, WhereHigherIsBetterAllIsTurnedRound) {
   EXPECT_THAT(ComparisonText(negative), HasSubstr("lower is better"));
 }
 
-// Errors of either sign, and shares on either side of what is stated, do not make up for each
-// other.
-TEST(StudyComparison, SignedErrorsAndSharesWithinTheStatedAreBestNearestToWhatTheyShouldBe) {
+// Errors of both signs, and shares on both sides of the stated share, do not cancel.
+TEST(StudyComparison, SignedErrorsAndCoverageAreBestNearestToTheirTarget) {
   NamedStudy a = Study("a", {"bold", "right"}, 8, 1), b = Study("b", {"right"}, 8, 2);
   for (NamedStudy* study : {&a, &b}) {
     for (std::size_t n = 0; n < study->results.trials.size(); ++n) {
@@ -210,24 +209,24 @@ TEST(StudyComparison, SignedErrorsAndSharesWithinTheStatedAreBestNearestToWhatTh
   EXPECT_THAT(ComparisonText(error), HasSubstr("nearest to 0 is better"));
 }
 
-TEST(StudyComparison, WhatASearchTookAsBetterIsKeptAndAContradictionIsAskedAbout) {
+TEST(StudyComparison, ContradictingDirectionsNeedAChoice) {
   NamedStudy a = Study("a", {"x"}, 8, 1), b = Study("b", {"x"}, 8, 2);
   a.results.preference.better = Better::kHigher;
   EXPECT_THAT(WordsOf<InputError>([&] {
                 CompareStudies(std::vector{a, b}, {});
               }),
-              AllOf(HasSubstr("a took higher values"), HasSubstr("--better")));
+              AllOf(HasSubstr("higher values are better in a"), HasSubstr("--better")));
   EXPECT_EQ(
       CompareStudies(std::vector{a, b}, {.metric = "", .better = Better::kLower}).preference.better,
       Better::kLower);
   b.results.preference.better = Better::kHigher;
   EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).preference.better, Better::kHigher);
   b.results.preference.better = Better::kLower;
-  b.results.metric = "face.mean_abs_mm";  // says nothing of the metric that is compared
+  b.results.metric = "face.mean_abs_mm";  // another metric than the compared one
   EXPECT_EQ(CompareStudies(std::vector{a, b}, {}).preference.better, Better::kHigher);
 }
 
-TEST(StudyComparison, FoldersAreCalledByAsMuchOfTheirPathAsTellsThemApart) {
+TEST(StudyComparison, NamesAreTheShortestDistinctPathEnds) {
   const testing::ScratchFolder folder;
   const std::string plan =
       R"({"title": "t", "hash": "0", "metric": "m", "axes": [], "trials": [], "notes": []})";
@@ -260,7 +259,68 @@ TEST(ComparisonFiles, TheTablesHoldEveryPairAndValue) {
   OutputFolder output(folder / "out", WhenNotEmpty::kRefuse);
   WriteComparison(comparison, output);
   EXPECT_THAT(ReadFileBytes(folder / "out" / "report.html"), HasSubstr("a, b compared"));
-  EXPECT_THAT(ComparisonText(comparison), HasSubstr("b: x less a: x: "));
+  EXPECT_THAT(ComparisonText(comparison), HasSubstr("b: x minus a: x: "));
+}
+
+// values[treatment][subject]; the treatments are called t0, t1, ...
+NamedStudy Study(const std::string& name, const std::string& subjects,
+                 const std::vector<std::vector<double>>& values) {
+  NamedStudy study{.name = name, .results = {}, .folder = "out/" + name};
+  study.results.metric = "face.rms_mm";
+  study.results.axes = {"interp"};
+  for (std::size_t t = 0; t < values.size(); ++t) {
+    for (std::size_t s = 0; s < values[t].size(); ++s) {
+      study.results.trials.push_back({.id = fmt::format("{}{}", t, s),
+                                      .subject = fmt::format("{}{}", subjects, s),
+                                      .values = {fmt::format("t{}", t)},
+                                      .status = "done",
+                                      .reason = "",
+                                      .metrics = {{"face.rms_mm", values[t][s]}}});
+    }
+  }
+  return study;
+}
+
+// Differences of ranks 1, 1, 0, 0: 1 - 6 * 2 / (4 * 15).
+TEST(RankAgreement, IsSpearmansOfTheMeansOverEachStudysSubjects) {
+  const NamedStudy heads = Study("heads", "head ", {{1, 2}, {2, 3}, {3, 4}, {4, 5}}),
+                   phantoms = Study("phantoms", "phantom ", {{0.2}, {0.1}, {0.3}, {0.4}});
+  const RankAgreement agreement = CompareRanks(heads, phantoms, {});
+  EXPECT_NEAR(agreement.spearman, 0.8, 1e-12);
+  ASSERT_EQ(agreement.treatments.size(), 4u);
+  EXPECT_EQ(agreement.treatments[0].label, "t0");
+  EXPECT_EQ(agreement.treatments[0].reference_mean, 1.5);
+  EXPECT_EQ(agreement.treatments[0].rank, 2);
+  EXPECT_THAT(RankText(agreement), ::testing::HasSubstr("over 4 treatments: 0.80"));
+}
+
+// The second subject lacks t2: its other values, which would turn the order round, do not count.
+TEST(RankAgreement, TakesOnlySubjectsThatHaveAllTreatments) {
+  const NamedStudy heads = Study("heads", "head ", {{1}, {2}, {3}}),
+                   phantoms = Study("phantoms", "phantom ", {{1, 9}, {2, 0}, {3}});
+  EXPECT_NEAR(CompareRanks(heads, phantoms, {}).spearman, 1, 1e-12);
+}
+
+// The direction comes from the studies or from the caller, and the text states it.
+TEST(RankAgreement, UsesTheDirectionOfTheStudies) {
+  NamedStudy a = Study("a", "s", {{1}, {2}, {3}}), b = Study("b", "s", {{4}, {2}, {3}});
+  EXPECT_EQ(CompareRanks(a, b, {}).treatments[0].label, "t0");
+  EXPECT_THAT(RankText(CompareRanks(a, b, {})), ::testing::HasSubstr("; lower is better\n"));
+  a.results.preference.better = b.results.preference.better = Better::kHigher;
+  const RankAgreement agreement = CompareRanks(a, b, {});
+  EXPECT_EQ(agreement.treatments[0].label, "t2");
+  EXPECT_EQ(agreement.treatments[2].rank, 1);
+  EXPECT_THAT(RankText(agreement), ::testing::HasSubstr("; higher is better\n"));
+  EXPECT_EQ(CompareRanks(a, b, {.metric = "", .better = Better::kLower}).treatments[0].label, "t0");
+  b.results.preference.better = Better::kLower;
+  EXPECT_THROW(CompareRanks(a, b, {}), InputError);
+}
+
+TEST(RankAgreement, RefusesTwoTreatments) {
+  const NamedStudy a = Study("a", "s", {{1}, {2}, {3}}), b = Study("b", "s", {{1}, {2}});
+  EXPECT_THAT([&] { CompareRanks(a, b, {}); },
+              ::testing::ThrowsMessage<InputError>(
+                  ::testing::StartsWith("out/a and out/b have too few treatments")));
 }
 
 }  // namespace

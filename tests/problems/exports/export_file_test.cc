@@ -36,7 +36,7 @@ using Json = nlohmann::json;
 
 class ExportFile : public ::testing::Test {
  protected:
-  // A coarse phantom's.
+  // The folder of a coarse phantom.
   fs::path WriteSmallRun() {
     const std::vector<std::string> overrides = {
         "subject.rings=40",     "implicit.resolution=20",
@@ -49,7 +49,7 @@ class ExportFile : public ::testing::Test {
     return folder.Root();
   }
 
-  // With a value and colours.
+  // A mesh with a value and colours.
   fs::path WriteSphere() {
     const TriMesh sphere = testing::SphereMesh({1, 2, 3}, 10, 8);
     MeshAttributes attributes;
@@ -93,7 +93,7 @@ std::vector<std::string> NamesOf(const Json& document, const Json& nodes) {
   return names;
 }
 
-TEST_F(ExportFile, ARunKeepsItsValuesAndBecomesAGlbWithSkullFaceAndDowels) {
+TEST_F(ExportFile, ARunBecomesAGlbWithSkullFaceAndDowels) {
   const fs::path run = WriteSmallRun();
   const std::string ply = ReadFileBytes(run / "face.ply");
   pugi::xml_document vtp;
@@ -121,7 +121,7 @@ TEST_F(ExportFile, ARunKeepsItsValuesAndBecomesAGlbWithSkullFaceAndDowels) {
   EXPECT_EQ(glb["accessors"][primitive["indices"].get<int>()]["count"], 3 * face.triangles.size());
 }
 
-TEST_F(ExportFile, AMeshGoesToEveryFormatOfMeshes) {
+TEST_F(ExportFile, AMeshIsExportedToEveryMeshFormat) {
   const fs::path sphere = WriteSphere();
   const TriMesh mesh = ReadMesh(sphere);
   for (const char* extension : {".obj", ".off", ".stl", ".ply"}) {
@@ -129,7 +129,7 @@ TEST_F(ExportFile, AMeshGoesToEveryFormatOfMeshes) {
     WriteFileAtomically(file, Export(sphere, extension));
     EXPECT_EQ(ReadMesh(file).triangles.size(), mesh.triangles.size()) << extension;
   }
-  EXPECT_EQ(Export(sphere, ".ply"), ReadFileBytes(sphere));  // with all that it carries
+  EXPECT_EQ(Export(sphere, ".ply"), ReadFileBytes(sphere));  // with all its values
   pugi::xml_document vtu;
   ASSERT_TRUE(vtu.load_string(Export(sphere, ".vtu").c_str()));
   EXPECT_EQ(Values(vtu, "height_mm"),
@@ -137,8 +137,8 @@ TEST_F(ExportFile, AMeshGoesToEveryFormatOfMeshes) {
   EXPECT_EQ(DocumentOf(Export(sphere, ".glb"))["nodes"][0]["name"], "sphere");
 }
 
-// As surface.ply of a fit is: each pole of a closed surface is one vertex. An open tube stays open.
-TEST_F(ExportFile, WhatClosesAtPolesIsWatertightInEveryFormatOfMeshes) {
+// As in surface.ply of a fit, each pole of a closed surface is one vertex. An open tube stays open.
+TEST_F(ExportFile, ASurfaceClosedAtPolesIsWatertightInEveryFormat) {
   const fs::path closed = scratch_ / "closed.hspline.json", open = scratch_ / "open.hspline.json";
   WriteHSpline(closed, testing::DrawnTube(0.002, 0));
   WriteHSpline(open, testing::DrawnTube(0.2, 0));
@@ -165,16 +165,16 @@ TEST_F(ExportFile, WhatClosesAtPolesIsWatertightInEveryFormatOfMeshes) {
             corners);
 }
 
-TEST_F(ExportFile, ASceneThatIsNoneIsRefusedInOurWords) {
+TEST_F(ExportFile, ASceneThatIsNoneIsRefusedWithItsFile) {
   WriteFileAtomically(scratch_ / "result.json", "{}");
   WriteFileAtomically(scratch_ / "scene.json",
                       R"({"layers": [{"id": "skull", "mesh": {"a": 1}}], "blobs": {}})");
   EXPECT_THAT([&] { Export(scratch_.Path(), ".glb"); },
-              ThrowsMessage<IoError>(AllOf(HasSubstr("scene.json: no scene of a run"),
+              ThrowsMessage<IoError>(AllOf(HasSubstr("scene.json: not the scene of a run"),
                                            Not(HasSubstr("json.exception")))));
 }
 
-TEST_F(ExportFile, WhatDoesNotGoTogetherIsRefusedWithWhatDoes) {
+TEST_F(ExportFile, InvalidCombinationsAreRefusedWithARemedy) {
   const fs::path sphere = WriteSphere(), folder = scratch_.Path();
   EXPECT_THAT([&] { Export(folder, ".vtp"); }, ThrowsMessage<InputError>(HasSubstr("face.ply")));
   EXPECT_THAT([&] { Export(sphere, ".step"); }, ThrowsMessage<InputError>(HasSubstr(".vtp")));

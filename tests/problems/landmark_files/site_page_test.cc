@@ -37,14 +37,14 @@ std::string LineOf(const std::string& page, const std::string& begin) {
 }
 
 TEST(SitePage, ThePageInTheDocsIsTheOneThatTheProgramMakes) {
-  EXPECT_EQ(ReadFileBytes(kSource + "/docs/sites.md"), SitePage(Tables(), "sites.png"))
-      << "make it anew: semblance landmarks page configs/tables/*.yaml --out docs --force";
-  EXPECT_GT(ReadFileBytes(kSource + "/docs/sites.png").size(), 10000u);
+  EXPECT_EQ(ReadFileBytes(kSource + "/docs/sites.md"), SitePage(Tables(), "sites.svg"))
+      << "make it again: semblance landmarks page configs/tables/*.yaml --out docs --force";
+  EXPECT_GT(ReadFileBytes(kSource + "/docs/sites.svg").size(), 10000u);
 }
 
 TEST(SitePage, EachSiteStandsThereOnceWithTheTablesThatHaveIt) {
   const std::vector<TissueTable> tables = Tables();
-  const std::string page = SitePage(tables, "sites.png");
+  const std::string page = SitePage(tables, "sites.svg");
   for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
     for (const Site& site : *list) {
       const std::string line =
@@ -61,7 +61,7 @@ TEST(SitePage, EachSiteStandsThereOnceWithTheTablesThatHaveIt) {
 }
 
 TEST(SitePage, EveryRowOfTheTablesIsASiteOfThePage) {
-  const std::string page = SitePage(Tables(), "sites.png");
+  const std::string page = SitePage(Tables(), "sites.svg");
   for (const TissueTable& table : Tables()) {
     for (const TissueRow& row : table.rows) {
       EXPECT_TRUE(page.find("`" + row.site + "`") != std::string::npos ||

@@ -42,10 +42,19 @@ Red RedIn(const Image& image, int begin, int end) {
   return {red.count, red.x / red.count, red.y / red.count};
 }
 
-TEST(SitePicture, ShowsMarksOnBone) {
-  const Image picture = SitePicture(2);
-  EXPECT_GT(RedIn(picture, 0, picture.width).count, 32 * 30);  // 32 in front, 21 at the side
-  EXPECT_EQ(picture.rgb, SitePicture(1).rgb);
+TEST(SitePicture, ShowsNumberedMarksOnBone) {
+  const std::string picture = SitePictureSvg(2);
+  const auto count = [&](const std::string& part) {
+    int found = 0;
+    for (std::size_t at = picture.find(part); at != picture.npos; at = picture.find(part, at + 1)) {
+      ++found;
+    }
+    return found;
+  };
+  EXPECT_EQ(count("<image "), 2);
+  EXPECT_EQ(count("<circle "), 32 + 21);    // in front, at the side
+  EXPECT_EQ(count("<text "), 32 + 21 + 2);  // and a caption each
+  EXPECT_EQ(picture, SitePictureSvg(1));
 }
 
 class OneSite : public ::testing::Test {

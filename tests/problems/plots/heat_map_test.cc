@@ -28,7 +28,7 @@ TEST(HeatMap, ACellHasItsNumberItsColourAndItsLink) {
   pugi::xml_document document;
   ASSERT_TRUE(document.load_string(svg.c_str()));
   const auto cells = document.select_nodes("//rect[@class='cell']");
-  ASSERT_EQ(cells.size(), 3u);  // none for what is missing
+  ASSERT_EQ(cells.size(), 3u);  // none for a missing value
   const ColourMap colours = SequentialMap(0, 1);
   EXPECT_EQ(cells[0].node().attribute("fill").value(), HexText(ColourAt(colours, 0)));
   EXPECT_EQ(cells[1].node().attribute("fill").value(), HexText(ColourAt(colours, 0.5)));
@@ -40,7 +40,7 @@ TEST(HeatMap, ACellHasItsNumberItsColourAndItsLink) {
   EXPECT_THAT(svg, HasSubstr("mm: 1 dark to 3 yellow"));
 }
 
-TEST(HeatMap, ItsNumbersHaveAsManyDecimalsAsOneAnother) {
+TEST(HeatMap, AllNumbersHaveTheSameDecimals) {
   const auto shown = [](double a, double b) {
     pugi::xml_document document;
     const std::string svg =

@@ -309,7 +309,7 @@ TEST(AnalysePopulation, SaysWhatItDidNotLookForAndWhatATableLeavesOpen) {
   EXPECT_THAT(text, HasSubstr("\noutliers not looked for\n"));
   EXPECT_THAT(text, HasSubstr("no sd stated"));
   EXPECT_THAT(text, Not(HasSubstr("nan")));
-  EXPECT_THAT(PopulationReport(few), HasSubstr("They are looked for from 8 subjects on"));
+  EXPECT_THAT(PopulationReport(few), HasSubstr("The search needs at least 8 subjects"));
   // Eight are enough, but not at a site that one of them lacks.
   std::vector<MeasuredSubject> subjects = ReadMeasured(plan, folder / "out");
   for (int k = 0; k < 4; ++k) {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/pipeline/experiment_config.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/run.h"
 #include "surfaces/base/error.h"

@@ -42,7 +42,7 @@ Experiment SmallPhantom(std::vector<std::string> overrides) {
 
 const fs::path kTable = kConfigs / "tables/rhine_caucasoid.yaml";
 
-// Those of a file beside the phantom's.
+// The alternatives of a file in the folder of configs/phantom.yaml.
 std::vector<NamedExperiment> Named(const std::string& file) {
   ConfigErrors errors;
   const ConfigNode tree =
@@ -54,7 +54,7 @@ std::vector<NamedExperiment> Named(const std::string& file) {
 
 constexpr char kBase[] = "base: phantom.yaml\nsubject: {type: phantom, rings: 24}\n";
 
-TEST(Alternatives, AreTheExperimentWithWhatTheySet) {
+TEST(Alternatives, AreTheExperimentWithTheirSettings) {
   const Experiment experiment = SmallPhantom(
       {"alternatives=[{name: fat, set: [\"tissue.build=obese\", \"tissue.sex=female\"]}]"});
   const auto named = AlternativesOf(experiment, kConfigs, {});
@@ -66,15 +66,15 @@ TEST(Alternatives, AreTheExperimentWithWhatTheySet) {
   EXPECT_EQ(named[0].experiment.implicit.resolution, experiment.implicit.resolution);
 }
 
-TEST(Alternatives, NameFilesFromTheConfigurationsFolder) {
+TEST(Alternatives, PathsStartAtTheConfigurationsFolder) {
   const Experiment experiment = SmallPhantom(
       {"alternatives=[{name: other, set: [\"tissue.table=tables/t_table_2023.yaml\"]}]"});
   EXPECT_EQ(AlternativesOf(experiment, kConfigs, {})[0].experiment.tissue.table,
             kConfigs / "tables/t_table_2023.yaml");
 }
 
-// As `semblance run mine.yaml` gives it.
-TEST(Alternatives, OfAConfigurationInTheWorkingFolderStartThere) {
+// `semblance run mine.yaml` passes an empty folder.
+TEST(Alternatives, PathsOfAnEmptyFolderStartAtTheWorkingFolder) {
   const Experiment experiment =
       SmallPhantom({"alternatives=[{name: other, set: [\"tissue.table=mine.yaml\"]}]"});
   EXPECT_EQ(AlternativesOf(experiment, "", {})[0].experiment.tissue.table,
@@ -94,7 +94,7 @@ TEST(Alternatives, AreCheckedBeforeAnythingRuns) {
               ThrowsMessage<ConfigError>(HasSubstr("another `subject`")));
 }
 
-TEST(Alternatives, AllTheirFaultsAreToldAtOnceEachAtItsLine) {
+TEST(Alternatives, AllFaultsAreReportedTogetherAtTheirLines) {
   const std::string words = testing::WordsOf<ConfigError>([] {
     Named(std::string(kBase) +
           "alternatives:\n"
@@ -110,7 +110,7 @@ TEST(Alternatives, AllTheirFaultsAreToldAtOnceEachAtItsLine) {
   EXPECT_THAT(words, Not(HasSubstr("--set")));
 }
 
-TEST(Alternatives, TheirInputsAreLookedAtAndToldByName) {
+TEST(Alternatives, TheirInputsAreCheckedAndReportedByName) {
   const auto named = Named(
       fmt::format("{}tissue: {{depths: table, table: {}}}\n"
                   "alternatives:\n"
@@ -129,7 +129,7 @@ TEST(Alternatives, TheirInputsAreLookedAtAndToldByName) {
               Contains(AllOf(HasSubstr("alternative 'lean': "), HasSubstr("no depth for 2"))));
 }
 
-TEST(Alternatives, StandBelowTheRunAndSayWhatIsLeftOut) {
+TEST(Alternatives, LieBelowTheRunAndListLeftOutSites) {
   const Experiment experiment = SmallPhantom(
       {"alternatives=[{name: lean, set: [\"tissue.build=emaciated\"]}, {name: same}]"});
   const testing::ScratchFolder scratch;
@@ -142,7 +142,7 @@ TEST(Alternatives, StandBelowTheRunAndSayWhatIsLeftOut) {
       ElementsAre());
   const auto json = nlohmann::json::parse(ReadFileBytes(scratch / "out/alternatives.json"));
   ASSERT_EQ(json.size(), 3u);
-  EXPECT_THAT(json[1]["left_out"], Contains("iM2_l"));  // a hole of that table
+  EXPECT_THAT(json[1]["left_out"], Contains("iM2_l"));  // missing from that table
   EXPECT_THAT(json[0]["notes"], Contains("of the implicit face"));
   EXPECT_LT(json[1]["difference"]["mean_mm"].get<double>(), -0.5);
   EXPECT_EQ(json[2]["left_out"].size(), 0u);
@@ -154,7 +154,7 @@ TEST(Alternatives, StandBelowTheRunAndSayWhatIsLeftOut) {
   }
 }
 
-TEST(Alternatives, WhatTheRunsOwnTableLacksIsLeftOutToo) {
+TEST(Alternatives, SitesWithoutADepthInTheRunsTableAreLeftOut) {
   const Experiment experiment =
       SmallPhantom({"tissue.build=emaciated", "face=placed",
                     "alternatives=[{name: same}, {name: normal, set: [\"tissue.build=normal\"]}]"});
@@ -169,12 +169,12 @@ TEST(Alternatives, WhatTheRunsOwnTableLacksIsLeftOutToo) {
   EXPECT_THAT(json[2]["left_out"], Not(Contains("iM2_l")));
 }
 
-TEST(Alternatives, OfAnotherRunInTheFolderStayOutOfTheReport) {
+TEST(Alternatives, OfAnEarlierRunInTheFolderAreIgnored) {
   const testing::ScratchFolder scratch;
   const Experiment experiment = SmallPhantom({"face=placed"});
   OutputFolder folder(scratch / "out", WhenNotEmpty::kRefuse);
   WriteRun(experiment, semblance::Run(experiment, {}), folder, {});
-  folder.Write("alternatives.json", "[]");  // left there
+  folder.Write("alternatives.json", "[]");  // left by an earlier run
   WriteReport(folder);
   EXPECT_THAT(ReadFileBytes(scratch / "out/report.html"),
               Not(HasSubstr("Alternatives side by side")));

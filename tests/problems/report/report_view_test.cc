@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The 3-D view of a report as a browser shows it: a script laid over the page presses its buttons
-// and counts pixels. The page itself may reach no network; what it tries is a fault here.
+// The 3-D view of a report in a browser: a script added to the page presses its buttons and counts
+// pixels. The page must not use the network; any attempt is a fault.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 
 #include "problems/pipeline/experiment_config.h"
 #include "problems/plots/svg_plot.h"
-#include "problems/report/report.h"
 #include "problems/report/report_assets.h"
+#include "problems/report/report_kit.h"
 #include "problems/report/scene_json.h"
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
@@ -199,12 +199,11 @@ TEST_F(ReportViewTest, FitsAPhoneAndFindsWhatIsFolded) {
   report.title = "a_title_without_a_single_blank_in_it_that_goes_on_and_on_and_on_and_on_and_on";
   report.notes = {"a note"};
   report.tiles = {{"mean", "1", "mm", ""}};
-  ReportTable table{"many columns", {"a", "b", "c", "d", "e", "f", "g", "h"}, {}};
+  ReportTable table{"many columns", {"a", "b", "c", "d", "e", "f", "g", "h"}};
   for (int row = 0; row < 20; ++row) {
     table.rows.emplace_back(8, fmt::format("row {} of words_that_cannot_be_broken", row));
     table.ids.push_back(fmt::format("row-{}", row));
   }
-  table.filter = true;
   report.main_images = {{BoxPlotSvg({{"row", {1, 2, 3}}}, "axis"), "caption", "a plot"}};
   report.sections.push_back({.heading = "open", .preformatted = std::string(300, 'x')});
   report.sections.push_back({.heading = "folded", .tables = {table}, .folded = true});

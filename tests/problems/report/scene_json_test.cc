@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "problems/report/scene_blobs.h"
+#include "problems/view/view_mesh.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
@@ -19,7 +19,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using testing::WordsOf;
 
-// RFC 4648, written anew.
+// An independent implementation of RFC 4648.
 std::string FromBase64(const std::string& text) {
   std::string bytes;
   std::uint32_t bits = 0;
@@ -69,7 +69,7 @@ TEST(SceneBlobs, PointsAreWithinHalfAStepAndTrianglesAreKept) {
   }
 }
 
-TEST(SceneBlobs, ValuesAreHundredthsAndNoValueIsKeptApart) {
+TEST(SceneBlobs, ValuesAreHundredthsAndNaNIsItsOwnCode) {
   SceneBlobs blobs;
   const std::string name = blobs.AddValues(std::vector<double>{1.234, -0.5, kNaN, 1e9});
   const std::string bytes = FromBase64(blobs.All().at(name)["values"]);
@@ -80,7 +80,7 @@ TEST(SceneBlobs, ValuesAreHundredthsAndNoValueIsKeptApart) {
   EXPECT_EQ(at(3), 32000);
 }
 
-TEST(SceneBlobs, TheSameGeometryIsThereOnce) {
+TEST(SceneBlobs, EqualGeometryIsStoredOnce) {
   SceneBlobs blobs;
   const TriMesh mesh = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
   EXPECT_EQ(blobs.AddMesh(mesh), blobs.AddMesh(mesh));
@@ -105,12 +105,12 @@ TEST(CollectScenes, SharesBlobsAndStopsAtTheLimit) {
   EXPECT_EQ(CollectScenes({{"a", Scene("k", 1000)}}, 0).count, 1);
 }
 
-TEST(CollectScenes, ASceneAloneIsTheSameAsItsText) {
+TEST(CollectScenes, CollectSceneAgreesWithCollectScenes) {
   EXPECT_EQ(CollectScene("a", Json::parse(Scene("k", 1000))),
             CollectScenes({{"a", Scene("k", 1000)}}, 0).json);
 }
 
-TEST(CollectScenes, RefusesWhatIsNoScene) {
+TEST(CollectScenes, RefusesAnInvalidScene) {
   EXPECT_THAT(WordsOf<IoError>([] {
                 CollectScenes({{"a", "{}"}}, 1);
               }),

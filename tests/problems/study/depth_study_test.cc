@@ -11,7 +11,7 @@
 #include "problems/pipeline/experiment_config.h"
 #include "problems/study/study_run.h"
 #include "problems/study_report/study_report.h"
-#include "problems/study_report/study_subtables.h"
+#include "problems/study_report/study_sections.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
@@ -252,7 +252,7 @@ TEST(DepthStudy, AsAStudyItRanksBreaksDownAndShowsTheFirstSubjectsMaps) {
   const auto& rms = treatments[1].by_subject;
   EXPECT_EQ(tables[0].rows[1][1], fmt::format("{:.3f}", (rms.at("a") + rms.at("b")) / 2));
   EXPECT_THAT(tables[4].header, Contains("CRPS (mm)"));
-  EXPECT_THAT(tables[5].caption, HasSubstr("where the scheme itself answers"));
+  EXPECT_THAT(tables[5].caption, HasSubstr("where the scheme itself predicts"));
   EXPECT_THAT(tables[7].caption, HasSubstr("paired by subject"));
   EXPECT_THAT(tables[7].rows[0][1], ::testing::StartsWith("0.000 (0 of 2)"));
   int maps = 0;

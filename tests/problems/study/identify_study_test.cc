@@ -92,7 +92,7 @@ TEST_F(IdentifyStudy, TheReportHasTheCurvesAndSaysThatTheGalleryIsSmall) {
   EXPECT_EQ(results.Count("done"), 3);
   EXPECT_EQ(results.trials[0].metrics.at("identify.gallery"), 3);
   const std::string html = ReadFileBytes(folder_ / "out" / "report.html");
-  EXPECT_THAT(html, HasSubstr("The gallery holds 3 people. It is small"));
+  EXPECT_THAT(html, HasSubstr("The gallery holds 3 people. That is small"));
   EXPECT_THAT(html, HasSubstr("Cumulative match characteristic"));
   EXPECT_THAT(html, HasSubstr("floor: the generic face"));
   EXPECT_THAT(html, HasSubstr("ceiling: the true face, seen again"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/report/report.h"
+#include "problems/report/report_kit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,8 @@
 #include <regex>
 
 #include "problems/pictures/image.h"
-#include "problems/plots/escape_html.h"
+#include "problems/plots/svg_parts.h"
+#include "problems/report/plain_names.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/error.h"
 
@@ -81,6 +82,27 @@ TEST(Html, NeedsNothingElse) {
   EXPECT_EQ(Count(html, "href=\"(?!#)"), 0);
 }
 
+TEST(Html, LegendsShowColoursAndTicks) {
+  Report report = Full();
+  report.main_images[0].legends = {{DivergingMap(8), "error & sign"},
+                                   {SequentialMap(0, 1), "depth", /*shows_no_data=*/false}};
+  const std::string html = ReportHtml(report);
+  EXPECT_THAT(html, HasSubstr("error &amp; sign (mm)"));
+  EXPECT_THAT(html, HasSubstr("<span>\u22128</span><span>\u22124</span><span>0</span>"
+                              "<span>+4</span><span>+8</span>"));
+  EXPECT_THAT(html, HasSubstr("<span>0</span><span>0.25</span><span>0.5</span>"));
+  EXPECT_EQ(Count(html, "no data</small>"), 1);
+}
+
+TEST(Table, CellsAreText) {
+  ReportTable table{"", {"a", "b", "c", "d"}};
+  table.AddRow("word", 1.23456, 7, kNaN);
+  EXPECT_EQ(table.rows[0], (std::vector<std::string>{"word", "1.235", "7", ""}));
+  EXPECT_EQ(TableFigures(1234.5), "1.23e+03");
+  EXPECT_EQ(TablePercent(0.1234), "12.3");
+  EXPECT_EQ(IntervalText({.low = -1, .high = 2}), "-1.000 to 2.000");
+}
+
 TEST(Html, TagsAreBalanced) {
   // With its void elements closed, the page is XML, which a strict parser can check.
   std::string html = ReportHtml(Full());
@@ -113,7 +135,7 @@ TEST(Html, ColumnsOfNumbersAreAlignedRight) {
 
 TEST(Html, SameReportSameBytes) { EXPECT_EQ(ReportHtml(Full()), ReportHtml(Full())); }
 
-TEST(Html, WrongPartsAreErrors) {
+TEST(Html, InvalidPartsAreRefused) {
   Report report = Full();
   report.sections[0].tables[0].rows[1].pop_back();
   EXPECT_THROW(ReportHtml(report), InputError);
@@ -158,17 +180,51 @@ TEST(Html, RowsHaveIdsAndLinksThatAreEscaped) {
   ReportTable& table = report.sections[0].tables[0];
   table.ids = {"a\"b", ""};
   table.links = {"#x", "", "y.html?<"};
-  table.filter = true;
+  for (int row = 3; row < 13; ++row) {
+    table.AddRow("x", 1.5, row);
+  }
   EXPECT_THAT(ReportHtml(report),
               AllOf(HasSubstr("<tr id=\"a&quot;b\"><td data-head=\"site\"><a href=\"#x\">g</a>"),
                     HasSubstr("<a href=\"y.html?&lt;\">go_l</a>"), HasSubstr("data-filter")));
 }
 
-TEST(Html, WithoutThreeJsThePageSaysSo) {
+TEST(Html, WithoutThreeJsThePageExplainsWhy) {
   Report report = Full();
   report.scenes = "{\"scenes\": [], \"blobs\": {}}";
   EXPECT_THAT(ReportHtml(report),
               HasSubstr(ThreeScript().empty() ? "built without three.js" : "<noscript>"));
+}
+
+TEST(PlainNames, AKeyBecomesWordsWithItsUnit) {
+  EXPECT_EQ(WordsOfKey("dowel_rms_mm"), "RMS distance of the depth markers (mm)");
+  EXPECT_EQ(WordsOfKey("some_new_count"), "some new count");
+  EXPECT_EQ(WordsOfKey("some_new_area_cm2"), "some new area (cm²)");
+  EXPECT_EQ(WordsOfKey("_mm"), " mm");
+  EXPECT_EQ(WordsOfKey("eye_l"), "eye, left");
+  EXPECT_EQ(WordsOfKey("_r"), " r");
+  EXPECT_EQ(WordsOfMeasure("rms_mm"), "RMS distance (mm)");
+  EXPECT_EQ(WordsOfMeasure("coverage_90"), "coverage_90");
+}
+
+TEST(PlainNames, AMetricKeepsItsPath) {
+  EXPECT_EQ(WordsOfMetric("face.rms_mm"), "RMS distance (mm) of the recovered face (face.rms_mm)");
+  EXPECT_EQ(
+      WordsOfMetric("face.regions.nose.p95_mm"),
+      "95th percentile of the distance (mm) of the recovered face (face.regions.nose.p95_mm)");
+  EXPECT_EQ(WordsOfMetric("identify.rank"), "identify.rank");
+  EXPECT_EQ(WordsOfMetric("rms_mm"), "rms_mm");
+}
+
+TEST(PlainNames, ASiteHasItsNameAndSide) {
+  EXPECT_EQ(WordsOfSite("go_l"), "Gonion, left (go_l)");
+  EXPECT_EQ(WordsOfSite("g"), "Glabella (g)");
+  EXPECT_EQ(WordsOfSite("no site <"), "no site <");
+}
+
+TEST(PlainNames, OneIsSingular) {
+  EXPECT_EQ(Counted(1, "subject"), "1 subject");
+  EXPECT_EQ(Counted(0, "subject"), "0 subjects");
+  EXPECT_EQ(Counted(2, "trial is", "trials are"), "2 trials are");
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/report/report.h"
+#include "problems/report/report_kit.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -9,7 +10,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "problems/plots/escape_html.h"
+#include "problems/plots/svg_parts.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/base64.h"
@@ -31,7 +32,7 @@ std::string MimeType(const ReportImage& image) {
       image.caption.empty() ? image.alt : image.caption, bytes.size()));
 }
 
-// " width=.. height=.." of a PNG, so that a page does not jump while it loads; empty for others.
+// " width=.. height=.." for a PNG, so that the page does not jump while it loads. Empty for others.
 std::string SizeAttributes(const std::string& bytes) {
   if (!bytes.starts_with('\x89') || bytes.size() < 24) {
     return {};
@@ -47,8 +48,8 @@ std::string SizeAttributes(const std::string& bytes) {
   return fmt::format(" width=\"{}\" height=\"{}\"", width, height);
 }
 
-// An SVG is part of the page: its titles show where the pointer rests, and its colours follow those
-// of the page.
+// An SVG becomes part of the page, so that its titles appear under the pointer and its colours
+// follow those of the page.
 std::string PictureHtml(const ReportImage& image) {
   if (MimeType(image) == "image/png") {
     return fmt::format("<img alt=\"{}\"{} src=\"data:image/png;base64,{}\">", EscapeHtml(image.alt),
@@ -58,19 +59,46 @@ std::string PictureHtml(const ReportImage& image) {
                      image.bytes.substr(image.bytes.find("<svg") + 4));
 }
 
+// Five evenly spaced values of the map. Only a map with negative values shows plus signs.
+std::string LegendTicks(const ColourMap& map) {
+  constexpr int kSteps = 4;
+  std::string html;
+  for (int k = 0; k <= kSteps; ++k) {
+    const double value = map.low_mm + (map.high_mm - map.low_mm) * k / kSteps;
+    const char* const sign = value < 0 ? "\u2212" : map.low_mm < 0 && value > 0 ? "+" : "";
+    html += fmt::format("<span>{}{:.3g}</span>", sign, std::abs(value));
+  }
+  return html;
+}
+
+std::string LegendHtml(const Legend& legend) {
+  return fmt::format(
+      "<div class=\"view3d-legend\"><div>{} (mm)</div><div class=\"view3d-bar\" "
+      "style=\"background:linear-gradient(to right,{})\"></div><div "
+      "class=\"view3d-ticks\">{}</div>{}</div>",
+      EscapeHtml(legend.title), fmt::join(ColourSteps(legend.map), ","), LegendTicks(legend.map),
+      legend.shows_no_data ? fmt::format("<small><i style=\"background:{}\"></i>no data</small>",
+                                         HexText(kNoDataColour))
+                           : "");
+}
+
 std::string ImageHtml(const ReportImage& image) {
   if (image.alt.empty()) {
-    throw InputError(fmt::format(
-        "report image '{}': it has no alt text; say in a few words what it shows", image.caption));
+    throw InputError(
+        fmt::format("report image '{}': it has no alt text; describe in a few words what it shows",
+                    image.caption));
   }
   std::string html = "<figure>" + PictureHtml(image);
+  for (const Legend& legend : image.legends) {
+    html += LegendHtml(legend);
+  }
   if (!image.caption.empty()) {
     html += fmt::format("<figcaption>{}</figcaption>", EscapeHtml(image.caption));
   }
   return html + "</figure>\n";
 }
 
-// A number with an optional sign, unit or spread: "1.84", "-3 mm", "1.2 ± 0.4", "12 %".
+// True for a number with an optional sign, unit or spread: "1.84", "-3 mm", "1.2 ± 0.4", "12 %".
 bool IsNumeric(const std::string& cell) {
   std::size_t i = 0;
   for (const std::string_view sign : {"+", "-", "\u2212", "\u00b1", "<", ">"}) {
@@ -82,7 +110,7 @@ bool IsNumeric(const std::string& cell) {
   return (starts_with_digit && !is_list && cell.size() <= 24) || cell == "NaN" || cell == "inf";
 }
 
-// Columns whose cells are numbers or empty.
+// True for each column whose cells are numbers or empty.
 std::vector<bool> NumericColumns(const ReportTable& table) {
   std::vector<bool> numeric(table.header.size(), false);
   for (std::size_t c = 0; c < numeric.size(); ++c) {
@@ -113,7 +141,7 @@ std::string HeadHtml(const ReportTable& table, const std::vector<bool>& numeric)
   return html + "</tr>\n";
 }
 
-// Each cell knows its column's head, which a narrow screen shows beside it.
+// Each cell repeats the head of its column, which a narrow screen shows in front of the cell.
 std::string RowHtml(const ReportTable& table, std::size_t r, const std::vector<bool>& numeric) {
   const std::string id = r < table.ids.size() ? table.ids[r] : "",
                     link = r < table.links.size() ? table.links[r] : "";
@@ -131,12 +159,13 @@ std::string RowHtml(const ReportTable& table, std::size_t r, const std::vector<b
 }
 
 std::string TableHtml(const ReportTable& table) {
-  constexpr std::size_t kFitsAPhone = 3;  // columns
+  constexpr std::size_t kPhoneColumns = 3;  // more become cards on a narrow screen
+  constexpr std::size_t kLongTable = 12;    // rows; longer tables can be filtered
   CheckTable(table);
   const std::vector<bool> numeric = NumericColumns(table);
   std::string html = fmt::format("<div class=\"scroll\" tabindex=\"0\"><table{}{}>\n",
-                                 table.header.size() > kFitsAPhone ? " class=\"cards\"" : "",
-                                 table.filter ? " data-filter=\"\"" : "");
+                                 table.header.size() > kPhoneColumns ? " class=\"cards\"" : "",
+                                 table.rows.size() > kLongTable ? " data-filter=\"\"" : "");
   if (!table.caption.empty()) {
     html += fmt::format("<caption>{}</caption>\n", EscapeHtml(table.caption));
   }
@@ -191,7 +220,7 @@ std::string ScoreHtml(const Report& report) {
   return html + "</section>\n";
 }
 
-// The headings of a page and where they are, in order.
+// The ids and headings of the page's sections, in order.
 std::vector<std::pair<std::string, std::string>> Headings(const Report& report) {
   std::vector<std::pair<std::string, std::string>> headings;
   if (!report.notes.empty()) {
@@ -222,14 +251,14 @@ std::string NavigationHtml(const Report& report) {
   return html + "</ul></details></nav>\n";
 }
 
-// A policy that lets the page reach nothing outside itself.
+// The content security policy: the page must not load anything from outside itself.
 constexpr std::string_view kPolicy =
     "default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src "
     "'unsafe-inline'";
 
 std::string Script(std::string_view text) { return fmt::format("<script>\n{}</script>\n", text); }
 
-// In JSON "<" can stand in strings only, where it may be written as \\u003c, so that no "</script>"
+// In JSON, "<" occurs only inside strings. It is written as \\u003c there, so that no "</script>"
 // ends the block early.
 std::string JsonScript(const std::string& id, const std::string& json) {
   std::string html = fmt::format("<script type=\"application/json\" id=\"{}\">", id);
@@ -243,7 +272,7 @@ std::string JsonScript(const std::string& id, const std::string& json) {
   return html + "</script>\n";
 }
 
-// The 3-D view, with all that it is made of.
+// The 3-D view with its data and scripts, or a sentence in its place.
 std::string ViewHtml(const std::string& scenes, const std::string& note) {
   if (scenes.empty()) {
     return {};
@@ -252,12 +281,13 @@ std::string ViewHtml(const std::string& scenes, const std::string& note) {
   if (ThreeScript().empty()) {
     return html +
            "<p class=\"no-view\">There is no 3-D view here: the program that wrote this page was "
-           "built without three.js (Debian: libjs-three). Built with it, semblance report makes "
-           "this page anew.</p>\n</section>\n";
+           "built without three.js (Debian: libjs-three). Build it with three.js, then run "
+           "semblance "
+           "report to write this page again.</p>\n</section>\n";
   }
   html +=
       "<div id=\"view3d\"><noscript><p class=\"no-view\">The 3-D view needs JavaScript, which is "
-      "off in this browser. The pictures do without.</p></noscript></div>\n";
+      "off in this browser. The pictures need no script.</p></noscript></div>\n";
   html += JsonScript("view3d-scenes", scenes);
   html += note.empty() ? "" : fmt::format("<p>{}</p>\n", EscapeHtml(note));
   html += "</section>\n";
@@ -297,9 +327,46 @@ std::string TableNumber(double value, int digits) {
                               : "";
 }
 
+std::string TableFigures(double value) {
+  return std::isfinite(value) ? fmt::format("{:.3g}", value) : "";
+}
+
+std::string TablePercent(double share) {
+  return std::isfinite(share) ? fmt::format("{:.1f}", 100 * share) : "";
+}
+
+std::string IntervalText(const Interval& interval) {
+  return std::isfinite(interval.low)
+             ? fmt::format("{} to {}", TableNumber(interval.low), TableNumber(interval.high))
+             : "";
+}
+
+std::vector<ReportTable> WithoutEmptyTables(std::vector<ReportTable> tables) {
+  std::erase_if(tables, [](const ReportTable& table) { return table.rows.empty(); });
+  return tables;
+}
+
 ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,
-                                std::string alt) {
-  return {.bytes = ReadFileBytes(path), .caption = std::move(caption), .alt = std::move(alt)};
+                                std::string alt, std::vector<Legend> legends) {
+  return {.bytes = ReadFileBytes(path),
+          .caption = std::move(caption),
+          .alt = std::move(alt),
+          .legends = std::move(legends)};
+}
+
+ReportImage SubjectBoxPlot(const std::vector<BoxRow>& rows, const std::string& axis_label,
+                           std::string alt) {
+  return {.bytes = BoxPlotSvg(rows, axis_label),
+          .caption = "One dot per subject; box: quartiles and median.",
+          .alt = std::move(alt)};
+}
+
+std::vector<std::string> FaultNotes(const std::vector<std::string>& faults) {
+  std::vector<std::string> notes;
+  for (const std::string& fault : faults) {
+    notes.push_back("The result is not usable: " + fault);
+  }
+  return notes;
 }
 
 std::string ReportHtml(const Report& report) {
@@ -322,10 +389,8 @@ std::string ReportHtml(const Report& report) {
   for (std::size_t i = 0; i < report.sections.size(); ++i) {
     html += SectionHtml(report.sections[i], i + 1);
   }
-  html += "</main>\n";
-  if (!report.footer.empty()) {
-    html += fmt::format("<footer>{}</footer>\n", EscapeHtml(report.footer));
-  }
+  html += fmt::format("</main>\n<footer>semblance {}{}{}</footer>\n", SEMBLANCE_VERSION,
+                      report.footer.empty() ? "" : "; ", EscapeHtml(report.footer));
   return html + Script(ReportPageScript()) + "</body>\n</html>\n";
 }
 
