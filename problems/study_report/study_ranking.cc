@@ -21,7 +21,7 @@ double MeanOverSubjects(const Treatment& treatment) {
   return treatment.by_subject.empty() ? kNaN : sum / count;
 }
 
-std::vector<Treatment> Ranked(const StudyResults& results) {
+std::vector<Treatment> RankTreatments(const StudyResults& results) {
   std::vector<Treatment> treatments = Treatments(results, results.metric);
   const auto cost = [&](const Treatment& treatment) {
     double sum = 0;
@@ -65,7 +65,7 @@ std::string LabelPartsText(const StudyResults& results) {
 
 std::string RankingText(const StudyResults& results) {
   constexpr std::size_t kLines = 20;
-  std::vector<Treatment> ranked = Ranked(results);
+  std::vector<Treatment> ranked = RankTreatments(results);
   std::erase_if(ranked, [](const Treatment& t) { return t.by_subject.empty(); });
   if (ranked.empty()) {
     return {};

@@ -14,7 +14,7 @@ double MeanOverSubjects(const Treatment& treatment);
 
 // The treatments by the mean cost (Preference) of the study's metric, best first. Treatments
 // without values come last.
-std::vector<Treatment> Ranked(const StudyResults& results);
+std::vector<Treatment> RankTreatments(const StudyResults& results);
 
 // The mean wall time of the treatment's trials that have one. NaN if none has. It does not contain
 // work that another trial did for one of them.

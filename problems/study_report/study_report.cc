@@ -419,7 +419,7 @@ std::vector<std::string> Notes(const StudyResults& results) {
 }
 
 std::string StudyPage(const StudyResults& results, const std::filesystem::path& root) {
-  const std::vector<Treatment> ranked = Ranked(results);
+  const std::vector<Treatment> ranked = RankTreatments(results);
   const SceneCollection scenes = Scenes(results, ranked, root);
   const std::vector<ReportImage> maps = DepthMaps(results, ranked, root);
   Report report;

@@ -72,7 +72,7 @@ TEST(StudyRanking, ALongRankingIsCutAndCounted) {
 
 TEST(StudyCharts, OnlyAxesOfNumbersArePlotted) {
   const StudyResults results = Results();
-  const auto plots = AxisPlots(results, Ranked(results));
+  const auto plots = AxisPlots(results, RankTreatments(results));
   ASSERT_THAT(plots, SizeIs(1));
   EXPECT_THAT(plots[0].alt, HasSubstr("weight"));
   EXPECT_THAT(plots[0].bytes, HasSubstr("<title>b, 1: 1.5</title>"));
@@ -81,7 +81,7 @@ TEST(StudyCharts, OnlyAxesOfNumbersArePlotted) {
 
 TEST(StudyCharts, EachCellOfTheMapLinksToItsTrial) {
   const StudyResults results = Results();
-  const auto ranked = Ranked(results);
+  const auto ranked = RankTreatments(results);
   const auto map = SubjectMap(results, ranked);
   ASSERT_THAT(map, SizeIs(1));
   EXPECT_THAT(map[0].bytes, HasSubstr("<a href=\"#t-s2b10\">"));
@@ -115,7 +115,7 @@ StudyResults TwoTreatments(bool higher) {
 
 TEST(StudySubtables, AMetricWithHigherBetterHasAColumnWithItsDirection) {
   const StudyResults results = TwoTreatments(true);
-  const auto tables = Subtables(results, Ranked(results));
+  const auto tables = Subtables(results, RankTreatments(results));
   ASSERT_EQ(tables.size(), 2u);
   EXPECT_THAT(tables[0].caption, HasSubstr("lower is better"));
   EXPECT_THAT(tables[0].header,
@@ -127,7 +127,7 @@ TEST(StudySubtables, AMetricWithHigherBetterHasAColumnWithItsDirection) {
 
 TEST(StudySubtables, AnErrorMetricHasOneColumn) {
   const StudyResults results = TwoTreatments(false);
-  const auto tables = Subtables(results, Ranked(results));
+  const auto tables = Subtables(results, RankTreatments(results));
   ASSERT_EQ(tables.size(), 2u);
   EXPECT_THAT(tables[0].header, ElementsAre("treatment", "RMS (mm)"));
   EXPECT_THAT(tables[0].rows[0], ElementsAre("narrow", "1.500"));
