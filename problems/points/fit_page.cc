@@ -16,7 +16,6 @@
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
 #include "problems/points/fit_report.h"
-#include "problems/points/join_report.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/report.h"
 
@@ -44,9 +43,6 @@ std::vector<std::string> Notes(const PointFit& result, const Tolerance& toleranc
   }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
-  }
-  for (std::string& line : JoinLines(result.joins)) {
-    notes.push_back(std::move(line));
   }
   if (result.fit.automatic) {
     std::istringstream lines(AutoText(*result.fit.automatic));

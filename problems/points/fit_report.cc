@@ -13,7 +13,6 @@
 #include "problems/config/config.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_page.h"
-#include "problems/points/join_report.h"
 #include "problems/points/residual_files.h"
 #include "problems/points/surface_ply.h"
 #include "problems/report/fit_json.h"
@@ -233,9 +232,6 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   if (result.moves) {
     json["moves"] = MovesJson(*result.moves);
   }
-  if (!result.joins.empty()) {
-    json["joins"] = JoinsJson(result.joins);
-  }
   if (!result.attributes.empty()) {
     json["attributes"] = AttributesJson(result);
   }
@@ -300,9 +296,6 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
-  }
-  for (std::string& line : JoinLines(result.joins)) {
-    notes.push_back(std::move(line));
   }
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
     notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,

@@ -17,12 +17,9 @@
 #include "fitting/solve/surface_sigma.h"
 #include "problems/config/config_errors.h"
 #include "problems/pipeline/step_clock.h"
-#include "problems/points/fit_joins.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_trim.h"
-#include "problems/points/join_report.h"
 #include "problems/points/point_table.h"
-#include "problems/points/surface_join.h"
 #include "surfaces/base/auto_or.h"
 #include "surfaces/hspline_query/surface_poles.h"
 
@@ -41,7 +38,6 @@ struct PointFitOptions {
   Closure closure = Closure::kOpen;          // whether u, or u and v, go round
   Parameters parameters;                     // where the points' (u,v) come from
   std::vector<std::string> attributes = {};  // further columns that are fitted
-  std::vector<SurfaceJoin> joins = {};       // edges that continue other surfaces
   FitOptions fit = {
       .plan = AutoPlan{},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
@@ -72,12 +68,6 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                   .doc = "further columns of the points (properties of a PLY) that are fitted over "
                          "the surface, such as [intensity] or [red, green, blue]"},
         o.attributes);
-  visit(FieldInfo{.name = "joins",
-                  .doc = "edges of the new surface that continue edges of surfaces that are there, "
-                         "without a gap or a crease, such as [{surface: "
-                         "out/a/surface.hspline.json, its_edge: u1, edge: u0}]; needs the points' "
-                         "own u and v, and plan: auto or adaptive"},
-        o.joins);
   visit(FieldInfo{.name = "fit", .doc = "the fit; its finest level is the surface's"}, o.fit);
   visit(
       FieldInfo{.name = "chord_mm",
@@ -122,7 +112,6 @@ struct PointFit {
   FitResult fit;
   double weighted_rms_mm = kNaN;  // the same with the points' weights; NaN where all are equal
   DistanceQuantiles distance;     // of the points from the surface
-  std::vector<JoinReport> joins;  // one per join
   std::vector<PointAttribute> attributes;         // as given
   std::vector<std::vector<double>> attribute_at;  // fitted, at the points
   AttributeFit attribute_fit;
@@ -144,13 +133,12 @@ struct PointFit {
 // Of an adaptive fit: whether every point is within its tolerance (fit_maps.h).
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
-// Throws InputError as Parametrise, StartSurface, Fit, FitJoined and FitAttributes do, for a
+// Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a
 // closure that does not suit the parameters (a cylinder, a sphere and a closed mesh go round in
-// u, a torus both ways, a plane and an open mesh do not), for joins of points without (u,v) of
-// their own, for attributes that the table has not, for a trim below what the points are apart, and
+// u, a torus both ways, a plane and an open mesh do not), for attributes that the table has not,
+// for a trim below what the points are apart, and
 // for a chord so fine that a coarse fit of some of the points has already shown surface.ply to be
-// too large, and for moves of (u,v) beside exact points. Reads the surfaces that are joined, and
-// throws as OpenJoins does.
+// too large, and for moves of (u,v) beside exact points.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // What the points came from.

@@ -278,9 +278,6 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
                 HasSubstr("fit.features: a surface through points of a file has no features"));
   }
   EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
-  EXPECT_THAT(read("fit: {plan: {type: auto, relaxation_rounds: 2}}\n"
-                   "joins: [{surface: a.json, edge: u0, its_edge: u1}]\n"),
-              HasSubstr("fit.plan.relaxation_rounds: joins need"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, relaxation_rounds: 2}}\n"),
               HasSubstr("fit.plan.relaxation_rounds"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
