@@ -187,12 +187,9 @@ ReportSection RoundsSection(const FitResult& fit, bool is_weighted) {
 }  // namespace
 
 std::string FitPageHtml(const PointFitOptions& options, const PointSource& source,
-                        const PointFit& result, const PageTrim& trim, int threads) {
+                        const PointFit& result, int threads) {
   const Tolerance tolerance = ToleranceOf(options, result);
-  FitGrid grid = GridOf(result.fit, threads);
-  if (trim.kept != nullptr) {
-    TrimGrid(*trim.kept, threads, grid);
-  }
+  const FitGrid grid = GridOf(result.fit, threads);
   const std::vector<FitCell> cells = CellsOf(result.fit);
   Report report;
   report.title = options.title == PointFitOptions().title ? source.name : options.title;
@@ -200,9 +197,6 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
       "An H-spline surface through {} of {}",
       Counted(static_cast<long long>(result.fit.residual_mm.size()), "point"), source.name);
   report.notes = Notes(result, tolerance);
-  if (trim.report) {
-    report.notes.push_back(TrimText(*trim.report) + ", in surface.ply and here");
-  }
   report.scenes = FitScene(grid);
   report.scenes_note = "Thinned out for looking; surface.hspline.json is exact.";
   report.main_images = {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <utility>
 
 #include "fitting/plan/fit_check.h"
@@ -194,11 +193,6 @@ Json ToleranceJson(const ToleranceReport& tolerance) {
   return json;
 }
 
-Json TrimJson(const TrimReport& trim) {
-  return {
-      {"distance_mm", trim.distance_mm}, {"kept_mm2", trim.kept_mm2}, {"cut_mm2", trim.cut_mm2}};
-}
-
 // What every fit has.
 Json FiguresJson(const PointFitOptions& options, const PointSource& source,
                  const PointFit& result) {
@@ -217,8 +211,8 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"faults", result.Faults()}};
 }
 
-Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, const PointFit& result,
-                  const std::optional<TrimReport>& trim) {
+Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
+                  const PointFit& result) {
   Json json = FiguresJson(options, source, result);
   if (std::isfinite(result.weighted_rms_mm)) {
     json["weighted_rms_mm"] = result.weighted_rms_mm;
@@ -246,9 +240,6 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   }
   if (const auto tolerance = ToleranceOf(options, result)) {
     json["tolerance"] = ToleranceJson(*tolerance);
-  }
-  if (trim) {
-    json["trim"] = TrimJson(*trim);
   }
   json.update(StepsToJson(result.fit));
   return json;
@@ -324,27 +315,20 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
   context.Report("write");
   // First what can still be refused.
   const double chord_mm = ChordFor(result.fit.surface, options.chord_mm);
-  const std::optional<TrimmedTo> trim =
-      result.Faults().empty() ? TrimOf(options.trim, result.fit, context.threads) : std::nullopt;
-  const SurfaceMesh mesh = SurfacePly(result, chord_mm, trim ? &*trim : nullptr, context.threads);
+  const std::string ply = SurfacePly(result, chord_mm, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
-  folder.Write("surface.ply", mesh.ply);
+  folder.Write("surface.ply", ply);
   WriteResiduals(options.residuals, result, folder);
   WriteAttributes(result, folder);
   if (options.report && result.Faults().empty()) {
-    folder.Write("report.html", FitPageHtml(options, source, result,
-                                            {trim ? &*trim : nullptr, mesh.trim}, context.threads));
+    folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
   }
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("result.json", ResultJsonOf(options, source, result, mesh.trim)
+  folder.Write("result.json", ResultJsonOf(options, source, result)
                                       .dump(2, ' ', false, Json::error_handler_t::replace) +
                                   "\n");
-  std::vector<std::string> notes = NotesOf(options, result, chord_mm);
-  if (mesh.trim) {
-    notes.push_back(TrimText(*mesh.trim));
-  }
-  return notes;
+  return NotesOf(options, result, chord_mm);
 }
 
 }  // namespace semblance

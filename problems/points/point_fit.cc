@@ -493,7 +493,6 @@ std::vector<std::string> PointFit::Faults() const {
 
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
-  CheckTrim(options.trim, table.positions);
   std::vector<PointAttribute> attributes = AttributesAsked(table, options);
   StepClock step(context);
   PlacedPoints placed = PlacePoints(table, options, step, context);

@@ -18,7 +18,6 @@
 #include "problems/config/config_errors.h"
 #include "problems/pipeline/step_clock.h"
 #include "problems/points/fit_maps.h"
-#include "problems/points/fit_trim.h"
 #include "problems/points/point_table.h"
 #include "surfaces/base/auto_or.h"
 #include "surfaces/hspline_query/surface_poles.h"
@@ -43,7 +42,6 @@ struct PointFitOptions {
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);  // of surface.ply's triangles
-  Trim trim = {};                                        // what surface.ply and pictures leave out
   ResidualFile residuals = ResidualFile::kAuto;  // auto: .csv of up to 100,000 points, else .ply
   bool sigma = false;                            // write the standard deviation; for the plan auto
   bool report = true;                            // write report.html
@@ -77,10 +75,6 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                 .doc = "how far a triangle of surface.ply may be from the surface; auto: 1/5000 "
                        "of the points' extent, or more where that would be millions of triangles"},
       o.chord_mm);
-  visit(FieldInfo{.name = "trim",
-                  .doc = "what surface.ply and the report leave out: none: nothing; cloud: what is "
-                         "far from every point. surface.hspline.json stays whole"},
-        o.trim);
   visit(FieldInfo{.name = "residuals",
                   .doc = "what is written of each point: csv: residuals.csv; ply: residuals.ply, "
                          "binary, faster and smaller; none: nothing; auto: csv of up to 100000 "
@@ -136,7 +130,7 @@ std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const
 // Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a
 // closure that does not suit the parameters (a cylinder, a sphere and a closed mesh go round in
 // u, a torus both ways, a plane and an open mesh do not), for attributes that the table has not,
-// for a trim below what the points are apart, and
+// and
 // for a chord so fine that a coarse fit of some of the points has already shown surface.ply to be
 // too large, and for moves of (u,v) beside exact points.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);

@@ -102,7 +102,7 @@ def fit_space(schema, folder):
         schema,
         lists={"fit.plan[listed].schedule": [steps[:1], steps], "fit.plan[until].schedule": [steps]},
         work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 2], ".sweeps": [0, 2], ".max_passes": [1, 3], "[adaptive].margin": [0, 2],
-              "rounds": [1, 3], "chord_mm": [0.01, 1000], "trim[cloud].distance_mm": [0.3, 1000], "fit.plan[auto].finest": [0, 3]},
+              "rounds": [1, 3], "chord_mm": [0.01, 1000], "fit.plan[auto].finest": [0, 3]},
         beside={}, files={("fit.plan", "until"): FEW_PASSES}, defaults={"parameters": "given", "fit.plan": "listed", "fit.solver": "ceres"})
 
 

@@ -110,12 +110,12 @@ TEST(FitPage, SaysWhatWasMissedAndEscapesWhatItIsGiven) {
   const PointFitOptions options = Adaptive(0.004, 0);
   const PointFit fit = FitPoints(Points(500), options, {});
   const PointSource source{"<b>hostile</b>.csv", "0123"};
-  const std::string html = FitPageHtml(options, source, fit, {}, 2);
+  const std::string html = FitPageHtml(options, source, fit, 2);
   EXPECT_THAT(html,
               AllOf(HasSubstr("THE TOLERANCE WAS MISSED"), HasSubstr("id=\"notes\""),
                     HasSubstr("&lt;b&gt;hostile&lt;/b&gt;.csv"), Not(HasSubstr("<b>hostile"))));
   EXPECT_LT(html.find("<p>THE TOLERANCE"), html.find("id=\"s1\""));
-  EXPECT_EQ(html, FitPageHtml(options, source, fit, {}, 1));  // whatever the number of threads
+  EXPECT_EQ(html, FitPageHtml(options, source, fit, 1));  // whatever the number of threads
 }
 
 }  // namespace
