@@ -53,26 +53,12 @@ Parametrisation FromPlaces(MapCandidate laid) {
 
 }  // namespace
 
-Parametrisation FromLayout(PointLayout layout) {
-  if (!layout.fault.empty()) {
-    FailParameters("triangles between the points make no open sheet: " + layout.fault);
-  }
-  std::string how = fmt::format("the points triangulated and laid out by {}, with {} corners",
-                                NameOfMap(layout.map), layout.corners);
-  if (layout.far_off > 0) {
-    how += fmt::format("; {} of the points lie off the triangles", layout.far_off);
-  }
-  return FromPlaces({.how = std::move(how), .at = std::move(layout.at), .faults = layout.faults});
-}
-
 Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh) {
-  if (points.triangles.empty() && points.closure != Closure::kOpen) {
-    FailParameters(
-        "type 'mesh' makes triangles of its own for open sheets alone; with closure: periodic_u "
-        "give a PLY, OBJ, STL or OFF with faces, or take 'sphere' or 'cylinder'");
-  }
   if (points.triangles.empty()) {
-    return FromLayout(LayOutPoints(points.positions, mesh.map));
+    FailParameters(
+        "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces "
+        "(MeshLab and CloudCompare make them from points), or the columns u and v with parameters: "
+        "given");
   }
   if (points.closure == Closure::kPeriodicU) {
     return OnSphere(points);

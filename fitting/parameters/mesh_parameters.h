@@ -6,15 +6,13 @@
 
 #include "fitting/parameters/mesh_map.h"
 #include "fitting/parameters/parametrisation.h"
-#include "fitting/parameters/point_layout.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {
 
 // The triangles between the points, laid out on the plane (mesh_map.h), u and v along its sides;
 // or, of a surface that is to go round in u, on the sphere (closed_map.h), u the azimuth and v the
-// angle from a pole over pi. Points without triangles get some
-// (point_layout.h), for the plane alone.
+// angle from a pole over pi.
 struct MeshParameters {
   static constexpr std::string_view kName = "mesh";
   MeshMap map = MeshMap::kLscm;  // of the triangles to the plane; there is one to the sphere
@@ -32,11 +30,7 @@ void Fields(Visitor& visit, MeshParameters& o) {
       o.map);
 }
 
-// Throws InputError as LayOut or LayOutOnSphere does, where the map folds, and as FromLayout does;
-// and without triangles for a surface that is to go round.
+// Throws InputError as LayOut or LayOutOnSphere does, where the map folds, and without triangles.
 Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh);
-
-// Throws InputError for what has a fault.
-Parametrisation FromLayout(PointLayout layout);
 
 }  // namespace semblance

@@ -94,13 +94,8 @@ Parametrisation ParametriseBy(const Scan& points, const AutoParameters&) {
   if (!points.triangles.empty()) {
     return ParametriseBy(points, MeshParameters{});
   }
-  PointLayout layout = LayOutPoints(points.positions, MeshParameters{}.map);
-  if (!layout.fault.empty()) {
-    FailParameters(fmt::format(
-        "the points fold over every plane: {}; and triangles between them make no open sheet: {}",
-        FaultsText(planes), layout.fault));
-  }
-  return FromLayout(std::move(layout));
+  FailParameters(fmt::format("the points fold over every plane: {}; {}", FaultsText(planes),
+                             OtherThanPlane()));
 }
 
 void CheckTriangles(const Scan& points) {

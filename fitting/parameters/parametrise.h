@@ -20,9 +20,9 @@ namespace semblance {
 // The parameters that are given, if there are any. Otherwise those of a torus for a surface that
 // goes round both ways, of a cylinder for one that goes round in u, and of a plane for an open one.
 // What goes round in u and closes at both ends of the cylinder gets those of a sphere, unless it
-// folds over that. Where every plane folds the mesh is laid out, or, of points without triangles,
-// one that is made for them; and so is a closed mesh that goes round in u, where it folds over the
-// sphere. Triangles that the plane or the sphere squeezes are laid out where that squeezes less.
+// folds over that. Where every plane folds the mesh is laid out; and so is a closed mesh that goes
+// round in u, where it folds over the sphere. Triangles that the plane or the sphere squeezes are
+// laid out where that squeezes less.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
@@ -39,8 +39,7 @@ using Parameters =
 // that of the points, an empty range, given_uv outside of it, points that span no plane or have no
 // extent along the axis, points that are no torus, close at an end of the cylinder, do not go all
 // round the sphere's centre, or fold over every plane, cylinder, sphere or torus that may be taken,
-// points without triangles that make no open sheet, a corner that is no point, and as LayOut and
-// LayOutOnSphere.
+// a mesh without triangles, a corner that is no point, and as LayOut and LayOutOnSphere.
 Parametrisation Parametrise(const Scan& scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},

@@ -20,9 +20,6 @@
 #include "problems/points/residual_files.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
-#include "surfaces/hspline_query/tessellate.h"
-#include "surfaces/mesh/mesh_query.h"
-#include "tests/testing/bent_sheets.h"
 #include "tests/testing/closed_shapes.h"
 #include "tests/testing/point_csv.h"
 #include "tests/testing/scattered_data.h"
@@ -349,27 +346,6 @@ TEST(PointFit, ABallIsNoTube) {
   options.parameters = CylinderParameters{};
   EXPECT_THAT(testing::WordsOf<InputError>([&] { FitPoints(table, options, {}); }),
               HasSubstr("the points close at an end of the cylinder"));
-}
-
-// Over triangles that are made for the points.
-TEST(PointFit, ASheetThatFoldsOverEveryPlaneIsFoundBelowItsNoise) {
-  for (const auto& [name, sheet] : testing::BentSheets()) {
-    const testing::Sheet wavy = testing::Wavy(sheet, 0.5);
-    const testing::SheetPoints points = testing::ScatterOver(wavy, {.count = 10000, .noise = 0.2});
-    PointTable table;
-    table.positions = points.positions;
-    const PointFit fit = FitPoints(table, {}, {});
-    EXPECT_EQ(fit.parameters, "mesh");
-    const MeshQuery surface(Tessellate(fit.fit.surface, 8).mesh);
-    double squares = 0;
-    for (const Vec2& q : points.at) {
-      const double off_mm = surface.Closest(wavy(q)).distance_mm;
-      squares += off_mm * off_mm;
-    }
-    EXPECT_LT(std::sqrt(squares / static_cast<double>(points.at.size())),
-              0.5 * 0.2 * points.spacing_mm)
-        << name;
-  }
 }
 
 PointTable StonePoints(int count, double noise) {
