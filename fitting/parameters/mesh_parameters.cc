@@ -9,9 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "fitting/closed_mesh/closed_map.h"
 #include "fitting/parameters/map_candidate.h"
-#include "fitting/parameters/sphere.h"
 
 namespace semblance {
 namespace {
@@ -21,24 +19,6 @@ std::string_view NameOfMap(MeshMap map) { return EnumNames(map)[static_cast<std:
 TriMesh MeshOf(const Scan& points) {
   return {.points = {points.positions.begin(), points.positions.end()},
           .triangles = {points.triangles.begin(), points.triangles.end()}};
-}
-
-Parametrisation OnSphere(const Scan& points) {
-  const ClosedLayout layout = LayOutOnSphere(MeshOf(points));
-  if (layout.folded > kMostFaults) {
-    FailParameters(fmt::format(
-        "the mesh laid out on the sphere folds {} of it, for parts of it are too thin or have "
-        "triangles without area; make its triangles even (remesh it), or give u and v",
-        PercentText(layout.folded)));
-  }
-  const PolarSphere sphere{.centre = Vec3::Zero(), .axis = layout.axis, .radius_mm = 1};
-  std::vector<Vec2> uv = AnglesAbout(sphere, layout.at);
-  const Poles poles = PolesAmong(points.positions, uv);
-  return {.uv = std::move(uv),
-          .source = ParameterSource::kMesh,
-          .how = "the mesh laid out on the sphere",
-          .faults = {.folded = layout.folded, .collapsed = layout.collapsed},
-          .poles = poles};
 }
 
 Parametrisation FromPlaces(MapCandidate laid) {
@@ -59,9 +39,6 @@ Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh) {
         "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces "
         "(MeshLab and CloudCompare make them from points), or the columns u and v with parameters: "
         "given");
-  }
-  if (points.closure == Closure::kPeriodicU) {
-    return OnSphere(points);
   }
   MeshLayout layout = LayOut(MeshOf(points), mesh.map);
   MapCandidate laid{.how = fmt::format("the mesh laid out by {}", NameOfMap(layout.map)),

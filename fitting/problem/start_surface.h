@@ -18,11 +18,4 @@ namespace semblance {
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv);
 
-// The same of what is one place along v = 0 and one along v = 1: the least-squares fit of all
-// affine images of the unit sphere, u being the azimuth and pi v the angle from a pole. The edges
-// are closed, and have no frames: offsets there need OffsetReference::kWorld.
-//   shape: closed in u.
-HSplineSurface StartBall(const HSplineShape& shape, std::span<const Vec3> positions,
-                         std::span<const Vec2> uv);
-
 }  // namespace semblance

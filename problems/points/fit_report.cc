@@ -154,15 +154,6 @@ Json MapJson(const PointFit& result) {
           {"collapsed_share", result.map_faults.collapsed}};
 }
 
-Json PolesJson(const PoleGaps& poles) {
-  Json json = Json::array();
-  for (const int v : {0, 1}) {
-    const Vec3& at = poles[v].place;
-    json.push_back({{"v", v}, {"at_mm", {at.x(), at.y(), at.z()}}, {"gap_mm", poles[v].gap_mm}});
-  }
-  return json;
-}
-
 Json AttributesJson(const PointFit& result) {
   Json json = Json::array();
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
@@ -219,9 +210,6 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
   }
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
-  }
-  if (result.poles) {
-    json["poles"] = PolesJson(*result.poles);
   }
   if (result.moves) {
     json["moves"] = MovesJson(*result.moves);
@@ -280,11 +268,6 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
   }
-  if (result.poles) {
-    notes.push_back(
-        fmt::format("poles: the edges v = 0 and v = 1 are one place each to {:.3g} and {:.3g} mm",
-                    (*result.poles)[0].gap_mm, (*result.poles)[1].gap_mm));
-  }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
   }
@@ -325,9 +308,10 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
     folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
   }
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("result.json", ResultJsonOf(options, source, result)
-                                      .dump(2, ' ', false, Json::error_handler_t::replace) +
-                                  "\n");
+  folder.Write(
+      "result.json",
+      ResultJsonOf(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+          "\n");
   return NotesOf(options, result, chord_mm);
 }
 

@@ -15,7 +15,6 @@
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
-#include "fitting/plan/pole_points.h"
 #include "fitting/problem/start_surface.h"
 #include "fitting/solve/auto_weight.h"
 #include "problems/points/surface_ply.h"
@@ -40,17 +39,11 @@ std::string ClosureFault(ParameterSource source, Closure closure) {
   if (source == ParameterSource::kCylinder && closure != Closure::kPeriodicU) {
     return "parameters on a cylinder go round in u alone; write closure: periodic_u";
   }
-  if (source == ParameterSource::kSphere && closure != Closure::kPeriodicU) {
-    return "parameters on a sphere go round in u alone; write closure: periodic_u";
-  }
   if (source == ParameterSource::kTorus && closure != Closure::kPeriodicUv) {
     return "parameters on a torus go round both ways; write closure: periodic_uv";
   }
-  if (closure == Closure::kPeriodicUv && source == ParameterSource::kMesh) {
-    return "parameters on a mesh do not go round both ways; write closure: periodic_u if it is "
-           "closed, else open";
-  }
-  if (closure != Closure::kOpen && source == ParameterSource::kPlane) {
+  if (closure != Closure::kOpen &&
+      (source == ParameterSource::kPlane || source == ParameterSource::kMesh)) {
     return fmt::format("parameters on a {} do not go round; write closure: open", NameOf(source));
   }
   return "";
@@ -68,8 +61,6 @@ std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
              ? std::optional(ParameterSource::kPlane)
          : std::holds_alternative<CylinderParameters>(parameters)
              ? std::optional(ParameterSource::kCylinder)
-         : std::holds_alternative<SphereParameters>(parameters)
-             ? std::optional(ParameterSource::kSphere)
          : std::holds_alternative<TorusParameters>(parameters)
              ? std::optional(ParameterSource::kTorus)
          : std::holds_alternative<MeshParameters>(parameters)
@@ -352,13 +343,6 @@ std::vector<ExactPoint> ExactOf(const PointTable& table, std::span<const Vec2> u
   return exact;
 }
 
-// At a pole the frame of an offset would turn with the noise.
-HSplineSurface BallOver(HSplineShape shape, std::span<const Vec3> positions,
-                        std::span<const Vec2> uv) {
-  shape.reference = OffsetReference::kWorld;
-  return StartBall(shape, positions, uv);
-}
-
 FitResult FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
                    const FitOptions& options, const RunContext& context) {
   if (!exact.empty()) {
@@ -398,7 +382,6 @@ PointFit FoundBy(PlacedPoints placed, FitResult fit, std::vector<PointAttribute>
           .how = std::move(placed.parameters.how),
           .map_faults = placed.parameters.faults,
           .moves = placed.moves,
-          .poles = placed.parameters.poles ? std::optional(PoleGapsOf(fit.surface)) : std::nullopt,
           .fit = std::move(fit),
           .weighted_rms_mm = kNaN,
           .distance = {},
@@ -497,20 +480,14 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   StepClock step(context);
   PlacedPoints placed = PlacePoints(table, options, step, context);
   std::vector<Vec2>& uv = placed.parameters.uv;
-  const std::optional<Poles> poles = placed.parameters.poles;
-  const HSplineSurface start =
-      poles ? BallOver(shape, table.positions, uv) : StartSurface(shape, table.positions, uv);
+  const HSplineSurface start = StartSurface(shape, table.positions, uv);
   CheckChord(options.chord_mm, start, {table.positions, uv}, context);
   std::vector<ExactPoint> exact = ExactOf(table, uv);
   const GivenPoints given = GivenOf(table, placed.parameters.source, exact);
   OwnedPoints points{std::move(table.positions), std::move(uv), std::move(table.weights)};
-  const std::size_t added = poles ? AddPolePoints(*poles, points) : 0;
   FitResult fit = step("fit", [&] {
     return FitOwned(start, std::move(points), std::move(exact), AfterMoves(options.fit), context);
   });
-  if (poles) {
-    ForgetLastPoints(added, given.weights, fit);
-  }
   PointFit result = FoundBy(std::move(placed), std::move(fit), std::move(attributes));
   CompareWith(given, result);
   AddAttributes(given.weights, context, step, result);

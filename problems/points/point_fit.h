@@ -20,7 +20,6 @@
 #include "problems/points/fit_maps.h"
 #include "problems/points/point_table.h"
 #include "surfaces/base/auto_or.h"
-#include "surfaces/hspline_query/surface_poles.h"
 
 namespace semblance {
 
@@ -58,8 +57,8 @@ void Fields(Visitor& visit, PointFitOptions& o) {
   visit(FieldInfo{.name = "patches_v", .min = 1, .max = kMostPatches, .doc = "of level 0 along v"},
         o.patches_v);
   visit(FieldInfo{.name = "closure",
-                  .doc = "open; periodic_u for surfaces that go round in u, as a tube or a ball "
-                         "does; periodic_uv for those that go round both ways, as a torus does"},
+                  .doc = "open; periodic_u for surfaces that go round in u, as a tube does; "
+                         "periodic_uv for those that go round both ways, as a torus does"},
         o.closure);
   visit(FieldInfo{.name = "parameters", .doc = "where the points' (u,v) come from"}, o.parameters);
   visit(FieldInfo{.name = "attributes",
@@ -96,11 +95,10 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
-  std::string parameters;               // given, plane, cylinder, sphere, torus or mesh
+  std::string parameters;               // given, plane, cylinder, torus or mesh
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
-  std::optional<PoleGaps> poles = {};   // on a sphere, at v = 0 and v = 1
   // Its point_rms_mm: each point counts as much as any other. The weights of its smoothness: as the
   // written terms have them.
   FitResult fit;
@@ -128,8 +126,8 @@ struct PointFit {
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
 // Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a
-// closure that does not suit the parameters (a cylinder, a sphere and a closed mesh go round in
-// u, a torus both ways, a plane and an open mesh do not), for attributes that the table has not,
+// closure that does not suit the parameters (a cylinder goes round in u, a torus both ways, a plane
+// and a mesh do not), for attributes that the table has not,
 // and
 // for a chord so fine that a coarse fit of some of the points has already shown surface.ply to be
 // too large, and for moves of (u,v) beside exact points.

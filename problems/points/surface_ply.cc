@@ -16,7 +16,6 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/surface_cells.h"
-#include "surfaces/hspline_query/surface_poles.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -147,9 +146,6 @@ double ChordFor(const HSplineSurface& surface, const AutoOr<double>& chord_mm) {
 
 std::string SurfacePly(const PointFit& result, double chord_mm, int threads) {
   Tessellation tessellation = TessellateToChord(result.fit.surface, chord_mm, threads);
-  if (result.poles) {
-    JoinPoles(*result.poles, tessellation);
-  }
   MeshAttributes attributes = AttributesOf(result, tessellation.uv, threads);
   attributes.normals = std::move(tessellation.normals);
   return EncodeMesh(tessellation.mesh, ".ply", attributes, chord_mm);

@@ -3,11 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cstdint>
-#include <functional>
-
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -42,49 +37,6 @@ Tessellation Tessellate(const HSplineSurface& surface, int per_patch) {
     }
   }
   return result;
-}
-
-namespace {
-
-bool HasArea(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
-
-Vec3 NormalAt(const TriMesh& mesh, std::int32_t vertex) {
-  Vec3 sum = Vec3::Zero();
-  for (const Triangle& t : mesh.triangles) {
-    if (std::ranges::find(t, vertex) != t.end()) {
-      sum += TriangleAreaVector(mesh, t);
-    }
-  }
-  return sum.normalized();
-}
-
-void DropUnused(Tessellation& tessellation) {
-  const std::vector<std::int32_t> kept = DropUnusedPoints(tessellation.mesh);
-  for (std::size_t k = 0; k < kept.size(); ++k) {
-    tessellation.uv[k] = tessellation.uv[kept[k]];
-    tessellation.normals[k] = tessellation.normals[kept[k]];
-  }
-  tessellation.uv.resize(kept.size());
-  tessellation.normals.resize(kept.size());
-}
-
-}  // namespace
-
-void JoinEdge(Tessellation& tessellation, double v, const Vec3& place) {
-  TriMesh& mesh = tessellation.mesh;
-  const auto is_there = [&](std::int32_t k) { return tessellation.uv[k].y() == v; };
-  const auto first = std::ranges::find(tessellation.uv, v, [](const Vec2& uv) { return uv.y(); });
-  if (first == tessellation.uv.end()) {
-    return;
-  }
-  const auto pole = static_cast<std::int32_t>(first - tessellation.uv.begin());
-  for (Triangle& t : mesh.triangles) {
-    std::ranges::replace_if(t, is_there, pole);
-  }
-  std::erase_if(mesh.triangles, std::not_fn(HasArea));
-  mesh.points[pole] = place;
-  tessellation.normals[pole] = NormalAt(mesh, pole);
-  DropUnused(tessellation);
 }
 
 }  // namespace semblance

@@ -156,24 +156,6 @@ TEST(OneToOne, WhatNoiseTurnsIsNoFold) {
   EXPECT_NEAR(FaultsBeyondNoise({mesh.points, folded}, mesh.triangles).folded, 0.4, 0.02);
 }
 
-// A sheet with a strip of which a twentieth of the width is left.
-TEST(OneToOne, TheSqueezedShareIsThatOfTheArea) {
-  const TriMesh mesh =
-      testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 50);
-  std::vector<double> on_map;
-  for (const Triangle& t : mesh.triangles) {
-    const double x = TriangleCentroid(mesh, t).x();
-    on_map.push_back((x > 0.4 && x < 0.6 ? 0.05 : 1) * TriangleAreaVector(mesh, t).z());
-  }
-  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
-  for (double& area : on_map) {
-    area *= -3;
-  }
-  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
-  on_map.assign(mesh.triangles.size(), 0.1);
-  EXPECT_EQ(SqueezedShare(mesh.points, mesh.triangles, on_map), 0);
-}
-
 // The axis of a tube that bends leaves it: its near side is few points widely spread over many of
 // the far side.
 TEST(OneToOne, ATubeThatBendsAwayFromItsAxisFoldsAroundIt) {

@@ -91,27 +91,5 @@ TEST(StartSurface, NeedsUvForEachPoint) {
   EXPECT_THROW(StartSurface(shape, points.positions, std::span(points.uv).first(3)), InputError);
 }
 
-// Its vertices lie on the ellipsoid, and its edges are one place each.
-TEST(StartSurface, ABallIsClosedAtItsPoles) {
-  const auto place = [](const Vec2& uv) {
-    const double turn = 2 * std::numbers::pi * uv.x(), angle = std::numbers::pi * uv.y();
-    return Vec3(3 + 30 * std::sin(angle) * std::cos(turn), 20 * std::sin(angle) * std::sin(turn),
-                -40 * std::cos(angle));
-  };
-  const Points points = PointsOf(place);
-  const HSplineShape shape{
-      .patches_u = 16, .patches_v = 16, .max_level = 0, .closure = Closure::kPeriodicU};
-  const HSplineSurface surface = StartBall(shape, points.positions, points.uv);
-  for (const double v : {0.0, 1.0}) {
-    for (const double u : {0.2, 0.5, 0.93}) {
-      EXPECT_LT((surface.Point({u, v}) - surface.Point({0, v})).norm(), 1e-10);
-    }
-  }
-  for (const Vec2& uv : points.uv) {
-    EXPECT_LT((surface.Point(uv) - place(uv)).norm(), 1.5);
-  }
-  EXPECT_THROW(StartBall(shape, {}, {}), InputError);
-}
-
 }  // namespace
 }  // namespace semblance

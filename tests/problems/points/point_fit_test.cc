@@ -20,11 +20,9 @@
 #include "problems/points/residual_files.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
-#include "tests/testing/closed_shapes.h"
 #include "tests/testing/point_csv.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
-#include "tests/testing/stone.h"
 
 namespace semblance {
 namespace {
@@ -33,9 +31,7 @@ using testing::ErrorAgainst;
 using testing::FrankePoint;
 using ::testing::HasSubstr;
 using testing::HeadPoint;
-using testing::RingErrors;
 using testing::Scattered;
-using testing::StoneRadius;
 using testing::UvCsv;
 
 const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs/fit";
@@ -250,10 +246,10 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
   EXPECT_THAT(read("parameters: cylinder\nclosure: periodic_uv\n"),
               HasSubstr("go round in u alone; write closure: periodic_u"));
-  EXPECT_THAT(read("parameters: sphere\n"), HasSubstr("closure: parameters on a sphere"));
   EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"),
               HasSubstr("closure: parameters on a torus go round both ways"));
-  EXPECT_THAT(read("parameters: mesh\nclosure: periodic_uv\n"), HasSubstr("do not go round"));
+  EXPECT_THAT(read("parameters: mesh\nclosure: periodic_u\n"),
+              HasSubstr("closure: parameters on a mesh do not go round; write closure: open"));
   EXPECT_THAT(read("patches_v: 3\nclosure: periodic_uv\n"),
               HasSubstr("patches_v: H-spline: 8 x 3 patches are not allowed"));
   EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
@@ -331,126 +327,6 @@ TEST(PointFit, LinesOfAScannerAreASheet) {
     EXPECT_LT(fit.fit.point_rms_mm, 2.5e-3);
     EXPECT_NEAR(fit.fit.automatic->noise_mm, 2e-3, 2e-4);
   }
-}
-
-// A ball has the areas of its cylinder, and no angle at its poles.
-TEST(PointFit, ABallIsNoTube) {
-  Random random(3);
-  PointTable table;
-  for (int k = 0; k < 5000; ++k) {
-    table.positions.push_back(Vec3(random.Normal(), random.Normal(), random.Normal()).normalized());
-  }
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  EXPECT_EQ(FitPoints(table, options, {}).parameters, "sphere");
-  options.parameters = CylinderParameters{};
-  EXPECT_THAT(testing::WordsOf<InputError>([&] { FitPoints(table, options, {}); }),
-              HasSubstr("the points close at an end of the cylinder"));
-}
-
-PointTable StonePoints(int count, double noise) {
-  PointTable table;
-  table.positions = testing::PointsAround(StoneRadius, count, noise);
-  return table;
-}
-
-RingErrors ErrorsOfStone(const HSplineSurface& surface, double first, double last) {
-  return testing::ErrorsOfRings(surface, StoneRadius, first, last);
-}
-
-// Also within ten degrees of the poles, where there are few points; each pole is one place to less
-// than the noise.
-TEST(PointFit, AStoneIsFoundBelowItsNoiseAlsoAtItsPoles) {
-  constexpr double kNoise = 1e-3;
-  const PointTable table = StonePoints(10000, kNoise);
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  options.sigma = true;
-  const PointFit result = FitPoints(table, options, {});
-  EXPECT_EQ(result.parameters, "sphere");
-  EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-  EXPECT_LT(ErrorsOfStone(result.fit.surface, 0, 1).rms, 0.5 * kNoise);
-  for (const double v : {0.0, 1.0}) {
-    const RingErrors errors = ErrorsOfStone(result.fit.surface, v, std::abs(v - 1.0 / 18));
-    EXPECT_LT(errors.rms, 1.5 * kNoise);
-    EXPECT_LT(errors.largest, 4 * kNoise);
-  }
-  ASSERT_TRUE(result.poles);
-  for (const PoleGap& pole : *result.poles) {
-    EXPECT_LT(pole.gap_mm, kNoise);
-    EXPECT_NEAR(pole.place.norm(), StoneRadius(pole.place.normalized()), kNoise);
-  }
-  // Nothing is told of points that were not given.
-  EXPECT_EQ(result.fit.residual_mm.size(), table.positions.size());
-  EXPECT_EQ(result.fit.uv.size(), table.positions.size());
-  EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
-  for (const std::uint32_t k : result.fit.automatic->outliers) {
-    EXPECT_LT(k, table.positions.size());
-  }
-  EXPECT_NEAR(result.fit.automatic->noise_mm, 0.6 * kNoise, 0.1 * kNoise);
-}
-
-// By every plan, the finest levels alone too, for which the start's edges are one place exactly.
-TEST(PointFit, ASphereIsFittedByEveryPlan) {
-  const PointTable table = StonePoints(3000, 1e-3);
-  const std::vector<Term> smooth = {PointTerm{}, SmoothnessTerm{.weight = 1e-9, .length_mm = 1}};
-  const std::vector<FitOptions> all = {
-      {.plan = AdaptivePlan{.tolerance_mm = 0.02, .finest = 2}, .terms = smooth},
-      {.plan = ListedPlan{.schedule = {{.level = 0}, {.level = 1}}}, .terms = smooth},
-      {.plan = ListedPlan{.schedule = {{.level = 2}}}, .terms = smooth}};
-  for (const FitOptions& fit : all) {
-    const PointFit result = FitPoints(
-        table, {.closure = Closure::kPeriodicU, .parameters = SphereParameters{}, .fit = fit}, {});
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    EXPECT_LT(result.fit.point_rms_mm, 0.01);
-    EXPECT_LT((*result.poles)[0].gap_mm, 0.02);
-    EXPECT_EQ(result.fit.residual_mm.size(), 3000u);
-  }
-}
-
-PointTable MeshTable(const TriMesh& mesh) {
-  PointTable table;
-  table.positions = mesh.points;
-  table.triangles = mesh.triangles;
-  return table;
-}
-
-// A bent one, which no rays from a centre meet once each; also where (u,v) are moved.
-TEST(PointFit, ABeanIsFoundBelowItsNoiseAlsoAtItsPoles) {
-  constexpr double kNoise = 1e-3;
-  const testing::ClosedShape bean = testing::Bean();
-  const PointTable table = MeshTable(testing::MeshOf(bean, 10000, kNoise));
-  for (const int rounds : {0, 2}) {
-    PointFitOptions options;
-    options.closure = Closure::kPeriodicU;
-    options.sigma = true;
-    options.fit.plan = AutoPlan{.relaxation_rounds = rounds};
-    const PointFit result = FitPoints(table, options, {});
-    EXPECT_EQ(result.parameters, "mesh");
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    const HSplineSurface& surface = result.fit.surface;
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1).rms, 0.4 * kNoise);
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1.0 / 18).rms, kNoise);
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 17.0 / 18, 1).rms, kNoise);
-    ASSERT_TRUE(result.poles);
-    for (const PoleGap& pole : *result.poles) {
-      EXPECT_LT(pole.gap_mm, kNoise);
-      EXPECT_LT((pole.place - bean.FootOf(pole.place)).norm(), kNoise);
-    }
-    EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
-  }
-}
-
-TEST(PointFit, AClosedMeshGivesTheSameBytesForAnyNumberOfThreads) {
-  const PointTable table = MeshTable(testing::MeshOf(testing::EllipsoidWithEars(), 3000, 1e-3));
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  options.parameters = MeshParameters{};
-  RunContext two_threads;
-  two_threads.threads = 2;
-  const PointFit one = FitPoints(table, options, {}), two = FitPoints(table, options, two_threads);
-  EXPECT_EQ(one.fit.uv, two.fit.uv);
-  EXPECT_EQ(one.fit.residual_mm, two.fit.residual_mm);
 }
 
 // At a hundred million mm, digits of a hundredth of a micrometre are left.

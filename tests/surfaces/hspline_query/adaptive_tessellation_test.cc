@@ -148,28 +148,5 @@ TEST(AdaptiveTessellation, ChordsThatCannotBeAreRefused) {
   EXPECT_THROW(TessellateToChord(surface, 1e-15), InputError);
 }
 
-TEST(JoinEdge, ATubeWithBothEdgesJoinedIsClosed) {
-  const HSplineSurface surface = testing::DrawnTube(0, 0.01);
-  Tessellation t = TessellateToChord(surface, 1e-3);
-  EXPECT_GT(CheckEdges(t.mesh).boundary, 10);
-  const Tessellation untouched = t;
-  JoinEdge(t, 0.4321, Vec3::Zero());
-  EXPECT_EQ(t.mesh.triangles, untouched.mesh.triangles);
-  const Vec3 low = surface.Point({0, 0}), high = surface.Point({0, 1});
-  JoinEdge(t, 0, low);
-  JoinEdge(t, 1, high);
-  const EdgeReport edges = CheckEdges(t.mesh);
-  EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
-  ASSERT_EQ(t.uv.size(), t.mesh.points.size());
-  ASSERT_EQ(t.normals.size(), t.mesh.points.size());
-  for (const auto& [v, place] : {std::pair(0.0, low), std::pair(1.0, high)}) {
-    ASSERT_EQ(std::ranges::count(t.uv, v, [](const Vec2& uv) { return uv.y(); }), 1);
-    const auto at =
-        std::ranges::find(t.uv, v, [](const Vec2& uv) { return uv.y(); }) - t.uv.begin();
-    EXPECT_EQ(t.mesh.points[at], place);
-    EXPECT_GT(t.normals[at].z() * (v == 0 ? -1 : 1), 0.999);
-  }
-}
-
 }  // namespace
 }  // namespace semblance
