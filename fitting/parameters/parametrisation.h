@@ -29,9 +29,9 @@ struct Scan {
   PointNames name_of = {};                   // of a point, where it was read
 };
 
-enum class ParameterSource { kGiven, kPlane, kCylinder, kTorus, kMesh };
+enum class ParameterSource { kGiven, kPlane, kCylinder, kMesh };
 constexpr auto EnumNames(ParameterSource) {
-  return std::to_array<std::string_view>({"given", "plane", "cylinder", "torus", "mesh"});
+  return std::to_array<std::string_view>({"given", "plane", "cylinder", "mesh"});
 }
 
 struct Parametrisation {

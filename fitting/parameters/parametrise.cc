@@ -17,9 +17,6 @@ Parametrisation ParametriseBy(const Scan& points, const AutoParameters&) {
   if (!points.given_uv.empty()) {
     return ParametriseBy(points, GivenParameters{});
   }
-  if (points.closure == Closure::kPeriodicUv) {
-    return ParametriseBy(points, TorusParameters{});
-  }
   if (points.closure == Closure::kPeriodicU) {
     return ParametriseBy(points, CylinderParameters{});
   }

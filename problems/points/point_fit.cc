@@ -39,9 +39,6 @@ std::string ClosureFault(ParameterSource source, Closure closure) {
   if (source == ParameterSource::kCylinder && closure != Closure::kPeriodicU) {
     return "parameters on a cylinder go round in u alone; write closure: periodic_u";
   }
-  if (source == ParameterSource::kTorus && closure != Closure::kPeriodicUv) {
-    return "parameters on a torus go round both ways; write closure: periodic_uv";
-  }
   if (closure != Closure::kOpen &&
       (source == ParameterSource::kPlane || source == ParameterSource::kMesh)) {
     return fmt::format("parameters on a {} do not go round; write closure: open", NameOf(source));
@@ -61,8 +58,6 @@ std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
              ? std::optional(ParameterSource::kPlane)
          : std::holds_alternative<CylinderParameters>(parameters)
              ? std::optional(ParameterSource::kCylinder)
-         : std::holds_alternative<TorusParameters>(parameters)
-             ? std::optional(ParameterSource::kTorus)
          : std::holds_alternative<MeshParameters>(parameters)
              ? std::optional(ParameterSource::kMesh)
              : std::nullopt;

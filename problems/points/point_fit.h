@@ -95,7 +95,7 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
-  std::string parameters;               // given, plane, cylinder, torus or mesh
+  std::string parameters;               // given, plane, cylinder or mesh
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
@@ -126,8 +126,8 @@ struct PointFit {
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
 // Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a
-// closure that does not suit the parameters (a cylinder goes round in u, a torus both ways, a plane
-// and a mesh do not), for attributes that the table has not,
+// closure that does not suit the parameters (a cylinder goes round in u, a plane and a mesh do
+// not), for attributes that the table has not,
 // and
 // for a chord so fine that a coarse fit of some of the points has already shown surface.ply to be
 // too large, and for moves of (u,v) beside exact points.

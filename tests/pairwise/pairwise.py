@@ -140,16 +140,6 @@ def ply(points, faces):
     return "\n".join(head + points + faces) + "\n"
 
 
-def ring(draw):
-    """Points of a torus, for what closes both ways."""
-    rows = ["x,y,z,u,v"]
-    for _ in range(400):
-        u, v = draw.random(), draw.random()
-        r, z = 1 + 0.4 * math.cos(2 * math.pi * v), 0.4 * math.sin(2 * math.pi * v) + draw.gauss(0, 0.01)
-        rows.append(f"{r * math.cos(2 * math.pi * u):.6f},{r * math.sin(2 * math.pi * u):.6f},{z:.6f},{u:.6f},{v:.6f}")
-    return "\n".join(rows) + "\n"
-
-
 class ShareIsUsed(Exception):
     """No call is begun after the share's seconds."""
 
@@ -208,7 +198,6 @@ class Runner:
                 rows.append(f"{u:.6f},{v:.6f},{math.sin(3 * u) * v + draw.gauss(0, 0.01):.6f},{u:.6f},{v:.6f}")
             (self.folder / "points.csv").write_text("\n".join(rows) + "\n")
             (self.folder / "scan.ply").write_text(scan(draw))
-            (self.folder / "ring.csv").write_text(ring(draw))
             return {"configs": self.configs, "first": first}
         code, said, _ = call([self.program, "run", "base.yaml", "--out", "first", "--quiet"], self.folder)
         if code != 0:
@@ -222,7 +211,7 @@ class Runner:
     def write(self, tree):
         parameters = tree.get("parameters")
         kind = parameters.get("type") if isinstance(parameters, dict) else parameters
-        self.points = {"mesh": "scan.ply", "torus": "ring.csv"}.get(kind, "points.csv")
+        self.points = "scan.ply" if kind == "mesh" else "points.csv"
         (self.folder / "case.yaml").write_text(yaml({"base": "base.yaml", **tree}))
 
     def check(self, trees):

@@ -71,64 +71,6 @@ TEST(Parametrise, ACylinderFindsItsAxis) {
   }
 }
 
-// Of a ring with bumps, stretched, turned and off the origin.
-std::vector<Vec3> RingPoints(int count, double noise) {
-  const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).matrix();
-  std::vector<Vec3> points;
-  for (const FitPoint& p : testing::Scattered(testing::RingPoint, count, noise, 1).points) {
-    points.emplace_back(30 * (turn * p.position) + Vec3(1, 2, 3));
-  }
-  return points;
-}
-
-// By the angles that it was made with, but for where they start and their sense.
-TEST(Parametrise, ATorusIsFoundHoweverItLies) {
-  const std::vector<Vec3> points = RingPoints(5000, 1e-3);
-  const std::vector<FitPoint> made = testing::Scattered(testing::RingPoint, 5000, 1e-3, 1).points;
-  for (const Parameters& parameters :
-       {Parameters(TorusParameters{}), Parameters(AutoParameters{})}) {
-    const Parametrisation p =
-        Parametrise({.positions = points, .closure = Closure::kPeriodicUv}, parameters);
-    EXPECT_EQ(p.source, ParameterSource::kTorus);
-    EXPECT_THAT(p.how, HasSubstr("the torus around ["));
-    EXPECT_LT(p.faults.Sum(), 0.01);
-    const auto apart = [](double turns) { return std::abs(turns - std::round(turns)); };
-    const auto off = [&](std::size_t k, double sense) {
-      return apart(p.uv[k].x() - p.uv[0].x() - sense * (made[k].uv.x() - made[0].uv.x()));
-    };
-    const double sense = off(1, 1) + off(2, 1) + off(3, 1) < 0.1 ? 1 : -1;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      EXPECT_LT(off(k, sense), 0.03);
-      EXPECT_LT(apart(p.uv[k].y() - sense * made[k].uv.y()), 0.08);
-    }
-  }
-}
-
-// The surface's normal looks as the triangles do, whichever way that is.
-TEST(Parametrise, ATorusLooksAsTheTrianglesDo) {
-  TriMesh mesh = testing::GridMesh(testing::RingPoint, 60);
-  for (const bool inward : {false, true}) {
-    for (Triangle& t : mesh.triangles) {
-      if (inward) {
-        std::swap(t[1], t[2]);
-      }
-    }
-    const Parametrisation p =
-        Parametrise(Scan{.positions = mesh.points, .triangles = mesh.triangles}, TorusParameters{});
-    const Vec2 lengths_mm = 2 * std::numbers::pi * Vec2(1, 0.4);
-    std::vector<Vec2> at;
-    for (const Vec2& uv : p.uv) {
-      at.push_back(uv.cwiseProduct(lengths_mm));
-    }
-    const MapFaults faults = FaultsOfTriangles({mesh.points, at, lengths_mm}, mesh.triangles);
-    EXPECT_LT(faults.Sum(), 1e-3);
-    EXPECT_FALSE(faults.mirrored);
-    for (const Vec2& uv : p.uv) {
-      EXPECT_TRUE(uv.minCoeff() >= 0 && uv.maxCoeff() <= 1);
-    }
-  }
-}
-
 // Of count points of the sphere, and of a tube that is closed at its ends by flat lids.
 std::vector<Vec3> OnSphere(int count) {
   Random random(3);
@@ -197,24 +139,6 @@ TEST(Parametrise, ACylinderOnWhichLidsCollapseIsRefusedOrLeft) {
   EXPECT_GT(Parametrise(tin, CylinderParameters{.axis = {0, 0, 1}, .folds = FoldRule::kAccept})
                 .faults.collapsed,
             0.1);
-}
-
-TEST(Parametrise, WhatIsNoTorusIsRefused) {
-  Random random(4);
-  std::vector<Vec3> tube, cloud, half, plane;
-  for (int k = 0; k < 2000; ++k) {
-    tube.push_back(OnCylinder(k % 400, Mat3::Identity()));
-    cloud.push_back(random.InBox(-10, 10));
-    plane.emplace_back(random.Uniform(), 2 * random.Uniform(), 0);
-    half.push_back(testing::RingPoint({random.Uniform(), random.Uniform(0, 0.5)}));
-  }
-  for (const std::vector<Vec3>& points : {OnSphere(2000), Tin(3000), tube, cloud, half, plane}) {
-    EXPECT_THAT(WordsOf({.positions = points}, TorusParameters{}),
-                ::testing::AnyOf(HasSubstr("the points are not a torus"),
-                                 HasSubstr("the points fold over the torus")));
-  }
-  EXPECT_THAT(WordsOf({.positions = RingPoints(2000, 0)}, TorusParameters{.axis = {1, 0, 0}}),
-              HasSubstr("give another axis"));
 }
 
 TEST(Parametrise, OfAClosedSurfaceAutoIsTheCylinder) {

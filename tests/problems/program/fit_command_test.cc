@@ -257,7 +257,7 @@ TEST_F(FitCommand, AScanThatFoldsIsLaidOut) {
   const auto alone = Call("fit bowl.csv --out alone --quiet");
   EXPECT_EQ(alone.code, 2);
   EXPECT_THAT(alone.err, HasSubstr("the points fold over every plane"));
-  EXPECT_THAT(alone.err, HasSubstr("give u and v, or triangles between the points"));
+  EXPECT_THAT(alone.err, HasSubstr("give the columns u and v, or triangles between the points"));
 }
 
 // Colours and heat over the surface, each point surer or less sure; out in every file of points.
