@@ -22,12 +22,12 @@ std::vector<VertexId> MissingOver(const HierarchicalSplineSpace& space, const Pa
     return 2 * k + (!closed && k == patches - 1 ? 4 : 3) + margin;
   };
   const int last_u = last(patch.i, shape.PatchesU(patch.level), shape.ClosedU()),
-            last_v = last(patch.j, shape.PatchesV(patch.level), shape.ClosedV());
+            last_v = last(patch.j, shape.PatchesV(patch.level), false);
   std::vector<VertexId> missing;
-  for (int b = first(patch.j, shape.ClosedV()); b <= last_v; ++b) {
+  for (int b = first(patch.j, false); b <= last_v; ++b) {
     for (int a = first(patch.i, shape.ClosedU()); a <= last_u; ++a) {
       const VertexId vertex{level, PlaceAmong(shape.Columns(level), a, shape.ClosedU()),
-                            PlaceAmong(shape.Rows(level), b, shape.ClosedV())};
+                            PlaceAmong(shape.Rows(level), b, false)};
       if (vertex.i >= 0 && vertex.j >= 0 && !space.IsEdited(vertex)) {
         missing.push_back(vertex);
       }
@@ -54,7 +54,7 @@ class PatchCounts {
       const PatchId other{
           patch.level,
           PlaceAmong(shape_.PatchesU(patch.level), patch.i + k % 3 - 1, shape_.ClosedU()),
-          PlaceAmong(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, shape_.ClosedV())};
+          PlaceAmong(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, false)};
       const auto found = counts_.find(KeyOf(other));
       if (found != counts_.end() && 4 * found->second < own) {
         emptier.push_back(other);

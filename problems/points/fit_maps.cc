@@ -80,9 +80,8 @@ namespace {
 
 // A place on a seam has one vertex in the triangles, so that normals do not break there.
 int VertexAt(const FitGrid& grid, int i, int j) {
-  const bool across_u = grid.closure != Closure::kOpen && i == grid.columns - 1,
-             across_v = grid.closure == Closure::kPeriodicUv && j == grid.rows - 1;
-  return (across_u ? 0 : i) + grid.columns * (across_v ? 0 : j);
+  const bool across = grid.closure == Closure::kPeriodicU && i == grid.columns - 1;
+  return (across ? 0 : i) + grid.columns * j;
 }
 
 // Two per cell.

@@ -33,7 +33,7 @@ struct PointFitOptions {
   std::string title = "untitled";            // of the result
   int patches_u = 8;                         // of level 0
   int patches_v = 8;                         // of level 0
-  Closure closure = Closure::kOpen;          // whether u, or u and v, go round
+  Closure closure = Closure::kOpen;          // whether u goes round
   Parameters parameters;                     // where the points' (u,v) come from
   std::vector<std::string> attributes = {};  // further columns that are fitted
   FitOptions fit = {
@@ -57,8 +57,7 @@ void Fields(Visitor& visit, PointFitOptions& o) {
   visit(FieldInfo{.name = "patches_v", .min = 1, .max = kMostPatches, .doc = "of level 0 along v"},
         o.patches_v);
   visit(FieldInfo{.name = "closure",
-                  .doc = "open; periodic_u for surfaces that go round in u, as a tube does; "
-                         "periodic_uv for those that go round both ways, as a torus does"},
+                  .doc = "open; or periodic_u for surfaces that go round in u, as a tube does"},
         o.closure);
   visit(FieldInfo{.name = "parameters", .doc = "where the points' (u,v) come from"}, o.parameters);
   visit(FieldInfo{.name = "attributes",

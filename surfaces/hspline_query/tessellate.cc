@@ -15,8 +15,7 @@ Tessellation Tessellate(const HSplineSurface& surface, int per_patch) {
   const HSplineShape& shape = surface.shape();
   const int quads_u = per_patch * shape.PatchesU(shape.max_level),
             quads_v = per_patch * shape.PatchesV(shape.max_level);
-  const int columns = quads_u + (shape.ClosedU() ? 0 : 1),
-            rows = quads_v + (shape.ClosedV() ? 0 : 1);
+  const int columns = quads_u + (shape.ClosedU() ? 0 : 1), rows = quads_v + 1;
   Tessellation result;
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
@@ -29,9 +28,8 @@ Tessellation Tessellate(const HSplineSurface& surface, int per_patch) {
   }
   for (int j = 0; j < quads_v; ++j) {
     for (int i = 0; i < quads_u; ++i) {
-      const int i1 = (i + 1) % columns, j1 = (j + 1) % rows;
-      const int a = i + columns * j, b = i1 + columns * j, c = i + columns * j1,
-                d = i1 + columns * j1;
+      const int i1 = (i + 1) % columns;
+      const int a = i + columns * j, b = i1 + columns * j, c = a + columns, d = b + columns;
       result.mesh.triangles.push_back({a, b, d});
       result.mesh.triangles.push_back({a, d, c});
     }

@@ -11,14 +11,10 @@
 
 namespace semblance::testing {
 
-// A bent sheet (open), a tube (closed in u) or a torus (closed in both).
+// A bent sheet (open) or a tube (closed in u).
 inline Vec3 SmoothPlace(const HSplineShape& shape, double u, double v) {
   const double angle = (shape.ClosedU() ? 2 * std::numbers::pi : 2.0) * u;
-  if (!shape.ClosedV()) {
-    return {50 * std::cos(angle), 50 * std::sin(angle), 80 * v};
-  }
-  const double around = 2 * std::numbers::pi * v, distance = 50 + 20 * std::cos(around);
-  return {distance * std::cos(angle), distance * std::sin(angle), 40 + 20 * std::sin(around)};
+  return {50 * std::cos(angle), 50 * std::sin(angle), 80 * v};
 }
 
 // Level 0 over that, shaken a little; no edits yet.

@@ -106,22 +106,6 @@ TEST(OneToOne, LidsCollapseOnACylinder) {
   EXPECT_GT(around(true).Sum(), 0.15);
 }
 
-// A ring by its two angles is one-to-one across both seams; with the tube gone round twice, one
-// half of it lies on the other.
-TEST(OneToOne, ATorusIsAcrossBothSeams) {
-  const auto around = [](double turns) {
-    Cloud cloud{.positions = {}, .at = {}, .period_mm = 2 * std::numbers::pi * Vec2(1, 0.4)};
-    for (const FitPoint& p : testing::Scattered(testing::RingPoint, 20000, 1e-3, 1).points) {
-      cloud.positions.push_back(p.position);
-      const double v = turns * p.uv.y();
-      cloud.at.push_back(Vec2(p.uv.x(), v - std::floor(v)).cwiseProduct(cloud.period_mm));
-    }
-    return cloud.Faults();
-  };
-  EXPECT_LT(around(1).Sum(), kNone);
-  EXPECT_GT(around(2).folded, 0.5);
-}
-
 // 0.4 of a sheet is folded back over the rest.
 TEST(OneToOne, TrianglesTellTheShareThatIsTurnedOver) {
   const TriMesh mesh =

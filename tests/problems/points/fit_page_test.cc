@@ -72,7 +72,6 @@ TEST(FitMaps, TheGridIsClosedAsTheSurfaceIs) {
   const std::size_t open = border_edges(Closure::kOpen);
   EXPECT_EQ(open % 4, 0U);
   EXPECT_EQ(border_edges(Closure::kPeriodicU), open / 2);
-  EXPECT_EQ(border_edges(Closure::kPeriodicUv), 0U);
 }
 
 TEST(FitMaps, QuantilesAreThoseOfAllFigures) {
