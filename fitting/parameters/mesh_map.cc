@@ -22,7 +22,7 @@
 #include <string>
 #include <utility>
 
-#include "fitting/parameters/one_to_one.h"
+#include "fitting/folds/fold_check.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -89,7 +89,7 @@ double LengthOf(const LayoutMesh& mesh, Border border) {
   return length;
 }
 
-// The longest border; the others are filled with triangles between their points.
+// Returns the longest border, and fills the others with triangles between their points.
 Border OnlyBorder(LayoutMesh& mesh) {
   std::vector<Border> borders;
   processing::extract_boundary_cycles(mesh, std::back_inserter(borders));
@@ -119,8 +119,8 @@ Border OnlyBorder(LayoutMesh& mesh) {
   return *longest;
 }
 
-// The four vertices of the border that lie farthest towards the corners of its rectangle, in the
-// order in which CGAL goes round; nothing if they are not four.
+// The four vertices of the border that lie farthest towards the corners of its rectangle, in CGAL's
+// order around the border; nothing if two of them are the same.
 std::optional<std::array<Vertex, 4>> CornersOf(const LayoutMesh& mesh, Border border) {
   std::vector<Vertex> around;
   std::vector<Vec3> places;
@@ -195,7 +195,7 @@ double SignedArea(const TriMesh& mesh, const std::vector<Vec2>& at) {
   return area;
 }
 
-// The longest side along the first axis; a proper rotation.
+// Rotates the layout so that its longest side lies along the first axis.
 void TurnLengthwise(std::vector<Vec2>& at) {
   Vec2 mean = Vec2::Zero();
   for (const Vec2& p : at) {
@@ -240,7 +240,9 @@ std::vector<Vec2> Places(const TriMesh& mesh, LayoutMesh& halfedges, Border bord
 }  // namespace
 
 MeshLayout LayOut(const TriMesh& mesh, MeshMap map) {
-  constexpr double kMostFolded = 0.002;  // of the area, before another way is taken
+  // Largest share of the area that ARAP may fold. Mean-value coordinates do not fold but distort
+  // more.
+  constexpr double kMostFolded = 0.002;
   LayoutMesh halfedges = HalfedgesOf(mesh);
   const Border border = OnlyBorder(halfedges);
   if (map != MeshMap::kAuto) {

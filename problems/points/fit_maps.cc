@@ -16,9 +16,9 @@
 namespace semblance {
 namespace {
 
-constexpr int kGrid = 141;  // vertices along u and v
+constexpr int kGrid = 141;  // vertices along u and v: odd, so that Halved keeps the borders
 
-// Per point; an outlier is no point of the surface.
+// One flag per point: 0 for outliers, which are no points of the surface.
 std::vector<char> CountedPoints(const FitResult& fit) {
   std::vector<char> counted(fit.residual_mm.size(), 1);
   if (fit.automatic) {
@@ -29,13 +29,14 @@ std::vector<char> CountedPoints(const FitResult& fit) {
   return counted;
 }
 
-// Cells along u and v that hold four points each, were they spread evenly; no more than vertices.
+// The number of cells along u and v that gives each four evenly spread points; at most one cell per
+// vertex.
 int CellsAcross(std::size_t points) {
   constexpr int kFewest = 8;
   return std::clamp(static_cast<int>(std::sqrt(static_cast<double>(points)) / 2), kFewest, kGrid);
 }
 
-// A vertex tells of the points in its cell.
+// Gives each vertex the RMS distance of the points in its cell.
 void AddSquares(const FitResult& fit, FitGrid& grid) {
   const std::vector<char> counted = CountedPoints(fit);
   const int across = CellsAcross(fit.uv.size());
@@ -64,7 +65,7 @@ void AddSquares(const FitResult& fit, FitGrid& grid) {
 
 }  // namespace
 
-DistanceQuantiles QuantilesOf(const FitResult& fit) {
+DistanceQuantiles ComputeQuantiles(const FitResult& fit) {
   std::vector<double> known;
   std::ranges::copy_if(fit.residual_mm, std::back_inserter(known),
                        [](double v) { return std::isfinite(v); });
@@ -78,7 +79,7 @@ DistanceQuantiles QuantilesOf(const FitResult& fit) {
 
 namespace {
 
-// A place on a seam has one vertex in the triangles, so that normals do not break there.
+// At a seam the triangles use the vertex of the first column, so that normals do not break there.
 int VertexAt(const FitGrid& grid, int i, int j) {
   const bool across = grid.closure == Closure::kPeriodicU && i == grid.columns - 1;
   return (across ? 0 : i) + grid.columns * j;
@@ -100,7 +101,7 @@ std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
 
 }  // namespace
 
-FitGrid GridOf(const FitResult& fit, int threads) {
+FitGrid SampleFit(const FitResult& fit, int threads) {
   FitGrid grid{.columns = kGrid,
                .rows = kGrid,
                .closure = fit.surface.shape().closure,
@@ -135,7 +136,7 @@ FitGrid Halved(const FitGrid& grid) {
   return half;
 }
 
-std::vector<FitCell> CellsOf(const FitResult& fit) {
+std::vector<FitCell> FindFitCells(const FitResult& fit) {
   const PatchTree tree(fit.surface);
   const HSplineShape& shape = fit.surface.shape();
   std::vector<FitCell> cells;
@@ -160,7 +161,7 @@ std::vector<FitCell> CellsOf(const FitResult& fit) {
   return cells;
 }
 
-ToleranceReport ToleranceOf(const FitResult& fit, const AdaptivePlan& plan) {
+ToleranceReport CompareWithTolerance(const FitResult& fit, const AdaptivePlan& plan) {
   ToleranceReport report{.tolerance_mm = plan.tolerance_mm,
                          .regions = static_cast<int>(plan.regions.size())};
   const std::vector<char> counted = CountedPoints(fit);
@@ -205,7 +206,7 @@ std::string ToleranceText(const ToleranceReport& r) {
                     r.at_finest);
   }
   if (r.at_finest < r.cells) {
-    text += fmt::format("; {} not refined, for want of points: see fit.plan.min_points",
+    text += fmt::format("; {} not refined, for lack of points: see fit.plan.min_points",
                         r.cells - r.at_finest);
   }
   return text;

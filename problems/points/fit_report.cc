@@ -10,10 +10,8 @@
 
 #include "fitting/plan/fit_check.h"
 #include "problems/config/config.h"
-#include "problems/points/fit_maps.h"
+#include "problems/points/fit_files.h"
 #include "problems/points/fit_page.h"
-#include "problems/points/residual_files.h"
-#include "problems/points/surface_ply.h"
 #include "problems/report/fit_json.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/timing_json.h"
@@ -25,8 +23,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kHangTogether = 0.1;  // correlation of neighbours' residuals
-constexpr double kSmaller = 0.85;      // of the noise that the neighbours show
+// The verdict that the residuals still contain detail: the residuals of neighbours correlate by
+// more than the first number, or the noise between neighbours is a smaller share of the noise than
+// the second. Lower and higher values give the verdict more often, also for noise alone.
+constexpr double kMostCorrelation = 0.1, kLeastNoiseShare = 0.85;
 
 Json RoundJson(const NestedRound& round) {
   return {{"finest", round.finest},
@@ -42,17 +42,18 @@ Json RoundJson(const NestedRound& round) {
 }
 
 bool LeavesDetail(const AutoReport& r) {
-  return r.neighbour_correlation > kHangTogether || r.neighbour_noise_mm < kSmaller * r.noise_mm;
+  return r.neighbour_correlation > kMostCorrelation ||
+         r.neighbour_noise_mm < kLeastNoiseShare * r.noise_mm;
 }
 
 std::string Verdict(const AutoReport& r) {
   if (r.met_to_rounding) {
-    return "points are met to a hundred-millionth of their extent: what is left is rounding";
+    return "points are met to a hundred-millionth of their extent: the rest is rounding";
   }
   if (r.limited_by_density) {
     return "detail goes down to the points' spacing: denser points would show more";
   }
-  return LeavesDetail(r) ? "residuals are still correlated: part of what counts as noise is detail"
+  return LeavesDetail(r) ? "residuals are still correlated: part of the noise is detail"
                          : "residuals look like noise: these points show no more detail";
 }
 
@@ -94,8 +95,8 @@ std::string AutoText(const AutoReport& r) {
   text += '\n';
   if (r.stretch > 1) {
     text += fmt::format(
-        "it bends less along {:.0f} deg from u towards v than across: smoothness is stretched by "
-        "{:.2g}\n",
+        "the surface bends less along {:.0f} deg from u towards v than across: smoothness is "
+        "stretched by {:.2g}\n",
         r.direction_deg, r.stretch);
   }
   if (!r.repeated.empty()) {
@@ -109,15 +110,6 @@ std::string AutoText(const AutoReport& r) {
                         r.outliers.size() == 1 ? "it" : "them");
   }
   return text + Verdict(r) + "\n";
-}
-
-nlohmann::ordered_json MovesJson(const FootMoves& moves) {
-  return {{"rounds", moves.rounds},
-          {"rms_move_mm", moves.rms_move_mm},
-          {"max_move_mm", moves.max_move_mm},
-          {"coarse_rms_before_mm", moves.rms_before_mm},
-          {"coarse_rms_after_mm", moves.rms_after_mm},
-          {"folds_prevented", moves.folds_prevented}};
 }
 
 std::string MovesText(const FootMoves& moves) {
@@ -147,7 +139,16 @@ Json VerticesJson(const HSplineSurface& surface) {
   return json;
 }
 
-// Of (u,v) that were not given.
+Json MovesJson(const FootMoves& moves) {
+  return {{"rounds", moves.rounds},
+          {"rms_move_mm", moves.rms_move_mm},
+          {"max_move_mm", moves.max_move_mm},
+          {"coarse_rms_before_mm", moves.rms_before_mm},
+          {"coarse_rms_after_mm", moves.rms_after_mm},
+          {"folds_prevented", moves.folds_prevented}};
+}
+
+// The map of (u,v) that were not given.
 Json MapJson(const PointFit& result) {
   return {{"how", result.how},
           {"folded_share", result.map_faults.folded},
@@ -184,7 +185,7 @@ Json ToleranceJson(const ToleranceReport& tolerance) {
   return json;
 }
 
-// What every fit has.
+// The entries that every fit has.
 Json FiguresJson(const PointFitOptions& options, const PointSource& source,
                  const PointFit& result) {
   return {{"title", options.title},
@@ -202,8 +203,7 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"faults", result.Faults()}};
 }
 
-Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
-                  const PointFit& result) {
+Json ResultJson(const PointFitOptions& options, const PointSource& source, const PointFit& result) {
   Json json = FiguresJson(options, source, result);
   if (std::isfinite(result.weighted_rms_mm)) {
     json["weighted_rms_mm"] = result.weighted_rms_mm;
@@ -226,7 +226,7 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
   if (result.fit.automatic) {
     json["automatic"] = AutoJson(*result.fit.automatic);
   }
-  if (const auto tolerance = ToleranceOf(options, result)) {
+  if (const auto tolerance = CompareWithTolerance(options, result)) {
     json["tolerance"] = ToleranceJson(*tolerance);
   }
   json.update(StepsToJson(result.fit));
@@ -234,7 +234,7 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
 }
 
 void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& folder) {
-  constexpr std::size_t kMostAsText = 100'000;
+  constexpr std::size_t kMostAsText = 100'000;  // documented with the option `residuals`
   const ResidualColumns columns{result.fit, result.attributes, result.attribute_at,
                                 result.sigma_mm};
   if (kind == ResidualFile::kAuto) {
@@ -247,7 +247,7 @@ void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& fol
   }
 }
 
-// Three columns per file.
+// Each file holds three attributes, as x, y and z.
 void WriteAttributes(const PointFit& result, OutputFolder& folder) {
   for (std::size_t k = 0; k < result.attribute_fit.surfaces.size(); ++k) {
     folder.Write(fmt::format("attributes_{}.hspline.json", k + 1),
@@ -255,9 +255,9 @@ void WriteAttributes(const PointFit& result, OutputFolder& folder) {
   }
 }
 
-// What a user should know beside the figures.
-std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit& result,
-                                 double chord_mm) {
+// Lines for the terminal, besides the figures.
+std::vector<std::string> Notes(const PointFitOptions& options, const PointFit& result,
+                               double chord_mm) {
   std::vector<std::string> notes;
   if (std::isfinite(result.weighted_rms_mm)) {
     notes.push_back(
@@ -276,15 +276,15 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
                                 result.attribute_fit.columns[k].rms));
   }
   if (std::isfinite(result.sigma_factor)) {
-    notes.push_back(fmt::format("the points are off by {:.3g} times the sigma that was given",
-                                result.sigma_factor));
+    notes.push_back(
+        fmt::format("the points are off by {:.3g} times the given sigma", result.sigma_factor));
   }
   for (const std::string& unused : UnusedOptions(options.fit)) {
     notes.push_back("fit." + unused);
   }
   if (!options.chord_mm.automatic && chord_mm > options.chord_mm.value) {
     notes.push_back(fmt::format(
-        "surface.ply is within {:.3g} mm of the surface, for {} mm would need too many triangles",
+        "surface.ply is within {:.3g} mm of the surface; {} mm would need too many triangles",
         chord_mm, options.chord_mm.value));
   }
   return notes;
@@ -296,8 +296,8 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
                                        const PointFit& result, OutputFolder& folder,
                                        const RunContext& context) {
   context.Report("write");
-  // First what can still be refused.
-  const double chord_mm = ChordFor(result.fit.surface, options.chord_mm);
+  // The mesh comes first, because it can still be refused.
+  const double chord_mm = ChooseChord(result.fit.surface, options.chord_mm);
   const std::string ply = SurfacePly(result, chord_mm, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
@@ -310,9 +310,9 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
   folder.Write("timing.json", TimingJson(result.times));
   folder.Write(
       "result.json",
-      ResultJsonOf(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+      ResultJson(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
           "\n");
-  return NotesOf(options, result, chord_mm);
+  return Notes(options, result, chord_mm);
 }
 
 }  // namespace semblance

@@ -73,7 +73,7 @@ int FitCommand(const FitArguments& arguments) {
   for (const std::string& note : notes) {
     fmt::print("{}\n", note);
   }
-  if (const auto tolerance = ToleranceOf(options, result)) {
+  if (const auto tolerance = CompareWithTolerance(options, result)) {
     fmt::print("{}\n", ToleranceText(*tolerance));
   }
   fmt::print("folder: {}\n", folder.Root().string());

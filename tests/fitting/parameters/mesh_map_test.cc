@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "fitting/parameters/one_to_one.h"
+#include "fitting/folds/fold_check.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/grid_mesh.h"
 #include "tests/testing/shapes.h"

@@ -28,13 +28,13 @@ std::vector<Vec3> FrankePoints(int count) {
   return points;
 }
 
-// Of 400 points on a cylinder about `axis`, by angle and height.
+// Point k of 400 on a cylinder, 20 on each of 20 circles.
 Vec3 OnCylinder(int k, const Mat3& turn) {
   const double angle = 2 * std::numbers::pi * (k % 20) / 20.0;
   return turn * Vec3(30 * std::cos(angle), 30 * std::sin(angle), 5.0 * (k / 20)) + Vec3(1, 2, 3);
 }
 
-TEST(Parametrise, WithoutParametersThePlaneIsTaken) {
+TEST(Parametrise, AutoTakesThePlane) {
   const std::vector<Vec3> points = {{0, 0, 5}, {40, 0, 5}, {40, 10, 5}, {0, 10, 5}};
   const Parametrisation p = Parametrise(points);
   EXPECT_EQ(p.source, ParameterSource::kPlane);
@@ -44,7 +44,7 @@ TEST(Parametrise, WithoutParametersThePlaneIsTaken) {
   }
 }
 
-// Steep heights, which do not spread least upwards, over the plane that is asked for.
+// Steep heights, which do not spread least upwards, over a given plane.
 TEST(Parametrise, APlaneAcrossANormalHasItsHeights) {
   const std::vector<Vec3> points = FrankePoints(2000);
   const Parametrisation p = Parametrise(points, PlaneParameters{.normal = {0, 0, 2}});
@@ -54,7 +54,7 @@ TEST(Parametrise, APlaneAcrossANormalHasItsHeights) {
   }
 }
 
-// However it stands: angles and heights come back, but for where the angle starts and its sense.
+// Angles and heights come back in any pose, but for the start and the sense of the angle.
 TEST(Parametrise, ACylinderFindsItsAxis) {
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).matrix();
   std::vector<Vec3> points;
@@ -71,7 +71,7 @@ TEST(Parametrise, ACylinderFindsItsAxis) {
   }
 }
 
-// Of count points of the sphere, and of a tube that is closed at its ends by flat lids.
+// `count` points on a sphere.
 std::vector<Vec3> OnSphere(int count) {
   Random random(3);
   std::vector<Vec3> points;
@@ -81,6 +81,7 @@ std::vector<Vec3> OnSphere(int count) {
   return points;
 }
 
+// `count` points on a tube whose ends are closed by flat lids.
 std::vector<Vec3> Tin(int count) {
   Random random(3);
   std::vector<Vec3> points;
@@ -102,7 +103,8 @@ std::string WordsOf(const Scan& scan, const Parameters& parameters) {
   return "no error";
 }
 
-// Steep heights spread most upwards: the plane of least squares folds them, that across z does not.
+// Steep heights spread most upwards: they fold over the plane of least squares, but not over the
+// plane across z.
 TEST(Parametrise, AFoldedPlaneIsLeftForAnAxis) {
   std::vector<Vec3> points = FrankePoints(4000);
   for (Vec3& p : points) {
@@ -128,7 +130,7 @@ TEST(Parametrise, WhatFoldsOverEveryPlaneIsRefusedUnlessAccepted) {
   EXPECT_GT(accepted.faults.folded, 0.3);
 }
 
-// Around its own axis the lids of a tin collapse; around another it can be gone round.
+// The lids of a tin collapse around its own axis, but not around another.
 TEST(Parametrise, ACylinderOnWhichLidsCollapseIsRefusedOrLeft) {
   const std::vector<Vec3> tin = Tin(20000);
   const CylinderParameters upright{.axis = {0, 0, 1}};
@@ -141,7 +143,7 @@ TEST(Parametrise, ACylinderOnWhichLidsCollapseIsRefusedOrLeft) {
             0.1);
 }
 
-TEST(Parametrise, OfAClosedSurfaceAutoIsTheCylinder) {
+TEST(Parametrise, AutoTakesTheCylinderForASurfaceThatGoesRound) {
   std::vector<Vec3> points;
   for (int k = 0; k < 400; ++k) {
     points.push_back(OnCylinder(k, Mat3::Identity()));
@@ -150,7 +152,7 @@ TEST(Parametrise, OfAClosedSurfaceAutoIsTheCylinder) {
   EXPECT_EQ(p.source, ParameterSource::kCylinder);
 }
 
-// Its ends are tips as those of a ball are, but nothing closes them.
+// Its ends are tips, as those of a ball are, but they are open.
 TEST(Parametrise, ATubeThatIsCutAslantStaysACylinder) {
   std::vector<Vec3> points;
   for (int k = 0; k < 400; ++k) {
@@ -170,7 +172,7 @@ TEST(Parametrise, ABallIsNoTube) {
   }
 }
 
-TEST(Parametrise, AMeshDoesNotNeedItsTrianglesWhereThePlaneDoesNotFold) {
+TEST(Parametrise, AutoTakesThePlaneForAMeshThatDoesNotFold) {
   const TriMesh mesh = testing::GridMesh(
       [](const Vec2& uv) { return Vec3(90 * uv.x(), 60 * uv.y(), 9 * std::sin(3 * uv.x())); }, 40);
   const Scan scan{.positions = mesh.points, .triangles = mesh.triangles};
@@ -185,8 +187,8 @@ TEST(Parametrise, AClosedMeshIsRefused) {
       HasSubstr("it is closed and has no border; cut it open, or give the columns u and v"));
 }
 
-// Two thirds of a sphere, as a scan: it folds over every plane, and its triangles are laid out. The
-// surface's normal looks as theirs do, whichever way that is.
+// Two thirds of a sphere, as a scan, folds over every plane, and its triangles are laid out. The
+// normal of the surface faces as theirs, inwards or outwards.
 TEST(Parametrise, TrianglesThatFoldAreLaidOut) {
   const auto bowl = [](const Vec2& uv) -> Vec3 {
     const Vec2 q = 2 * uv - Vec2(1, 1);
@@ -209,7 +211,7 @@ TEST(Parametrise, TrianglesThatFoldAreLaidOut) {
   }
 }
 
-// Heights that a plane serves stay on the plane, looking as the triangles do.
+// Heights stay on the plane, and the surface faces as the triangles.
 TEST(Parametrise, APlaneLooksAsTheTrianglesDo) {
   TriMesh mesh = testing::GridMesh(
       [](const Vec2& uv) { return Vec3(9 * uv.x(), 4 * uv.y(), std::sin(2 * uv.x())); }, 20);
@@ -248,7 +250,7 @@ TEST(Parametrise, WrongInputIsNamed) {
     return "no error";
   };
   EXPECT_THAT(message({}, AutoParameters{}, {}), HasSubstr("there is no point"));
-  EXPECT_THAT(message(points, GivenParameters{}, {}), HasSubstr("needs each point's (u,v)"));
+  EXPECT_THAT(message(points, GivenParameters{}, {}), HasSubstr("needs the (u,v) of each point"));
   EXPECT_THAT(
       message(points, GivenParameters{}, uv),
       HasSubstr("point 2 has (u,v) = (9, 0), outside [0, 1] x [0, 1]; to take all points, write "

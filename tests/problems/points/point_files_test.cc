@@ -273,9 +273,9 @@ TEST_F(PointFiles, WhatATableWouldRefuseIsRefusedOfAPlyAndAnXyz) {
 }
 
 TEST_F(PointFiles, APointIsCalledByItsFileAndLine) {
-  EXPECT_EQ(NameOfPoint(Read("a.csv", Csv()), 3), (folder_ / "a.csv:5: point 4").string());
-  EXPECT_EQ(NameOfPoint(Read("a.ply", PlainPly()), 3), (folder_ / "a.ply: point 4").string());
-  EXPECT_EQ(NameOfPoint(PointTable(), 3), "point 4");
+  EXPECT_EQ(PointName(Read("a.csv", Csv()), 3), (folder_ / "a.csv:5: point 4").string());
+  EXPECT_EQ(PointName(Read("a.ply", PlainPly()), 3), (folder_ / "a.ply: point 4").string());
+  EXPECT_EQ(PointName(PointTable(), 3), "point 4");
 }
 
 TEST_F(PointFiles, AttributesAreOfATableOrAPly) {

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "problems/config/config.h"
+#include "problems/points/fit_files.h"
 #include "problems/points/fit_report.h"
-#include "problems/points/residual_files.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "tests/testing/point_csv.h"

@@ -256,8 +256,9 @@ TEST_F(FitCommand, AScanThatFoldsIsLaidOut) {
   Write("bowl.csv", csv);
   const auto alone = Call("fit bowl.csv --out alone --quiet");
   EXPECT_EQ(alone.code, 2);
-  EXPECT_THAT(alone.err, HasSubstr("the points fold over every plane"));
-  EXPECT_THAT(alone.err, HasSubstr("give the columns u and v, or triangles between the points"));
+  EXPECT_THAT(alone.err, HasSubstr("the points fold over the plane: "));
+  EXPECT_THAT(alone.err,
+              HasSubstr("or triangles between the points (a PLY, OBJ, STL or OFF with faces)"));
 }
 
 // Colours and heat over the surface, each point surer or less sure; out in every file of points.
@@ -389,14 +390,13 @@ TEST_F(FitCommand, ForceLeavesNoReportOrAttributesOfAnEarlierFit) {
   EXPECT_TRUE(exists("report.html")) << "it is no fit's";
 }
 
-TEST_F(FitCommand, AWidthWithoutALossIsTold) {
+TEST_F(FitCommand, AWidthWithoutALossIsReported) {
   const auto outcome =
       Call(fmt::format("fit {}/points.csv --out out --quiet --set 'fit.terms=[{{type: points, "
                        "loss_width_mm: 3}}, {{type: smoothness, weight: auto, length_mm: 1}}]'",
                        kConfigs));
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out,
-              HasSubstr("fit.terms[0].loss_width_mm: `loss: none` does not look at it"));
+  EXPECT_THAT(outcome.out, HasSubstr("fit.terms[0].loss_width_mm: `loss: none` ignores it"));
 }
 
 TEST_F(FitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {

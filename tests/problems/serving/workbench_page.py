@@ -366,7 +366,7 @@ def expect_reports_on_a_phone(browser, program, url, folder):
     fit = os.path.abspath(os.path.join(os.path.dirname(folder), "fit"))
     subprocess.run([program, "fit", points, "--out", fit, "--quiet"], check=True, stdout=subprocess.DEVNULL)
     for report, heads in ((url + "run/report.html", ["In three dimensions", "In figures"]),
-                          (f"file://{fit}/report.html", ["In three dimensions", "In figures", "How far the points are off"])):
+                          (f"file://{fit}/report.html", ["In three dimensions", "In figures", "Distances of the points"])):
         browser.open(report)
         browser.wait("return document.querySelector('#view3d canvas')")
         wide = browser.run("return document.documentElement.scrollWidth")
