@@ -141,7 +141,7 @@ class Prober {
     return false;
   }
 
-  // Whether a cluster has at least three samples on a sheet, and two thirds of its samples are.
+  // Returns whether at least three samples and two thirds of a cluster lie on sheets.
   bool IsSheet(const Neighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
                int which) const {
     constexpr int kFewest = 3;
@@ -156,7 +156,8 @@ class Prober {
     return on_sheet >= kFewest && 3 * on_sheet >= 2 * count;
   }
 
-  // Whether the map mixes a cluster with that of the sample, instead of putting them side by side.
+  // Returns whether the map mixes a cluster with that of the sample, instead of putting them side
+  // by side.
   bool AreMixed(const Neighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
                 int other) const {
     // Two clusters side by side have their means about one sum of radii apart, mixed ones none.

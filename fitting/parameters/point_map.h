@@ -55,8 +55,8 @@ struct CylinderEnds {
   double narrower_mm = kNaN;  // median of the hundredth of the points at the narrower end
   double all_mm = kNaN;       // median of all points
 
-  // Whether the points close at an end, as a ball does. They then have no angle there, although
-  // they fold over the cylinder as little as a tube.
+  // Returns whether the points close at an end, as a ball does. They then have no angle there,
+  // although they fold over the cylinder as little as a tube.
   bool Close() const;
 };
 CylinderEnds FindEnds(std::span<const Vec3> points, const CylinderAxis& axis);

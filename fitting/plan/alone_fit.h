@@ -10,7 +10,7 @@
 
 namespace semblance {
 
-// Whether the options need nothing else: plan auto with the solver `fastest`.
+// Returns whether the options need nothing else: plan auto with the solver `fastest`.
 bool IsAlone(const FitOptions& options);
 
 // Fits and measures only the final surface. Throws as FitNested does. The second overload frees the

@@ -32,7 +32,7 @@ double BoxDiagonal(std::span<const Vec3> positions) {
   return box.diagonal().norm();
 }
 
-// Chords per extent with `auto`: a picture of the surface that is 5000 pixels wide shows no edges.
+// Chords per extent with `auto`: the error is a pixel in a picture that is 5000 pixels wide.
 constexpr double kChordsPerExtent = 5000;
 
 // Rounds up to two digits.
@@ -78,7 +78,7 @@ std::uint8_t AsColour(double value) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
 }
 
-// Whether red, green and blue range from 0 to 255, and not from 0 to 1 or from 0 to 65535.
+// Returns whether red, green and blue range from 0 to 255, and not from 0 to 1 or from 0 to 65535.
 bool AreBytes(std::span<const PointAttribute> attributes,
               const std::array<std::ptrdiff_t, 3>& rgb) {
   double least = 0, most = 0;
@@ -122,7 +122,7 @@ MeshAttributes AttributesAt(const PointFit& result, std::span<const Vec2> uv, in
 void CheckChord(const AutoOr<double>& chord_mm, const HSplineSurface& start,
                 const ScatteredPoints& points, const RunContext& context) {
   constexpr std::size_t kFewest = 16;  // points: the auto plan refuses fewer
-  constexpr double kFinest = 1e-7;     // share of the extent, near the round-off of a PLY's floats
+  constexpr double kFinest = 1e-7;  // share of the extent, near the round-off of single precision
   if (chord_mm.automatic) {
     return;
   }

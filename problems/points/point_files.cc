@@ -407,7 +407,7 @@ void CheckReach(const PointTable& points) {
   }
 }
 
-// Whether each point is a line of the file, after a line with the names of the columns.
+// Returns whether each point is a line of the file, after a line with the names of the columns.
 bool IsTable(const std::filesystem::path& path) {
   return path == "-" || IsCsv(LowerCase(path.extension().string()) == ".gz" ? path.stem() : path);
 }

@@ -357,8 +357,8 @@ void SplitRms(std::span<const double> weights, PointFit& result) {
   }
 }
 
-// How far the surface goes beyond the box, in diagonals of the box. It is sampled: more cells would
-// only refine a figure that is compared with 3.
+// Returns how far the surface goes beyond the box, in diagonals of the box. It looks at a grid of
+// places; more of them would only refine a figure that is compared with 3.
 double ReachBeyond(const HSplineSurface& surface, const Box3& box) {
   constexpr int kCells = 64;  // along u and v
   double farthest = 0;

@@ -32,7 +32,7 @@ Vec3 Pipe(const Vec2& uv) {
   return turn * Vec3(30 * std::sin(2 * uv.x()), 80 * uv.y(), 30 * std::cos(2 * uv.x()));
 }
 
-TEST(MeshMap, EveryMapIsOneToOneAsLargeAndTheRightWayRound) {
+TEST(MeshMap, EveryMapIsOneToOneCounterClockwiseAndKeepsTheArea) {
   const TriMesh mesh = testing::GridMesh(Bowl, 24);
   for (const MeshMap map : kMaps) {
     const MeshLayout layout = LayOut(mesh, map);
@@ -50,7 +50,7 @@ TEST(MeshMap, EveryMapIsOneToOneAsLargeAndTheRightWayRound) {
   }
 }
 
-// What can be unrolled is unrolled: every edge keeps its length.
+// A pipe is unrolled: every edge keeps its length.
 TEST(MeshMap, FreeBordersUnrollAPipe) {
   const TriMesh mesh = testing::GridMesh(Pipe, 16);
   for (const MeshMap map : {MeshMap::kArap, MeshMap::kLscm}) {
@@ -64,7 +64,7 @@ TEST(MeshMap, FreeBordersUnrollAPipe) {
   }
 }
 
-// The border is the square's: its corners are the mesh's.
+// The corners of the mesh become those of the square.
 TEST(MeshMap, ASquareTakesTheCornersOfARectangle) {
   const TriMesh mesh =
       testing::GridMesh([](const Vec2& uv) { return Vec3(90 * uv.x(), 20 * uv.y(), 7); }, 12);
@@ -92,7 +92,7 @@ TEST(MeshMap, AHoleIsBridgedAndNoPointIsAdded) {
   EXPECT_EQ(FaultsOfTriangles({mesh.points, layout.at}, mesh.triangles).folded, 0);
 }
 
-TEST(MeshMap, WhatIsNoDiscIsRefusedWithWhatToDo) {
+TEST(MeshMap, AMeshThatIsNoDiscIsRefusedWithTheRemedy) {
   const auto message = [](const TriMesh& mesh) -> std::string {
     try {
       LayOut(mesh, MeshMap::kAuto);

@@ -118,7 +118,7 @@ TEST(Parametrise, AFoldedPlaneIsLeftForAnAxis) {
   }
 }
 
-TEST(Parametrise, WhatFoldsOverEveryPlaneIsRefusedUnlessAccepted) {
+TEST(Parametrise, FoldsOverEveryPlaneAreRefusedUnlessAccepted) {
   const std::vector<Vec3> sphere = OnSphere(3000);
   for (const Parameters& parameters : {Parameters(AutoParameters{}), Parameters(PlaneParameters{}),
                                        Parameters(PlaneParameters{.normal = {1, 2, 3}})}) {
@@ -212,7 +212,7 @@ TEST(Parametrise, TrianglesThatFoldAreLaidOut) {
 }
 
 // Heights stay on the plane, and the surface faces as the triangles.
-TEST(Parametrise, APlaneLooksAsTheTrianglesDo) {
+TEST(Parametrise, APlaneFacesAsTheTriangles) {
   TriMesh mesh = testing::GridMesh(
       [](const Vec2& uv) { return Vec3(9 * uv.x(), 4 * uv.y(), std::sin(2 * uv.x())); }, 20);
   for (const bool inward : {false, true}) {

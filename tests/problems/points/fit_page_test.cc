@@ -74,7 +74,7 @@ TEST(FitMaps, TheGridIsClosedAsTheSurfaceIs) {
   EXPECT_EQ(border_edges(Closure::kPeriodicU), open / 2);
 }
 
-TEST(FitMaps, QuantilesAreThoseOfAllFigures) {
+TEST(FitMaps, QuantilesAreThoseOfAllNumbers) {
   for (const int count : {1, 2, 3, 20, 21, 40, 1000}) {
     PointFit fit = FitPoints(Points(30), Adaptive(0.01, 0), {});
     fit.fit.residual_mm.clear();
@@ -90,7 +90,7 @@ TEST(FitMaps, QuantilesAreThoseOfAllFigures) {
   }
 }
 
-TEST(FitMaps, AMissedToleranceIsSaidWithWhatMayHelp) {
+TEST(FitMaps, AMissedToleranceIsReportedWithTheRemedy) {
   const PointFit coarse = FitPoints(Points(2000), Adaptive(0.004, 0), {});
   const ToleranceReport missed =
       CompareWithTolerance(coarse.fit, {.tolerance_mm = 0.004, .finest = 0});
@@ -106,7 +106,7 @@ TEST(FitMaps, AMissedToleranceIsSaidWithWhatMayHelp) {
   EXPECT_THAT(ToleranceText(met), HasSubstr("is met"));
 }
 
-TEST(FitPage, SaysWhatWasMissedAndEscapesWhatItIsGiven) {
+TEST(FitPage, ReportsAMissedToleranceAndEscapesText) {
   const PointFitOptions options = Adaptive(0.004, 0);
   const PointFit fit = FitPoints(Points(500), options, {});
   const PointSource source{"<b>hostile</b>.csv", "0123"};

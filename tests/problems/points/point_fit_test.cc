@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any scattered points, with and without (u,v).
+// Fits of scattered points, with and without (u,v).
 #include "problems/points/point_fit.h"
 
 #include <fmt/format.h>
@@ -74,9 +74,9 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
   }
 }
 
-// Noise of 1e-3 and twenty points a parameter or so: sigma is a fraction of it, and more at
-// borders.
-TEST(PointFit, SigmaIsKnownWhereItIsAskedFor) {
+// With noise of 1e-3 and about twenty points per parameter sigma is a fraction of the noise, and
+// larger at borders.
+TEST(PointFit, SigmaIsComputedIfRequested) {
   PointFitOptions options;
   options.sigma = true;
   const PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 3000, 1e-3, 1)), "test");
@@ -98,7 +98,7 @@ TEST(PointFit, SigmaIsKnownWhereItIsAskedFor) {
   EXPECT_THAT(plain.sigma_mm, ::testing::IsEmpty());
 }
 
-// Every hundredth point lifted, and to be met all the same.
+// Every hundredth point is lifted and must still be met.
 TEST(PointFit, ExactPointsOfATableAreMet) {
   const FitTarget target = Scattered(FrankePoint, 2000, 1e-3, 1);
   std::string csv = "x,y,z,u,v,exact,nx,ny,nz\n";
@@ -123,9 +123,9 @@ TEST(PointFit, ExactPointsOfATableAreMet) {
   EXPECT_LT(ErrorAgainst(FrankePoint, result.fit.surface, 50).rms, 0.01);
 }
 
-// One point in five is twenty times as rough as the others, and says so; one in fifty is far off
-// and claims to be the surest of all. 1 is what the others are off by.
-TEST(PointFit, SigmaFactorsAreOfThePointsThatAreNoOutliers) {
+// One point in five is twenty times as rough as the others, and its sigma is right. One point in
+// fifty is far off and has the smallest sigma. The factor of the others is 1.
+TEST(PointFit, OutliersDoNotCountForTheSigmaFactor) {
   const FitTarget target = Scattered(FrankePoint, 5000, 0, 1);
   Random random(2);
   std::string csv = "x,y,z,u,v,sigma\n";
@@ -143,9 +143,8 @@ TEST(PointFit, SigmaFactorsAreOfThePointsThatAreNoOutliers) {
   EXPECT_NEAR(static_cast<double>(result.fit.automatic->outliers.size()), 100, 5);
 }
 
-// With the weight that was found, its length and the same points, a fit that is given numbers is
-// the same.
-TEST(PointFit, TheWeightThatIsReportedIsThatOfTheTermsAsWritten) {
+// A fit with the reported weight and length as numbers gives the same surface.
+TEST(PointFit, TheReportedWeightBelongsToTheWrittenTerms) {
   const PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 3000, 1e-3, 1)), "test");
   const PointFit plain = FitPoints(table, {}, {});
   PointFitOptions options;
@@ -168,7 +167,7 @@ TEST(PointFit, TheWeightThatIsReportedIsThatOfTheTermsAsWritten) {
   EXPECT_LT(ErrorAgainst(of_settled, again.fit.surface, 50).rms, 1e-9);
 }
 
-// Two strips of points, and next to nothing between them.
+// Two strips of points with nearly nothing between them.
 TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   std::string csv = "x,y,z,u,v\n";
   for (int k = 0; k < 400; ++k) {
@@ -187,7 +186,7 @@ TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   EXPECT_THAT(result.Faults()[0], HasSubstr("times the points' extent beyond them"));
 }
 
-// Inside a ball there is no surface to find; on its upper half there is, however noisy.
+// The points in a ball have no surface; those on its upper half have one, even with noise.
 TEST(PointFit, PointsThatFillSpaceCannotBeUsed) {
   Random random(7);
   PointTable filled, half;
@@ -205,7 +204,7 @@ TEST(PointFit, PointsThatFillSpaceCannotBeUsed) {
   EXPECT_THAT(noisy.Faults(), ::testing::IsEmpty());
 }
 
-TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
+TEST(PointFit, ContradictingOptionsAreFaultsOfTheFile) {
   const auto read = [](const std::string& text) {
     return testing::WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
   };
@@ -226,7 +225,7 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
               HasSubstr("closure: parameters on a mesh do not go round; write closure: open"));
   EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
   EXPECT_THAT(read("patches_u: 1\nclosure: periodic_u\n"), HasSubstr("patches_u: H-spline: 1 x 8"));
-  // What is said to be allowed is.
+  // The allowed values that the message names are allowed.
   EXPECT_THAT(read("patches_u: 3\nclosure: periodic_u\n"), HasSubstr("use 4..8192 x 1..8192"));
   EXPECT_NO_THROW(ReadConfigText<PointFitOptions>("patches_u: 8192\n", "x.yaml"));
   EXPECT_NO_THROW(ReadConfigText<PointFitOptions>("patches_u: 1024\npatches_v: 1024\n", "x.yaml"));
@@ -251,7 +250,7 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("sigma: true\nfit: {plan: adaptive}\n"), HasSubstr("sigma: it follows"));
 }
 
-// Some points once more, one of them twice: nothing is learned from them, of noise least of all.
+// Some points are repeated, one of them twice. Copies must not change the noise.
 TEST(PointFit, CopiesOfPointsCountOnce) {
   PointFitOptions options;
   options.sigma = true;
@@ -263,7 +262,7 @@ TEST(PointFit, CopiesOfPointsCountOnce) {
     again.uv.push_back(once.uv[k]);
   }
   const PointFit plain = FitPoints(once, options, {}), more = FitPoints(again, options, {});
-  // But for where the fits start from, which all points tell.
+  // The fits differ slightly, because copies count for the start surface.
   const auto of_plain = [&](const Vec2& uv) { return plain.fit.surface.Point(uv); };
   EXPECT_LT(ErrorAgainst(of_plain, more.fit.surface, 50).rms, 5e-5);
   EXPECT_NEAR(more.fit.automatic->noise_mm, plain.fit.automatic->noise_mm, 1e-5);
@@ -279,8 +278,8 @@ TEST(PointFit, CopiesOfPointsCountOnce) {
   EXPECT_THAT(AutoText(*more.fit.automatic), HasSubstr("6 points were given before"));
 }
 
-// Lines of a scanner, close together along themselves and far apart, of a height field and of a
-// flat one: a sheet, and no wall.
+// Scan lines, whose points are close together along the lines and far apart across them, are a
+// sheet and no wall.
 TEST(PointFit, LinesOfAScannerAreASheet) {
   for (const auto& [lines, along, height] : {std::tuple(20, 500, 1), std::tuple(60, 180, 1),
                                              std::tuple(40, 400, 1), std::tuple(20, 500, 0)}) {
@@ -301,7 +300,7 @@ TEST(PointFit, LinesOfAScannerAreASheet) {
   }
 }
 
-// At a hundred million mm, digits of a hundredth of a micrometre are left.
+// At 1e8 mm a double resolves 1.5e-8 mm.
 TEST(PointFit, PointsFarFromTheOriginHaveAnExtent) {
   PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 500, 1e-3, 1)), "test");
   const PointFit near = FitPoints(table, {}, {});

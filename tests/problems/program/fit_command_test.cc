@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `semblance fit` as it is called: files in, files out.
+// `semblance fit` from the command line, from files to files.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -75,7 +75,7 @@ TEST_F(FitCommand, FrankesFunctionAndTheHeadComeOut) {
   EXPECT_GT(ReadMesh(folder_ / "head/surface.ply").triangles.size(), 1000u);
 }
 
-// Neither a configuration nor (u,v): what is left of the points is their noise, 1e-3 each way.
+// Without (u,v): the residuals are the noise, 1e-3 per coordinate.
 TEST_F(FitCommand, AHeightFieldKeepsItsNoise) {
   Write("franke.csv", PlainCsv(Scattered(FrankePoint, 5000, 1e-3, 1)));
   const auto outcome =
@@ -99,8 +99,8 @@ TEST_F(FitCommand, TheTableOfTheReadmeIsFittedWithoutAConfiguration) {
   EXPECT_NEAR(json["automatic"]["outlier_count"], 20, 2);
 }
 
-// (u,v) that are off by a hundredth blur the head; moved first, they do not.
-TEST_F(FitCommand, UvMoveBeforeTheFitWhereThatIsAskedFor) {
+// (u,v) that are off by a hundredth blur the head, unless they are moved first.
+TEST_F(FitCommand, UvMoveBeforeTheFitIfRequested) {
   FitTarget target = Scattered(HeadPoint, 8000, 1e-4, 1);
   Random random(2);
   for (FitPoint& p : target.points) {
@@ -133,7 +133,7 @@ TEST_F(FitCommand, UvMoveBeforeTheFitWhereThatIsAskedFor) {
   }
 }
 
-TEST_F(FitCommand, GivenUvStayUnlessAskedFor) {
+TEST_F(FitCommand, GivenUvStayWithoutARequest) {
   const FitTarget target = Scattered(FrankePoint, 500, 1e-3, 1);
   const PointTable table = ParsePointTable(UvCsv(target), "test");
   const PointFit result = FitPoints(table, {}, {});
@@ -151,7 +151,7 @@ TEST_F(FitCommand, MovesBesideExactPointsAreRefused) {
               HasSubstr("fit.plan.relaxation_rounds: exact points"));
 }
 
-TEST_F(FitCommand, PointsOfEachKindOfFileAreTheSame) {
+TEST_F(FitCommand, PointsOfEachFileFormatAreTheSame) {
   const FitTarget target = Scattered(FrankePoint, 300, 0, 1);
   std::string xyz, obj, ply = "ply\nformat ascii 1.0\nelement vertex 300\n";
   for (const char* name : {"x", "y", "z", "u", "v"}) {
@@ -177,8 +177,7 @@ TEST_F(FitCommand, PointsOfEachKindOfFileAreTheSame) {
   EXPECT_THROW(ReadPointFile(folder_ / "p.doc"), IoError);
 }
 
-// Larger than what is read at once; with a blank somewhere it goes by the general reader.
-TEST_F(FitCommand, WhatComesByAPipeIsATableOrIsRefused) {
+TEST_F(FitCommand, StandardInputIsATableOrIsRefused) {
   Write("a.csv", UvCsv(Scattered(FrankePoint, 500, 1e-3, 1)));
   ASSERT_EQ(Call("fit a.csv --out plain --quiet").code, 0);
   ASSERT_EQ(std::system(("gzip -kf '" + (folder_ / "a.csv").string() + "'").c_str()), 0);
@@ -209,6 +208,7 @@ TEST_F(FitCommand, OnlyBytesAreColours) {
   EXPECT_EQ(carried.scalars.size(), 3u);
 }
 
+// The table is larger than a block of the plain reader; with a blank the general reader takes over.
 TEST_F(FitCommand, ALargeTableIsReadAsASmallOne) {
   std::string text = UvCsv(Scattered(FrankePoint, 60000, 1e-3, 1));
   ASSERT_GT(text.size(), 4u << 20);
@@ -228,7 +228,7 @@ TEST_F(FitCommand, ALargeTableIsReadAsASmallOne) {
   expect_same("blank.csv");
 }
 
-// Triangles in whatever file they stand; without them the same points are refused.
+// Triangles of every format are laid out; without triangles the same points are refused.
 TEST_F(FitCommand, AScanThatFoldsIsLaidOut) {
   const auto bowl = [](const Vec2& uv) -> Vec3 {
     const Vec2 q = 2 * uv - Vec2(1, 1);
@@ -261,7 +261,7 @@ TEST_F(FitCommand, AScanThatFoldsIsLaidOut) {
               HasSubstr("or triangles between the points (a PLY, OBJ, STL or OFF with faces)"));
 }
 
-// Colours and heat over the surface, each point surer or less sure; out in every file of points.
+// Colours and heat over the surface, with two values of sigma, are written to every file.
 TEST_F(FitCommand, FurtherColumnsAreFittedOverTheSurface) {
   Random random(1);
   std::string csv = "x,y,z,u,v,sigma,red,green,blue,heat\n";
@@ -321,7 +321,7 @@ TEST_F(FitCommand, TheChordHoldsFarFromTheOrigin) {
   }
 }
 
-TEST_F(FitCommand, NothingThatItReadsIsReplaced) {
+TEST_F(FitCommand, InputFilesAreNotReplaced) {
   Write("own/residuals.csv", UvCsv(Scattered(FrankePoint, 300, 1e-3, 1)));
   Write("own/resolved.yaml", "chord_mm: 0.1\n");
   const auto refused = [&](const std::string& arguments, const std::string& file,
@@ -399,7 +399,7 @@ TEST_F(FitCommand, AWidthWithoutALossIsReported) {
   EXPECT_THAT(outcome.out, HasSubstr("fit.terms[0].loss_width_mm: `loss: none` ignores it"));
 }
 
-TEST_F(FitCommand, WhatIsWrongIsSaidInOneLineAndNothingIsWritten) {
+TEST_F(FitCommand, AFaultIsOneLineAndNothingIsWritten) {
   Write("good.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,0\n");
   Write("bad.csv", "x,y,z\n0,0,zero\n");
   Write("line.csv", "x,y,z\n0,0,0\n1,0,0\n2,0,0\n");
@@ -463,7 +463,7 @@ TEST_F(FitCommand, ATubeIsFittedByEveryPlan) {
   }
 }
 
-// As residuals.csv has it, and beside it with weights, where those differ.
+// The RMS is that of residuals.csv; the weighted RMS is shown too if the weights differ.
 TEST_F(FitCommand, TheRmsIsThatOfTheDistances) {
   const FitTarget target = Scattered(FrankePoint, 2000, 1e-3, 1);
   const auto csv = [&](auto&& sigma) {
