@@ -85,7 +85,6 @@ int VertexAt(const FitGrid& grid, int i, int j) {
   return (across ? 0 : i) + grid.columns * j;
 }
 
-// Two per cell.
 std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
   std::vector<Triangle> triangles;
   for (int j = 0; j + 1 < grid.rows; ++j) {

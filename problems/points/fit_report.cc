@@ -25,7 +25,8 @@ using Json = nlohmann::ordered_json;
 
 // The verdict that the residuals still contain detail: the residuals of neighbours correlate by
 // more than the first number, or the noise between neighbours is a smaller share of the noise than
-// the second. Lower and higher values give the verdict more often, also for noise alone.
+// the second. A lower first or a higher second number gives the verdict more often, also for noise
+// alone.
 constexpr double kMostCorrelation = 0.1, kLeastNoiseShare = 0.85;
 
 Json RoundJson(const NestedRound& round) {
@@ -48,12 +49,12 @@ bool LeavesDetail(const AutoReport& r) {
 
 std::string Verdict(const AutoReport& r) {
   if (r.met_to_rounding) {
-    return "points are met to a hundred-millionth of their extent: the rest is rounding";
+    return "points are met to a hundred-millionth of their extent: what is left is rounding";
   }
   if (r.limited_by_density) {
     return "detail goes down to the points' spacing: denser points would show more";
   }
-  return LeavesDetail(r) ? "residuals are still correlated: part of the noise is detail"
+  return LeavesDetail(r) ? "residuals are still correlated: part of what counts as noise is detail"
                          : "residuals look like noise: these points show no more detail";
 }
 
