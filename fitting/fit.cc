@@ -284,7 +284,6 @@ class Fitter {
                     .held = Held(),
                     .solver = options_.solver,
                     .threads = context_.threads});
-    all.AddAsked(plan.finest);
     const auto solve = [&](std::span<const Term>, SolveReport report) {
       SeePoints(all);
       const LevelSummary summary = all.Solve(SolveTolerance::kLoose, report);
@@ -348,7 +347,6 @@ class Fitter {
                     .settled = true});
     const AdaptivePlan where_unmet{.tolerance_mm = std::numeric_limits<double>::infinity(),
                                    .finest = start.shape().max_level};
-    all.AddAsked(where_unmet.finest);
     LevelSummary summary = all.Settle();
     while (exact && all.Refine(where_unmet)) {
       summary = all.Settle();

@@ -9,7 +9,7 @@
 #include <iterator>
 #include <memory>
 
-#include "fitting/plan/fit_faults.h"
+#include "fitting/plan/fit_result.h"
 #include "problems/pipeline/hand_edits.h"
 #include "problems/pipeline/make_face.h"
 #include "problems/pipeline/stage_key.h"

@@ -1,36 +1,56 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Samples of scattered points and of a map of theirs, few enough to look at all of them.
+// A map of scattered points to the plane, and samples of it that are few enough to compare each
+// with all others.
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
-#include "fitting/folds/plane_map.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance {
+
+// Positions and places are both in mm, so that lengths can be compared.
+struct PlaneMap {
+  std::span<const Vec3> positions;
+  std::span<const Vec2> at;  // one per position
+  double period_mm = 0;  // length once round along the first coordinate; 0: it does not go round
+};
+
+// The way from one place to another, the shorter way round.
+inline Vec2 Way(const Vec2& from, const Vec2& to, double period_mm) {
+  Vec2 way = to - from;
+  if (period_mm > 0) {
+    way.x() -= period_mm * std::round(way.x() / period_mm);
+  }
+  return way;
+}
 
 struct MapSample {
   Vec3 position = Vec3::Zero();
   Vec2 at = Vec2::Zero();
 };
 
-// Points as they are, sixty thousand at most.
+// Every n-th point as it is, at most 60,000.
 std::vector<MapSample> ThinnedSamples(const PlaneMap& map);
 
-// Means over the cubes of a lattice, over which noise is less; ordered by their places.
-//   most: of them, at least 1.
+// Means over the cubes of a lattice, which have less noise than the points; ordered by their
+// places.
+//   most: largest number of means, at least 1.
 std::vector<MapSample> MeanSamples(const PlaneMap& map, std::size_t most);
 
 inline constexpr int kNearSamples = 16, kNearWithItself = kNearSamples + 1;
-inline constexpr std::size_t kFewestSamples = 32;                   // that say anything
-using NearestSamples = std::array<std::uint32_t, kNearWithItself>;  // itself first
+inline constexpr std::size_t kFewestSamples = 32;  // twice a neighbourhood: fewer say nothing
+using NearestSamples = std::array<std::uint32_t, kNearWithItself>;  // the sample itself first
 
-// Of `count` samples those that are nearest to `own`, in order. square(n): of a distance.
+// Returns the sample `own` and the nearest others among `count` samples, in order of their
+// distance. square(n): squared distance of sample n from `own`.
 template <class Square>
 NearestSamples NearestBy(std::uint32_t count, std::uint32_t own, const Square& square) {
   std::array<std::pair<double, std::uint32_t>, kNearWithItself> best;
@@ -55,12 +75,12 @@ NearestSamples NearestBy(std::uint32_t count, std::uint32_t own, const Square& s
 
 NearestSamples NearestInSpace(const std::vector<MapSample>& samples, std::uint32_t own);
 
-// The plane of least squares through those around a sample.
+// The plane of least squares through the neighbours of a sample.
 struct SheetPlane {
   Vec3 mean = Vec3::Zero();
-  Mat3 axes = Mat3::Identity();  // by spread; the first is the normal
-  bool is_sheet = false;  // the sample and those around it lie on a sheet: noise and outliers
-                          // do not
+  Mat3 axes = Mat3::Identity();  // columns by ascending spread; the first is the normal
+  bool is_sheet = false;  // the sample and its neighbours lie on a sheet; false in noise, and
+                          // for an outlier
 };
 SheetPlane PlaneAround(const std::vector<MapSample>& samples, const NearestSamples& nearest);
 

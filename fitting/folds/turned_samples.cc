@@ -14,13 +14,14 @@ namespace {
 struct SheetSample {
   NearestSamples nearest{};
   bool is_sheet = false;
-  Vec3 normal = Vec3::Zero();  // of either side
-  double left = 0;             // of an area on the map; negative where it is turned over
+  Vec3 normal = Vec3::Zero();  // unit; to either side
+  double area_left = 0;        // area on the map over area in space; negative if turned over
 };
 
-// Of an area on the plane, counter-clockwise seen from its normal, what the map leaves.
-double LeftOn(const SheetPlane& plane, const std::vector<MapSample>& samples,
-              const NearestSamples& nearest, const Vec2& period_mm) {
+// The area on the map over the area on the plane, counter-clockwise seen from the plane's normal:
+// the determinant of the linear map of least squares.
+double AreaLeft(const SheetPlane& plane, const std::vector<MapSample>& samples,
+                const NearestSamples& nearest, double period_mm) {
   const Vec3 across = plane.axes.col(2), third = plane.axes.col(0).cross(across);
   const Vec2& own = samples[nearest[0]].at;
   Vec2 mean = Vec2::Zero();
@@ -37,8 +38,7 @@ double LeftOn(const SheetPlane& plane, const std::vector<MapSample>& samples,
   return mixed.determinant() / on_plane.determinant();
 }
 
-std::vector<SheetSample> SheetSamples(const std::vector<MapSample>& samples,
-                                      const Vec2& period_mm) {
+std::vector<SheetSample> SheetSamples(const std::vector<MapSample>& samples, double period_mm) {
   std::vector<SheetSample> sheets;
   sheets.reserve(samples.size());
   for (std::uint32_t k = 0; k < samples.size(); ++k) {
@@ -46,14 +46,14 @@ std::vector<SheetSample> SheetSamples(const std::vector<MapSample>& samples,
     const SheetPlane plane = PlaneAround(samples, sheet.nearest);
     sheet.is_sheet = plane.is_sheet;
     sheet.normal = plane.axes.col(0);
-    sheet.left = LeftOn(plane, samples, sheet.nearest, period_mm);
+    sheet.area_left = AreaLeft(plane, samples, sheet.nearest, period_mm);
     sheets.push_back(sheet);
   }
   return sheets;
 }
 
-// Which samples are of one piece, and whether the normal of each looks as that of the piece's
-// first.
+// Disjoint sets of samples that form one piece, in which each sample has the side of its normal
+// against that of the piece's first sample.
 class Pieces {
  public:
   explicit Pieces(std::size_t count) : up_(count), side_(count, 1) {
@@ -71,7 +71,7 @@ class Pieces {
     }
     return {k, side};
   }
-  // side: of a's normal as seen from b's.
+  // side: 1 if the normals of a and b look to the same side, else -1.
   void Join(std::uint32_t a, std::uint32_t b, int side) {
     const Place of_a = PlaceOf(a), of_b = PlaceOf(b);
     if (of_a.piece != of_b.piece) {
@@ -86,8 +86,9 @@ class Pieces {
 };
 
 Pieces Join(const std::vector<SheetSample>& sheets) {
-  constexpr int kNext = 8;
-  constexpr double kLeastAlike = 0.5;  // sixty degrees
+  constexpr int kNext = 8;  // neighbours per sample; more would join sheets that lie close together
+  // Cosine of 60 degrees: across a sharper bend the side of a normal is not carried on.
+  constexpr double kLeastAlike = 0.5;
   struct Pair {
     double alike;
     std::uint32_t a, b;
@@ -110,7 +111,7 @@ Pieces Join(const std::vector<SheetSample>& sheets) {
   return pieces;
 }
 
-// Samples of which so much is left have a side.
+// Samples that have a side, because more than a share of their area is left on the map.
 struct Sided {
   std::size_t count = 0, turned = 0;
 };
@@ -118,10 +119,10 @@ Sided CountTurned(const std::vector<SheetSample>& sheets, const Pieces& pieces, 
   std::vector<std::array<std::size_t, 2>> sides(sheets.size(), {0, 0});  // of each piece
   Sided sided;
   for (std::uint32_t k = 0; k < sheets.size(); ++k) {
-    if (sheets[k].is_sheet && std::abs(sheets[k].left) > least_left) {
+    if (sheets[k].is_sheet && std::abs(sheets[k].area_left) > least_left) {
       const auto [piece, side] = pieces.PlaceOf(k);
       ++sided.count;
-      ++sides[piece][side * sheets[k].left > 0 ? 1 : 0];
+      ++sides[piece][side * sheets[k].area_left > 0 ? 1 : 0];
     }
   }
   for (const auto& [one, other] : sides) {
@@ -132,7 +133,7 @@ Sided CountTurned(const std::vector<SheetSample>& sheets, const Pieces& pieces, 
 
 }  // namespace
 
-TurnedSamples FindTurned(const std::vector<MapSample>& samples, const Vec2& period_mm) {
+TurnedSamples FindTurned(const std::vector<MapSample>& samples, double period_mm) {
   if (samples.size() < kFewestSamples) {
     return {};
   }
@@ -140,7 +141,7 @@ TurnedSamples FindTurned(const std::vector<MapSample>& samples, const Vec2& peri
   const Pieces pieces = Join(sheets);
   const auto on_sheet = static_cast<double>(std::ranges::count_if(sheets, &SheetSample::is_sheet));
   TurnedSamples found{.on_sheet = on_sheet / static_cast<double>(samples.size())};
-  for (const double least_left : {0.1, 0.02}) {
+  for (const double least_left : {0.1, 0.02}) {  // see turned_samples.h
     const Sided sided = CountTurned(sheets, pieces, least_left);
     if (sided.count >= kFewestSamples) {
       found.turned = static_cast<double>(sided.turned) / static_cast<double>(sided.count);

@@ -16,14 +16,13 @@ struct PatchGrid {
   int patches_u = 0;
   int patches_v = 0;
   bool periodic_u = false;
-  bool periodic_v = false;
 
   int Columns() const { return periodic_u ? patches_u : patches_u + 3; }
-  int Rows() const { return periodic_v ? patches_v : patches_v + 3; }
+  int Rows() const { return patches_v + 3; }
   static PatchGrid Of(const HSplineShape& shape, int level);
-  HSplineShape Shape() const;  // with this as level 0, and no other; periodic in u if it is in v
-  // The sixteen vertices of patch (i, j), the one at column a, row b of its 4 x 4 at a + 4 b. Along
-  // a periodic direction a vertex stands several times if there are fewer than 4 patches.
+  HSplineShape Shape() const;  // with this as level 0, and no other
+  // The sixteen vertices of patch (i, j), the one at column a, row b of its 4 x 4 at a + 4 b. A
+  // vertex stands several times if the grid is periodic and has fewer than 4 patches along u.
   std::array<int, 16> PatchVertices(int i, int j) const;
   // semblance::StencilAt on this net; its vertices are PatchVertices of the patch at uv.
   Stencil StencilAt(const Vec2& uv, DerivativeOrder order = {}) const;

@@ -22,8 +22,7 @@
 #include <string>
 #include <utility>
 
-#include "fitting/closed_mesh/mesh_pieces.h"
-#include "fitting/parameters/one_to_one.h"
+#include "fitting/folds/fold_check.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -37,14 +36,26 @@ using Vertex = LayoutMesh::Vertex_index;
 using Border = LayoutMesh::Halfedge_index;
 using PositionMap = LayoutMesh::Property_map<Vertex, LayoutKernel::Point_2>;
 
-constexpr char kRefused[] = "parameters: the mesh cannot be laid out on the plane";
-
 [[noreturn]] void FailLayout(const std::string& what) {
-  throw InputError(fmt::format("{}: {}", kRefused, what));
+  throw InputError("parameters: the mesh cannot be laid out on the plane: " + what);
+}
+
+void CheckOnePiece(const TriMesh& mesh) {
+  std::vector<char> used(mesh.points.size(), 0);
+  for (const Triangle& t : mesh.triangles) {
+    used[t[0]] = used[t[1]] = used[t[2]] = 1;
+  }
+  if (const auto loose = std::count(used.begin(), used.end(), 0); loose > 0) {
+    FailLayout(fmt::format("{} of its {} points belong to no triangle; remove them", loose,
+                           mesh.points.size()));
+  }
+  if (const int pieces = ConnectedComponents(mesh).count; pieces != 1) {
+    FailLayout(fmt::format("it has {} pieces; keep one", pieces));
+  }
 }
 
 LayoutMesh HalfedgesOf(const TriMesh& mesh) {
-  CheckOnePiece(mesh, kRefused);
+  CheckOnePiece(mesh);
   std::vector<LayoutKernel::Point_3> points;
   points.reserve(mesh.points.size());
   for (const Vec3& p : mesh.points) {
@@ -78,15 +89,14 @@ double LengthOf(const LayoutMesh& mesh, Border border) {
   return length;
 }
 
-// The longest border; the others are filled with triangles between their points.
+// Returns the longest border, and fills the others with triangles between their points.
 Border OnlyBorder(LayoutMesh& mesh) {
   std::vector<Border> borders;
   processing::extract_boundary_cycles(mesh, std::back_inserter(borders));
   if (borders.empty()) {
     FailLayout(
-        "it is closed and has no border; write closure: periodic_u, with which it is laid out on a "
-        "sphere, or, if it is a ring, take parameters: torus with closure: periodic_uv, or cut it "
-        "open");
+        "it is closed and has no border; cut it open, or give the columns u and v with parameters: "
+        "given");
   }
   const auto longest = std::max_element(
       borders.begin(), borders.end(),
@@ -109,8 +119,8 @@ Border OnlyBorder(LayoutMesh& mesh) {
   return *longest;
 }
 
-// The four vertices of the border that lie farthest towards the corners of its rectangle, in the
-// order in which CGAL goes round; nothing if they are not four.
+// The four vertices of the border that lie farthest towards the corners of its rectangle, in CGAL's
+// order around the border; nothing if two of them are the same.
 std::optional<std::array<Vertex, 4>> CornersOf(const LayoutMesh& mesh, Border border) {
   std::vector<Vertex> around;
   std::vector<Vec3> places;
@@ -185,7 +195,7 @@ double SignedArea(const TriMesh& mesh, const std::vector<Vec2>& at) {
   return area;
 }
 
-// The longest side along the first axis; a proper rotation.
+// Rotates the layout so that its longest side lies along the first axis.
 void TurnLengthwise(std::vector<Vec2>& at) {
   Vec2 mean = Vec2::Zero();
   for (const Vec2& p : at) {
@@ -230,7 +240,9 @@ std::vector<Vec2> Places(const TriMesh& mesh, LayoutMesh& halfedges, Border bord
 }  // namespace
 
 MeshLayout LayOut(const TriMesh& mesh, MeshMap map) {
-  constexpr double kMostFolded = 0.002;  // of the area, before another way is taken
+  // Largest share of the area that ARAP may fold. Mean-value coordinates do not fold but distort
+  // more.
+  constexpr double kMostFolded = 0.002;
   LayoutMesh halfedges = HalfedgesOf(mesh);
   const Border border = OnlyBorder(halfedges);
   if (map != MeshMap::kAuto) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Triangles laid out on the plane, so that their corners have (u,v).
+// The layout of a mesh on the plane, which gives its points (u,v).
 #pragma once
 
 #include <array>
@@ -16,19 +16,20 @@ constexpr auto EnumNames(MeshMap) {
 }
 
 struct MeshLayout {
-  std::vector<Vec2> at;  // per point; as large in all as the mesh, mm^2, and the right way round
-  MeshMap map = MeshMap::kAuto;  // that was taken
+  std::vector<Vec2> at;          // per point, mm; of the same area as the mesh, counter-clockwise
+  MeshMap map = MeshMap::kAuto;  // the map that was used
 };
 
-// With a free border: as rigid as possible (ARAP; Liu et al. 2008), or least-squares conformal
-// (LSCM; Levy et al. 2002), turned so that the longest side lies along the first axis. With the
-// border on a square, whose corners are those of the border seen along its least spread:
-// mean-value coordinates (Floater 2003), or uniform weights (Tutte 1963), neither of which folds.
-// kAuto: ARAP, or mean_value where that folds. By CGAL's Surface_mesh_parameterization.
-//   mesh: one piece with a border, manifold, without handles, every point used. Of several borders
-//     the longest is the border, and the others are bridged while the mesh is laid out.
-// Throws InputError for any other mesh, with what it has instead and what to do, and where no
-// layout is found.
+// Lays the mesh out by CGAL's Surface_mesh_parameterization.
+// - With a free border, turned so that the longest side lies along the first axis: as rigid as
+//   possible (ARAP; Liu et al. 2008), or least-squares conformal (LSCM; Levy et al. 2002).
+// - With the border on a square, whose corners are the corners of the border as seen along its
+// least
+//   spread: mean-value coordinates (Floater 2003), or uniform weights (Tutte 1963). Neither folds.
+// - kAuto takes ARAP, or mean_value if ARAP folds.
+//   mesh: one piece with a border, manifold, without handles, every point used. The longest border
+//     counts; the other borders are bridged during the layout.
+// Throws InputError for any other mesh, with its fault and the remedy, and if the layout fails.
 MeshLayout LayOut(const TriMesh& mesh, MeshMap map);
 
 }  // namespace semblance

@@ -3,113 +3,268 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <utility>
-#include <vector>
 
-#include "fitting/closed_mesh/closed_map.h"
-#include "fitting/parameters/map_candidate.h"
-#include "fitting/parameters/one_to_one.h"
+#include "fitting/parameters/point_map.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
-// (u,v) as a place on the unit sphere, or on the plane.
-Vec3 PlaceOf(const Parametrisation& map, const Vec2& uv) {
-  if (!map.poles) {
-    return {uv.x(), uv.y(), 0};
+// Largest share of the points that may fold or collapse. Outliers and noise reach a few permille.
+constexpr double kMostFaults = 0.02;
+
+[[noreturn]] void Fail(const std::string& what) { throw InputError("parameters: " + what); }
+
+std::string PercentText(double share) { return fmt::format("{:.3g} %", 100 * share); }
+
+// ---------------------------------------------------------------------- given
+
+using Ranges = std::array<std::array<double, 2>, 2>;  // of u and v
+
+// Returns what is wrong with a point's (u,v), or nothing.
+std::string UvFault(const Vec2& uv, const Ranges& ranges) {
+  if (!uv.allFinite()) {
+    return fmt::format("has (u,v) = ({}, {}), which is not finite; give numbers, or leave it out",
+                       uv.x(), uv.y());
   }
-  const double turn = 2 * std::numbers::pi * uv.x(), from_pole = std::numbers::pi * uv.y();
-  return {std::sin(from_pole) * std::cos(turn), std::sin(from_pole) * std::sin(turn),
-          -std::cos(from_pole)};
+  const bool inside = uv.x() >= ranges[0][0] && uv.x() <= ranges[0][1] && uv.y() >= ranges[1][0] &&
+                      uv.y() <= ranges[1][1];
+  return inside ? ""
+                : fmt::format("has (u,v) = ({}, {}), outside [{}, {}] x [{}, {}]", uv.x(), uv.y(),
+                              ranges[0][0], ranges[0][1], ranges[1][0], ranges[1][1]);
 }
 
-double SqueezedBy(const Parametrisation& map, const Scan& points) {
-  std::vector<double> on_map;
-  on_map.reserve(points.triangles.size());
-  for (const Triangle& t : points.triangles) {
-    const Vec3 a = PlaceOf(map, map.uv[t[0]]), b = PlaceOf(map, map.uv[t[1]]),
-               c = PlaceOf(map, map.uv[t[2]]), outwards = map.poles ? a : Vec3::UnitZ();
-    on_map.push_back(outwards.dot((b - a).cross(c - a)) / 2);
-  }
-  return SqueezedShare(points.positions, points.triangles, on_map);
-}
-
-// A plane, or a sphere about a centre, may leave little room for some of the surface, or fold where
-// the check lets it. The triangles are then laid out, and whichever of the two squeezes less is
-// taken. Most surfaces are not squeezed, and need no layout, which takes longer.
-Parametrisation LessSqueezed(const Scan& points, Parametrisation simple) {
-  constexpr double kLittle = 1e-3;  // of the area
-  const double squeezed = SqueezedBy(simple, points);
-  if (squeezed <= kLittle) {
-    return simple;
-  }
-  try {
-    Parametrisation laid = ParametriseBy(points, MeshParameters{});
-    return SqueezedBy(laid, points) < squeezed ? std::move(laid) : std::move(simple);
-  } catch (const InputError&) {
-    return simple;  // triangles that cannot be laid out are not needed for it
-  }
-}
-
-// By rays where they meet it once and leave room for all of it, for that needs no triangles to be
-// right.
-Parametrisation SphereOrMesh(const Scan& points) {
-  TriedSphere sphere = TrySphere(points, {});
-  return sphere.fault.empty() ? LessSqueezed(points, TakeSphere(points, std::move(sphere)))
-                              : ParametriseBy(points, MeshParameters{});
-}
-
-// What ends in tips may be a sphere; a tube that is cut aslant is none, and stays a cylinder.
-Parametrisation CylinderOrSphere(const Scan& points) {
-  const TriedCylinder cylinder = TryCylinders(points, {});
-  if (cylinder.ends_in_tips) {
-    if (TriedSphere sphere = TrySphere(points, {}); sphere.fault.empty()) {
-      return TakeSphere(points, std::move(sphere));
+// The option with the ranges widened so that they hold all the points.
+std::string WiderRanges(std::span<const Vec2> uv, Ranges ranges) {
+  for (const Vec2& p : uv) {
+    for (const int c : {0, 1}) {
+      ranges[c] = {std::fmin(ranges[c][0], p[c]), std::fmax(ranges[c][1], p[c])};
     }
   }
-  if (!cylinder.end_fault.empty()) {
-    FailParameters(cylinder.end_fault);
-  }
-  return TakeCylinder(points, cylinder);
+  return fmt::format("parameters: {{type: given, u_range: [{}, {}], v_range: [{}, {}]}}",
+                     ranges[0][0], ranges[0][1], ranges[1][0], ranges[1][1]);
 }
 
-Parametrisation ParametriseBy(const Scan& points, const AutoParameters&) {
-  if (!points.given_uv.empty()) {
-    return ParametriseBy(points, GivenParameters{});
+void CheckGiven(std::span<const Vec2> uv, const Ranges& ranges, const PointNames& name_of) {
+  for (const auto& [low, high] : ranges) {
+    if (!(high > low)) {
+      Fail(fmt::format("the range [{}, {}] is empty; give the lower bound first", low, high));
+    }
   }
-  if (points.closure == Closure::kPeriodicUv) {
-    return ParametriseBy(points, TorusParameters{});
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    if (const std::string fault = UvFault(uv[k], ranges); !fault.empty()) {
+      throw InputError(fmt::format(
+          "{} {}{}", name_of ? name_of(k) : fmt::format("point {}", k + 1), fault,
+          uv[k].allFinite() ? fmt::format("; to take all points, write {}", WiderRanges(uv, ranges))
+                            : ""));
+    }
   }
-  if (points.closure == Closure::kPeriodicU) {
-    return IsClosed(points.triangles) ? SphereOrMesh(points) : CylinderOrSphere(points);
-  }
-  std::vector<MapCandidate> planes = PlanesOver(points, {});
-  if (MayBeTaken(planes.back(), FoldRule::kRefuse)) {
-    return LessSqueezed(points, TakePlane(std::move(planes.back())));
-  }
-  if (!points.triangles.empty()) {
-    return ParametriseBy(points, MeshParameters{});
-  }
-  PointLayout layout = LayOutPoints(points.positions, MeshParameters{}.map);
-  if (!layout.fault.empty()) {
-    FailParameters(fmt::format(
-        "the points fold over every plane: {}; and triangles between them make no open sheet: {}",
-        FaultsText(planes), layout.fault));
-  }
-  return FromLayout(std::move(layout));
 }
 
-void CheckTriangles(const Scan& points) {
-  const auto count = static_cast<std::int64_t>(points.positions.size());
-  for (const Triangle& t : points.triangles) {
+Parametrisation ParametriseBy(Scan scan, const GivenParameters& given) {
+  if (scan.given_uv.empty()) {
+    Fail(
+        "type 'given' needs the (u,v) of each point (the columns u and v of a table); give them, "
+        "or take 'plane', 'cylinder' or 'mesh'");
+  }
+  const Ranges ranges = {given.u_range, given.v_range};
+  CheckGiven(scan.given_uv, ranges, scan.name_of);
+  for (Vec2& uv : scan.given_uv) {
+    for (const int c : {0, 1}) {
+      uv[c] = (uv[c] - ranges[c][0]) / (ranges[c][1] - ranges[c][0]);
+    }
+  }
+  return {.uv = std::move(scan.given_uv), .source = ParameterSource::kGiven};
+}
+
+// ----------------------------------------------------------- plane, cylinder, mesh
+
+struct CheckedMap {
+  PointMap map;
+  MapFaults faults;
+  std::string looked_at;  // all maps among which it was chosen, with their faults; for messages
+};
+
+// The larger share of each fault, by the points and by the triangles if there are any.
+MapFaults FindFaults(const Scan& scan, const PointMap& map) {
+  const std::vector<Vec2> in_mm = map.goes_round ? map.InMm() : std::vector<Vec2>();
+  const PlaneMap plane{scan.positions, map.goes_round ? in_mm : map.at, map.Period_mm()};
+  const MapFaults by_points = FaultsOfPoints(plane);
+  if (scan.triangles.empty()) {
+    return by_points;
+  }
+  MapFaults by_triangles = FaultsOfTriangles(plane, scan.triangles);
+  if (by_triangles.Sum() > kMostFaults) {
+    const MapFaults beyond_noise = FaultsBeyondNoise(plane, scan.triangles);
+    by_triangles = beyond_noise.Sum() < by_triangles.Sum() ? beyond_noise : by_triangles;
+  }
+  return {.folded = std::max(by_points.folded, by_triangles.folded),
+          .collapsed = std::max(by_points.collapsed, by_triangles.collapsed),
+          .mirrored = by_triangles.mirrored};
+}
+
+// The first map with next to no faults, or else the one with the fewest.
+CheckedMap BestMap(const Scan& scan, const MapChoice& choice) {
+  // Below this share of faulty points another map is not tried. It saves time: a map that does not
+  // fold shows up to a permille or two by chance.
+  constexpr double kNextToNone = 0.003;
+  CheckedMap best;
+  for (int k = 0; k < choice.count && (k == 0 || best.faults.Sum() > kNextToNone); ++k) {
+    PointMap map = choice.make(k);
+    const MapFaults faults = FindFaults(scan, map);
+    best.looked_at +=
+        fmt::format("{}{} of them over {}", k == 0 ? "" : ", ", PercentText(faults.Sum()), map.how);
+    if (k == 0 || faults.Sum() < best.faults.Sum()) {
+      best.map = std::move(map);
+      best.faults = faults;
+    }
+  }
+  return best;
+}
+
+bool MayBeTaken(const CheckedMap& map, FoldRule folds) {
+  return folds == FoldRule::kAccept || map.faults.Sum() <= kMostFaults;
+}
+
+// Brings one coordinate to 0..1.
+void Normalise(int coordinate, std::vector<Vec2>& uv) {
+  double low = uv.front()[coordinate], high = low;
+  for (const Vec2& p : uv) {
+    low = std::min(low, p[coordinate]);
+    high = std::max(high, p[coordinate]);
+  }
+  if (!(high > low)) {
+    Fail(
+        fmt::format("the points have no extent along {}; give other points, or the columns u and v "
+                    "with parameters: given",
+                    coordinate == 0 ? "u" : "v"));
+  }
+  for (Vec2& p : uv) {
+    p[coordinate] = std::clamp((p[coordinate] - low) / (high - low), 0.0, 1.0);
+  }
+}
+
+Parametrisation Take(CheckedMap checked, ParameterSource source) {
+  PointMap& map = checked.map;
+  for (Vec2& p : map.at) {
+    p.x() = map.goes_round ? std::clamp(p.x(), 0.0, 1.0) : p.x();
+    p.y() *= checked.faults.mirrored ? -1 : 1;  // so that du x dv faces as the triangles do
+  }
+  if (!map.goes_round) {
+    Normalise(0, map.at);
+  }
+  Normalise(1, map.at);
+  return {.uv = std::move(map.at),
+          .source = source,
+          .how = std::move(map.how),
+          .faults = checked.faults};
+}
+
+[[noreturn]] void RefusePlanes(const CheckedMap& planes) {
+  Fail(fmt::format(
+      "the points fold over the plane: {}; give the columns u and v with parameters: given, or "
+      "triangles between the points (a PLY, OBJ, STL or OFF with faces) with parameters: mesh, or, "
+      "for a tube, take parameters: cylinder with closure: periodic_u; parameters: {{type: plane, "
+      "folds: accept}} fits them all the same",
+      planes.looked_at));
+}
+
+CheckedMap BestPlane(const Scan& scan, const PlaneParameters& plane) {
+  return BestMap(scan, PlanesOver(scan.positions, Vec3(plane.normal.data())));
+}
+
+Parametrisation ParametriseBy(const Scan& scan, const PlaneParameters& plane) {
+  CheckedMap best = BestPlane(scan, plane);
+  if (!MayBeTaken(best, plane.folds)) {
+    RefusePlanes(best);
+  }
+  return Take(std::move(best), ParameterSource::kPlane);
+}
+
+constexpr std::string_view kOtherThanCylinder =
+    "give another axis, cut off what closes the ends, or give the columns u and v with parameters: "
+    "given; parameters: {type: cylinder, folds: accept} fits them all the same";
+
+void CheckEnds(const Scan& scan, const CylinderAxis& axis) {
+  if (const CylinderEnds ends = FindEnds(scan.positions, axis); ends.Close()) {
+    Fail(fmt::format(
+        "the points close at an end of the cylinder, where their angle is not known: half of the "
+        "last hundredth are within {:.3g} mm of the axis, half of all points within {:.3g} mm; {}",
+        ends.narrower_mm, ends.all_mm, kOtherThanCylinder));
+  }
+}
+
+Parametrisation ParametriseBy(const Scan& scan, const CylinderParameters& cylinder) {
+  CheckedMap best = BestMap(scan, CylindersAround(scan.positions, Vec3(cylinder.axis.data())));
+  if (!MayBeTaken(best, cylinder.folds)) {
+    Fail(fmt::format(
+        "the points fold over the cylinder, or close at its ends, where their angle is not known: "
+        "{}; {}",
+        best.looked_at, kOtherThanCylinder));
+  }
+  if (cylinder.folds == FoldRule::kRefuse) {
+    CheckEnds(scan, best.map.axis);
+  }
+  return Take(std::move(best), ParameterSource::kCylinder);
+}
+
+Parametrisation ParametriseBy(const Scan& scan, const MeshParameters& mesh) {
+  if (scan.triangles.empty()) {
+    Fail(
+        "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces "
+        "(MeshLab and CloudCompare make them from points), or the columns u and v with parameters: "
+        "given");
+  }
+  MeshLayout layout = LayOut({.points = {scan.positions.begin(), scan.positions.end()},
+                              .triangles = {scan.triangles.begin(), scan.triangles.end()}},
+                             mesh.map);
+  const std::string how = fmt::format("the mesh laid out by {}",
+                                      EnumNames(layout.map)[static_cast<std::size_t>(layout.map)]);
+  CheckedMap laid{.map = {.how = how, .at = std::move(layout.at)}, .faults = {}, .looked_at = {}};
+  laid.faults = FindFaults(scan, laid.map);
+  if (laid.faults.folded > kMostFaults) {  // a layout squeezes, which is no fault
+    Fail(fmt::format("{} folds {} of it; take another map (mean_value does not fold)", how,
+                     PercentText(laid.faults.folded)));
+  }
+  return Take(std::move(laid), ParameterSource::kMesh);
+}
+
+// ----------------------------------------------------------------------- auto
+
+Parametrisation ParametriseBy(Scan scan, const AutoParameters&) {
+  if (!scan.given_uv.empty()) {
+    return ParametriseBy(std::move(scan), GivenParameters{});
+  }
+  if (scan.closure == Closure::kPeriodicU) {
+    return ParametriseBy(scan, CylinderParameters{});
+  }
+  CheckedMap plane = BestPlane(scan, {});
+  if (MayBeTaken(plane, FoldRule::kRefuse)) {
+    return Take(std::move(plane), ParameterSource::kPlane);
+  }
+  if (scan.triangles.empty()) {
+    RefusePlanes(plane);
+  }
+  return ParametriseBy(scan, MeshParameters{});
+}
+
+void CheckScan(const Scan& scan) {
+  if (scan.positions.empty()) {
+    Fail("there is no point; give some");
+  }
+  if (!scan.given_uv.empty() && scan.given_uv.size() != scan.positions.size()) {
+    Fail(fmt::format("{} pairs (u,v) for {} points; give one per point, or none",
+                     scan.given_uv.size(), scan.positions.size()));
+  }
+  const auto count = static_cast<std::int64_t>(scan.positions.size());
+  for (const Triangle& t : scan.triangles) {
     for (const std::int32_t corner : t) {
       if (corner < 0 || corner >= count) {
-        FailParameters(
-            fmt::format("a triangle has the corner {}, and there are {} points", corner, count));
+        Fail(fmt::format("a triangle has the corner {}, and there are {} points", corner, count));
       }
     }
   }
@@ -117,21 +272,16 @@ void CheckTriangles(const Scan& points) {
 
 }  // namespace
 
-Parametrisation Parametrise(const Scan& scan, const Parameters& parameters) {
-  if (scan.positions.empty()) {
-    FailParameters("there is no point; give some");
-  }
-  if (!scan.given_uv.empty() && scan.given_uv.size() != scan.positions.size()) {
-    FailParameters(fmt::format("{} pairs (u,v) for {} points; give one per point, or none",
-                               scan.given_uv.size(), scan.positions.size()));
-  }
-  CheckTriangles(scan);
-  return std::visit([&](const auto& p) { return ParametriseBy(scan, p); }, parameters);
+Parametrisation Parametrise(Scan scan, const Parameters& parameters) {
+  CheckScan(scan);
+  return std::visit([&](const auto& chosen) { return ParametriseBy(std::move(scan), chosen); },
+                    parameters);
 }
 
 Parametrisation Parametrise(std::span<const Vec3> positions, const Parameters& parameters,
                             std::span<const Vec2> given_uv) {
-  return Parametrise({.positions = positions, .given_uv = given_uv}, parameters);
+  return Parametrise({.positions = positions, .given_uv = {given_uv.begin(), given_uv.end()}},
+                     parameters);
 }
 
 }  // namespace semblance

@@ -1,47 +1,146 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// (u,v) in [0,1] x [0,1] for scattered points.
+// Parameters (u,v) in [0,1] x [0,1] for scattered points: read from the file, or found by a plane,
+// a cylinder, or a mesh that is laid out.
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <functional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
-#include "fitting/parameters/cylinder_parameters.h"
-#include "fitting/parameters/given_parameters.h"
-#include "fitting/parameters/mesh_parameters.h"
-#include "fitting/parameters/parametrisation.h"
-#include "fitting/parameters/plane_parameters.h"
-#include "fitting/parameters/sphere_parameters.h"
-#include "fitting/parameters/torus_parameters.h"
+#include "fitting/folds/fold_check.h"
+#include "fitting/parameters/mesh_map.h"
+#include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
+#include "surfaces/hspline/hspline_shape.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 
-// The parameters that are given, if there are any. Otherwise those of a torus for a surface that
-// goes round both ways, of a cylinder for one that goes round in u, and of a plane for an open one.
-// What goes round in u and closes at both ends of the cylinder gets those of a sphere, unless it
-// folds over that. Where every plane folds the mesh is laid out, or, of points without triangles,
-// one that is made for them; and so is a closed mesh that goes round in u, where it folds over the
-// sphere. Triangles that the plane or the sphere squeezes are laid out where that squeezes less.
+// The treatment of points that fold over a plane or a cylinder.
+enum class FoldRule { kRefuse, kAccept };
+constexpr auto EnumNames(FoldRule) { return std::to_array<std::string_view>({"refuse", "accept"}); }
+template <class Visitor>
+void FoldField(Visitor& visit, FoldRule& folds) {
+  visit(FieldInfo{.name = "folds",
+                  .doc = "refuse: points of which more than 2 % fold over it are an error; accept: "
+                         "they are fitted, and the surface lies between the sheets"},
+        folds);
+}
+
+// The (u,v) of the file, with the ranges mapped to [0,1].
+struct GivenParameters {
+  static constexpr std::string_view kName = "given";
+  std::array<double, 2> u_range = {0, 1};
+  std::array<double, 2> v_range = {0, 1};
+};
+template <class Visitor>
+void Fields(Visitor& visit, GivenParameters& o) {
+  visit(FieldInfo{.name = "u_range", .doc = "values of the column u that become 0 and 1"},
+        o.u_range);
+  visit(FieldInfo{.name = "v_range", .doc = "values of the column v that become 0 and 1"},
+        o.v_range);
+}
+
+// Orthogonal projection on a plane, for height fields in any pose. On a given normal's plane u runs
+// along the coordinate axis that is nearest to the plane (the first of equals); on the plane of
+// least squares u runs along its longest direction.
+struct PlaneParameters {
+  static constexpr std::string_view kName = "plane";
+  std::array<double, 3> normal = {0, 0, 0};
+  FoldRule folds = FoldRule::kRefuse;
+};
+template <class Visitor>
+void Fields(Visitor& visit, PlaneParameters& o) {
+  visit(FieldInfo{.name = "normal",
+                  .doc = "direction of the heights, such as [0, 0, 1] for a terrain; [0, 0, 0] "
+                         "takes the direction in which the points spread least, or, where they "
+                         "fold over its plane, the best of that, z, y and x"},
+        o.normal);
+  FoldField(visit, o.folds);
+}
+
+// Angle around an axis (u, closed) and height along it (v), for points that go round.
+struct CylinderParameters {
+  static constexpr std::string_view kName = "cylinder";
+  std::array<double, 3> axis = {0, 0, 0};
+  FoldRule folds = FoldRule::kRefuse;
+};
+template <class Visitor>
+void Fields(Visitor& visit, CylinderParameters& o) {
+  visit(FieldInfo{.name = "axis",
+                  .doc = "direction of v; [0, 0, 0] takes the principal axis of the points from "
+                         "which their distances differ least, or, where they fold over its "
+                         "cylinder, the principal axis over whose cylinder they fold least"},
+        o.axis);
+  FoldField(visit, o.folds);
+}
+
+// The triangles between the points, laid out on the plane (mesh_map.h), with u and v along its
+// sides.
+struct MeshParameters {
+  static constexpr std::string_view kName = "mesh";
+  MeshMap map = MeshMap::kLscm;
+};
+template <class Visitor>
+void Fields(Visitor& visit, MeshParameters& o) {
+  visit(
+      FieldInfo{.name = "map",
+                .doc = "lscm: keeps angles, with a free border; arap: as rigid as possible, with a "
+                       "free border, slow; mean_value: the border on a square, which never folds; "
+                       "tutte: the same with uniform weights; auto: arap, or mean_value where arap "
+                       "folds"},
+      o.map);
+}
+
+// The first of these that applies: `given`, if the file has (u,v); `cylinder`, if the surface goes
+// round in u; `mesh`, if the file has triangles and the points fold over every plane; else `plane`.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
 template <class Visitor>
 void Fields(Visitor&, AutoParameters&) {}
 
-using Parameters =
-    std::variant<AutoParameters, GivenParameters, PlaneParameters, CylinderParameters,
-                 SphereParameters, TorusParameters, MeshParameters>;
+using Parameters = std::variant<AutoParameters, GivenParameters, PlaneParameters,
+                                CylinderParameters, MeshParameters>;
 
-// du x dv looks where the triangles look. Whatever is chosen is one-to-one, but for given (u,v) and
-// where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are
-// any. Throws InputError for no points, `given` without given_uv, a number of given_uv that is not
-// that of the points, an empty range, given_uv outside of it, points that span no plane or have no
-// extent along the axis, points that are no torus, close at an end of the cylinder, do not go all
-// round the sphere's centre, or fold over every plane, cylinder, sphere or torus that may be taken,
-// points without triangles that make no open sheet, a corner that is no point, and as LayOut and
-// LayOutOnSphere.
-Parametrisation Parametrise(const Scan& scan, const Parameters& parameters = AutoParameters{});
+// Returns the name of a point in messages, from its index, such as "scan.csv:110: point 109". An
+// empty function stands for "point 1" and so on.
+using PointNames = std::function<std::string(std::size_t)>;
+
+// The points of a file.
+struct Scan {
+  std::span<const Vec3> positions;           // mm
+  std::vector<Vec2> given_uv = {};           // one per point, or none
+  std::span<const Triangle> triangles = {};  // between the points, or none
+  Closure closure = Closure::kOpen;          // of the wanted surface
+  PointNames name_of = {};
+};
+
+enum class ParameterSource { kGiven, kPlane, kCylinder, kMesh };
+constexpr auto EnumNames(ParameterSource) {
+  return std::to_array<std::string_view>({"given", "plane", "cylinder", "mesh"});
+}
+
+struct Parametrisation {
+  std::vector<Vec2> uv;  // one per point, in [0,1] x [0,1]
+  ParameterSource source = ParameterSource::kGiven;
+  std::string how = {};   // the plane, axis or map in words; empty for given (u,v)
+  MapFaults faults = {};  // of the map; none for given (u,v), which are not checked
+};
+
+// Finds (u,v) and checks once, at the end, that they are one-to-one (fold_check.h): at most 2 % of
+// the points may fold or collapse, except where folds are accepted. Given (u,v) are not checked.
+// du x dv faces the same way as the triangles, if there are any. Throws InputError for no points, a
+// corner of a triangle that is no point, `given` without (u,v), a number of (u,v) that differs from
+// the number of points, an empty range or (u,v) outside of it, points that span no plane or have no
+// extent along the axis, points that fold, points that close at an end of their cylinder, `mesh`
+// without triangles, and a mesh that LayOut refuses.
+Parametrisation Parametrise(Scan scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},
                             std::span<const Vec2> given_uv = {});

@@ -10,7 +10,7 @@
 namespace semblance {
 namespace {
 
-LevelSummary RoundSummary(const NestedRound& round) {
+LevelSummary Summarise(const NestedRound& round) {
   return {.level = round.finest,
           .fraction = 1,
           .terms = {},
@@ -22,7 +22,7 @@ LevelSummary RoundSummary(const NestedRound& round) {
           .usable = true};
 }
 
-FitResult ResultOf(NestedFitResult fit) {
+FitResult MakeResult(NestedFitResult fit) {
   FitResult result{.surface = std::move(fit.surface),
                    .uv = std::move(fit.uv),
                    .residual_mm = std::move(fit.residual_mm),
@@ -32,7 +32,7 @@ FitResult ResultOf(NestedFitResult fit) {
                    .automatic = std::move(fit.report),
                    .usable = std::isfinite(fit.rms_mm)};
   for (const NestedRound& round : result.automatic->rounds) {
-    result.levels.push_back(RoundSummary(round));
+    result.levels.push_back(Summarise(round));
   }
   result.levels.back().rms_after_mm = fit.rms_mm;
   return result;
@@ -46,14 +46,14 @@ bool IsAlone(const FitOptions& options) {
 
 FitResult FitAlone(const HSplineSurface& start, const ScatteredPoints& points, const AutoPlan& plan,
                    const RunContext& context) {
-  return ResultOf(FitNested(start, points, plan, context));
+  return MakeResult(FitNested(start, points, plan, context));
 }
 
 FitResult FitAlone(const HSplineSurface& start, OwnedPoints points, const AutoPlan& plan,
                    const RunContext& context) {
   CheckNested(start, points.View());
-  return ResultOf(FitNested(start, TakeDisplacements(start, std::move(points), context.threads),
-                            plan, context));
+  return MakeResult(FitNested(start, TakeDisplacements(start, std::move(points), context.threads),
+                              plan, context));
 }
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The auto plan without any other term: nothing is to be driven between its solves.
+// The fit by the auto plan alone, without further terms or moves of points.
 #pragma once
 
 #include "fitting/nested/nested_points.h"
@@ -10,12 +10,12 @@
 
 namespace semblance {
 
-// Whether options ask for it.
+// Returns whether the options need nothing else: plan auto with the solver `fastest`.
 bool IsAlone(const FitOptions& options);
 
-// Only the surface as it ends is measured. Throw as FitNested does. Of points that it owns the
-// positions and weights are freed as soon as their displacements are known, and the result gets the
-// (u,v).
+// Fits and measures only the final surface. Throws as FitNested does. The second overload frees the
+// positions and weights as soon as it knows the displacements of the points, and moves their (u,v)
+// into the result.
 FitResult FitAlone(const HSplineSurface& start, const ScatteredPoints& points, const AutoPlan& plan,
                    const RunContext& context);
 FitResult FitAlone(const HSplineSurface& start, OwnedPoints points, const AutoPlan& plan,

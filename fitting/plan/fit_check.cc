@@ -102,7 +102,7 @@ class FaultFinder {
       }
     }
   }
-  // The surface takes the levels that it needs. What moves (u,v) does so before the fit.
+  // The surface takes the levels that it needs. (u,v) are moved before the fit, by `semblance fit`.
   void Plan(const AutoPlan& plan) {
     if (plan.relaxation_rounds > 0) {
       Add("plan.relaxation_rounds",
@@ -111,8 +111,8 @@ class FaultFinder {
     }
   }
 
-  // What the auto plan chooses by itself is not to be asked for, and what it weighs is to be
-  // written. Ceres takes other terms too, in the space that the plan has found.
+  // The options must list the terms that the auto plan weighs, and must not fix what it chooses by
+  // itself. With Ceres further terms are allowed, in the space that the plan has found.
   void TermsOfAutoPlan() {
     const bool ceres = options_.solver == Solver::kCeres;
     int automatic = 0, points = 0, smooth = 0;
@@ -157,7 +157,7 @@ class FaultFinder {
                      smooth->of == SmoothnessOf::kDisplacement && smooth->stretch == 1;
   }
 
-  // The first of the terms `points` with a weight; without any there is a fault.
+  // Returns the first term `points` with a weight; adds a fault if there is none.
   const PointTerm* NeedPoints(std::string what, std::string path) {
     for (const Term& term : options_.terms) {
       const auto* const points = std::get_if<PointTerm>(&term);
@@ -193,7 +193,7 @@ class FaultFinder {
     }
   }
 
-  // Relaxations that are more than moves of points between fits.
+  // Checks the relaxations that do more than move points between fits.
   void FindRelaxation() {
     const bool slides = std::holds_alternative<TangentDistanceRelaxation>(options_.relaxation);
     if (!slides && !std::holds_alternative<JointRelaxation>(options_.relaxation)) {
@@ -270,7 +270,7 @@ std::vector<std::string> UnusedOptions(const FitOptions& options) {
     const auto* points = std::get_if<PointTerm>(&options.terms[k]);
     if (points != nullptr && points->loss == RobustLoss::kNone &&
         points->loss_width_mm != PointTerm().loss_width_mm) {
-      notes.push_back(fmt::format("terms[{}].loss_width_mm: `loss: none` does not look at it", k));
+      notes.push_back(fmt::format("terms[{}].loss_width_mm: `loss: none` ignores it", k));
     }
   }
   return notes;

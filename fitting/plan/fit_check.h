@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fit can be asked for.
+// Checks of the options and the input of a fit.
 #pragma once
 
 #include <span>
@@ -13,24 +13,25 @@
 namespace semblance {
 
 struct FitFault {
-  std::string path;       // of the option within the fit's: plan.schedule[1].level
-  std::string what;       // is wrong, and what to do
-  bool too_fine = false;  // a level that the surface does not have: a finer one would do
+  std::string path;  // of the option within those of the fit, such as plan.schedule[1].level
+  std::string what;  // the fault and the remedy
+  bool too_fine =
+      false;  // the level is missing in the surface: a surface with more levels would do
 };
 
-// Options that are right each by itself but not together, or not for a surface whose finest level
-// is max_level. Everything that Fit refuses whatever the points and features are.
+// Returns the options that contradict each other, or that do not suit a surface whose finest level
+// is max_level: everything that Fit refuses for any points and features.
 std::vector<FitFault> FaultsOf(const FitOptions& options, int max_level);
 
-// What is given and not looked at, a line each, with the option's path as above. No fault: a study
-// may compare losses, none among them, at one width.
+// Returns one line per option that is given but has no effect, with its path as above. This is no
+// fault: a study may compare several losses, `none` among them, at one width.
 std::vector<std::string> UnusedOptions(const FitOptions& options);
 
 // Throws InputError as Fit does (fit.h).
 void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
               std::span<const VertexId> features, const FitOptions& options);
 
-// The same of scattered points without features.
+// The same for scattered points without features.
 void CheckFit(const HSplineSurface& start, const ScatteredPoints& points,
               const FitOptions& options);
 

@@ -31,7 +31,7 @@ double WeightedRms(std::vector<WeightAndDistance> points) {
 }
 
 std::vector<double> Distances(const HSplineSurface& surface, const FitTarget& target, int threads) {
-  constexpr std::size_t kAtOnce = 1 << 16;  // bounds the memory beside the points
+  constexpr std::size_t kAtOnce = 1 << 16;  // points; bounds the further memory
   const HSplineBatch batch(surface);
   const std::vector<FitPoint>& points = target.points;
   std::vector<double> distances;
@@ -48,7 +48,7 @@ std::vector<double> Distances(const HSplineSurface& surface, const FitTarget& ta
   return distances;
 }
 
-// The terms with points that may slide along the surface; what `weight: auto` was before holds.
+// The terms with points that may slide along the surface. `weight: auto` keeps its last value.
 std::vector<Term> AsTangentPoints(std::vector<Term> terms, double tangential, double auto_weight) {
   if (const int automatic = AutoTerm(terms); automatic >= 0) {
     SetWeight(auto_weight, terms[automatic]);
@@ -69,8 +69,8 @@ double SumOfCosts(const LevelSummary& summary) {
   return sum;
 }
 
-// How many solves of a step follow its first.
-int SolvesAgain(const Relaxation& relaxation) {
+// The number of solves of a step after its first.
+int CountFurtherSolves(const Relaxation& relaxation) {
   return std::visit(
       []<class R>(const R& chosen) {
         if constexpr (std::is_same_v<R, TangentDistanceRelaxation>) {
@@ -112,10 +112,10 @@ FitDriver::FitDriver(const HSplineSurface& rest, const FitTarget& target, const 
       context_(context),
       result_(result),
       rms_mm_(std::holds_alternative<AdaptivePlan>(options.plan) ||
-                      std::holds_alternative<AutoPlan>(options.plan)  // which measure by themselves
+                      std::holds_alternative<AutoPlan>(options.plan)  // both measure by themselves
                   ? kNaN
                   : PointRms(result.surface, target, context.threads)),
-      rounds_(SolvesAgain(options.relaxation)),
+      rounds_(CountFurtherSolves(options.relaxation)),
       moves_(MovesOf(options.relaxation)) {
   if (moves_) {
     moved_ = target;
@@ -134,32 +134,34 @@ void FitDriver::Take(const FitStep& step) {
   Solve(step, rounds_ > 0 ? SolveReport::kNone : SolveReport::kFull);
   if (mesh_) {
     result_.relaxations.emplace_back();
-    std::visit([&](const auto& chosen) { After(step, chosen); }, options_.relaxation);
+    std::visit([&](const auto& chosen) { RelaxAfter(step, chosen); }, options_.relaxation);
   }
 }
 
-void FitDriver::After(const FitStep&, const NoRelaxation&) {}
-void FitDriver::After(const FitStep&, const FootpointRelaxation&) { Keep(Move(*moves_, {})); }
-void FitDriver::After(const FitStep& step, const AlternatingRelaxation&) { Alternate(step); }
-void FitDriver::After(const FitStep& step, const TangentDistanceRelaxation& chosen) {
+void FitDriver::RelaxAfter(const FitStep&, const NoRelaxation&) {}
+void FitDriver::RelaxAfter(const FitStep&, const FootpointRelaxation&) {
+  AddToLastSummary(MovePoints(*moves_, {}));
+}
+void FitDriver::RelaxAfter(const FitStep& step, const AlternatingRelaxation&) { Alternate(step); }
+void FitDriver::RelaxAfter(const FitStep& step, const TangentDistanceRelaxation& chosen) {
   Alternate(step);
   Slide(step, chosen);
 }
-void FitDriver::After(const FitStep& step, const JointRelaxation& chosen) {
+void FitDriver::RelaxAfter(const FitStep& step, const JointRelaxation& chosen) {
   for (int round = 0; round < chosen.rounds; ++round) {
-    Keep(MoveJointly(step));
+    AddToLastSummary(MoveJointly(step));
     SolveAgain(step, terms_, round);
   }
 }
 
 void FitDriver::Alternate(const FitStep& step) {
   for (int round = 0; round < moves_->rounds; ++round) {
-    Keep(MoveOnce(round));
+    AddToLastSummary(MoveOnce(round));
     SolveAgain(step, terms_, round);
   }
 }
 
-// As a part of the last step.
+// Adds the solve to the summary of the last step.
 void FitDriver::SolveAgain(const FitStep& step, std::span<const Term> terms, int round) {
   const double rms_before_mm = result_.levels.back().rms_before_mm;
   result_.levels.back() =
@@ -173,7 +175,7 @@ void FitDriver::Slide(const FitStep& step, const TangentDistanceRelaxation& chos
       AsTangentPoints(terms_, chosen.tangential, result_.levels.back().auto_weight);
   for (int round = chosen.rounds; round < rounds_; ++round) {
     SolveAgain(step, terms, round);
-    Keep(MoveOnce(round));
+    AddToLastSummary(MoveOnce(round));
     result_.levels.back().rms_after_mm = rms_mm_;
   }
 }
@@ -181,10 +183,11 @@ void FitDriver::Slide(const FitStep& step, const TangentDistanceRelaxation& chos
 RelaxationSummary FitDriver::MoveOnce(int round) {
   NetworkMoves once = *moves_;
   once.rounds = 1;
-  return Move(once, {.before = round == 0, .after = IsLast(round)});
+  return MovePoints(once, {.before = round == 0, .after = IsLast(round)});
 }
 
-RelaxationSummary FitDriver::Move(const NetworkMoves& moves, const MeasuredPenalties& measured) {
+RelaxationSummary FitDriver::MovePoints(const NetworkMoves& moves,
+                                        const MeasuredPenalties& measured) {
   const RelaxationSummary summary = Relax(result_.surface, rest_, *mesh_, moves, moved_, measured);
   rms_mm_ = measured.after ? PointRms(result_.surface, moved_, context_.threads) : kNaN;
   return summary;
@@ -208,8 +211,8 @@ RelaxationSummary FitDriver::MoveJointly(const FitStep& step) {
   return RelaxJointly(result_.surface, rest_, *mesh_, *moves_, level, moved_);
 }
 
-// As a part of the last step's.
-void FitDriver::Keep(const RelaxationSummary& next) {
+// Adds the moves to the summary of the last step.
+void FitDriver::AddToLastSummary(const RelaxationSummary& next) {
   RelaxationSummary& all = result_.relaxations.back();
   all.before = std::isnan(all.before.distance) ? next.before : all.before;
   all.after = next.after;
@@ -233,7 +236,7 @@ void FitDriver::Finish(std::span<const VertexId> features) {
                    std::isfinite(result_.point_rms_mm);
 }
 
-// known: whether the surface is as the last step left it.
+// known: whether the surface is still that of the last step, whose RMS is known.
 void FitDriver::MeasurePoints(bool known) {
   result_.residual_mm = Distances(result_.surface, target(), context_.threads);
   std::vector<WeightAndDistance> dowels;

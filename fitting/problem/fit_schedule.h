@@ -232,7 +232,7 @@ void Fields(Visitor& visit, AutoPlan& o) {
                   .doc = "in how many rounds at most, before the fit, each point's (u,v) move to "
                          "the foot of its perpendicular on a coarse surface, for (u,v) that are "
                          "only about right; 0: they stay as they are. For `semblance fit`, without "
-                         "joins and exact points"},
+                         "exact points"},
         o.relaxation_rounds);
   visit(
       FieldInfo{.name = "stretched",

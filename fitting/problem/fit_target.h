@@ -35,17 +35,11 @@ struct ShapePoint {
   double share = 1;                      // > 0: of the surface that it stands for, relative
 };
 
-// Which tangents of the surface a normal is across. Of a border whose curve is held by its points
-// the tangent along it follows from them, and one more equation could only contradict.
-enum class HeldTangents { kBoth, kAlongU, kAlongV };
-
 // What the surface must meet whatever else it does.
 struct ExactPoint {
   Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
   Vec3 position = Vec3::Constant(kNaN);  // mm
   Vec3 normal = Vec3::Zero();            // of any length: it is across the tangents; or zero
-  HeldTangents tangents = HeldTangents::kBoth;
-  int level = 0;  // all vertices over the place are there to this level, if the plan allows it
 };
 
 // More are refused: their equations are solved as one dense system.

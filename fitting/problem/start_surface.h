@@ -10,19 +10,11 @@
 namespace semblance {
 
 // A smooth surface near the points, with level 0 alone: the least-squares fit of all affine maps of
-// (u,v) (open), or of all sums of 1, cos and sin of 2 pi u, each with and without v (closed in u),
-// or of the products of 1, cos and sin of 2 pi u with those of 2 pi v (closed in both).
+// (u,v) (open), or of all sums of 1, cos and sin of 2 pi u, each with and without v (closed in u).
 //   positions: mm; uv: in [0,1] x [0,1], one per position.
 // Throws InputError for no points, a number of uv that is not that of the points, and a shape as
 // CheckShape does.
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv);
-
-// The same of what is one place along v = 0 and one along v = 1: the least-squares fit of all
-// affine images of the unit sphere, u being the azimuth and pi v the angle from a pole. The edges
-// are closed, and have no frames: offsets there need OffsetReference::kWorld.
-//   shape: closed in u.
-HSplineSurface StartBall(const HSplineShape& shape, std::span<const Vec3> positions,
-                         std::span<const Vec2> uv);
 
 }  // namespace semblance

@@ -25,13 +25,12 @@ constexpr double kSameFoot = 0.01;  // of the noise
 Vec2 WayOnMap(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
   Vec2 way = to - from;
   way.x() -= shape.ClosedU() ? std::round(way.x()) : 0;
-  way.y() -= shape.ClosedV() ? std::round(way.y()) : 0;
   return way;
 }
 
 Vec2 HalfWay(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
   const Vec2 middle = from + WayOnMap(shape, from, to) / 2;
-  return {IntoUnit(middle.x(), shape.ClosedU()), IntoUnit(middle.y(), shape.ClosedV())};
+  return {IntoUnit(middle.x(), shape.ClosedU()), std::clamp(middle.y(), 0.0, 1.0)};
 }
 
 // Twice its area on the map, negative for one that runs clockwise.

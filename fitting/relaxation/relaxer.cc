@@ -167,8 +167,7 @@ Vec2 Relaxer::LongestMove(int corner) const {
 // Without a network nothing keeps a point from going round a closed surface.
 Vec2 Relaxer::Inside(const Vec2& uv) const {
   const bool loose = mesh_.triangles().empty();
-  return {IntoUnit(uv.x(), loose && surface_.shape().ClosedU()),
-          IntoUnit(uv.y(), loose && surface_.shape().ClosedV())};
+  return {IntoUnit(uv.x(), loose && surface_.shape().ClosedU()), std::clamp(uv.y(), 0.0, 1.0)};
 }
 
 void Relaxer::SetUv(const std::vector<Vec2>& uv) {

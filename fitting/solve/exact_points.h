@@ -13,7 +13,7 @@
 namespace semblance {
 
 // Three equations for a position, and two more for a normal: the tangents along u and v are across
-// it; or one, for one of them. The space must not be edited while they are asked.
+// it. The space must not be edited while they are asked.
 class ExactEquations {
  public:
   ExactEquations(const HierarchicalSplineSpace& space, std::span<const ExactPoint> points);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -225,24 +224,6 @@ bool SpaceSolve::Refine(const AdaptivePlan& plan) {
   return true;
 }
 
-void SpaceSolve::AddAsked(int finest) {
-  std::vector<FinerPlace> asked;
-  for (std::size_t k = 0; HasExact() && k < target_->exact.size(); ++k) {
-    if (const ExactPoint& point = target_->exact[k]; point.level > 0) {
-      asked.push_back({point.uv, point.level});
-    }
-  }
-  const AdaptivePlan of_places_alone{.tolerance_mm = std::numeric_limits<double>::infinity(),
-                                     .finest = finest};
-  for (std::vector<VertexId> finer;
-       !(finer = MarkForRefinement(space_, of_places_alone, cloud_, {}, asked)).empty();) {
-    space_.Edit(finer);
-    EditMirrors();
-    Begin();
-    Measure();
-  }
-}
-
 std::vector<double> SpaceSolve::ExactMisses() const {
   return HasExact() ? ExactEquations(space_, target_->exact).MissesOf(space_.Values())
                     : std::vector<double>();
@@ -251,12 +232,12 @@ std::vector<double> SpaceSolve::ExactMisses() const {
 double SpaceSolve::LeastMiss_mm() const { return 1e-10 * NetSize(space_); }
 
 // Places of exact points that the vertices cannot hold.
-std::vector<FinerPlace> SpaceSolve::Unmet() const {
-  std::vector<FinerPlace> unmet;
+std::vector<Vec2> SpaceSolve::Unmet() const {
+  std::vector<Vec2> unmet;
   const std::vector<double> misses = ExactMisses();
   for (std::size_t k = 0; k < misses.size(); ++k) {
     if (misses[k] > LeastMiss_mm()) {
-      unmet.push_back({target_->exact[k].uv});
+      unmet.push_back(target_->exact[k].uv);
     }
   }
   return unmet;

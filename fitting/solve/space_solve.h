@@ -51,8 +51,6 @@ class SpaceSolve {
   void SeePoints();
   // Chooses `weight: auto`, then goes to the minimum.
   LevelSummary Solve(SolveTolerance until, SolveReport report = SolveReport::kFull);
-  // Adds the vertices that exact points ask for, to level `finest` at most.
-  void AddAsked(int finest);
   // Adds the vertices that the plan asks for, those over exact points that are not met, and with a
   // term that pairs vertices their mirrors; false if there are none.
   bool Refine(const AdaptivePlan& plan);
@@ -100,7 +98,7 @@ class SpaceSolve {
   SolverOutcome Reweigh(double least_move);
   bool GoesDirectly() const;
   bool HasExact() const { return target_ != nullptr && !target_->exact.empty(); }
-  std::vector<FinerPlace> Unmet() const;
+  std::vector<Vec2> Unmet() const;
   void Measure();
   std::vector<double> FactorsOf(const std::vector<double>& squares) const;
   std::vector<int> HeldRows() const;

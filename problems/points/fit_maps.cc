@@ -16,9 +16,9 @@
 namespace semblance {
 namespace {
 
-constexpr int kGrid = 141;  // vertices along u and v
+constexpr int kGrid = 141;  // vertices along u and v: odd, so that Halved keeps the borders
 
-// Per point; an outlier is no point of the surface.
+// One flag per point: 0 for outliers, which are no points of the surface.
 std::vector<char> CountedPoints(const FitResult& fit) {
   std::vector<char> counted(fit.residual_mm.size(), 1);
   if (fit.automatic) {
@@ -29,13 +29,14 @@ std::vector<char> CountedPoints(const FitResult& fit) {
   return counted;
 }
 
-// Cells along u and v that hold four points each, were they spread evenly; no more than vertices.
+// The number of cells along u and v that gives each four evenly spread points; at most one cell per
+// vertex.
 int CellsAcross(std::size_t points) {
   constexpr int kFewest = 8;
   return std::clamp(static_cast<int>(std::sqrt(static_cast<double>(points)) / 2), kFewest, kGrid);
 }
 
-// A vertex tells of the points in its cell.
+// Gives each vertex the RMS distance of the points in its cell.
 void AddSquares(const FitResult& fit, FitGrid& grid) {
   const std::vector<char> counted = CountedPoints(fit);
   const int across = CellsAcross(fit.uv.size());
@@ -64,7 +65,7 @@ void AddSquares(const FitResult& fit, FitGrid& grid) {
 
 }  // namespace
 
-DistanceQuantiles QuantilesOf(const FitResult& fit) {
+DistanceQuantiles ComputeQuantiles(const FitResult& fit) {
   std::vector<double> known;
   std::ranges::copy_if(fit.residual_mm, std::back_inserter(known),
                        [](double v) { return std::isfinite(v); });
@@ -78,28 +79,20 @@ DistanceQuantiles QuantilesOf(const FitResult& fit) {
 
 namespace {
 
-// A place on a seam has one vertex in the triangles, so that normals do not break there.
+// At a seam the triangles use the vertex of the first column, so that normals do not break there.
 int VertexAt(const FitGrid& grid, int i, int j) {
-  const bool across_u = grid.closure != Closure::kOpen && i == grid.columns - 1,
-             across_v = grid.closure == Closure::kPeriodicUv && j == grid.rows - 1;
-  return (across_u ? 0 : i) + grid.columns * (across_v ? 0 : j);
+  const bool across = grid.closure == Closure::kPeriodicU && i == grid.columns - 1;
+  return (across ? 0 : i) + grid.columns * j;
 }
 
-// Two per cell, but for those that are trimmed away.
 std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
   std::vector<Triangle> triangles;
-  const auto add = [&](const Triangle& t) {
-    const auto kept = [&](int corner) { return grid.kept.empty() ? 1 : grid.kept[corner]; };
-    if (kept(t[0]) + kept(t[1]) + kept(t[2]) >= 2) {
-      triangles.push_back(t);
-    }
-  };
   for (int j = 0; j + 1 < grid.rows; ++j) {
     for (int i = 0; i + 1 < grid.columns; ++i) {
       const int a = VertexAt(grid, i, j), b = VertexAt(grid, i + 1, j),
                 c = VertexAt(grid, i, j + 1), d = VertexAt(grid, i + 1, j + 1);
-      add({a, b, d});
-      add({a, d, c});
+      triangles.push_back({a, b, d});
+      triangles.push_back({a, d, c});
     }
   }
   return triangles;
@@ -107,13 +100,12 @@ std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
 
 }  // namespace
 
-FitGrid GridOf(const FitResult& fit, int threads) {
+FitGrid SampleFit(const FitResult& fit, int threads) {
   FitGrid grid{.columns = kGrid,
                .rows = kGrid,
                .closure = fit.surface.shape().closure,
                .mesh = {},
-               .rms_mm = {},
-               .kept = {}};
+               .rms_mm = {}};
   std::vector<Vec2> uv;
   for (int j = 0; j < grid.rows; ++j) {
     for (int i = 0; i < grid.columns; ++i) {
@@ -126,37 +118,24 @@ FitGrid GridOf(const FitResult& fit, int threads) {
   return grid;
 }
 
-void TrimGrid(const TrimmedTo& trim, int threads, FitGrid& grid) {
-  constexpr std::size_t kBlock = 256;
-  grid.kept.assign(grid.mesh.points.size(), 0);
-  ParallelFor(grid.kept.size(), threads, kBlock, [&](std::size_t k) {
-    grid.kept[k] = trim.places.DistanceTo(grid.mesh.points[k]) <= trim.distance_mm ? 1 : 0;
-  });
-  grid.mesh.triangles = TrianglesOf(grid);
-}
-
 FitGrid Halved(const FitGrid& grid) {
   FitGrid half{.columns = (grid.columns + 1) / 2,
                .rows = (grid.rows + 1) / 2,
                .closure = grid.closure,
                .mesh = {},
-               .rms_mm = {},
-               .kept = {}};
+               .rms_mm = {}};
   for (int j = 0; j < half.rows; ++j) {
     for (int i = 0; i < half.columns; ++i) {
       const std::size_t at = 2 * (static_cast<std::size_t>(j) * grid.columns + i);
       half.mesh.points.push_back(grid.mesh.points[at]);
       half.rms_mm.push_back(grid.rms_mm[at]);
-      if (!grid.kept.empty()) {
-        half.kept.push_back(grid.kept[at]);
-      }
     }
   }
   half.mesh.triangles = TrianglesOf(half);
   return half;
 }
 
-std::vector<FitCell> CellsOf(const FitResult& fit) {
+std::vector<FitCell> FindFitCells(const FitResult& fit) {
   const PatchTree tree(fit.surface);
   const HSplineShape& shape = fit.surface.shape();
   std::vector<FitCell> cells;
@@ -181,7 +160,7 @@ std::vector<FitCell> CellsOf(const FitResult& fit) {
   return cells;
 }
 
-ToleranceReport ToleranceOf(const FitResult& fit, const AdaptivePlan& plan) {
+ToleranceReport CompareWithTolerance(const FitResult& fit, const AdaptivePlan& plan) {
   ToleranceReport report{.tolerance_mm = plan.tolerance_mm,
                          .regions = static_cast<int>(plan.regions.size())};
   const std::vector<char> counted = CountedPoints(fit);
@@ -226,7 +205,7 @@ std::string ToleranceText(const ToleranceReport& r) {
                     r.at_finest);
   }
   if (r.at_finest < r.cells) {
-    text += fmt::format("; {} not refined, for want of points: see fit.plan.min_points",
+    text += fmt::format("; {} not refined, for lack of points: see fit.plan.min_points",
                         r.cells - r.at_finest);
   }
   return text;

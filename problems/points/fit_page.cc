@@ -16,7 +16,6 @@
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
 #include "problems/points/fit_report.h"
-#include "problems/points/join_report.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/report_kit.h"
 
@@ -26,7 +25,7 @@ namespace {
 // Used by several parts of the page. None if no plan has a tolerance.
 using Tolerance = std::optional<ToleranceReport>;
 
-std::size_t VerticesOf(const HSplineSurface& surface) {
+std::size_t CountVertices(const HSplineSurface& surface) {
   return surface.Net(0).vertices.size() + surface.Offsets().size();
 }
 
@@ -37,9 +36,6 @@ std::vector<std::string> Notes(const PointFit& result, const Tolerance& toleranc
   }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
-  }
-  for (std::string& line : JoinLines(result.joins)) {
-    notes.push_back(std::move(line));
   }
   if (result.fit.automatic) {
     std::istringstream lines(AutoText(*result.fit.automatic));
@@ -58,7 +54,7 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Tolerance& tolerance
       {"median", TableFigures(result.distance.median_mm), "mm", ""},
       {"95th percentile", TableFigures(result.distance.p95_mm), "mm", ""},
       {"largest", TableFigures(result.distance.max_mm), "mm", ""},
-      {"control vertices", std::to_string(VerticesOf(result.fit.surface)), "", ""}};
+      {"control vertices", std::to_string(CountVertices(result.fit.surface)), "", ""}};
   if (std::isfinite(result.weighted_rms_mm)) {
     tiles.insert(tiles.begin() + 2, {"weighted RMS", TableFigures(result.weighted_rms_mm), "mm",
                                      "points count by their weights, as in the fit"});
@@ -177,22 +173,16 @@ ReportSection RoundsSection(const FitResult& fit, bool is_weighted) {
 }  // namespace
 
 std::string FitPageHtml(const PointFitOptions& options, const PointSource& source,
-                        const PointFit& result, const PageTrim& trim, int threads) {
-  const Tolerance tolerance = ToleranceOf(options, result);
-  FitGrid grid = GridOf(result.fit, threads);
-  if (trim.kept != nullptr) {
-    TrimGrid(*trim.kept, threads, grid);
-  }
-  const std::vector<FitCell> cells = CellsOf(result.fit);
+                        const PointFit& result, int threads) {
+  const Tolerance tolerance = CompareWithTolerance(options, result);
+  const FitGrid grid = SampleFit(result.fit, threads);
+  const std::vector<FitCell> cells = FindFitCells(result.fit);
   Report report;
   report.title = options.title == PointFitOptions().title ? source.name : options.title;
   report.subtitle = fmt::format(
       "An H-spline surface through {} of {}",
       Counted(static_cast<long long>(result.fit.residual_mm.size()), "point"), source.name);
   report.notes = Notes(result, tolerance);
-  if (trim.report) {
-    report.notes.push_back(TrimText(*trim.report) + ", in surface.ply and here");
-  }
   report.scenes = FitScene(grid);
   report.scenes_note = "Simplified for display; surface.hspline.json is exact.";
   report.main_images = {

@@ -6,16 +6,12 @@
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <utility>
 
 #include "fitting/plan/fit_check.h"
 #include "problems/config/config.h"
-#include "problems/points/fit_maps.h"
+#include "problems/points/fit_files.h"
 #include "problems/points/fit_page.h"
-#include "problems/points/join_report.h"
-#include "problems/points/residual_files.h"
-#include "problems/points/surface_ply.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/result_json.h"
 #include "surfaces/base/quantile.h"
@@ -26,8 +22,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kHangTogether = 0.1;  // correlation of neighbours' residuals
-constexpr double kSmaller = 0.85;      // of the noise that the neighbours show
+// The verdict that the residuals still contain detail: the residuals of neighbours correlate by
+// more than the first number, or the noise between neighbours is a smaller share of the noise than
+// the second. A lower first or a higher second number gives the verdict more often, also for noise
+// alone.
+constexpr double kMostCorrelation = 0.1, kLeastNoiseShare = 0.85;
 
 Json RoundJson(const NestedRound& round) {
   return {{"finest", round.finest},
@@ -43,7 +42,8 @@ Json RoundJson(const NestedRound& round) {
 }
 
 bool LeavesDetail(const AutoReport& r) {
-  return r.neighbour_correlation > kHangTogether || r.neighbour_noise_mm < kSmaller * r.noise_mm;
+  return r.neighbour_correlation > kMostCorrelation ||
+         r.neighbour_noise_mm < kLeastNoiseShare * r.noise_mm;
 }
 
 std::string Verdict(const AutoReport& r) {
@@ -95,8 +95,8 @@ std::string AutoText(const AutoReport& r) {
   text += '\n';
   if (r.stretch > 1) {
     text += fmt::format(
-        "it bends less along {:.0f} deg from u towards v than across: smoothness is stretched by "
-        "{:.2g}\n",
+        "the surface bends less along {:.0f} deg from u towards v than across: smoothness is "
+        "stretched by {:.2g}\n",
         r.direction_deg, r.stretch);
   }
   if (!r.repeated.empty()) {
@@ -110,15 +110,6 @@ std::string AutoText(const AutoReport& r) {
                         r.outliers.size() == 1 ? "it" : "them");
   }
   return text + Verdict(r) + "\n";
-}
-
-nlohmann::ordered_json MovesJson(const FootMoves& moves) {
-  return {{"rounds", moves.rounds},
-          {"rms_move_mm", moves.rms_move_mm},
-          {"max_move_mm", moves.max_move_mm},
-          {"coarse_rms_before_mm", moves.rms_before_mm},
-          {"coarse_rms_after_mm", moves.rms_after_mm},
-          {"folds_prevented", moves.folds_prevented}};
 }
 
 std::string MovesText(const FootMoves& moves) {
@@ -148,20 +139,20 @@ Json VerticesJson(const HSplineSurface& surface) {
   return json;
 }
 
-// Of (u,v) that were not given.
+Json MovesJson(const FootMoves& moves) {
+  return {{"rounds", moves.rounds},
+          {"rms_move_mm", moves.rms_move_mm},
+          {"max_move_mm", moves.max_move_mm},
+          {"coarse_rms_before_mm", moves.rms_before_mm},
+          {"coarse_rms_after_mm", moves.rms_after_mm},
+          {"folds_prevented", moves.folds_prevented}};
+}
+
+// The map of (u,v) that were not given.
 Json MapJson(const PointFit& result) {
   return {{"how", result.how},
           {"folded_share", result.map_faults.folded},
           {"collapsed_share", result.map_faults.collapsed}};
-}
-
-Json PolesJson(const PoleGaps& poles) {
-  Json json = Json::array();
-  for (const int v : {0, 1}) {
-    const Vec3& at = poles[v].place;
-    json.push_back({{"v", v}, {"at_mm", {at.x(), at.y(), at.z()}}, {"gap_mm", poles[v].gap_mm}});
-  }
-  return json;
 }
 
 Json AttributesJson(const PointFit& result) {
@@ -194,12 +185,7 @@ Json ToleranceJson(const ToleranceReport& tolerance) {
   return json;
 }
 
-Json TrimJson(const TrimReport& trim) {
-  return {
-      {"distance_mm", trim.distance_mm}, {"kept_mm2", trim.kept_mm2}, {"cut_mm2", trim.cut_mm2}};
-}
-
-// What every fit has.
+// The entries that every fit has.
 Json FiguresJson(const PointFitOptions& options, const PointSource& source,
                  const PointFit& result) {
   return {{"title", options.title},
@@ -217,8 +203,7 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"faults", result.Faults()}};
 }
 
-Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, const PointFit& result,
-                  const std::optional<TrimReport>& trim) {
+Json ResultJson(const PointFitOptions& options, const PointSource& source, const PointFit& result) {
   Json json = FiguresJson(options, source, result);
   if (std::isfinite(result.weighted_rms_mm)) {
     json["weighted_rms_mm"] = result.weighted_rms_mm;
@@ -226,14 +211,8 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
   }
-  if (result.poles) {
-    json["poles"] = PolesJson(*result.poles);
-  }
   if (result.moves) {
     json["moves"] = MovesJson(*result.moves);
-  }
-  if (!result.joins.empty()) {
-    json["joins"] = JoinsJson(result.joins);
   }
   if (!result.attributes.empty()) {
     json["attributes"] = AttributesJson(result);
@@ -247,18 +226,15 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   if (result.fit.automatic) {
     json["automatic"] = AutoJson(*result.fit.automatic);
   }
-  if (const auto tolerance = ToleranceOf(options, result)) {
+  if (const auto tolerance = CompareWithTolerance(options, result)) {
     json["tolerance"] = ToleranceJson(*tolerance);
-  }
-  if (trim) {
-    json["trim"] = TrimJson(*trim);
   }
   json.update(StepsToJson(result.fit));
   return json;
 }
 
 void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& folder) {
-  constexpr std::size_t kMostAsText = 100'000;
+  constexpr std::size_t kMostAsText = 100'000;  // documented with the option `residuals`
   const ResidualColumns columns{result.fit, result.attributes, result.attribute_at,
                                 result.sigma_mm};
   if (kind == ResidualFile::kAuto) {
@@ -271,7 +247,7 @@ void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& fol
   }
 }
 
-// Three columns per file.
+// Each file holds three attributes, as x, y and z.
 void WriteAttributes(const PointFit& result, OutputFolder& folder) {
   for (std::size_t k = 0; k < result.attribute_fit.surfaces.size(); ++k) {
     folder.Write(fmt::format("attributes_{}.hspline.json", k + 1),
@@ -279,9 +255,9 @@ void WriteAttributes(const PointFit& result, OutputFolder& folder) {
   }
 }
 
-// What a user should know beside the figures.
-std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit& result,
-                                 double chord_mm) {
+// Lines for the terminal, besides the figures.
+std::vector<std::string> Notes(const PointFitOptions& options, const PointFit& result,
+                               double chord_mm) {
   std::vector<std::string> notes;
   if (std::isfinite(result.weighted_rms_mm)) {
     notes.push_back(
@@ -292,31 +268,23 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
   }
-  if (result.poles) {
-    notes.push_back(
-        fmt::format("poles: the edges v = 0 and v = 1 are one place each to {:.3g} and {:.3g} mm",
-                    (*result.poles)[0].gap_mm, (*result.poles)[1].gap_mm));
-  }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
-  }
-  for (std::string& line : JoinLines(result.joins)) {
-    notes.push_back(std::move(line));
   }
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
     notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,
                                 result.attribute_fit.columns[k].rms));
   }
   if (std::isfinite(result.sigma_factor)) {
-    notes.push_back(fmt::format("the points are off by {:.3g} times the sigma that was given",
-                                result.sigma_factor));
+    notes.push_back(
+        fmt::format("the points are off by {:.3g} times the given sigma", result.sigma_factor));
   }
   for (const std::string& unused : UnusedOptions(options.fit)) {
     notes.push_back("fit." + unused);
   }
   if (!options.chord_mm.automatic && chord_mm > options.chord_mm.value) {
     notes.push_back(fmt::format(
-        "surface.ply is within {:.3g} mm of the surface, for {} mm would need too many triangles",
+        "surface.ply is within {:.3g} mm of the surface; {} mm would need too many triangles",
         chord_mm, options.chord_mm.value));
   }
   return notes;
@@ -328,29 +296,23 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
                                        const PointFit& result, OutputFolder& folder,
                                        const RunContext& context) {
   context.Report("write");
-  // First what can still be refused.
-  const double chord_mm = ChordFor(result.fit.surface, options.chord_mm);
-  const std::optional<TrimmedTo> trim =
-      result.Faults().empty() ? TrimOf(options.trim, result.fit, context.threads) : std::nullopt;
-  const SurfaceMesh mesh = SurfacePly(result, chord_mm, trim ? &*trim : nullptr, context.threads);
+  // The mesh comes first, because it can still be refused.
+  const double chord_mm = ChooseChord(result.fit.surface, options.chord_mm);
+  const std::string ply = SurfacePly(result, chord_mm, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
-  folder.Write("surface.ply", mesh.ply);
+  folder.Write("surface.ply", ply);
   WriteResiduals(options.residuals, result, folder);
   WriteAttributes(result, folder);
   if (options.report && result.Faults().empty()) {
-    folder.Write("report.html", FitPageHtml(options, source, result,
-                                            {trim ? &*trim : nullptr, mesh.trim}, context.threads));
+    folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
   }
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("result.json", ResultJsonOf(options, source, result, mesh.trim)
-                                      .dump(2, ' ', false, Json::error_handler_t::replace) +
-                                  "\n");
-  std::vector<std::string> notes = NotesOf(options, result, chord_mm);
-  if (mesh.trim) {
-    notes.push_back(TrimText(*mesh.trim));
-  }
-  return notes;
+  folder.Write(
+      "result.json",
+      ResultJson(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+          "\n");
+  return Notes(options, result, chord_mm);
 }
 
 }  // namespace semblance

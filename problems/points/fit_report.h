@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fit of points tells: in words, as JSON, and as the files of its folder.
+// The report of a fit of points: in words, as JSON, and as the files of its folder.
 #pragma once
 
 #include <array>
@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "fitting/nested/nested_fit.h"
-#include "fitting/relaxation/foot_moves.h"
 #include "problems/output/files.h"
 #include "problems/output/given_files.h"
 #include "problems/points/point_fit.h"
@@ -19,20 +18,20 @@ namespace semblance {
 
 nlohmann::ordered_json AutoJson(const AutoReport& report);
 
-// A few lines for people: noise, outliers, and whether points of this density can support more.
+// Returns a few lines about noise, outliers, and whether denser points would show more detail.
 std::string AutoText(const AutoReport& report);
 
-// How (u,v) were moved before the fit.
-nlohmann::ordered_json MovesJson(const FootMoves& moves);
+// Returns a sentence about the moves of (u,v) before the fit.
 std::string MovesText(const FootMoves& moves);
 
-// What WritePointFit may write (given_files.h).
+// The files that WritePointFit may write (given_files.h).
 inline constexpr std::array<std::string_view, 9> kPointFitFiles = {
     "resolved.yaml", "surface.hspline.json", "surface.ply",
     "residuals.csv", "residuals.ply",        "attributes_*.hspline.json",
     "report.html",   "timing.json",          "result.json"};
 
-// Those of them that not every fit writes: by what stands in their heads.
+// The files that not every fit writes, with words near their beginning by which they are
+// recognised.
 inline constexpr std::array<FileMark, 4> kPointFitMarks = {
     FileMark{R"(residuals\.csv)", "residual_mm"}, FileMark{R"(residuals\.ply)", "residual_mm"},
     FileMark{R"(attributes_\d+\.hspline\.json)", "semblance-hspline"},
@@ -40,8 +39,8 @@ inline constexpr std::array<FileMark, 4> kPointFitMarks = {
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
 // surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (three attributes each),
-// report.html and timing.json; the same bytes for the same input, timing.json apart. Returns
-// lines that a user should be told.
+// report.html and timing.json. The same input gives the same bytes, except in timing.json. Returns
+// lines for the terminal.
 std::vector<std::string> WritePointFit(const PointFitOptions& options, const PointSource& source,
                                        const PointFit& result, OutputFolder& folder,
                                        const RunContext& context);

@@ -17,7 +17,6 @@
 #include <utility>
 
 #include "problems/output/manifest.h"
-#include "problems/points/plain_points.h"
 #include "problems/volumes/gzip_bytes.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -39,7 +38,7 @@ constexpr std::string_view kGzip = "\x1f\x8b";
 std::string Unzipped(const std::string& bytes, const std::string& name) {
   if (!bytes.starts_with(kGzip)) {
     throw IoError(
-        fmt::format("{}: it is not what gzip makes; compress it, or take .gz off its name", name));
+        fmt::format("{}: it is not a gzip file; compress it, or take .gz off its name", name));
   }
   return Unpacked(bytes, name);
 }
@@ -82,10 +81,10 @@ PointTable ParseXyz(std::string_view text, const std::string& name) {
   return table;
 }
 
-// With all the digits of the points, and the faces, if there are any, as triangles.
+// Reads the points with all their digits, and the faces, if there are any, as triangles.
 PointTable ParseObj(std::string_view text, const std::string& name) {
   PointTable table;
-  table.triangles = ReadObj(text, name).triangles;  // without faces too, for it refuses other lines
+  table.triangles = ReadObj(text, name).triangles;  // also without faces: it refuses other lines
   TextLines lines(text, name, {.comment = '#'});
   while (lines.NextLine()) {
     if (lines.NextWord() == "v") {
@@ -132,7 +131,7 @@ bool HasProperties(const PlyHeader& header, std::initializer_list<std::string_vi
   });
 }
 
-// Weights of a PLY: its property weight, or of sigma.
+// Reads the weights of a PLY from its property weight or sigma.
 void TakeWeights(const PlyHeader& header, std::string_view bytes, const std::string& name,
                  PointTable& table) {
   const bool sigma = HasProperties(header, {"sigma"}), weight = HasProperties(header, {"weight"});
@@ -168,7 +167,7 @@ std::vector<double> FiniteScalar(std::string_view bytes, const std::string& scal
   return values;
 }
 
-// Nothing, `first` and `second`, or neither of them.
+// Returns both names if the vertices have both properties, nothing if they have neither.
 std::optional<std::array<std::string_view, 2>> PairIn(const PlyHeader& header,
                                                       std::string_view first,
                                                       std::string_view second,
@@ -181,7 +180,7 @@ std::optional<std::array<std::string_view, 2>> PairIn(const PlyHeader& header,
   return has_first ? std::optional(std::array{first, second}) : std::nullopt;
 }
 
-// Its properties u and v, or else s and t.
+// Reads (u,v) from the properties u and v, or else s and t.
 void TakeUv(const PlyHeader& header, std::string_view bytes, const std::string& name,
             PointTable& table) {
   auto pair = PairIn(header, "u", "v", name);
@@ -198,9 +197,9 @@ void TakeUv(const PlyHeader& header, std::string_view bytes, const std::string& 
   }
 }
 
-// What exact points are to be across; zero where the vertices have no normals.
-std::vector<Vec3> NormalsOf(const PlyHeader& header, std::string_view bytes,
-                            const std::string& name, std::size_t count) {
+// Reads the normals of the vertices; zero if they have none.
+std::vector<Vec3> ReadNormals(const PlyHeader& header, std::string_view bytes,
+                              const std::string& name, std::size_t count) {
   std::vector<Vec3> normals(count, Vec3::Zero());
   constexpr std::array kNames = {"nx", "ny", "nz"};
   const auto found = std::ranges::count_if(
@@ -219,18 +218,18 @@ std::vector<Vec3> NormalsOf(const PlyHeader& header, std::string_view bytes,
   return normals;
 }
 
-// Exact points of a PLY: where its property exact is 1.
+// Reads the exact points of a PLY: those whose property exact is 1.
 void TakeExact(const PlyHeader& header, std::string_view bytes, const std::string& name,
                PointTable& table) {
   if (!HasProperties(header, {"exact"})) {
     return;
   }
   const std::vector<double> exact = FiniteScalar(bytes, "exact", name);
-  const std::vector<Vec3> normals = NormalsOf(header, bytes, name, exact.size());
+  const std::vector<Vec3> normals = ReadNormals(header, bytes, name, exact.size());
   for (std::size_t k = 0; k < exact.size(); ++k) {
     if (exact[k] != 0 && exact[k] != 1) {
       throw InputError(
-          fmt::format("{}: the exact of point {} is {}; write 1 for a point that is to be met "
+          fmt::format("{}: the exact of point {} is {}; write 1 for a point that must be met "
                       "exactly, else 0",
                       name, k + 1, exact[k]));
     }
@@ -289,8 +288,8 @@ PointTable ParseUnnamed(const std::string& bytes, const std::string& ending,
                   name));
 }
 
-// Triangles that each have corners of their own, as some programs write them, make one mesh, as
-// those of an STL do: corners in one place are one point. Not where points carry more than a place.
+// Merges corners at the same place into one point if each triangle has corners of its own, as in an
+// STL and as some programs write other files. Points that carry more than a position stay apart.
 void WeldCorners(PointTable& table) {
   const std::vector<Vec3>& points = table.positions;
   if (table.triangles.empty() || points.size() != 3 * table.triangles.size() || !table.uv.empty() ||
@@ -346,7 +345,7 @@ bool IsCsv(const std::filesystem::path& path) {
   return ending == ".csv" || ending == ".txt";
 }
 
-// As many as there would be, were all lines as long as the first ones, and a few more.
+// Estimates the number of points from the length of the first lines, plus 2 %.
 std::size_t PointsExpected(const std::filesystem::path& path, std::string_view lines) {
   constexpr double kMore = 1.02;
   std::error_code unknown;
@@ -358,13 +357,13 @@ std::size_t PointsExpected(const std::filesystem::path& path, std::string_view l
                                                           static_cast<double>(lines.size()));
 }
 
-// Block by block; nothing if the file cannot be read, or is not as plain as that.
+// Reads a plain table block by block; returns nothing if the file cannot be read or is not plain.
 std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
                                       std::span<const std::string> attributes) {
   constexpr std::size_t kBlock = 1 << 22;
   std::ifstream stream(path, std::ios::binary);
   std::string text(kBlock, '\0');
-  std::size_t kept = 0;  // of the last block, the beginning of a line
+  std::size_t kept = 0;  // bytes of an unfinished line from the last block
   Sha256 sha;
   std::optional<PlainPoints> points;
   while (stream) {
@@ -378,7 +377,7 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
       if (begin == 0) {
         return std::nullopt;
       }
-      points.emplace(PointColumnsOf(all.substr(0, begin - 1), path.string(), attributes));
+      points.emplace(ReadPointColumns(all.substr(0, begin - 1), path.string(), attributes));
     }
     const std::size_t end = stream ? std::max(all.rfind('\n') + 1, begin) : all.size();
     if (begin > 0) {
@@ -396,29 +395,30 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
   return PointFile{.points = points->Take(), .sha256 = sha.Hex()};
 }
 
-// Beyond, the square of a distance is not a number any more.
+// Refuses coordinates so large that squares of distances overflow.
 void CheckReach(const PointTable& points) {
   constexpr double kFarthest = 1e100;
   for (std::size_t k = 0; k < points.positions.size(); ++k) {
     const double largest = points.positions[k].cwiseAbs().maxCoeff();
     if (largest > kFarthest) {
       throw InputError(fmt::format("{} has a coordinate of {:.3g}; at most 1e100 are allowed",
-                                   NameOfPoint(points, k), largest));
+                                   PointName(points, k), largest));
     }
   }
 }
 
-// Whether each point is a line, after one with the names of the columns.
+// Returns whether each point is a line of the file, after a line with the names of the columns.
 bool IsTable(const std::filesystem::path& path) {
   return path == "-" || IsCsv(LowerCase(path.extension().string()) == ".gz" ? path.stem() : path);
 }
 
-// gzip of a CSV too; what is no text comes with a name, whose end says what it is.
+// Returns the text of standard input, unpacked if it is gzip. Other formats need a file name, whose
+// ending names the format.
 std::string PipedText(std::string bytes) {
   if (bytes.starts_with(kGzip)) {
     bytes = Unpacked(bytes, "standard input");
   }
-  constexpr std::size_t kLooked = 4096;
+  constexpr std::size_t kLooked = 4096;  // bytes among which a binary file has a zero
   if (bytes.starts_with("ply") ||
       std::string_view(bytes).substr(0, kLooked).find('\0') != std::string_view::npos) {
     throw IoError("standard input: it is not a CSV; give the file's name in place of -");

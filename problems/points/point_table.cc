@@ -5,13 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
-#include "problems/points/plain_points.h"
 #include "surfaces/base/csv.h"
 
 namespace semblance {
@@ -20,10 +21,9 @@ namespace {
 constexpr std::array<std::string_view, kPointColumns> kNames = {
     "x", "y", "z", "u", "v", "weight", "sigma", "exact", "nx", "ny", "nz"};
 
-// Of the file, by PointColumn and then by attribute.
+// Column of the file for each PointColumn, then for each attribute.
 using ColumnIndices = std::vector<std::optional<std::size_t>>;
 
-// In `indices` or not.
 const std::optional<std::size_t>& IndexOf(const ColumnIndices& indices, PointColumn column) {
   return indices[static_cast<std::size_t>(column)];
 }
@@ -41,11 +41,13 @@ void CheckPairs(const CsvReader& csv, const ColumnIndices& indices) {
                        IndexOf(indices, PointColumn::kNz).has_value()};
   const auto some = std::count(normal.begin(), normal.end(), true);
   if (some != 0 && (some != 3 || !IndexOf(indices, PointColumn::kExact))) {
-    csv.Fail("the columns nx, ny and nz are of exact points; give all three and 'exact', or none");
+    csv.Fail(
+        "the columns nx, ny and nz are normals of exact points; give all three and 'exact', or "
+        "none");
   }
 }
 
-// What is neither a coordinate nor asked for.
+// Refuses columns that are neither PointColumns nor attributes.
 void CheckNames(const CsvReader& csv, std::span<const std::string> attributes) {
   for (const std::string& column : csv.Columns()) {
     if (std::find(kNames.begin(), kNames.end(), column) == kNames.end() &&
@@ -81,7 +83,7 @@ ColumnIndices IndicesIn(const CsvReader& csv, std::span<const std::string> attri
   return indices;
 }
 
-// Any table that may be, line by line.
+// Reads any allowed table, line by line.
 class PointReader {
  public:
   PointReader(std::string_view text, std::string_view name, std::span<const std::string> attributes)
@@ -128,7 +130,7 @@ class PointReader {
     const double exact = number(PointColumn::kExact);
     if (exact != 0 && exact != 1) {
       csv_.Fail(
-          fmt::format("exact is {}; write 1 for a point that is to be met exactly, else 0", exact));
+          fmt::format("exact is {}; write 1 for a point that must be met exactly, else 0", exact));
     }
     if (exact == 1) {
       const bool normal = IndexOf(indices_, PointColumn::kNx).has_value();
@@ -157,7 +159,7 @@ class PointReader {
 
 }  // namespace
 
-std::string NameOfPoint(const PointTable& table, std::size_t point) {
+std::string PointName(const PointTable& table, std::size_t point) {
   const std::string name = fmt::format("point {}", point + 1);
   if (table.file.empty()) {
     return name;
@@ -177,8 +179,8 @@ bool PointColumns::Has(PointColumn wanted) const {
   return std::find(kinds.begin(), kinds.end(), static_cast<std::size_t>(wanted)) != kinds.end();
 }
 
-PointColumns PointColumnsOf(std::string_view first_line, std::string_view name,
-                            std::span<const std::string> attributes) {
+PointColumns ReadPointColumns(std::string_view first_line, std::string_view name,
+                              std::span<const std::string> attributes) {
   const CsvReader csv(first_line, name);
   const ColumnIndices indices = IndicesIn(csv, attributes);
   PointColumns columns{.kinds = std::vector<std::size_t>(csv.Columns().size()),
@@ -191,10 +193,104 @@ PointColumns PointColumnsOf(std::string_view first_line, std::string_view name,
   return columns;
 }
 
+// ------------------------------------------------------------- plain tables
+
+namespace {
+
+// Moves past the end of a line; returns false if something else follows.
+bool TakeLineEnd(const char*& at, const char* end) {
+  at += at + 1 < end && at[0] == '\r' && at[1] == '\n' ? 1 : 0;
+  const bool ends = at == end || *at == '\n';
+  at += at != end && ends ? 1 : 0;
+  return ends;
+}
+
+}  // namespace
+
+PlainPoints::PlainPoints(PointColumns columns)
+    : columns_(std::move(columns)),
+      has_uv_(columns_.Has(PointColumn::kU)),
+      has_weight_(columns_.Has(PointColumn::kWeight)),
+      has_sigma_(columns_.Has(PointColumn::kSigma)),
+      has_exact_(columns_.Has(PointColumn::kExact)),
+      values_(columns_.Kinds(), 0.0) {
+  table_.weights_of_sigma = has_sigma_;
+  for (const std::string& attribute : columns_.attributes) {
+    table_.attributes.push_back({attribute, {}});
+  }
+}
+
+void PlainPoints::Reserve(std::size_t count) {
+  table_.positions.reserve(count);
+  table_.uv.reserve(has_uv_ ? count : 0);
+  table_.weights.reserve(has_weight_ || has_sigma_ ? count : 0);
+  for (PointAttribute& attribute : table_.attributes) {
+    attribute.values.reserve(count);
+  }
+}
+
+bool PlainPoints::Add(std::string_view lines) {
+  const char* at = lines.data();
+  const char* const end = at + lines.size();
+  while (at != end) {
+    if (!AddLine(at, end)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool PlainPoints::AddLine(const char*& at, const char* end) {
+  for (std::size_t k = 0; k < columns_.kinds.size(); ++k) {
+    if (k > 0 && (at == end || *at++ != ',')) {
+      return false;
+    }
+    double& value = values_[columns_.kinds[k]];
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc{} || !std::isfinite(value)) {
+      return false;
+    }
+    at = next;
+  }
+  return AddPoint() && TakeLineEnd(at, end);
+}
+
+bool PlainPoints::AddExactness() {
+  const auto value = [&](PointColumn column) { return values_[static_cast<std::size_t>(column)]; };
+  const double exact = value(PointColumn::kExact);
+  if (exact == 1) {
+    AddExact(table_, table_.positions.size() - 1,
+             {value(PointColumn::kNx), value(PointColumn::kNy), value(PointColumn::kNz)});
+  }
+  return exact == 0 || exact == 1;
+}
+
+bool PlainPoints::AddPoint() {
+  const auto value = [&](PointColumn column) { return values_[static_cast<std::size_t>(column)]; };
+  table_.positions.emplace_back(value(PointColumn::kX), value(PointColumn::kY),
+                                value(PointColumn::kZ));
+  if (has_uv_) {
+    table_.uv.emplace_back(value(PointColumn::kU), value(PointColumn::kV));
+  }
+  if (has_exact_ && !AddExactness()) {
+    return false;
+  }
+  for (std::size_t k = 0; k < table_.attributes.size(); ++k) {
+    table_.attributes[k].values.push_back(values_[kPointColumns + k]);
+  }
+  if (has_weight_ || has_sigma_) {
+    const double sigma = value(PointColumn::kSigma),
+                 weight = has_weight_ ? value(PointColumn::kWeight) : 1 / (sigma * sigma);
+    table_.weights.push_back(weight);
+    return weight > 0 && std::isfinite(weight) && (has_weight_ || sigma > 0);
+  }
+  return true;
+}
+
 PointTable ParsePointTable(std::string_view text, std::string_view name,
                            std::span<const std::string> attributes) {
   const std::size_t end = std::min(text.find('\n'), text.size());
-  PlainPoints plain(PointColumnsOf(text.substr(0, end), name, attributes));
+  PlainPoints plain(ReadPointColumns(text.substr(0, end), name, attributes));
   const bool is_plain = end < text.size() && plain.Add(text.substr(end + 1)) && plain.size() > 0;
   return is_plain ? plain.Take() : PointReader(text, name, attributes).Read();
 }

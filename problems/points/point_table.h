@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scattered points, and how they stand in a CSV file.
+// Scattered points, and their reader from CSV text.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
@@ -14,7 +15,7 @@
 
 namespace semblance {
 
-// A further number of each point, which is fitted too.
+// A further number of each point, which is fitted over the surface.
 struct PointAttribute {
   std::string name;
   std::vector<double> values;  // one per point
@@ -24,47 +25,74 @@ struct PointTable {
   std::vector<Vec3> positions;             // mm
   std::vector<Vec2> uv;                    // one per point, or none
   std::vector<double> weights;             // > 0; one per point, or none
-  bool weights_of_sigma = false;           // they are 1 / sigma^2
-  std::vector<PointAttribute> attributes;  // those that were asked for, in that order
-  std::vector<std::uint32_t> exact;        // indices of points that are to be met exactly
-  std::vector<Vec3> exact_normals;         // one per exact point: zero where it does not matter
-  std::vector<Triangle> triangles;         // between the points, where the file has faces
-  std::string file = {};                   // that they are of, in messages; empty: of none
-  int first_line = 0;                      // of the file, where a point is a line each; else 0
+  bool weights_of_sigma = false;           // the weights are 1 / sigma^2
+  std::vector<PointAttribute> attributes;  // the requested ones, in the requested order
+  std::vector<std::uint32_t> exact;        // ascending indices of points to be met exactly
+  std::vector<Vec3> exact_normals;         // one per exact point; zero leaves the normal free
+  std::vector<Triangle> triangles;         // between the points, if the file has faces
+  std::string file = {};                   // name of the file in messages; empty without a file
+  int first_line = 0;                      // line of the first point; 0 if points are not lines
 };
 
-// What messages call a point, by its index: "scan.csv:110: point 109".
-std::string NameOfPoint(const PointTable& table, std::size_t point);
+// Returns the name of a point in messages, such as "scan.csv:110: point 109".
+std::string PointName(const PointTable& table, std::size_t point);
 
-// Makes a point of a table exact, by its index; they are to be made so in order.
+// Makes a point exact. Points must be made exact in ascending order.
 void AddExact(PointTable& table, std::size_t point, const Vec3& normal);
+
+// Reads a CSV. The first line names the columns, in any order:
+// - x, y and z;
+// - u and v, together;
+// - weight, or sigma, the standard deviation of a point's coordinates (the weight is 1 / sigma^2);
+// - exact: 1 for a point that the surface must meet exactly, else 0; with it nx, ny and nz
+// together:
+//   the normal of the surface at an exact point, of any length, or 0, 0, 0;
+// - the attributes.
+// Each further line has one decimal number per column. Throws IoError (`name:line: what`) for any
+// other column, a repeated column, an attribute without a column, a line with more or fewer
+// entries, an empty line before the end, an entry that is no finite number, a weight or sigma that
+// is not positive, an exact that is neither 0 nor 1, and a table without points.
+PointTable ParsePointTable(std::string_view text, std::string_view name,
+                           std::span<const std::string> attributes = {});
 
 enum class PointColumn { kX, kY, kZ, kU, kV, kWeight, kSigma, kExact, kNx, kNy, kNz };
 constexpr std::size_t kPointColumns = 11;
 
-// What the columns of a table are: of each its PointColumn, or kPointColumns + the index of an
-// attribute.
+// The meaning of each column of a table.
 struct PointColumns {
-  std::vector<std::size_t> kinds;
+  std::vector<std::size_t> kinds;  // a PointColumn, or kPointColumns + the index of an attribute
   std::vector<std::string> attributes;
 
   std::size_t Kinds() const { return kPointColumns + attributes.size(); }
   bool Has(PointColumn wanted) const;
 };
-// By the table's first line. Throws as ParsePointTable.
-PointColumns PointColumnsOf(std::string_view first_line, std::string_view name,
-                            std::span<const std::string> attributes = {});
+// Reads the first line of a table. Throws as ParsePointTable.
+PointColumns ReadPointColumns(std::string_view first_line, std::string_view name,
+                              std::span<const std::string> attributes = {});
 
-// The first line names the columns, in any order: x, y and z, and, if wanted, u and v together,
-// weight or sigma (the standard deviation of a point's coordinates: the weight is 1 / sigma^2),
-// exact (1 for a point that the surface is to meet exactly, else 0) and beside it nx, ny and nz
-// together (of an exact point what the surface is to be across, of any length, or 0, 0, 0), and the
-// attributes. Each further line has one decimal number per column, separated by commas. Nothing
-// else is let pass: `name:line: what` as IoError for another column or one twice, an attribute that
-// is no column, a line with more or fewer entries, an empty line before the end, what is not a
-// finite number, a weight or sigma that is not positive, an exact that is neither 0 nor 1, or no
-// point at all.
-PointTable ParsePointTable(std::string_view text, std::string_view name,
-                           std::span<const std::string> attributes = {});
+// The fast reader of tables as programs write them: bare decimal numbers with commas between them.
+// It gives up on anything else (blanks, quotes, a plus sign, numbers that are not finite, too many
+// or too few entries), and ParsePointTable then reads the text or reports its fault.
+class PlainPoints {
+ public:
+  explicit PlainPoints(PointColumns columns);
+
+  // Adds whole lines; the last one may lack its line end. Returns false if a line is not plain; the
+  // points are then unusable.
+  bool Add(std::string_view lines);
+  void Reserve(std::size_t count);  // points in all
+  std::size_t size() const { return table_.positions.size(); }
+  PointTable Take() { return std::move(table_); }
+
+ private:
+  bool AddLine(const char*& at, const char* end);
+  bool AddPoint();
+  bool AddExactness();
+
+  PointColumns columns_;
+  bool has_uv_ = false, has_weight_ = false, has_sigma_ = false, has_exact_ = false;
+  std::vector<double> values_;  // of a line, by kind
+  PointTable table_;
+};
 
 }  // namespace semblance

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "problems/config/config.h"
-#include "problems/config/named_files.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
@@ -20,12 +19,11 @@
 namespace semblance {
 namespace {
 
-// What the user typed: the points' file, and perhaps a configuration.
 struct FitArguments : WorkOptions {
-  std::vector<std::string> files;
+  std::vector<std::string> files;  // the points, and perhaps a configuration
 };
 
-PointFitOptions FitOptionsOf(const FitArguments& arguments) {
+PointFitOptions ReadFitOptions(const FitArguments& arguments) {
   return arguments.files.size() > 1
              ? ReadConfig<PointFitOptions>(arguments.files[1], arguments.overrides)
              : ReadConfigText<PointFitOptions>("{}", "the options of the command",
@@ -36,7 +34,7 @@ bool IsConfigName(const std::filesystem::path& file) {
   return file.extension() == ".yaml" || file.extension() == ".yml";
 }
 
-// The other way round is the usual slip.
+// Refuses the configuration before the points, which is a common slip.
 void CheckOrder(const std::vector<std::string>& files) {
   if (files.size() == 2 && IsConfigName(files[0]) && !IsConfigName(files[1])) {
     throw InputError(fmt::format("fit {0} {1}: the points come first: semblance fit {1} {0}",
@@ -44,24 +42,20 @@ void CheckOrder(const std::vector<std::string>& files) {
   }
 }
 
-// What is read, and what may be written.
-GivenFiles GivenTo(const FitArguments& arguments, const PointFitOptions& options) {
-  GivenFiles given{.files = {arguments.files.begin(), arguments.files.end()},
-                   .outputs = kPointFitFiles,
-                   .marks = kPointFitMarks};
-  for (const NamedFile& named : NamedFiles(options)) {
-    given.files.push_back(named.file);
-  }
-  return given;
+// The files that are read, and those that may be written.
+GivenFiles ListFiles(const FitArguments& arguments) {
+  return {.files = {arguments.files.begin(), arguments.files.end()},
+          .outputs = kPointFitFiles,
+          .marks = kPointFitMarks};
 }
 
 int FitCommand(const FitArguments& arguments) {
   CheckOrder(arguments.files);
   const std::filesystem::path path = arguments.files.at(0);
-  const PointFitOptions options = FitOptionsOf(arguments);
+  const PointFitOptions options = ReadFitOptions(arguments);
   const std::string name = path == "-" ? "standard input" : path.filename().string();
   StagedFolder folder = FolderOf(arguments, "out/" + (path == "-" ? "points" : PlainName(path)),
-                                 GivenTo(arguments, options));
+                                 ListFiles(arguments));
   PointFile file = ReadPointFile(path, options.attributes);
   const RunContext context = ContextOf(arguments);
   const PointFit result = FitPoints(std::move(file.points), options, context);
@@ -78,7 +72,7 @@ int FitCommand(const FitArguments& arguments) {
   for (const std::string& note : notes) {
     fmt::print("{}\n", note);
   }
-  if (const auto tolerance = ToleranceOf(options, result)) {
+  if (const auto tolerance = CompareWithTolerance(options, result)) {
     fmt::print("{}\n", ToleranceText(*tolerance));
   }
   fmt::print("folder: {}\n", folder.Root().string());
@@ -95,8 +89,7 @@ void DeclareFit(CLI::App& command, CommandLine& line) {
           "POINTS [CONFIG]", a.files,
           "points: .csv with the columns x,y,z and, if known, u,v, weight or sigma; .xyz .npy .ply "
           ".obj .stl .off; each also .gz; - for a CSV on standard input. YAML file of the fit; "
-          "without it all "
-          "follows from the points")
+          "without it everything follows from the points")
       ->required()
       ->expected(1, 2);
 }

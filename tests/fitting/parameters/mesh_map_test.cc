@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "fitting/parameters/one_to_one.h"
+#include "fitting/folds/fold_check.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/grid_mesh.h"
 #include "tests/testing/shapes.h"
@@ -32,7 +32,7 @@ Vec3 Pipe(const Vec2& uv) {
   return turn * Vec3(30 * std::sin(2 * uv.x()), 80 * uv.y(), 30 * std::cos(2 * uv.x()));
 }
 
-TEST(MeshMap, EveryMapIsOneToOneAsLargeAndTheRightWayRound) {
+TEST(MeshMap, EveryMapIsOneToOneCounterClockwiseAndKeepsTheArea) {
   const TriMesh mesh = testing::GridMesh(Bowl, 24);
   for (const MeshMap map : kMaps) {
     const MeshLayout layout = LayOut(mesh, map);
@@ -50,7 +50,7 @@ TEST(MeshMap, EveryMapIsOneToOneAsLargeAndTheRightWayRound) {
   }
 }
 
-// What can be unrolled is unrolled: every edge keeps its length.
+// A pipe is unrolled: every edge keeps its length.
 TEST(MeshMap, FreeBordersUnrollAPipe) {
   const TriMesh mesh = testing::GridMesh(Pipe, 16);
   for (const MeshMap map : {MeshMap::kArap, MeshMap::kLscm}) {
@@ -64,7 +64,7 @@ TEST(MeshMap, FreeBordersUnrollAPipe) {
   }
 }
 
-// The border is the square's: its corners are the mesh's.
+// The corners of the mesh become those of the square.
 TEST(MeshMap, ASquareTakesTheCornersOfARectangle) {
   const TriMesh mesh =
       testing::GridMesh([](const Vec2& uv) { return Vec3(90 * uv.x(), 20 * uv.y(), 7); }, 12);
@@ -92,7 +92,7 @@ TEST(MeshMap, AHoleIsBridgedAndNoPointIsAdded) {
   EXPECT_EQ(FaultsOfTriangles({mesh.points, layout.at}, mesh.triangles).folded, 0);
 }
 
-TEST(MeshMap, WhatIsNoDiscIsRefusedWithWhatToDo) {
+TEST(MeshMap, AMeshThatIsNoDiscIsRefusedWithTheRemedy) {
   const auto message = [](const TriMesh& mesh) -> std::string {
     try {
       LayOut(mesh, MeshMap::kAuto);
@@ -103,7 +103,7 @@ TEST(MeshMap, WhatIsNoDiscIsRefusedWithWhatToDo) {
   };
   const TriMesh plate = testing::Plate(10, 4), sphere = testing::SphereMesh({0, 0, 50}, 10, 8);
   EXPECT_THAT(message(sphere), HasSubstr("it is closed"));
-  EXPECT_THAT(message(sphere), HasSubstr("closure: periodic_u"));
+  EXPECT_THAT(message(sphere), HasSubstr("give the columns u and v"));
   EXPECT_THAT(message(testing::Joined(plate, sphere)), HasSubstr("2 pieces"));
   TriMesh loose = plate;
   loose.points.emplace_back(1, 2, 3);

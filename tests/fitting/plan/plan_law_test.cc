@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Laws of every term in every plan by every solver; a new term is tested without being named here.
+// Laws of every term in every plan by every solver. A new term is covered without being named here.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +19,8 @@ using testing::SmoothSurface;
 
 constexpr HSplineShape kShape{.patches_u = 4, .patches_v = 3, .max_level = 2};
 
-// Points around a surface, standing on bone 4 mm below them; every tenth is a landmark. A prior
-// holds the surface 1 mm higher for likely, surer at one end than at the other.
+// Points around a surface, with bone 4 mm below them; every tenth is a landmark. A prior predicts
+// the surface 1 mm higher, with a smaller standard deviation at one end than at the other.
 FitTarget Target() {
   const HSplineSurface truth = RandomSurface(kShape, 1);
   Random random(5);
@@ -41,7 +41,7 @@ FitTarget Target() {
   return target;
 }
 
-// The adaptive plan overlays what is 3 mm off: some patches and not others.
+// The adaptive plan overlays the patches that are 3 mm off, which are some of all.
 const SchedulePlan kPlans[] = {ListedPlan{.schedule = {{0, 0.5}, {1, 1}}},
                                CoarseToFinePlan{.finest = 1, .sweeps = 1},
                                UntilPlan{.schedule = {{0, 0.5}, {1, 0.5}}, .max_passes = 2},
@@ -52,7 +52,7 @@ bool HasLoss(const Term& term) {
   return points != nullptr && points->loss != RobustLoss::kNone;
 }
 
-// The term beside points and a little smoothness, which hold what it leaves free.
+// The term with points and a little smoothness, which determine the rest.
 FitOptions Options(const SchedulePlan& plan, const Term& term, Solver solver) {
   FitOptions options{.plan = plan,
                      .terms = {SmoothnessTerm{.weight = 1e-3}, MembraneTerm{.weight = 1e-2}},
@@ -61,7 +61,7 @@ FitOptions Options(const SchedulePlan& plan, const Term& term, Solver solver) {
     options.terms.emplace_back(PointTerm{});
   }
   options.terms.push_back(term);
-  // With a loss, rounds that differ by little could overlay other patches: all are.
+  // With a loss a small difference could overlay other patches, so all patches are overlaid.
   if (auto* const adaptive = std::get_if<AdaptivePlan>(&options.plan);
       adaptive != nullptr && HasLoss(term)) {
     adaptive->tolerance_mm = 1e-9;
@@ -90,7 +90,7 @@ std::string NameOf(const SchedulePlan& plan) {
   return std::string(std::visit([](const auto& p) { return p.kName; }, plan));
 }
 
-// No solve makes its terms dearer.
+// No solve raises the cost of its terms.
 void ExpectNoneDearer(const FitResult& result) {
   ASSERT_FALSE(result.levels.empty());
   for (const LevelSummary& level : result.levels) {
@@ -120,7 +120,7 @@ TEST(PlanLaws, BothSolversFindTheSameSurfaceAndNoneMakesTheTermsDearer) {
         EXPECT_EQ(fastest.levels.back().solver, "direct");
       }
       EXPECT_EQ(ceres.surface.Offsets().size(), fastest.surface.Offsets().size());
-      // A surface that is held to where a solve starts keeps a trace of the solves before.
+      // A term towards the start of a solve depends on the solves before.
       const double near = std::holds_alternative<PriorTerm>(term) ? 1e-5 : 1e-6;
       EXPECT_LT(LargestDistance(ceres.surface, fastest.surface), HasLoss(term) ? 1e-3 : near);
       EXPECT_NEAR(CostAfter(ceres), CostAfter(fastest), 1e-6 * CostAfter(fastest));
@@ -129,7 +129,7 @@ TEST(PlanLaws, BothSolversFindTheSameSurfaceAndNoneMakesTheTermsDearer) {
   }
 }
 
-// All levels at once with the finest everywhere: a term pulls as it does on that level alone.
+// With the finest level everywhere, all levels at once give the same cost as that level alone.
 TEST(PlanLaws, TheAdaptivePlanWeighsATermAsALevelDoes) {
   HSplineShape shape = kShape;
   shape.max_level = 0;
@@ -141,7 +141,7 @@ TEST(PlanLaws, TheAdaptivePlanWeighsATermAsALevelDoes) {
         Options(AdaptivePlan{.tolerance_mm = 100, .finest = 0}, term, Solver::kCeres);
     const FitOptions level = Options(ListedPlan{.schedule = {{0, 1}}}, term, Solver::kCeres);
     const FitResult a = Fit(start, target, {}, adaptive, {}), b = Fit(start, target, {}, level, {});
-    // A second solve starts anew: what is held to its start, or looks along normals, goes on.
+    // A second solve has another start and other normals, on which some terms depend.
     const bool goes_on =
         std::holds_alternative<PriorTerm>(term) || std::holds_alternative<TangentPointTerm>(term);
     EXPECT_LT(LargestDistance(a.surface, b.surface), goes_on ? 1 : HasLoss(term) ? 1e-3 : 1e-6);

@@ -98,7 +98,7 @@ TEST(Experiment, AWidthWithoutALossIsTold) {
   };
   for (const char* face : {"fit", "prior_then_fit"}) {
     EXPECT_THAT(unused(face, ", loss_width_mm: 3"),
-                ElementsAre("fit.terms[1].loss_width_mm: `loss: none` does not look at it"));
+                ElementsAre("fit.terms[1].loss_width_mm: `loss: none` ignores it"));
     EXPECT_THAT(unused(face, ", loss: huber, loss_width_mm: 3"), IsEmpty());
     EXPECT_THAT(unused(face, ", loss_width_mm: 5"), IsEmpty()) << "the default";
   }

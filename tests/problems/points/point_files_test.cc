@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Law: the same points are the same table in whatever kind of file they come.
+// Law: the same points give the same table from every file format.
 #include "problems/points/point_files.h"
 
 #include <fmt/format.h>
@@ -66,7 +66,7 @@ std::string Npy(int columns) {
   return bytes;
 }
 
-// With further properties of type double, `values` a vertex.
+// A PLY with further properties of type double, `values` per vertex.
 template <class Values>
 std::string Ply(const std::vector<std::string>& properties, Values&& values,
                 const std::string& faces = "") {
@@ -126,7 +126,7 @@ class PointFiles : public ::testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(PointFiles, EveryKindGivesTheSamePoints) {
+TEST_F(PointFiles, EveryFormatGivesTheSamePoints) {
   const std::map<std::string, std::string> files = {
       {"a.csv", Csv()},  {"a.txt", Csv()},      {"a.xyz", Xyz()},
       {"a.npy", Npy(3)}, {"a.ply", PlainPly()}, {"a.obj", Obj()},
@@ -146,7 +146,7 @@ TEST_F(PointFiles, EveryKindGivesTheSamePoints) {
   }
 }
 
-TEST_F(PointFiles, WhatIsCompressedIsTheSameFile) {
+TEST_F(PointFiles, ACompressedFileGivesTheSamePoints) {
   for (const auto& [name, bytes] : std::map<std::string, std::string>{
            {"a.csv", Csv()}, {"a.npy", Npy(5)}, {"a.ply", PlainPly()}, {"a.xyz", Xyz()}}) {
     SCOPED_TRACE(name);
@@ -187,7 +187,7 @@ TEST_F(PointFiles, CornersInOnePlaceAreOnePoint) {
   EXPECT_THAT(table.triangles, ::testing::ElementsAre(Triangle{0, 1, 2}, Triangle{0, 2, 3}));
 }
 
-TEST_F(PointFiles, ParametersComeWithTheKindsThatHaveThem) {
+TEST_F(PointFiles, ParametersComeWithTheFormatsThatHaveThem) {
   const auto both = [](int k) { return fmt::format("{} {}", UvAt(k).x(), UvAt(k).y()); };
   for (const auto& [name, bytes] :
        std::map<std::string, std::string>{{"five.npy", Npy(5)},
@@ -259,7 +259,7 @@ TEST_F(PointFiles, ExactPointsOfAPlyAreThoseOfATable) {
   EXPECT_TRUE(Read("e.ply", OneScalarPly("nx", 0, 1)).exact.empty()) << "a normal of a mesh";
 }
 
-TEST_F(PointFiles, WhatATableWouldRefuseIsRefusedOfAPlyAndAnXyz) {
+TEST_F(PointFiles, APlyAndAnXyzRefuseWhatATableRefuses) {
   for (const char* lone : {"u", "v", "s", "t"}) {
     EXPECT_THAT(Refusal("lone.ply", OneScalarPly(lone, 0, 1)),
                 HasSubstr(fmt::format("the vertices have '{}' without '", lone)));
@@ -272,13 +272,13 @@ TEST_F(PointFiles, WhatATableWouldRefuseIsRefusedOfAPlyAndAnXyz) {
               HasSubstr("four.xyz: line 2: '0.5' follows x, y and z; leave it out, or give a CSV"));
 }
 
-TEST_F(PointFiles, APointIsCalledByItsFileAndLine) {
-  EXPECT_EQ(NameOfPoint(Read("a.csv", Csv()), 3), (folder_ / "a.csv:5: point 4").string());
-  EXPECT_EQ(NameOfPoint(Read("a.ply", PlainPly()), 3), (folder_ / "a.ply: point 4").string());
-  EXPECT_EQ(NameOfPoint(PointTable(), 3), "point 4");
+TEST_F(PointFiles, APointIsNamedByItsFileAndLine) {
+  EXPECT_EQ(PointName(Read("a.csv", Csv()), 3), (folder_ / "a.csv:5: point 4").string());
+  EXPECT_EQ(PointName(Read("a.ply", PlainPly()), 3), (folder_ / "a.ply: point 4").string());
+  EXPECT_EQ(PointName(PointTable(), 3), "point 4");
 }
 
-TEST_F(PointFiles, AttributesAreOfATableOrAPly) {
+TEST_F(PointFiles, OnlyATableAndAPlyHaveAttributes) {
   const PointTable table = Read("a.ply", OneScalarPly("warmth", 3, 5), {"warmth"});
   ASSERT_EQ(table.attributes.size(), 1u);
   EXPECT_EQ(table.attributes[0].name, "warmth");
@@ -290,7 +290,7 @@ TEST_F(PointFiles, AttributesAreOfATableOrAPly) {
               HasSubstr("c.ply: "));
 }
 
-TEST_F(PointFiles, WhatIsNotOfItsKindIsRefusedByName) {
+TEST_F(PointFiles, ContentsOfAnotherFormatAreRefusedByName) {
   EXPECT_THAT(Refusal("a.pcd", "1 2 3"), HasSubstr("files of points end in"));
   EXPECT_THAT(Refusal("a.npy", Npy(4)), HasSubstr("neither n x 3"));
   EXPECT_THAT(Refusal("a.xyz", "1 2\n"), HasSubstr("a.xyz"));

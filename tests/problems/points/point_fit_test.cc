@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Any scattered points, with and without (u,v).
+// Fits of scattered points, with and without (u,v).
 #include "problems/points/point_fit.h"
 
 #include <fmt/format.h>
@@ -16,18 +16,13 @@
 #include <vector>
 
 #include "problems/config/config.h"
+#include "problems/points/fit_files.h"
 #include "problems/points/fit_report.h"
-#include "problems/points/residual_files.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
-#include "surfaces/hspline_query/tessellate.h"
-#include "surfaces/mesh/mesh_query.h"
-#include "tests/testing/bent_sheets.h"
-#include "tests/testing/closed_shapes.h"
 #include "tests/testing/point_csv.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
-#include "tests/testing/stone.h"
 
 namespace semblance {
 namespace {
@@ -36,9 +31,7 @@ using testing::ErrorAgainst;
 using testing::FrankePoint;
 using ::testing::HasSubstr;
 using testing::HeadPoint;
-using testing::RingErrors;
 using testing::Scattered;
-using testing::StoneRadius;
 using testing::UvCsv;
 
 const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs/fit";
@@ -81,33 +74,9 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
   }
 }
 
-// A ring without (u,v), turned: the torus is found, and the surface closes both ways.
-TEST(PointFit, TorusParametersCloseTheRingBothWays) {
-  const Mat3 turn = Eigen::AngleAxisd(0.8, Vec3(1, -2, 0.5).normalized()).matrix();
-  const auto ring = [&](const Vec2& uv) -> Vec3 { return 30 * (turn * testing::RingPoint(uv)); };
-  const PointTable table = TableOf(Scattered(ring, 20000, 0.01, 3));
-  for (const Parameters& parameters :
-       {Parameters(AutoParameters{}), Parameters(TorusParameters{})}) {
-    const PointFit result =
-        FitPoints(table, {.closure = Closure::kPeriodicUv, .parameters = parameters}, {});
-    EXPECT_EQ(result.parameters, "torus");
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    EXPECT_LT(result.fit.point_rms_mm, 0.02);
-    const SurfaceProjector projector(result.fit.surface);
-    for (const FitPoint& p : Scattered(ring, 200, 0, 4).points) {
-      EXPECT_LT(projector.Project(p.position).distance_mm, 0.02);
-    }
-    for (const double other : {0.0, 0.4, 0.97}) {
-      const HSplineSurface& surface = result.fit.surface;
-      EXPECT_LT((surface.Point({1 - 1e-12, other}) - surface.Point({0, other})).norm(), 1e-8);
-      EXPECT_LT((surface.Point({other, 1 - 1e-12}) - surface.Point({other, 0})).norm(), 1e-8);
-    }
-  }
-}
-
-// Noise of 1e-3 and twenty points a parameter or so: sigma is a fraction of it, and more at
-// borders.
-TEST(PointFit, SigmaIsKnownWhereItIsAskedFor) {
+// With noise of 1e-3 and about twenty points per parameter sigma is a fraction of the noise, and
+// larger at borders.
+TEST(PointFit, SigmaIsComputedIfRequested) {
   PointFitOptions options;
   options.sigma = true;
   const PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 3000, 1e-3, 1)), "test");
@@ -129,7 +98,7 @@ TEST(PointFit, SigmaIsKnownWhereItIsAskedFor) {
   EXPECT_THAT(plain.sigma_mm, ::testing::IsEmpty());
 }
 
-// Every hundredth point lifted, and to be met all the same.
+// Every hundredth point is lifted and must still be met.
 TEST(PointFit, ExactPointsOfATableAreMet) {
   const FitTarget target = Scattered(FrankePoint, 2000, 1e-3, 1);
   std::string csv = "x,y,z,u,v,exact,nx,ny,nz\n";
@@ -154,9 +123,9 @@ TEST(PointFit, ExactPointsOfATableAreMet) {
   EXPECT_LT(ErrorAgainst(FrankePoint, result.fit.surface, 50).rms, 0.01);
 }
 
-// One point in five is twenty times as rough as the others, and says so; one in fifty is far off
-// and claims to be the surest of all. 1 is what the others are off by.
-TEST(PointFit, SigmaFactorsAreOfThePointsThatAreNoOutliers) {
+// One point in five is twenty times as rough as the others, and its sigma is right. One point in
+// fifty is far off and has the smallest sigma. The factor of the others is 1.
+TEST(PointFit, OutliersDoNotCountForTheSigmaFactor) {
   const FitTarget target = Scattered(FrankePoint, 5000, 0, 1);
   Random random(2);
   std::string csv = "x,y,z,u,v,sigma\n";
@@ -174,9 +143,8 @@ TEST(PointFit, SigmaFactorsAreOfThePointsThatAreNoOutliers) {
   EXPECT_NEAR(static_cast<double>(result.fit.automatic->outliers.size()), 100, 5);
 }
 
-// With the weight that was found, its length and the same points, a fit that is given numbers is
-// the same.
-TEST(PointFit, TheWeightThatIsReportedIsThatOfTheTermsAsWritten) {
+// A fit with the reported weight and length as numbers gives the same surface.
+TEST(PointFit, TheReportedWeightBelongsToTheWrittenTerms) {
   const PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 3000, 1e-3, 1)), "test");
   const PointFit plain = FitPoints(table, {}, {});
   PointFitOptions options;
@@ -199,7 +167,7 @@ TEST(PointFit, TheWeightThatIsReportedIsThatOfTheTermsAsWritten) {
   EXPECT_LT(ErrorAgainst(of_settled, again.fit.surface, 50).rms, 1e-9);
 }
 
-// Two strips of points, and next to nothing between them.
+// Two strips of points with nearly nothing between them.
 TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   std::string csv = "x,y,z,u,v\n";
   for (int k = 0; k < 400; ++k) {
@@ -218,7 +186,7 @@ TEST(PointFit, ASurfaceThatSwingsFarBeyondItsPointsCannotBeUsed) {
   EXPECT_THAT(result.Faults()[0], HasSubstr("times the points' extent beyond them"));
 }
 
-// Inside a ball there is no surface to find; on its upper half there is, however noisy.
+// The points in a ball have no surface; those on its upper half have one, even with noise.
 TEST(PointFit, PointsThatFillSpaceCannotBeUsed) {
   Random random(7);
   PointTable filled, half;
@@ -236,7 +204,7 @@ TEST(PointFit, PointsThatFillSpaceCannotBeUsed) {
   EXPECT_THAT(noisy.Faults(), ::testing::IsEmpty());
 }
 
-TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
+TEST(PointFit, ContradictingOptionsAreFaultsOfTheFile) {
   const auto read = [](const std::string& text) {
     return testing::WordsOf<ConfigError>([&] { ReadConfigText<PointFitOptions>(text, "x.yaml"); });
   };
@@ -251,17 +219,13 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("fit: {terms: [points, points, {type: smoothness, weight: auto}]}\n"),
               HasSubstr("fit.terms[1]: the auto plan weighs one 'points'"));
   EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
-  EXPECT_THAT(read("parameters: cylinder\nclosure: periodic_uv\n"),
-              HasSubstr("go round in u alone; write closure: periodic_u"));
-  EXPECT_THAT(read("parameters: sphere\n"), HasSubstr("closure: parameters on a sphere"));
-  EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"),
-              HasSubstr("closure: parameters on a torus go round both ways"));
-  EXPECT_THAT(read("parameters: mesh\nclosure: periodic_uv\n"), HasSubstr("do not go round"));
-  EXPECT_THAT(read("patches_v: 3\nclosure: periodic_uv\n"),
-              HasSubstr("patches_v: H-spline: 8 x 3 patches are not allowed"));
+  EXPECT_THAT(read("closure: periodic_uv\n"), HasSubstr("periodic_uv"));
+  EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"), HasSubstr("torus"));
+  EXPECT_THAT(read("parameters: mesh\nclosure: periodic_u\n"),
+              HasSubstr("closure: parameters on a mesh do not go round; write closure: open"));
   EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
   EXPECT_THAT(read("patches_u: 1\nclosure: periodic_u\n"), HasSubstr("patches_u: H-spline: 1 x 8"));
-  // What is said to be allowed is.
+  // The allowed values that the message names are allowed.
   EXPECT_THAT(read("patches_u: 3\nclosure: periodic_u\n"), HasSubstr("use 4..8192 x 1..8192"));
   EXPECT_NO_THROW(ReadConfigText<PointFitOptions>("patches_u: 8192\n", "x.yaml"));
   EXPECT_NO_THROW(ReadConfigText<PointFitOptions>("patches_u: 1024\npatches_v: 1024\n", "x.yaml"));
@@ -278,9 +242,6 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
                 HasSubstr("fit.features: a surface through points of a file has no features"));
   }
   EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
-  EXPECT_THAT(read("fit: {plan: {type: auto, relaxation_rounds: 2}}\n"
-                   "joins: [{surface: a.json, edge: u0, its_edge: u1}]\n"),
-              HasSubstr("fit.plan.relaxation_rounds: joins need"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, relaxation_rounds: 2}}\n"),
               HasSubstr("fit.plan.relaxation_rounds"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
@@ -289,7 +250,7 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("sigma: true\nfit: {plan: adaptive}\n"), HasSubstr("sigma: it follows"));
 }
 
-// Some points once more, one of them twice: nothing is learned from them, of noise least of all.
+// Some points are repeated, one of them twice. Copies must not change the noise.
 TEST(PointFit, CopiesOfPointsCountOnce) {
   PointFitOptions options;
   options.sigma = true;
@@ -301,7 +262,7 @@ TEST(PointFit, CopiesOfPointsCountOnce) {
     again.uv.push_back(once.uv[k]);
   }
   const PointFit plain = FitPoints(once, options, {}), more = FitPoints(again, options, {});
-  // But for where the fits start from, which all points tell.
+  // The fits differ slightly, because copies count for the start surface.
   const auto of_plain = [&](const Vec2& uv) { return plain.fit.surface.Point(uv); };
   EXPECT_LT(ErrorAgainst(of_plain, more.fit.surface, 50).rms, 5e-5);
   EXPECT_NEAR(more.fit.automatic->noise_mm, plain.fit.automatic->noise_mm, 1e-5);
@@ -317,8 +278,8 @@ TEST(PointFit, CopiesOfPointsCountOnce) {
   EXPECT_THAT(AutoText(*more.fit.automatic), HasSubstr("6 points were given before"));
 }
 
-// Lines of a scanner, close together along themselves and far apart, of a height field and of a
-// flat one: a sheet, and no wall.
+// Scan lines, whose points are close together along the lines and far apart across them, are a
+// sheet and no wall.
 TEST(PointFit, LinesOfAScannerAreASheet) {
   for (const auto& [lines, along, height] : {std::tuple(20, 500, 1), std::tuple(60, 180, 1),
                                              std::tuple(40, 400, 1), std::tuple(20, 500, 0)}) {
@@ -339,148 +300,7 @@ TEST(PointFit, LinesOfAScannerAreASheet) {
   }
 }
 
-// A ball has the areas of its cylinder, and no angle at its poles.
-TEST(PointFit, ABallIsNoTube) {
-  Random random(3);
-  PointTable table;
-  for (int k = 0; k < 5000; ++k) {
-    table.positions.push_back(Vec3(random.Normal(), random.Normal(), random.Normal()).normalized());
-  }
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  EXPECT_EQ(FitPoints(table, options, {}).parameters, "sphere");
-  options.parameters = CylinderParameters{};
-  EXPECT_THAT(testing::WordsOf<InputError>([&] { FitPoints(table, options, {}); }),
-              HasSubstr("the points close at an end of the cylinder"));
-}
-
-// Over triangles that are made for the points.
-TEST(PointFit, ASheetThatFoldsOverEveryPlaneIsFoundBelowItsNoise) {
-  for (const auto& [name, sheet] : testing::BentSheets()) {
-    const testing::Sheet wavy = testing::Wavy(sheet, 0.5);
-    const testing::SheetPoints points = testing::ScatterOver(wavy, {.count = 10000, .noise = 0.2});
-    PointTable table;
-    table.positions = points.positions;
-    const PointFit fit = FitPoints(table, {}, {});
-    EXPECT_EQ(fit.parameters, "mesh");
-    const MeshQuery surface(Tessellate(fit.fit.surface, 8).mesh);
-    double squares = 0;
-    for (const Vec2& q : points.at) {
-      const double off_mm = surface.Closest(wavy(q)).distance_mm;
-      squares += off_mm * off_mm;
-    }
-    EXPECT_LT(std::sqrt(squares / static_cast<double>(points.at.size())),
-              0.5 * 0.2 * points.spacing_mm)
-        << name;
-  }
-}
-
-PointTable StonePoints(int count, double noise) {
-  PointTable table;
-  table.positions = testing::PointsAround(StoneRadius, count, noise);
-  return table;
-}
-
-RingErrors ErrorsOfStone(const HSplineSurface& surface, double first, double last) {
-  return testing::ErrorsOfRings(surface, StoneRadius, first, last);
-}
-
-// Also within ten degrees of the poles, where there are few points; each pole is one place to less
-// than the noise.
-TEST(PointFit, AStoneIsFoundBelowItsNoiseAlsoAtItsPoles) {
-  constexpr double kNoise = 1e-3;
-  const PointTable table = StonePoints(10000, kNoise);
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  options.sigma = true;
-  const PointFit result = FitPoints(table, options, {});
-  EXPECT_EQ(result.parameters, "sphere");
-  EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-  EXPECT_LT(ErrorsOfStone(result.fit.surface, 0, 1).rms, 0.5 * kNoise);
-  for (const double v : {0.0, 1.0}) {
-    const RingErrors errors = ErrorsOfStone(result.fit.surface, v, std::abs(v - 1.0 / 18));
-    EXPECT_LT(errors.rms, 1.5 * kNoise);
-    EXPECT_LT(errors.largest, 4 * kNoise);
-  }
-  ASSERT_TRUE(result.poles);
-  for (const PoleGap& pole : *result.poles) {
-    EXPECT_LT(pole.gap_mm, kNoise);
-    EXPECT_NEAR(pole.place.norm(), StoneRadius(pole.place.normalized()), kNoise);
-  }
-  // Nothing is told of points that were not given.
-  EXPECT_EQ(result.fit.residual_mm.size(), table.positions.size());
-  EXPECT_EQ(result.fit.uv.size(), table.positions.size());
-  EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
-  for (const std::uint32_t k : result.fit.automatic->outliers) {
-    EXPECT_LT(k, table.positions.size());
-  }
-  EXPECT_NEAR(result.fit.automatic->noise_mm, 0.6 * kNoise, 0.1 * kNoise);
-}
-
-// By every plan, the finest levels alone too, for which the start's edges are one place exactly.
-TEST(PointFit, ASphereIsFittedByEveryPlan) {
-  const PointTable table = StonePoints(3000, 1e-3);
-  const std::vector<Term> smooth = {PointTerm{}, SmoothnessTerm{.weight = 1e-9, .length_mm = 1}};
-  const std::vector<FitOptions> all = {
-      {.plan = AdaptivePlan{.tolerance_mm = 0.02, .finest = 2}, .terms = smooth},
-      {.plan = ListedPlan{.schedule = {{.level = 0}, {.level = 1}}}, .terms = smooth},
-      {.plan = ListedPlan{.schedule = {{.level = 2}}}, .terms = smooth}};
-  for (const FitOptions& fit : all) {
-    const PointFit result = FitPoints(
-        table, {.closure = Closure::kPeriodicU, .parameters = SphereParameters{}, .fit = fit}, {});
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    EXPECT_LT(result.fit.point_rms_mm, 0.01);
-    EXPECT_LT((*result.poles)[0].gap_mm, 0.02);
-    EXPECT_EQ(result.fit.residual_mm.size(), 3000u);
-  }
-}
-
-PointTable MeshTable(const TriMesh& mesh) {
-  PointTable table;
-  table.positions = mesh.points;
-  table.triangles = mesh.triangles;
-  return table;
-}
-
-// A bent one, which no rays from a centre meet once each; also where (u,v) are moved.
-TEST(PointFit, ABeanIsFoundBelowItsNoiseAlsoAtItsPoles) {
-  constexpr double kNoise = 1e-3;
-  const testing::ClosedShape bean = testing::Bean();
-  const PointTable table = MeshTable(testing::MeshOf(bean, 10000, kNoise));
-  for (const int rounds : {0, 2}) {
-    PointFitOptions options;
-    options.closure = Closure::kPeriodicU;
-    options.sigma = true;
-    options.fit.plan = AutoPlan{.relaxation_rounds = rounds};
-    const PointFit result = FitPoints(table, options, {});
-    EXPECT_EQ(result.parameters, "mesh");
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    const HSplineSurface& surface = result.fit.surface;
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1).rms, 0.4 * kNoise);
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1.0 / 18).rms, kNoise);
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 17.0 / 18, 1).rms, kNoise);
-    ASSERT_TRUE(result.poles);
-    for (const PoleGap& pole : *result.poles) {
-      EXPECT_LT(pole.gap_mm, kNoise);
-      EXPECT_LT((pole.place - bean.FootOf(pole.place)).norm(), kNoise);
-    }
-    EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
-  }
-}
-
-TEST(PointFit, AClosedMeshGivesTheSameBytesForAnyNumberOfThreads) {
-  const PointTable table = MeshTable(testing::MeshOf(testing::EllipsoidWithEars(), 3000, 1e-3));
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  options.parameters = MeshParameters{};
-  RunContext two_threads;
-  two_threads.threads = 2;
-  const PointFit one = FitPoints(table, options, {}), two = FitPoints(table, options, two_threads);
-  EXPECT_EQ(one.fit.uv, two.fit.uv);
-  EXPECT_EQ(one.fit.residual_mm, two.fit.residual_mm);
-}
-
-// At a hundred million mm, digits of a hundredth of a micrometre are left.
+// At 1e8 mm a double resolves 1.5e-8 mm.
 TEST(PointFit, PointsFarFromTheOriginHaveAnExtent) {
   PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 500, 1e-3, 1)), "test");
   const PointFit near = FitPoints(table, {}, {});

@@ -46,7 +46,7 @@ TEST(PointTable, SigmaBecomesAWeight) {
   EXPECT_FALSE(ParsePointTable("x,y,z,weight\n1,2,3,4\n", "p.csv").weights_of_sigma);
 }
 
-TEST(PointTable, AttributesAreThoseThatAreAskedForInTheirOrder) {
+TEST(PointTable, AttributesAreTheRequestedOnesInTheirOrder) {
   const std::vector<std::string> names = {"red", "heat"};
   for (const char* text :
        {"heat,x,y,z,red\n9,1,2,3,255\n8,1,2,4,0\n", "heat,x,y,z,red\n9,1,2,3, 255\n8,1,2,4,0\n"}) {
@@ -71,7 +71,7 @@ TEST(PointTable, ExactPointsAreKnownByTheirIndex) {
   EXPECT_EQ(ParsePointTable("x,y,z,exact\n1,2,3,1\n", "p.csv").exact.size(), 1u);
 }
 
-TEST(PointTable, WhatIsWrongIsNamedWithItsLine) {
+TEST(PointTable, FaultsAreNamedWithTheirLine) {
   const auto message = [](std::string_view text) -> std::string {
     try {
       ParsePointTable(text, "p.csv");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/plan/fit_faults.h"
+#include "fitting/plan/fit_result.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/parameters/one_to_one.h"
+#include "fitting/folds/fold_check.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "surfaces/base/random.h"
-#include "tests/testing/bent_sheets.h"
 #include "tests/testing/grid_mesh.h"
 #include "tests/testing/point_sets.h"
 #include "tests/testing/scattered_data.h"
@@ -22,12 +21,12 @@ constexpr double kNone = 0.01;
 struct Cloud {
   std::vector<Vec3> positions;
   std::vector<Vec2> at;
-  Vec2 period_mm = Vec2::Zero();
+  double period_mm = 0;
 
   MapFaults Faults() const { return FaultsOfPoints({positions, at, period_mm}); }
 };
 
-// Seen from above.
+// Points of a surface, seen from above.
 Cloud FromAbove(const std::function<Vec3(const Vec2&)>& surface, int count, double noise = 0) {
   Cloud cloud;
   for (const FitPoint& p : testing::Scattered(surface, count, noise, 1).points) {
@@ -42,7 +41,7 @@ Vec3 OnSphere(const Vec2& uv) {
   return {r * std::cos(p), r * std::sin(p), z};
 }
 
-TEST(OneToOne, HeightFieldsAreHoweverSteepNoisyOrMany) {
+TEST(FoldCheck, HeightFieldsDoNotFoldHoweverSteepNoisyOrMany) {
   for (const double steep : {1.0, 5.0}) {
     const auto field = [&](const Vec2& uv) -> Vec3 {
       const Vec3 p = testing::FrankePoint(uv);
@@ -56,8 +55,8 @@ TEST(OneToOne, HeightFieldsAreHoweverSteepNoisyOrMany) {
   EXPECT_LT(FromAbove(testing::FrankePoint, 40000, /*noise=*/0.03).Faults().Sum(), kNone);
 }
 
-// Every set on which a fit is measured, as it is scattered: crowded, with outliers, with gaps.
-TEST(OneToOne, NoneOfTheHeightFieldsOfTheBenchFolds) {
+// Every point set of the benchmarks, as it is scattered: crowded, with outliers, with gaps.
+TEST(FoldCheck, NoneOfTheHeightFieldsOfTheBenchFolds) {
   for (const testing::PointSet& set : testing::PointSets()) {
     if (set.closure == Closure::kOpen) {
       Random random(7);
@@ -74,25 +73,25 @@ TEST(OneToOne, NoneOfTheHeightFieldsOfTheBenchFolds) {
   }
 }
 
-TEST(OneToOne, ASphereSeenFromAboveFolds) {
+TEST(FoldCheck, ASphereSeenFromAboveFolds) {
   for (const int count : {400, 5000, 60000}) {
     EXPECT_GT(FromAbove(OnSphere, count).Faults().folded, 0.3) << count;
   }
 }
 
-// Two terraces with nothing between them are no two sheets.
-TEST(OneToOne, ACliffIsNoFold) {
+// Two terraces with nothing between them are not two sheets over each other.
+TEST(FoldCheck, ACliffIsNoFold) {
   const auto terraces = [](const Vec2& uv) -> Vec3 {
     return {uv.x(), uv.y(), uv.x() + 0.3 * std::sin(4 * uv.y()) > 0.6 ? 0.5 : 0};
   };
   EXPECT_LT(FromAbove(terraces, 5000).Faults().Sum(), 0.01);
 }
 
-// A tube around its axis is one-to-one, also across the seam; its flat lids are not.
-TEST(OneToOne, LidsCollapseOnACylinder) {
+// The tube is one-to-one around its axis, also across the seam; its flat lids are not.
+TEST(FoldCheck, LidsCollapseOnACylinder) {
   const auto around = [](bool lids) {
     Random random(1);
-    Cloud cloud{.positions = {}, .at = {}, .period_mm = Vec2(2 * std::numbers::pi, 0)};
+    Cloud cloud{.positions = {}, .at = {}, .period_mm = 2 * std::numbers::pi};
     for (int k = 0; k < 20000; ++k) {
       const bool lid = lids && k % 3 == 0;
       const double turn = 2 * std::numbers::pi * random.Uniform(), place = random.Uniform();
@@ -106,24 +105,8 @@ TEST(OneToOne, LidsCollapseOnACylinder) {
   EXPECT_GT(around(true).Sum(), 0.15);
 }
 
-// A ring by its two angles is one-to-one across both seams; with the tube gone round twice, one
-// half of it lies on the other.
-TEST(OneToOne, ATorusIsAcrossBothSeams) {
-  const auto around = [](double turns) {
-    Cloud cloud{.positions = {}, .at = {}, .period_mm = 2 * std::numbers::pi * Vec2(1, 0.4)};
-    for (const FitPoint& p : testing::Scattered(testing::RingPoint, 20000, 1e-3, 1).points) {
-      cloud.positions.push_back(p.position);
-      const double v = turns * p.uv.y();
-      cloud.at.push_back(Vec2(p.uv.x(), v - std::floor(v)).cwiseProduct(cloud.period_mm));
-    }
-    return cloud.Faults();
-  };
-  EXPECT_LT(around(1).Sum(), kNone);
-  EXPECT_GT(around(2).folded, 0.5);
-}
-
 // 0.4 of a sheet is folded back over the rest.
-TEST(OneToOne, TrianglesTellTheShareThatIsTurnedOver) {
+TEST(FoldCheck, TrianglesGiveTheShareThatIsTurnedOver) {
   const TriMesh mesh =
       testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 20);
   std::vector<Vec2> at;
@@ -140,9 +123,9 @@ TEST(OneToOne, TrianglesTellTheShareThatIsTurnedOver) {
   EXPECT_TRUE(FaultsOfTriangles({mesh.points, at}, mesh.triangles).mirrored);
 }
 
-// Triangles whose corners are off by a third of an edge and more; four tenths of a sheet that is
-// folded back are told as before.
-TEST(OneToOne, WhatNoiseTurnsIsNoFold) {
+// The corners of the triangles are off by a third of an edge and more. A fold of four tenths of the
+// sheet is still found.
+TEST(FoldCheck, TrianglesThatNoiseTurnsAreNoFold) {
   TriMesh mesh = testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 60);
   Random random(3);
   std::vector<Vec2> above, folded;
@@ -156,30 +139,12 @@ TEST(OneToOne, WhatNoiseTurnsIsNoFold) {
   EXPECT_NEAR(FaultsBeyondNoise({mesh.points, folded}, mesh.triangles).folded, 0.4, 0.02);
 }
 
-// A sheet with a strip of which a twentieth of the width is left.
-TEST(OneToOne, TheSqueezedShareIsThatOfTheArea) {
-  const TriMesh mesh =
-      testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 50);
-  std::vector<double> on_map;
-  for (const Triangle& t : mesh.triangles) {
-    const double x = TriangleCentroid(mesh, t).x();
-    on_map.push_back((x > 0.4 && x < 0.6 ? 0.05 : 1) * TriangleAreaVector(mesh, t).z());
-  }
-  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
-  for (double& area : on_map) {
-    area *= -3;
-  }
-  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
-  on_map.assign(mesh.triangles.size(), 0.1);
-  EXPECT_EQ(SqueezedShare(mesh.points, mesh.triangles, on_map), 0);
-}
-
-// The axis of a tube that bends leaves it: its near side is few points widely spread over many of
+// A tube that bends leaves its axis: a few points of the near side then spread widely over many of
 // the far side.
-TEST(OneToOne, ATubeThatBendsAwayFromItsAxisFoldsAroundIt) {
+TEST(FoldCheck, ATubeThatBendsAwayFromItsAxisFoldsAroundIt) {
   const auto bent = [](double bend, int count) {
     Random random(1);
-    Cloud cloud{.positions = {}, .at = {}, .period_mm = Vec2(0.6 * std::numbers::pi, 0)};
+    Cloud cloud{.positions = {}, .at = {}, .period_mm = 0.6 * std::numbers::pi};
     for (int k = 0; k < count; ++k) {
       const double turn = 2 * std::numbers::pi * random.Uniform(), along = 2 * random.Uniform() - 1,
                    angle = bend / 2 * along, r = 2 / bend + 0.15 * std::cos(turn);
@@ -197,8 +162,28 @@ TEST(OneToOne, ATubeThatBendsAwayFromItsAxisFoldsAroundIt) {
   }
 }
 
-// Noise of one to three spacings leaves a height field what it is, and a roll what that is.
-TEST(OneToOne, ARollIsToldFromNoiseAsWideAsItsSpacing) {
+// Points spread evenly over one turn and a half of a spiral whose turns are 6.28 apart.
+//   noise: standard deviation of each coordinate, in spacings of the points.
+std::vector<Vec3> RollPoints(std::size_t count, double noise) {
+  constexpr double kFirst = 1.5 * std::numbers::pi, kLast = 4.5 * std::numbers::pi, kWidth = 21;
+  const auto length = [](double t) { return (t * std::hypot(1, t) + std::asinh(t)) / 2; };
+  const double spacing =
+      std::sqrt(kWidth * (length(kLast) - length(kFirst)) / static_cast<double>(count));
+  Random random(1);
+  std::vector<Vec3> points;
+  while (points.size() < count) {
+    const double turn = random.Uniform(kFirst, kLast), along = random.Uniform(0, kWidth);
+    if (random.Uniform() * std::hypot(1, kLast) <= std::hypot(1, turn)) {
+      const Vec3 off(random.Normal(), random.Normal(), random.Normal());
+      points.push_back(Vec3(turn * std::cos(turn), along, turn * std::sin(turn)) +
+                       noise * spacing * off);
+    }
+  }
+  return points;
+}
+
+// With noise of one to three spacings a height field stays one-to-one, and a roll folds.
+TEST(FoldCheck, ARollDiffersFromNoiseAsWideAsItsSpacing) {
   for (const int count : {2000, 20000}) {
     for (const double noise : {1.0, 2.0, 3.0}) {
       const double width = noise / std::sqrt(count);
@@ -208,8 +193,7 @@ TEST(OneToOne, ARollIsToldFromNoiseAsWideAsItsSpacing) {
   }
   for (const double noise : {0.3, 1.0}) {
     Cloud above, along;
-    above.positions = along.positions =
-        testing::ScatterOver(testing::SpiralRoll, {.count = 20000, .noise = noise}).positions;
+    above.positions = along.positions = RollPoints(20000, noise);
     for (const Vec3& p : above.positions) {
       above.at.emplace_back(p.x(), p.y());
       along.at.emplace_back(p.x(), p.z());
@@ -219,7 +203,7 @@ TEST(OneToOne, ARollIsToldFromNoiseAsWideAsItsSpacing) {
   }
 }
 
-TEST(OneToOne, OfAFewPointsNothingIsSaid) { EXPECT_EQ(FromAbove(OnSphere, 20).Faults().Sum(), 0); }
+TEST(FoldCheck, AFewPointsShowNoFaults) { EXPECT_EQ(FromAbove(OnSphere, 20).Faults().Sum(), 0); }
 
 }  // namespace
 }  // namespace semblance

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The check that a map of scattered points to the plane is one-to-one, so that it can carry a
+// surface.
+#pragma once
+
+#include <span>
+
+#include "fitting/folds/map_samples.h"
+#include "surfaces/base/geometry.h"
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance {
+
+// Shares of the surface, 0 to 1.
+struct MapFaults {
+  double folded = 0;      // another sheet of the surface lies at the same place of the plane
+  double collapsed = 0;   // less than 1/40 of the area is left, as of walls seen from above
+  bool mirrored = false;  // most triangles run clockwise on the plane; false without triangles
+
+  double Sum() const { return folded + collapsed; }
+};
+
+// Estimates the faults from the points alone, by some hundred samples of them and by means of
+// points in small cubes, in which noise is smaller. A sample is folded in two cases:
+// - The 16 samples that the map puts closest to it fall into several sheets, at least three times
+// the
+//   samples' spacing apart in space, and the map mixes these sheets. Two sheets on two sides of a
+//   line are a cliff and no fold; noise and outliers are no sheets.
+// - The map turns the sample over against its neighbours (turned_samples.h).
+// With more than 2000 points only the means decide which samples collapse, because the points of
+// one scan line look like a wall in their own noise. Fewer than 32 points give no faults.
+MapFaults FaultsOfPoints(const PlaneMap& map);
+
+// Computes the faults from the triangles between the points, as shares of their area: a triangle is
+// folded if the map turns it over against the majority. The shares are exact, except that two
+// sheets of one orientation at the same place are not found.
+MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> triangles);
+
+// The same, but each point is judged by the two rings of triangles around it together, because
+// noise turns single triangles over and their neighbours make up for it. It is too coarse for
+// narrow folds: near the edge of a fold it finds about half of the area.
+MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> triangles);
+
+}  // namespace semblance
