@@ -254,8 +254,8 @@ class Fitter {
   }
 
   LevelView View(int level, const FitTarget& target) const {
-    return ViewOfLevel(result_.surface, rest_, target, level,
-                       {.aim = AimOf(options_.plan), .held = Held()});
+    return MakeLevelView(result_.surface, rest_, target, level,
+                         {.aim = AimOf(options_.plan), .held = Held()});
   }
 
   LevelSummary SolveLevel(const ScheduleStep& step, std::span<const Term> terms,

@@ -14,7 +14,6 @@
 #include "fitting/solve/coupled_solver.h"
 #include "fitting/solve/exact_points.h"
 #include "fitting/solve/refinement_marking.h"
-#include "fitting/terms/robust_loss.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -195,7 +194,7 @@ void SpaceSolve::Begin() {
 
 const LevelView& SpaceSolve::View() {
   if (!view_) {
-    view_ = ViewOfSpace(space_, cloud_, *target_, lengths_mm_);
+    view_ = MakeSpaceView(space_, cloud_, *target_, lengths_mm_);
     view_->start = start_;
     view_->held = HeldRows();
   }

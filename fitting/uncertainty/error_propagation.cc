@@ -85,7 +85,7 @@ Eigen::MatrixXd UnitColumns(Eigen::Index rows, Eigen::Index first, Eigen::Index 
 // The points less what levels finer than `level` add.
 FitTarget LessFiner(const HSplineSurface& surface, const HSplineSurface& rest,
                     const FitTarget& target, int level) {
-  const LevelView view = ViewOfLevel(surface, rest, target, level);
+  const LevelView view = MakeLevelView(surface, rest, target, level);
   FitTarget moved = target;
   moved.anchors.clear();
   for (std::size_t k = 0; k < moved.points.size(); ++k) {
@@ -187,7 +187,7 @@ struct ErrorPropagation::Model {
                                                         .terms = solved,
                                                         .settled = true});
     } else {
-      solve = std::make_unique<SpaceSolve>(ViewOfLevel(fitted, rest, points_given, level), solved,
+      solve = std::make_unique<SpaceSolve>(MakeLevelView(fitted, rest, points_given, level), solved,
                                            Solver::kFastest);
     }
     weights = solve->PointWeights();

@@ -206,7 +206,7 @@ TEST_P(NestedSolveIn, ALevelComesOutAsByADirectFactor) {
                                                     .stretch = stretch.stretch,
                                                     .direction_deg = stretch.direction_deg}};
     const LevelSolution direct =
-        FitLevel(ViewOfLevel(start, start, target, 1, {.aim = FitAim::kLevel, .held = {}}), terms,
+        FitLevel(MakeLevelView(start, start, target, 1, {.aim = FitAim::kLevel, .held = {}}), terms,
                  Solver::kFastest);
     const NestedValues& displacements = solve.Displacements();
     const ControlNet net = start.Net(1);
