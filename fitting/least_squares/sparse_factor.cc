@@ -11,8 +11,9 @@
 namespace semblance {
 namespace {
 
-// Of a matrix over coordinates: a column per vertex, an entry per vertex that it meets.
-SparseMatrix PatternOfVertices(const SparseMatrix& lower) {
+// The pattern over vertices of a matrix over coordinates: a column per vertex, an entry per coupled
+// vertex.
+SparseMatrix VertexPattern(const SparseMatrix& lower) {
   const Eigen::Index vertices = lower.cols() / 3;
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(static_cast<std::size_t>(lower.nonZeros() / 9 + vertices));
@@ -30,16 +31,16 @@ SparseMatrix PatternOfVertices(const SparseMatrix& lower) {
 
 }  // namespace
 
-// Derived for the factor, which Eigen keeps to itself.
+// Gives access to the factor, which is a protected member of Eigen's class.
 struct SparseFactor::Cholmod : Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::Lower> {
   const cholmod_factor& Factor() const { return *m_cholmodFactor; }
 
-  // Orders the vertices, a third of the rows and a ninth of the entries, and keeps the coordinates
-  // of each together, as an order of all rows would.
+  // Orders the vertices instead of the rows: a third of the rows and a ninth of the entries. The
+  // coordinates of a vertex stay together, as they would in an order of all rows.
   void AnalyzeByVertex(const SparseMatrix& lower) {
     Cholmod of_vertices;
     of_vertices.cholmod().print = 0;
-    of_vertices.analyzePattern(PatternOfVertices(lower));
+    of_vertices.analyzePattern(VertexPattern(lower));
     const auto* const vertices = static_cast<const int*>(of_vertices.Factor().Perm);
     std::vector<int> rows;
     rows.reserve(of_vertices.Factor().n * 3);
@@ -61,7 +62,7 @@ struct SparseFactor::Cholmod : Eigen::CholmodSupernodalLLT<SparseMatrix, Eigen::
 SparseFactor::SparseFactor(const SparseMatrix& lower, double shift, RowKind rows)
     : cholmod_(std::make_unique<Cholmod>()) {
   UseOneLibraryThread();
-  cholmod_->cholmod().print = 0;  // what it would say is in usable()
+  cholmod_->cholmod().print = 0;  // usable() reports failures
   cholmod_->setShift(shift);
   if (rows == RowKind::kCoordinate) {
     cholmod_->AnalyzeByVertex(lower);
@@ -79,7 +80,8 @@ Eigen::MatrixXd SparseFactor::Solve(const Eigen::MatrixXd& right) const {
   return cholmod_->solve(right);
 }
 
-// Supernode s holds columns super[s] .. super[s + 1] - 1 as one dense block.
+// Reads the diagonal of CHOLMOD's supernodal factor. Supernode s holds columns super[s] .. super[s
+// + 1] - 1 as one dense block.
 Eigen::VectorXd SparseFactor::Pivots() const {
   const cholmod_factor& factor = cholmod_->Factor();
   const auto* const super = static_cast<const int*>(factor.super);
@@ -101,7 +103,7 @@ double SparseFactor::LogDeterminant() const { return Pivots().array().log().sum(
 
 namespace {
 
-// The whole normal matrix with its columns scaled to 1 on the diagonal, which leaves the rank.
+// The normal matrix with its diagonal scaled to 1, which preserves the rank.
 SparseMatrix Scaled(const SparseMatrix& lower) {
   const Eigen::VectorXd d = lower.diagonal();
   const Eigen::VectorXd scale =
@@ -109,25 +111,26 @@ SparseMatrix Scaled(const SparseMatrix& lower) {
   return scale.asDiagonal() * lower * scale.asDiagonal();
 }
 
-// From log det(A + more) - log det(A + less): each eigenvalue well below `less` adds the log of
-// their ratio, each well above `more` nothing, whatever the order of the pivots.
+// Counts eigenvalues below the shifts from log det(A + more) - log det(A + less). An eigenvalue
+// well below `less` adds log(more / less), and one well above `more` adds nothing. The order of the
+// pivots has no effect.
 double CountBelow(double less, double log_less, double more, double log_more) {
   return (log_more - log_less) / std::log(more / less);
 }
 
 }  // namespace
 
-// The shifts are far above rounding, which is of some 1e-15. Points that tell all apart leave no
-// small pivot, and cost one factor.
+// The two shifts lie far above round-off, about 1e-15, and bracket the threshold of the rank. If no
+// pivot is below kFullRankPivot, the rank is full and one factor is enough.
 int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
-  constexpr double kLess = 1e-11, kMore = 1e-10, kPlain = 1e-6;
+  constexpr double kLess = 1e-11, kMore = 1e-10, kFullRankPivot = 1e-6;
   const SparseMatrix scaled = Scaled(lower);
   const SparseFactor less(scaled, kLess);
   if (!less.usable()) {
     return -1;
   }
   int rank = static_cast<int>(scaled.rows());
-  if (!(less.Pivots().minCoeff() > kPlain)) {
+  if (!(less.Pivots().minCoeff() > kFullRankPivot)) {
     const SparseFactor more(scaled, kMore);
     rank -= static_cast<int>(
         std::lround(CountBelow(kLess, less.LogDeterminant(), kMore, more.LogDeterminant())));

@@ -264,8 +264,8 @@ class NestedFitter {
     report_.rounds.push_back({.finest = space_.finest(),
                               .vertices = space_.Vertices(),
                               .weight = chosen.weight,
-                              .stretch = StretchOf(metric_).stretch,
-                              .direction_deg = StretchOf(metric_).direction_deg,
+                              .stretch = FindStretch(metric_).stretch,
+                              .direction_deg = FindStretch(metric_).direction_deg,
                               .degrees_of_freedom = chosen.degrees_of_freedom,
                               .rms_mm = std::sqrt(chosen.mean_square),
                               .held_out_rms_mm = std::sqrt(held),
@@ -501,8 +501,8 @@ class NestedFitter {
 
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
-    report_.stretch = StretchOf(metric_).stretch;
-    report_.direction_deg = StretchOf(metric_).direction_deg;
+    report_.stretch = FindStretch(metric_).stretch;
+    report_.direction_deg = FindStretch(metric_).direction_deg;
     report_.weighted = points_.weighted;
     report_.met_to_rounding = report_.held_out_rms_mm <= rounding_mm_;
     report_.limited_by_density =

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <utility>
 
-#include "fitting/least_squares/cross_validation_score.h"
+#include "fitting/least_squares/cross_validation.h"
 
 namespace semblance {
 namespace {
@@ -150,7 +150,7 @@ void NestedWeightSearch::ScanStretches(double factor) {
   constexpr double kStretch = 4, kTurn_deg = 45;
   const double weight = best_.weight;
   for (int k = 0; k < 4 && !std::isnan(weight); ++k) {
-    TryMetric(MetricOf({.stretch = kStretch, .direction_deg = k * kTurn_deg}),
+    TryMetric(MakeBendingMetric({.stretch = kStretch, .direction_deg = k * kTurn_deg}),
               [&] { ClimbAnew(factor, weight); });
   }
 }

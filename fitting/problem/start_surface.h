@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surface to start from where there is no template.
+// A start surface for a fit without a template.
 #pragma once
 
 #include <span>
@@ -9,19 +9,19 @@
 
 namespace semblance {
 
-// A smooth surface near the points, with level 0 alone: the least-squares fit of all affine maps of
-// (u,v) (open), or of all sums of 1, cos and sin of 2 pi u, each with and without v (closed in u),
-// or of the products of 1, cos and sin of 2 pi u with those of 2 pi v (closed in both).
-//   positions: mm; uv: in [0,1] x [0,1], one per position.
-// Throws InputError for no points, a number of uv that is not that of the points, and a shape as
-// CheckShape does.
+// Makes a smooth surface near the points, with level 0 alone. It is the least-squares fit by linear
+// combinations of
+//   1, u, v                                                     (open),
+//   {1, cos 2 pi u, sin 2 pi u} x {1, v}                        (closed in u), or
+//   {1, cos 2 pi u, sin 2 pi u} x {1, cos 2 pi v, sin 2 pi v}   (closed in both).
+// positions: mm; uv: in [0,1] x [0,1], one per position. Throws InputError if there are no points
+// or the numbers differ, and like CheckShape for the shape.
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv);
 
-// The same of what is one place along v = 0 and one along v = 1: the least-squares fit of all
-// affine images of the unit sphere, u being the azimuth and pi v the angle from a pole. The edges
-// are closed, and have no frames: offsets there need OffsetReference::kWorld.
-//   shape: closed in u.
+// Makes a start surface with a pole along each of v = 0 and v = 1: the least-squares fit by affine
+// images of the unit sphere, with azimuth 2 pi u and angle pi v from a pole. The poles have no
+// frames, so offsets there need OffsetReference::kWorld. shape: closed in u.
 HSplineSurface StartBall(const HSplineShape& shape, std::span<const Vec3> positions,
                          std::span<const Vec2> uv);
 

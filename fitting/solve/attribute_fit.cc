@@ -12,10 +12,9 @@
 #include <set>
 #include <utility>
 
-#include "fitting/least_squares/cross_validation_score.h"
+#include "fitting/least_squares/cross_validation.h"
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/least_squares/sparse_factor.h"
-#include "fitting/least_squares/trace_probes.h"
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
@@ -168,7 +167,7 @@ class AttributeSolver {
       return trial;
     }
     trial.values = factor.Solve(right_);
-    trial.trace = probes_.TraceOf(factor.Solve(influenced_));
+    trial.trace = probes_.Estimate(factor.Solve(influenced_));
     const Eigen::MatrixXd product = points_part_.selfadjointView<Eigen::Lower>() * trial.values;
     for (std::size_t c = 0; c < values_.size(); ++c) {
       const auto column = static_cast<Eigen::Index>(c);

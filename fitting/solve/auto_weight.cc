@@ -7,9 +7,8 @@
 #include <cmath>
 #include <map>
 
-#include "fitting/least_squares/cross_validation_score.h"
+#include "fitting/least_squares/cross_validation.h"
 #include "fitting/least_squares/sparse_factor.h"
-#include "fitting/least_squares/trace_probes.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -56,7 +55,7 @@ class WeightSearch {
     const double misfit =
         problem_.misfit - 2 * step.cwiseProduct(problem_.points.right).sum() +
         step.cwiseProduct(problem_.points.lower.selfadjointView<Eigen::Lower>() * step).sum();
-    const double trace = probes_.TraceOf(factor.Solve(influenced_));
+    const double trace = probes_.Estimate(factor.Solve(influenced_));
     return {.weight = weight,
             .score = CrossValidationScore(misfit, trace, problem_.count),
             .degrees_of_freedom = trace};

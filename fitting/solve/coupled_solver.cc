@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "fitting/least_squares/triangle_sum.h"
+#include "fitting/least_squares/sparse_factor.h"
 #include "fitting/terms/tangent_points.h"
 #include "fitting/terms/term_cost.h"
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "fitting/space/spline_element.h"
+#include "fitting/space/hierarchical_spline_space.h"
 
 namespace semblance {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "fitting/least_squares/triangle_sum.h"
+#include "fitting/least_squares/sparse_factor.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {

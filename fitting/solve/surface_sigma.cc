@@ -12,7 +12,6 @@
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
-#include "fitting/space/spline_element.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -8,12 +8,11 @@
 #include <vector>
 
 #include "fitting/least_squares/patch_energy.h"
-#include "fitting/least_squares/row_sink.h"
+#include "fitting/least_squares/qr_compression.h"
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/problem/fit_target.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
-#include "fitting/space/spline_element.h"
 #include "surfaces/hspline/control_net.h"
 #include "surfaces/hspline/hspline_surface.h"
 

@@ -93,9 +93,9 @@ double Energy(const auto& term, const LevelView& view, const ControlNet& net) {
 ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
                              int patches_v) {
   const double scale = term.weight * std::pow(term.length_mm, 4) / lengths_mm.prod();
-  return scale * ThinPlateStiffness(
-                     lengths_mm.x() / patches_u, lengths_mm.y() / patches_v,
-                     MetricOf({.stretch = term.stretch, .direction_deg = term.direction_deg}));
+  return scale * ThinPlateStiffness(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v,
+                                    MakeBendingMetric({.stretch = term.stretch,
+                                                       .direction_deg = term.direction_deg}));
 }
 
 // weight * length^2 / area * energy of a patch.

@@ -13,7 +13,7 @@
 #include <variant>
 
 #include "fitting/least_squares/linear_cost.h"
-#include "fitting/least_squares/row_sink.h"
+#include "fitting/least_squares/qr_compression.h"
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/least_squares/sparse_factor.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -9,13 +7,13 @@
 #include <filesystem>
 #include <vector>
 
-#include "fitting/least_squares/triangle_sum.h"
+#include "fitting/least_squares/sparse_factor.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
 
-// Rows of four numbers each, beside each other in the columns, as of points on a curve.
+// Rows of four consecutive entries each, like those of points on a curve.
 Eigen::MatrixXd Rows(int rows, int columns, std::uint64_t random_seed) {
   Random random(random_seed);
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(rows, columns);
@@ -33,8 +31,8 @@ SparseMatrix LowerOf(const Eigen::MatrixXd& a) {
   return Eigen::MatrixXd(normal.triangularView<Eigen::Lower>()).sparseView();
 }
 
-// Few rows, many, some twice, and columns of no row; each of its own size.
-TEST(NumericalRank, IsThatOfTheSingularValues) {
+// Few rows, many rows, repeated rows and columns without rows, with columns of different sizes.
+TEST(NumericalRank, EqualsThatOfTheSingularValues) {
   for (std::uint64_t k = 0; k < 60; ++k) {
     const int columns = 10 + static_cast<int>(k), rows = 3 + 2 * static_cast<int>(k % 37);
     Eigen::MatrixXd a = Rows(rows, columns, k);
@@ -50,7 +48,7 @@ TEST(NumericalRank, IsThatOfTheSingularValues) {
   }
 }
 
-// The Laplacian of a square grid, a little stiffened: its factor has wide dense blocks.
+// The Laplacian of a square grid with a small shift. Its factor has wide dense blocks.
 SparseMatrix GridLaplacian(int side) {
   std::vector<Eigen::Triplet<double>> entries;
   for (int k = 0; k < side * side; ++k) {
@@ -117,7 +115,7 @@ TEST(BlockTriangleSum, IsTheSumOfItsBlocks) {
   EXPECT_EQ(taken.nonZeros(), 9 + 9 + 6);
 }
 
-TEST(SparseFactor, IsTheSameByVertex) {
+TEST(SparseFactor, OrderByVertexGivesTheSameSolution) {
   const SparseMatrix lower = RingOfVertices(40);
   const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(lower.rows(), -1, 2);
   const SparseFactor plain(lower, 1e-3), by_vertex(lower, 1e-3, RowKind::kCoordinate);

@@ -197,7 +197,7 @@ TEST_P(NestedSolveIn, ALevelComesOutAsByADirectFactor) {
     space.Link();
     constexpr double kWeight = 1e-5;
     NestedSolve solve(points, MeanLengths(start));
-    solve.Begin(space, {}, MetricOf(stretch));
+    solve.Begin(space, {}, MakeBendingMetric(stretch));
     solve.SetWeight(kWeight);
     solve.Solve(0);
     const std::vector<Term> terms = {PointTerm{},
@@ -228,7 +228,7 @@ TEST(NestedSolve, LengthsMayChange) {
   const HSplineSurface start = PlainStart(shape);
   const NestedPoints points = DisplacementsOf(start, PointsFor(Closure::kOpen, 1000, 0.01));
   const NestedSpace space(shape);
-  const BendingMetric metric = MetricOf({.stretch = 3, .direction_deg = 120});
+  const BendingMetric metric = MakeBendingMetric({.stretch = 3, .direction_deg = 120});
   NestedSolve changed(points, MeanLengths(start)), at_once(points, MeanLengths(start));
   changed.Begin(space, {});
   changed.SetWeight(1e-4);

@@ -41,8 +41,8 @@ TEST(StartSurface, AnOpenOneReproducesPlanes) {
   }
 }
 
-// A cubic B-spline whose vertices lie on a circle is a rounder figure a little inside of it: with n
-// patches around, its radius is (2 + cos(2 pi / n)) / 3 of the vertices' at the knots.
+// A cubic B-spline with vertices on a circle lies slightly inside it: with n patches around, its
+// radius at the knots is (2 + cos(2 pi / n)) / 3 times the circle's.
 TEST(StartSurface, APeriodicOneIsATube) {
   constexpr int kPatches = 16;
   const auto place = [](const Vec2& uv) {
@@ -61,7 +61,7 @@ TEST(StartSurface, APeriodicOneIsATube) {
   }
 }
 
-// The same both ways; the tube is of the radius 10 here, so that all nine functions are in use.
+// The torus has a tube of radius 10, so that all nine functions are in use.
 TEST(StartSurface, OneThatClosesBothWaysIsATorus) {
   constexpr int kPatches = 16;
   const auto at = [](const Vec2& uv, double ring, double tube, double both) {
@@ -91,7 +91,7 @@ TEST(StartSurface, NeedsUvForEachPoint) {
   EXPECT_THROW(StartSurface(shape, points.positions, std::span(points.uv).first(3)), InputError);
 }
 
-// Its vertices lie on the ellipsoid, and its edges are one place each.
+// The vertices lie on the ellipsoid, and each edge in v is a single place.
 TEST(StartSurface, ABallIsClosedAtItsPoles) {
   const auto place = [](const Vec2& uv) {
     const double turn = 2 * std::numbers::pi * uv.x(), angle = std::numbers::pi * uv.y();
