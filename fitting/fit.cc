@@ -15,7 +15,6 @@
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
 #include "fitting/solve/auto_weight.h"
-#include "fitting/solve/level_fit.h"
 #include "fitting/solve/space_solve.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/feature.h"
@@ -114,10 +113,10 @@ HSplineSurface WithLevels(const HSplineSurface& surface, int max_level) {
 }
 
 // Throws InputError for exact points that the surface does not meet.
-void CheckMet(const SpaceSolve& all, const FitTarget& target) {
+void CheckMet(const AdaptiveSolve& all, const FitTarget& target) {
   const std::vector<double> misses = all.ExactMisses();
   const auto worst = std::max_element(misses.begin(), misses.end());
-  if (worst == misses.end() || *worst <= all.LeastMiss_mm()) {
+  if (worst == misses.end() || *worst <= all.MissTolerance_mm()) {
     return;
   }
   const Vec2& uv = target.exact[static_cast<std::size_t>(worst - misses.begin())].uv;
@@ -157,7 +156,7 @@ std::vector<Term> WithSmoothness(std::span<const Term> terms, const AutoReport& 
 }
 
 // A point that is to be met exactly is believed.
-void Believe(const FitTarget& target, std::vector<std::uint32_t>& outliers) {
+void KeepExactPoints(const FitTarget& target, std::vector<std::uint32_t>& outliers) {
   std::erase_if(outliers, [&](std::uint32_t k) {
     const FitPoint& point = target.points[k];
     return std::ranges::any_of(target.exact, [&](const ExactPoint& exact) {
@@ -277,16 +276,16 @@ class Fitter {
 
   void Follow(const AdaptivePlan& plan) {
     const Feature features = ExtractFeature(result_.surface, "features", features_);
-    SpaceSolve all({.start = result_.surface,
-                    .rest = rest_,
-                    .target = driver_.target(),
-                    .terms = driver_.terms(),
-                    .held = Held(),
-                    .solver = options_.solver,
-                    .threads = context_.threads});
-    all.AddAsked(plan.finest);
+    AdaptiveSolve all({.start = result_.surface,
+                       .rest = rest_,
+                       .target = driver_.target(),
+                       .terms = driver_.terms(),
+                       .held = Held(),
+                       .solver = options_.solver,
+                       .threads = context_.threads});
+    all.RefineWhereRequested(plan.finest);
     const auto solve = [&](std::span<const Term>, SolveReport report) {
-      SeePoints(all);
+      UpdatePoints(all);
       const LevelSummary summary = all.Solve(SolveTolerance::kLoose, report);
       if (driver_.MovesPoints()) {
         Take(all, features);
@@ -297,10 +296,10 @@ class Fitter {
       context_.ThrowIfStopped();
       context_.Report("fit", fmt::format("{} vertices to level {}", all.dofs(), all.finest()));
       driver_.Take({.solve = solve});
-      SeePoints(all);
+      UpdatePoints(all);
     }
     driver_.Solve({.solve = [&](std::span<const Term>, SolveReport) {
-      LevelSummary summary = all.Settle();
+      LevelSummary summary = all.FinalSolve();
       CheckMet(all, driver_.target());
       if (Take(all, features)) {
         summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
@@ -321,16 +320,16 @@ class Fitter {
       driver_.Solve({.solve = [&](std::span<const Term>, SolveReport) { return level; }});
     }
     driver_.Solve({.solve = [&](std::span<const Term> terms, SolveReport) {
-      return SettleAlone(terms, start);
+      return SolveAllTerms(terms, start);
     }});
     TellOf(result_.surface, points.Points(), alone.residual_mm, context_.threads,
            *result_.automatic);
-    Believe(driver_.target(), result_.automatic->outliers);
+    KeepExactPoints(driver_.target(), result_.automatic->outliers);
   }
 
   // The minimum of all terms in the space that the auto plan has found, with its smoothness and
   // without its outliers; with finer vertices where exact points ask for them.
-  LevelSummary SettleAlone(std::span<const Term> terms, const ControlNet& rest) {
+  LevelSummary SolveAllTerms(std::span<const Term> terms, const ControlNet& rest) {
     context_.Report("fit", "all terms");
     const FitTarget kept = Without(result_.automatic->outliers, driver_.target());
     const std::vector<Term> weighed = WithSmoothness(terms, *result_.automatic);
@@ -339,19 +338,19 @@ class Fitter {
         exact ? WithLevels(result_.surface, FinestAllowed(options_.plan, result_.surface.shape()))
               : result_.surface;
     const HSplineSurface flat(start.shape(), rest);
-    SpaceSolve all({.start = start,
-                    .rest = flat,
-                    .target = kept,
-                    .terms = weighed,
-                    .solver = options_.solver,
-                    .threads = context_.threads,
-                    .settled = true});
+    AdaptiveSolve all({.start = start,
+                       .rest = flat,
+                       .target = kept,
+                       .terms = weighed,
+                       .solver = options_.solver,
+                       .threads = context_.threads,
+                       .final_loss_width = true});
     const AdaptivePlan where_unmet{.tolerance_mm = std::numeric_limits<double>::infinity(),
                                    .finest = start.shape().max_level};
-    all.AddAsked(where_unmet.finest);
-    LevelSummary summary = all.Settle();
+    all.RefineWhereRequested(where_unmet.finest);
+    LevelSummary summary = all.FinalSolve();
     while (exact && all.Refine(where_unmet)) {
-      summary = all.Settle();
+      summary = all.FinalSolve();
     }
     CheckMet(all, kept);
     result_.surface = exact ? WithLevels(all.Surface(), all.finest()) : all.Surface();
@@ -359,15 +358,15 @@ class Fitter {
     return summary;
   }
 
-  void SeePoints(SpaceSolve& all) const {
+  void UpdatePoints(AdaptiveSolve& all) const {
     if (driver_.MovesPoints()) {
-      all.SeePoints();
+      all.UpdatePoints();
     }
   }
 
   // Of frozen features a term has held the detail as it stands in space; their offsets stay to the
   // bit, and so turn with the coarser surface. Returns whether there are any.
-  bool Take(const SpaceSolve& all, const Feature& features) {
+  bool Take(const AdaptiveSolve& all, const Feature& features) {
     const bool frozen =
         std::holds_alternative<FrozenFeatures>(options_.features) && !features_.empty();
     result_.surface = all.Surface();

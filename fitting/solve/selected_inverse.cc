@@ -22,7 +22,7 @@ SelectedInverse::SelectedInverse(const Matrix& lower) {
   }
   const auto& order = factor.permutationP().indices();
   place_.assign(order.begin(), order.end());
-  const std::vector<double> of_factor = TakePattern(factor.matrixL());
+  const std::vector<double> of_factor = StorePattern(factor.matrixL());
   values_.assign(rows_.size(), 0);
   std::vector<double> sums(place_.size(), 0);
   for (int j = static_cast<int>(place_.size()) - 1; j >= 0; --j) {
@@ -30,8 +30,9 @@ SelectedInverse::SelectedInverse(const Matrix& lower) {
   }
 }
 
-// Returns the factor's entries, with those of its diagonal, which are 1.
-std::vector<double> SelectedInverse::TakePattern(const Matrix& factor) {
+// Stores the factor's pattern, and returns its entries including those of its diagonal, which
+// are 1.
+std::vector<double> SelectedInverse::StorePattern(const Matrix& factor) {
   std::vector<double> entries;
   starts_.push_back(0);
   for (int j = 0; j < factor.cols(); ++j) {
@@ -48,9 +49,10 @@ std::vector<double> SelectedInverse::TakePattern(const Matrix& factor) {
   return entries;
 }
 
-// With H = L D L^T (L of unit diagonal) the inverse Z has Z = D^-1 L^-1 + (I - L^T) Z. Column by
-// column from the last: Z_ij = -sum_k L_kj Z_ik for i > j, and Z_jj = 1 / D_j - sum_k L_kj Z_kj,
-// over the rows k > j of L's column j. Any two of those rows have an entry in L, by its fill.
+// With H = L D L^T (L with unit diagonal) the inverse Z satisfies Z = D^-1 L^-1 + (I - L^T) Z.
+// Columns are computed from the last: Z_ij = -sum_k L_kj Z_ik for i > j, and Z_jj = 1 / D_j - sum_k
+// L_kj Z_kj, summed over the rows k > j of L's column j. By fill-in, L has an entry for any two of
+// those rows.
 void SelectedInverse::FillColumn(int j, double pivot, const std::vector<double>& of_factor,
                                  std::vector<double>& sums) {
   const int begin = starts_[j] + 1, end = starts_[j + 1];
@@ -68,8 +70,8 @@ void SelectedInverse::FillColumn(int j, double pivot, const std::vector<double>&
   values_[starts_[j]] = diagonal;
 }
 
-// What the column of row k of the inverse gives, k standing at `a` of begin .. end - 1: of each
-// pair of those rows once, to both.
+// Adds the contributions of the inverse's column k, where k is the row at `a` among begin .. end
+// - 1. Each pair of those rows is visited once and contributes to both.
 void SelectedInverse::AddColumn(int a, int begin, int end, const std::vector<double>& of_factor,
                                 std::vector<double>& sums) const {
   const int k = rows_[a];

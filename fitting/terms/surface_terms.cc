@@ -121,7 +121,7 @@ double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNe
   return Energy(term, view, net);
 }
 
-VertexId MirrorOf(const HSplineShape& shape, const VertexId& vertex) {
+VertexId MirrorVertex(const HSplineShape& shape, const VertexId& vertex) {
   const int columns = shape.Columns(vertex.level);
   const int mirrored =
       shape.ClosedU() ? (columns + 2 - vertex.i) % columns : columns - 1 - vertex.i;
@@ -179,7 +179,7 @@ std::vector<Control> MakeControls(const LevelView& view) {
     }
   }
   for (const auto& [vertex, k] : index) {
-    controls[k].twin = index.at(MirrorOf(shape, vertex));
+    controls[k].twin = index.at(MirrorVertex(shape, vertex));
   }
   return controls;
 }
@@ -200,7 +200,7 @@ struct Mirror {
 // The reflection that maps the template's vertices best to their mirrors. Its normal n minimises n
 // . sum_k x_k y_k^T n, where x_k and y_k are a vertex and its mirror, relative to the common
 // centre.
-Mirror MirrorOf(const std::vector<Control>& controls) {
+Mirror FitMirror(const std::vector<Control>& controls) {
   const double all = ShareSum(controls);
   Mirror mirror;
   for (const Control& control : controls) {
@@ -229,7 +229,7 @@ Vec3 Origin(const SymmetryTerm& term, const Mirror& mirror, const Control& contr
 void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem) {
   const std::vector<Control> controls = MakeControls(view);
-  const Mirror mirror = MirrorOf(controls);
+  const Mirror mirror = FitMirror(controls);
   const double all = ShareSum(controls);
   for (int k = 0; k < static_cast<int>(controls.size()); ++k) {
     const Control &control = controls[k], &twin = controls[control.twin];
@@ -256,7 +256,7 @@ void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& n
 
 double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net) {
   const std::vector<Control> controls = MakeControls(view);
-  const Mirror mirror = MirrorOf(controls);
+  const Mirror mirror = FitMirror(controls);
   double sum = 0;
   for (const Control& control : controls) {
     const Control& twin = controls[control.twin];

@@ -243,7 +243,7 @@ void Fields(Visitor& visit, SymmetryTerm& o) {
 }
 
 // The vertex of the same level at 1 - u.
-VertexId MirrorOf(const HSplineShape& shape, const VertexId& vertex);
+VertexId MirrorVertex(const HSplineShape& shape, const VertexId& vertex);
 
 enum class DistortionOf { kMetric, kArea };
 constexpr auto EnumNames(DistortionOf) {

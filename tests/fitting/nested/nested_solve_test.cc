@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Conjugate gradients over all levels, against the direct solve of one level and the definitions.
-#include "fitting/nested/nested_solve.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -10,7 +8,8 @@
 #include <cmath>
 #include <utility>
 
-#include "fitting/solve/level_fit.h"
+#include "fitting/nested/nested_solve.h"
+#include "fitting/solve/space_solve.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/scattered_data.h"

@@ -138,7 +138,7 @@ TEST(ShapeParameters, JacobianEqualsItsNumericTwin) {
     for (double& x : parameters.field) body(x);
   };
   each([&](double& x) { x += random.Uniform(-0.7, 0.7); });
-  const ShapeRow row = RowAt(model, field, {12, {0.2, 0.3, 0.5}});
+  const ShapeRow row = PointRowAt(model, field, {12, {0.2, 0.3, 0.5}});
   const Vec3 direction = Vec3(1, -2, 3).normalized();
   ShapeDerivatives derivatives;
   PlacedPoint(frame, row, parameters, &derivatives);
@@ -177,7 +177,7 @@ TEST(Whitening, IsTheInverseRootOfTheCovariance) {
   const Mat3 nn = spread.normal * spread.normal.transpose();
   const Mat3 c = 0.25 * nn + 16 * (Mat3::Identity() - nn) +
                  4 * spread.direction * spread.direction.transpose();
-  const Mat3 w = WhiteningOf(spread);
+  const Mat3 w = MakeWhitening(spread);
   EXPECT_TRUE((w * c * w.transpose()).isIdentity(1e-12));
 }
 
@@ -280,9 +280,9 @@ struct SeenDome {
     std::vector<ShapeObservation> seen;
     for (const int v : seen_vertices) {
       const PointSpread spread{.normal = Vec3::UnitZ(), .normal_sd_mm = 0.5, .tangent_sd_mm = 4};
-      seen.push_back({.row = RowOfVertex(model, field, v),
+      seen.push_back({.row = VertexRow(model, field, v),
                       .position = model.mean.points[v],
-                      .whitening = WhiteningOf(spread),
+                      .whitening = MakeWhitening(spread),
                       .loss_width = 3});
     }
     return SigmaOf(seen, population_sd, 20);
@@ -293,11 +293,11 @@ struct SeenDome {
                               double smooth_length_mm) const {
     std::vector<ShapeRow> rows;
     for (int v = 0; v < kSide * kSide; ++v) {
-      rows.push_back(RowOfVertex(model, field, v));
+      rows.push_back(VertexRow(model, field, v));
     }
     const std::vector<Vec3> up(rows.size(), Vec3::UnitZ());
     const ShapePosterior posterior =
-        PosteriorOf(frame, parameters, seen, {.population_sd = population_sd}, smooth_length_mm);
+        MakePosterior(frame, parameters, seen, {.population_sd = population_sd}, smooth_length_mm);
     return DeviationsAlong(frame, parameters, posterior, rows, up, 1);
   }
 };
@@ -376,7 +376,7 @@ TEST(ShapePosterior, SmoothErrorsLieBetweenOneForEachAndOneForAll) {
   const auto sigma = [&](double smooth_length_mm, const std::vector<int>& sharing) {
     std::vector<ShapeObservation> seen;
     for (const int v : {12, 22, 40, 41, 66}) {
-      seen.push_back({.row = RowOfVertex(dome.model, dome.field, v),
+      seen.push_back({.row = VertexRow(dome.model, dome.field, v),
                       .position = dome.model.mean.points[v],
                       .whitening = Vec3::UnitZ().transpose() / 2,
                       .loss_width = 3,

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The ways to solve a level agree.
-#include "fitting/solve/ceres_solver.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "fitting/solve/coupled_solver.h"
-#include "fitting/solve/level_fit.h"
+#include "fitting/solve/ceres_solver.h"
+#include "fitting/solve/space_solve.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/solve/level_fit.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include <utility>
 
 #include "fitting/least_squares/qr_compression.h"
+#include "fitting/solve/space_solve.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"

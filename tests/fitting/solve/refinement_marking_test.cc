@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Tolerances of parts of the domain.
-#include "fitting/solve/refinement_marking.h"
-
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "fitting/fit.h"
+#include "fitting/solve/refinement_marking.h"
+#include "tests/testing/drawn_part.h"
 #include "tests/testing/scattered_data.h"
 
 namespace semblance {
@@ -61,4 +64,83 @@ TEST(Regions, OfSeveralTheLastCounts) {
 }
 
 }  // namespace
+namespace {
+
+constexpr double kShare = 0.1;  // of the range of all heights
+
+struct Range {
+  double low = kNaN, high = kNaN;
+  void Add(double z) {
+    low = std::fmin(low, z);
+    high = std::fmax(high, z);
+  }
+};
+
+template <class Wanted>
+Range HeightsWhere(const FitTarget& target, const Wanted& wanted) {
+  Range range;
+  for (const FitPoint& p : target.points) {
+    if (wanted(p.uv)) {
+      range.Add(p.position.z());
+    }
+  }
+  return range;
+}
+
+Range SurfaceWithin(const testing::DrawnGap& gap, const HSplineSurface& surface) {
+  constexpr int kSide = 40;
+  Range range;
+  for (int k = 0; k < kSide * kSide; ++k) {
+    const Vec2 off((k % kSide + 0.5) / kSide * 2 - 1, (k / kSide + 0.5) / kSide * 2 - 1);
+    const Vec2 uv = gap.center + gap.radius * off;
+    if (off.norm() < 1 && uv.minCoeff() >= 0 && uv.maxCoeff() <= 1) {
+      range.Add(surface.Point(uv).z());
+    }
+  }
+  return range;
+}
+
+// By how much the surface in the gaps leaves the heights of the points around each, within half its
+// radius, of the range of all heights.
+double MostBeyond(const FitTarget& target, const HSplineSurface& surface) {
+  const Range all = HeightsWhere(target, [](const Vec2&) { return true; });
+  double most = 0;
+  for (const testing::DrawnGap& gap : testing::kDrawnGaps) {
+    const Range near = HeightsWhere(
+        target, [&](const Vec2& uv) { return (uv - gap.center).norm() < 1.5 * gap.radius; });
+    const Range in = SurfaceWithin(gap, surface);
+    most = std::max({most, near.low - in.low, in.high - near.high});
+  }
+  return most / (all.high - all.low);
+}
+
+HSplineSurface FitDrawn(const FitTarget& target, const SchedulePlan& plan, AutoOr<double> weight) {
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 3};
+  const SmoothnessTerm smooth{.weight = weight, .of = SmoothnessOf::kSurface, .length_mm = 1};
+  return Fit(testing::PlainStart(shape), target, {},
+             {.plan = plan, .terms = {PointTerm{}, smooth}, .solver = Solver::kFastest}, {})
+      .surface;
+}
+
+const ListedPlan kFinest{.schedule = {{3, 1}}};
+const SchedulePlan kPlans[] = {kFinest, AdaptivePlan{.tolerance_mm = 5e-3, .finest = 3}};
+
+TEST(Gap, TheSurfaceStaysNearTheHeightsAroundIt) {
+  for (const double noise : {1e-4, 1e-3}) {
+    const FitTarget target = testing::DrawnScan(12000, noise, 3);
+    for (const SchedulePlan& plan : kPlans) {
+      EXPECT_LT(MostBeyond(target, FitDrawn(target, plan, AutoOr<double>::Auto())), kShare)
+          << noise << " plan " << plan.index();
+    }
+  }
+}
+
+// The law is not empty: this is the trap.
+TEST(Gap, WithHardlyAnySmoothnessItBlowsUp) {
+  const FitTarget target = testing::DrawnScan(12000, 1e-3, 3);
+  EXPECT_GT(MostBeyond(target, FitDrawn(target, kFinest, 1e-18)), 3 * kShare);
+}
+
+}  // namespace
+
 }  // namespace semblance

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/uncertainty/error_propagation.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +7,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
-#include "fitting/uncertainty/pivoted_root.h"
+#include "fitting/uncertainty/error_propagation.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/adaptive_coverage.h"
