@@ -283,7 +283,7 @@ class Fitter {
                        .held = Held(),
                        .solver = options_.solver,
                        .threads = context_.threads});
-    all.RefineWhereRequested(plan.finest);
+
     const auto solve = [&](std::span<const Term>, SolveReport report) {
       UpdatePoints(all);
       const LevelSummary summary = all.Solve(SolveTolerance::kLoose, report);
@@ -347,7 +347,7 @@ class Fitter {
                        .final_loss_width = true});
     const AdaptivePlan where_unmet{.tolerance_mm = std::numeric_limits<double>::infinity(),
                                    .finest = start.shape().max_level};
-    all.RefineWhereRequested(where_unmet.finest);
+
     LevelSummary summary = all.FinalSolve();
     while (exact && all.Refine(where_unmet)) {
       summary = all.FinalSolve();

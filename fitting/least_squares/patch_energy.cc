@@ -80,7 +80,7 @@ ElementStiffness DerivativeStiffness(int k, int l, double size_s, double size_t)
 std::array<int, 16> PatchGrid::PatchVertices(int i, int j) const {
   std::array<int, 16> vertices;
   for (int k = 0; k < 16; ++k) {
-    vertices[k] = (i + k % 4) % Columns() + Columns() * ((j + k / 4) % Rows());
+    vertices[k] = (i + k % 4) % Columns() + Columns() * (j + k / 4);
   }
   return vertices;
 }
@@ -88,17 +88,14 @@ std::array<int, 16> PatchGrid::PatchVertices(int i, int j) const {
 PatchGrid PatchGrid::Of(const HSplineShape& shape, int level) {
   return {.patches_u = shape.PatchesU(level),
           .patches_v = shape.PatchesV(level),
-          .periodic_u = shape.ClosedU(),
-          .periodic_v = shape.ClosedV()};
+          .periodic_u = shape.ClosedU()};
 }
 
 HSplineShape PatchGrid::Shape() const {
   return {.patches_u = patches_u,
           .patches_v = patches_v,
           .max_level = 0,
-          .closure = periodic_v   ? Closure::kPeriodicUv
-                     : periodic_u ? Closure::kPeriodicU
-                                  : Closure::kOpen};
+          .closure = periodic_u ? Closure::kPeriodicU : Closure::kOpen};
 }
 
 Stencil PatchGrid::StencilAt(const Vec2& uv, DerivativeOrder order) const {

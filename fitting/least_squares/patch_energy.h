@@ -46,15 +46,14 @@ struct PatchGrid {
   int patches_u = 0;
   int patches_v = 0;
   bool periodic_u = false;
-  bool periodic_v = false;
 
   int Columns() const { return periodic_u ? patches_u : patches_u + 3; }
-  int Rows() const { return periodic_v ? patches_v : patches_v + 3; }
+  int Rows() const { return patches_v + 3; }
   static PatchGrid Of(const HSplineShape& shape, int level);
-  // The shape with this grid as its only level, level 0. It is periodic in u if it is in v.
+  // The shape with this grid as its only level, level 0.
   HSplineShape Shape() const;
   // The sixteen vertices of patch (i, j); that at column a, row b of its 4 x 4 has index a + 4 b.
-  // Along a periodic direction with fewer than 4 patches a vertex appears several times.
+  // A vertex appears several times if the grid is periodic with fewer than 4 patches along u.
   std::array<int, 16> PatchVertices(int i, int j) const;
   // semblance::StencilAt on this grid; the vertices are PatchVertices of the patch at uv.
   Stencil StencilAt(const Vec2& uv, DerivativeOrder order = {}) const;

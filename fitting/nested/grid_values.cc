@@ -94,7 +94,7 @@ Columns ColumnsOf(const GridRun& run, const GridLayout& layout) {
 std::array<int, 4> RowsOfPatches(const PatchGrid& grid, int row) {
   std::array<int, 4> rows;
   for (int b = 0; b < 4; ++b) {
-    rows[b] = PlaceAmong(grid.patches_v, row - 3 + b, grid.periodic_v);
+    rows[b] = PlaceAmong(grid.patches_v, row - 3 + b, false);
   }
   return rows;
 }
@@ -180,35 +180,15 @@ void GridValues::FillHalo(const GridRuns& runs) {
       }
     }
   }
-  for (int c = 0; layout_.grid.periodic_v && c < channels_; ++c) {
-    for (int k = 0; k < GridLayout::kHalo; ++k) {
-      std::copy_n(Row(c, k % layout_.grid.Rows()) - GridLayout::kHalo, layout_.Stride(),
-                  Row(c, layout_.grid.Rows() + k) - GridLayout::kHalo);
-    }
-  }
 }
 
 void GridValues::FoldHalo(const GridRuns& runs) {
-  const int last = layout_.grid.Rows() - 1 + (layout_.grid.periodic_v ? GridLayout::kHalo : 0);
+  const int last = layout_.grid.Rows() - 1;
   for (int c = 0; c < channels_; ++c) {
     int next = 0;
     for (const GridRun& run : runs) {
       for (next = std::max(next, run.row); next <= std::min(run.row + 3, last); ++next) {
         FoldRow(Row(c, next));
-      }
-    }
-  }
-  FoldRows();
-}
-
-void GridValues::FoldRows() {
-  const int rows = layout_.grid.Rows(), columns = layout_.grid.Columns();
-  for (int c = 0; layout_.grid.periodic_v && c < channels_; ++c) {
-    for (int k = 0; k < GridLayout::kHalo; ++k) {
-      double *const behind = Row(c, rows + k), *const row = Row(c, k % rows);
-      for (int i = 0; i < columns; ++i) {
-        row[i] += behind[i];
-        behind[i] = 0;
       }
     }
   }

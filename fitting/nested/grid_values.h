@@ -36,8 +36,7 @@ struct GridLayout {
   GridLayout Finer() const {
     return {{.patches_u = 2 * grid.patches_u,
              .patches_v = 2 * grid.patches_v,
-             .periodic_u = grid.periodic_u,
-             .periodic_v = grid.periodic_v}};
+             .periodic_u = grid.periodic_u}};
   }
 };
 
@@ -72,13 +71,11 @@ class GridValues {
   const double* Row(int c, int j) const { return Channel(c) + layout_.At(0, j); }
 
   void Clear(const GridRuns& runs);
-  // Copies the columns across the seam into the halo of the runs' rows, then the rows across it.
+  // Copies the columns across the seam into the halo of the runs' rows.
   void FillHalo(const GridRuns& runs);
   // Adds what the halo has gathered to the vertices that it stands for, and empties it; also of the
   // three rows beneath each run.
   void FoldHalo(const GridRuns& runs);
-  // The same of the rows behind the last one alone.
-  void FoldRows();
 
  private:
   struct Free {

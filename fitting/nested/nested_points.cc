@@ -136,7 +136,6 @@ NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, i
   NestedPoints points;
   points.patches = Vec2(shape.patches_u, shape.patches_v);
   points.periodic_u = shape.ClosedU();
-  points.periodic_v = shape.ClosedV();
   points.given = CurveOrder(shape, given.View());
   SubtractStart(start, given.uv, threads, given.positions);
   points.value = std::move(given.positions);

@@ -39,7 +39,6 @@ struct NestedPoints {
   std::vector<Vec2> uv;        // in [0,1] x [0,1], as given
   Vec2 patches = {1, 1};       // of level 0
   bool periodic_u = false;     // u = 1 is u = 0
-  bool periodic_v = false;     // likewise
   std::vector<double> weight;  // > 0; or none: all 1
   double mean_weight = 1;      // of those that count (TakeMeanWeight)
   bool weighted = false;       // some weigh more than others
@@ -55,9 +54,7 @@ struct NestedPoints {
   double X(std::size_t k) const {
     return periodic_u && uv[k].x() == 1 ? 0 : uv[k].x() * patches.x();
   }
-  double Y(std::size_t k) const {
-    return periodic_v && uv[k].y() == 1 ? 0 : uv[k].y() * patches.y();
-  }
+  double Y(std::size_t k) const { return uv[k].y() * patches.y(); }
   double Weight(std::size_t k) const { return weight.empty() ? 1 : weight[k]; }
   // 1 for a point of mean weight. A weight is 1 / sigma^2 up to a factor, so that errors times this
   // are of one size if the points' sigma are right.

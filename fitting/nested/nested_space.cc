@@ -27,13 +27,13 @@ int NestedSpace::Overlay(int level, int i, int j) {
   const auto last = [](int k, int patches, bool closed) {
     return 2 * k + (!closed && k == patches - 1 ? 4 : 3);
   };
-  const int columns = finer.layout.grid.Columns(), rows = finer.layout.grid.Rows(),
+  const int columns = finer.layout.grid.Columns(),
             last_u = last(i, coarse.patches_u, coarse.periodic_u),
-            last_v = last(j, coarse.patches_v, coarse.periodic_v);
+            last_v = last(j, coarse.patches_v, false);
   int added = 0;
-  for (int b = first(j, coarse.periodic_v); b <= last_v; ++b) {
+  for (int b = first(j, false); b <= last_v; ++b) {
     for (int a = first(i, coarse.periodic_u); a <= last_u; ++a) {
-      char& active = finer.active[finer.layout.At(a % columns, b % rows)];
+      char& active = finer.active[finer.layout.At(a % columns, b)];
       added += active == 0 ? 1 : 0;
       active = 1;
     }
@@ -136,7 +136,7 @@ bool NestedSpace::IsCovered(int level, int i, int j) const {
   }
   const GridLayout& finer = levels_[level + 1].layout;
   for (int b = 2 * j - 3; b <= 2 * j + 1; ++b) {
-    const int row = PlaceAmong(finer.grid.Rows(), b, finer.grid.periodic_v);
+    const int row = PlaceAmong(finer.grid.Rows(), b, false);
     for (int a = 2 * i - 3; row >= 0 && a <= 2 * i + 1; ++a) {
       const int column = PlaceAmong(finer.grid.Columns(), a, finer.grid.periodic_u);
       if (column >= 0 && levels_[level + 1].active[finer.At(column, row)] == 0) {

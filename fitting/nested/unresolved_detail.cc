@@ -123,18 +123,16 @@ void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridVa
   }
 }
 
-// What stands beyond a seam belongs to the columns and rows across it.
+// What stands beyond the seam belongs to the columns across it.
 void FoldSeam(GridValues& values) {
   const PatchGrid& grid = values.layout().grid;
-  const int rows = grid.Rows() + (grid.periodic_v ? GridLayout::kHalo : 0);
   for (int c = 0; grid.periodic_u && c < values.channels(); ++c) {
-    for (int j = 0; j < rows; ++j) {
+    for (int j = 0; j < grid.Rows(); ++j) {
       for (int k = 0; k < GridLayout::kHalo; ++k) {
         values.Row(c, j)[k % grid.Columns()] += values.Row(c, j)[grid.Columns() + k];
       }
     }
   }
-  values.FoldRows();
 }
 
 Evidence EvidenceOn(const EvidencePoints& of, const GridLayout& layout, int level) {
@@ -180,7 +178,7 @@ std::vector<char> PatchesSeen(const GridLayout& layout, const GridLayout& coarse
     std::fill(together.begin(), together.end(), 0.0);
     std::fill(apart.begin(), apart.end(), 0.0);
     for (int b = 2 * j; b <= 2 * j + 4; ++b) {
-      const int row = PlaceAmong(layout.grid.Rows(), b, layout.grid.periodic_v);
+      const int row = PlaceAmong(layout.grid.Rows(), b, false);
       if (row >= 0) {
         AddWindows(layout, evidence.together, row, together);
         AddWindows(layout, evidence.apart, row, apart);

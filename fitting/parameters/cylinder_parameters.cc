@@ -7,11 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <numbers>
 #include <span>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -92,71 +90,38 @@ double MeanRadius(const CylinderAxis& axis, std::span<const Vec3> positions) {
   return sum / static_cast<double>(positions.size());
 }
 
-// The hundredth of the points at an end: medians of their distances from the axis, and from their
-// own mean, which tells a tip that is off the axis from a ring.
-struct CylinderEnd {
-  double from_axis_mm = kNaN, from_mean_mm = kNaN;
-};
-
-struct CylinderRadii {
-  std::array<CylinderEnd, 2> ends;
-  double all_mm = kNaN;  // median of all points' distances from the axis
-
-  double NarrowerEnd() const { return std::min(ends[0].from_axis_mm, ends[1].from_axis_mm); }
-  // A ball has areas on its cylinder as any tube has, but at its poles no angle.
-  bool Closes() const { return NarrowerEnd() < kLeast * all_mm; }
-  bool AreBothTips() const {
-    return std::max(ends[0].from_mean_mm, ends[1].from_mean_mm) < kRing * all_mm;
-  }
-
- private:
-  static constexpr double kLeast = 0.2, kRing = 0.5;
-};
-
-CylinderEnd EndOf(std::span<const std::tuple<double, double, std::uint32_t>> some,
-                  std::span<const Vec3> positions) {
-  std::vector<double> from_axis, from_mean;
-  std::vector<Vec3> at_end;
-  for (const auto& [along, distance, k] : some) {
-    from_axis.push_back(distance);
-    at_end.push_back(positions[k]);
-  }
-  const Vec3 mean = MeanPoint(at_end);
-  for (const Vec3& p : at_end) {
-    from_mean.push_back((p - mean).norm());
-  }
-  return {UpperMedian(from_axis), UpperMedian(from_mean)};
-}
-
-CylinderRadii RadiiOf(const CylinderAxis& axis, std::span<const Vec3> positions) {
-  std::vector<std::tuple<double, double, std::uint32_t>> along;  // the distance, and which point
+// Why the ends may not be taken; empty if they may. A ball has areas on its cylinder as any tube
+// has, but at its poles no angle: there the points of an end lie at the axis.
+std::string EndFault(const CylinderAxis& axis, std::span<const Vec3> positions) {
+  constexpr std::size_t kFewest = 8;  // points at an end
+  constexpr double kLeast = 0.2;      // distance from the axis at an end, of that of all points
+  std::vector<std::pair<double, double>> along;  // with the distance from the axis
   std::vector<double> distances;
-  for (std::uint32_t k = 0; k < positions.size(); ++k) {
-    const Vec3 x = positions[k] - axis.centre;
+  for (const Vec3& p : positions) {
+    const Vec3 x = p - axis.centre;
     distances.push_back(std::hypot(x.dot(axis.third), x.dot(axis.across)));
-    along.emplace_back(x.dot(axis.direction), distances.back(), k);
+    along.emplace_back(x.dot(axis.direction), distances.back());
   }
-  constexpr std::size_t kFewest = 8;
   const std::size_t count = std::min(positions.size(), std::max(positions.size() / 100, kFewest));
-  const auto end_of = [&](const auto& before) {
+  const auto median_at_end = [&](const auto& before) {
     std::ranges::nth_element(along, along.begin() + static_cast<std::ptrdiff_t>(count) - 1, before);
-    return EndOf(std::span(along).first(count), positions);
+    std::vector<double> at_end;
+    for (const auto& [height, distance] : std::span(along).first(count)) {
+      at_end.push_back(distance);
+    }
+    return UpperMedian(at_end);
   };
-  const CylinderEnd low = end_of(std::less()), high = end_of(std::greater());
-  return {{low, high}, UpperMedian(distances)};
-}
-
-// Why the ends may not be taken; empty if they may.
-std::string EndFault(const CylinderRadii& radii) {
-  if (!radii.Closes()) {
+  const double all_mm = UpperMedian(distances),
+               narrower_mm = std::min(median_at_end(std::less()), median_at_end(std::greater()));
+  if (narrower_mm >= kLeast * all_mm) {
     return "";
   }
   return fmt::format(
       "the points close at an end of the cylinder, where their angle is not known: half of the "
-      "last hundredth are within {:.3g} mm of the axis, of all points within {:.3g} mm; take "
-      "parameters: sphere if they are closed at both ends, cut off what closes the ends, or give u "
-      "and v; or write folds: accept",
-      radii.NarrowerEnd(), radii.all_mm);
+      "last hundredth are within {:.3g} mm of the axis, of all points within {:.3g} mm; cut off "
+      "what closes the ends, or give the columns u and v with parameters: given; or write folds: "
+      "accept",
+      narrower_mm, all_mm);
 }
 
 MapCandidate OnCylinder(const CylinderAxis& axis, std::span<const Vec3> positions) {
@@ -182,16 +147,14 @@ TriedCylinder TryCylinders(const Scan& points, const CylinderParameters& cylinde
   if (!MayBeTaken(cylinders.back(), cylinder.folds)) {
     FailParameters(fmt::format(
         "the points fold over the cylinder, or close at its ends, where its angle is not known: "
-        "{}; give another axis, take parameters: sphere if they are closed at both ends, cut off "
-        "what closes the ends, or give u and v; or write folds: accept",
+        "{}; give another axis, cut off what closes the ends, or give the columns u and v with "
+        "parameters: given; or write folds: accept",
         FaultsText(cylinders)));
   }
   const CylinderAxis& axis = axes[cylinders.back().number];
-  const CylinderRadii radii = RadiiOf(axis, points.positions);
   return {.axis = axis,
           .over = std::move(cylinders.back()),
-          .end_fault = EndFault(radii),
-          .ends_in_tips = radii.AreBothTips()};
+          .end_fault = EndFault(axis, points.positions)};
 }
 
 Parametrisation TakeCylinder(const Scan& points, const TriedCylinder& tried) {

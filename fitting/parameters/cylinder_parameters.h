@@ -38,8 +38,7 @@ struct CylinderAxis {
 struct TriedCylinder {
   CylinderAxis axis;
   MapCandidate over;
-  std::string end_fault;      // of an end at which the points close; empty if neither does
-  bool ends_in_tips = false;  // both ends, as of a ball
+  std::string end_fault;  // of an end at which the points close; empty if neither does
 };
 
 // Throws InputError where the points fold over every cylinder.

@@ -78,7 +78,7 @@ Parametrisation ParametriseBy(const Scan& points, const GivenParameters& given) 
   if (points.given_uv.empty()) {
     FailParameters(
         "type 'given' needs each point's (u,v) (of a table, the columns u and v); give them, or "
-        "take 'plane', 'cylinder', 'sphere' or 'torus'");
+        "take 'plane', 'cylinder' or 'mesh'");
   }
   return TakeGiven({points.given_uv.begin(), points.given_uv.end()}, given, points.name_of);
 }

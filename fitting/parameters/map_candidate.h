@@ -16,7 +16,7 @@
 
 namespace semblance {
 
-// What becomes of a plane, cylinder, sphere or torus over which the points fold.
+// What becomes of a plane or cylinder over which the points fold.
 enum class FoldRule { kRefuse, kAccept };
 constexpr auto EnumNames(FoldRule) { return std::to_array<std::string_view>({"refuse", "accept"}); }
 template <class Visitor>

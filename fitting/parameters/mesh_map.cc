@@ -22,7 +22,6 @@
 #include <string>
 #include <utility>
 
-#include "fitting/closed_mesh/mesh_pieces.h"
 #include "fitting/parameters/one_to_one.h"
 #include "surfaces/base/error.h"
 
@@ -37,14 +36,26 @@ using Vertex = LayoutMesh::Vertex_index;
 using Border = LayoutMesh::Halfedge_index;
 using PositionMap = LayoutMesh::Property_map<Vertex, LayoutKernel::Point_2>;
 
-constexpr char kRefused[] = "parameters: the mesh cannot be laid out on the plane";
-
 [[noreturn]] void FailLayout(const std::string& what) {
-  throw InputError(fmt::format("{}: {}", kRefused, what));
+  throw InputError("parameters: the mesh cannot be laid out on the plane: " + what);
+}
+
+void CheckOnePiece(const TriMesh& mesh) {
+  std::vector<char> used(mesh.points.size(), 0);
+  for (const Triangle& t : mesh.triangles) {
+    used[t[0]] = used[t[1]] = used[t[2]] = 1;
+  }
+  if (const auto loose = std::count(used.begin(), used.end(), 0); loose > 0) {
+    FailLayout(fmt::format("{} of its {} points belong to no triangle; remove them", loose,
+                           mesh.points.size()));
+  }
+  if (const int pieces = ConnectedComponents(mesh).count; pieces != 1) {
+    FailLayout(fmt::format("it has {} pieces; keep one", pieces));
+  }
 }
 
 LayoutMesh HalfedgesOf(const TriMesh& mesh) {
-  CheckOnePiece(mesh, kRefused);
+  CheckOnePiece(mesh);
   std::vector<LayoutKernel::Point_3> points;
   points.reserve(mesh.points.size());
   for (const Vec3& p : mesh.points) {
@@ -84,9 +95,8 @@ Border OnlyBorder(LayoutMesh& mesh) {
   processing::extract_boundary_cycles(mesh, std::back_inserter(borders));
   if (borders.empty()) {
     FailLayout(
-        "it is closed and has no border; write closure: periodic_u, with which it is laid out on a "
-        "sphere, or, if it is a ring, take parameters: torus with closure: periodic_uv, or cut it "
-        "open");
+        "it is closed and has no border; cut it open, or give the columns u and v with parameters: "
+        "given");
   }
   const auto longest = std::max_element(
       borders.begin(), borders.end(),

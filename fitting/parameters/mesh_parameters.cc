@@ -9,9 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "fitting/closed_mesh/closed_map.h"
 #include "fitting/parameters/map_candidate.h"
-#include "fitting/parameters/sphere.h"
 
 namespace semblance {
 namespace {
@@ -21,24 +19,6 @@ std::string_view NameOfMap(MeshMap map) { return EnumNames(map)[static_cast<std:
 TriMesh MeshOf(const Scan& points) {
   return {.points = {points.positions.begin(), points.positions.end()},
           .triangles = {points.triangles.begin(), points.triangles.end()}};
-}
-
-Parametrisation OnSphere(const Scan& points) {
-  const ClosedLayout layout = LayOutOnSphere(MeshOf(points));
-  if (layout.folded > kMostFaults) {
-    FailParameters(fmt::format(
-        "the mesh laid out on the sphere folds {} of it, for parts of it are too thin or have "
-        "triangles without area; make its triangles even (remesh it), or give u and v",
-        PercentText(layout.folded)));
-  }
-  const PolarSphere sphere{.centre = Vec3::Zero(), .axis = layout.axis, .radius_mm = 1};
-  std::vector<Vec2> uv = AnglesAbout(sphere, layout.at);
-  const Poles poles = PolesAmong(points.positions, uv);
-  return {.uv = std::move(uv),
-          .source = ParameterSource::kMesh,
-          .how = "the mesh laid out on the sphere",
-          .faults = {.folded = layout.folded, .collapsed = layout.collapsed},
-          .poles = poles};
 }
 
 Parametrisation FromPlaces(MapCandidate laid) {
@@ -53,29 +33,12 @@ Parametrisation FromPlaces(MapCandidate laid) {
 
 }  // namespace
 
-Parametrisation FromLayout(PointLayout layout) {
-  if (!layout.fault.empty()) {
-    FailParameters("triangles between the points make no open sheet: " + layout.fault);
-  }
-  std::string how = fmt::format("the points triangulated and laid out by {}, with {} corners",
-                                NameOfMap(layout.map), layout.corners);
-  if (layout.far_off > 0) {
-    how += fmt::format("; {} of the points lie off the triangles", layout.far_off);
-  }
-  return FromPlaces({.how = std::move(how), .at = std::move(layout.at), .faults = layout.faults});
-}
-
 Parametrisation ParametriseBy(const Scan& points, const MeshParameters& mesh) {
-  if (points.triangles.empty() && points.closure != Closure::kOpen) {
-    FailParameters(
-        "type 'mesh' makes triangles of its own for open sheets alone; with closure: periodic_u "
-        "give a PLY, OBJ, STL or OFF with faces, or take 'sphere' or 'cylinder'");
-  }
   if (points.triangles.empty()) {
-    return FromLayout(LayOutPoints(points.positions, mesh.map));
-  }
-  if (points.closure == Closure::kPeriodicU) {
-    return OnSphere(points);
+    FailParameters(
+        "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces "
+        "(MeshLab and CloudCompare make them from points), or the columns u and v with parameters: "
+        "given");
   }
   MeshLayout layout = LayOut(MeshOf(points), mesh.map);
   MapCandidate laid{.how = fmt::format("the mesh laid out by {}", NameOfMap(layout.map)),

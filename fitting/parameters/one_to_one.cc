@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -306,22 +305,6 @@ MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> trian
     sum.Add(point.around, point.own_mm2);
   }
   return sum.Faults();
-}
-
-double SqueezedShare(std::span<const Vec3> positions, std::span<const Triangle> triangles,
-                     std::span<const double> on_map) {
-  constexpr double kMuch = 0.1;  // of what is left of all
-  const std::vector<PointAreas> points = AreasAround(positions, triangles, on_map);
-  const double all = std::accumulate(on_map.begin(), on_map.end(), 0.0);
-  double in_space = 0, squeezed = 0;
-  for (const PointAreas& point : points) {
-    in_space += point.own_mm2;
-  }
-  for (const auto& [around, own_mm2] : points) {
-    const double left = all < 0 ? -around.on_map : around.on_map;
-    squeezed += left * in_space < kMuch * std::abs(all) * around.in_space ? own_mm2 : 0;
-  }
-  return in_space > 0 ? squeezed / in_space : 0;
 }
 
 }  // namespace semblance

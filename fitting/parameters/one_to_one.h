@@ -38,10 +38,4 @@ MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> trian
 // of it.
 MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> triangles);
 
-// The share of the area that is turned over, or of which less than a tenth of what is left of all
-// is left; judged likewise.
-//   on_map: the area of each triangle on the map, in any unit; negative where it runs clockwise.
-double SqueezedShare(std::span<const Vec3> positions, std::span<const Triangle> triangles,
-                     std::span<const double> on_map);
-
 }  // namespace semblance

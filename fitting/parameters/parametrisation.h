@@ -5,14 +5,12 @@
 #include <array>
 #include <cstddef>
 #include <functional>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "fitting/parameters/one_to_one.h"
-#include "fitting/parameters/sphere.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_shape.h"
 #include "surfaces/mesh/tri_mesh.h"
@@ -31,9 +29,9 @@ struct Scan {
   PointNames name_of = {};                   // of a point, where it was read
 };
 
-enum class ParameterSource { kGiven, kPlane, kCylinder, kSphere, kTorus, kMesh };
+enum class ParameterSource { kGiven, kPlane, kCylinder, kMesh };
 constexpr auto EnumNames(ParameterSource) {
-  return std::to_array<std::string_view>({"given", "plane", "cylinder", "sphere", "torus", "mesh"});
+  return std::to_array<std::string_view>({"given", "plane", "cylinder", "mesh"});
 }
 
 struct Parametrisation {
@@ -41,7 +39,6 @@ struct Parametrisation {
   ParameterSource source = ParameterSource::kGiven;
   std::string how = {};   // in words: which plane, axis or map; empty of given ones
   MapFaults faults = {};  // of what was chosen; none of given ones, which are not looked at
-  std::optional<Poles> poles = {};  // of what lies on a sphere
 };
 
 }  // namespace semblance

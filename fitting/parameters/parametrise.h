@@ -11,36 +11,27 @@
 #include "fitting/parameters/mesh_parameters.h"
 #include "fitting/parameters/parametrisation.h"
 #include "fitting/parameters/plane_parameters.h"
-#include "fitting/parameters/sphere_parameters.h"
-#include "fitting/parameters/torus_parameters.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance {
 
-// The parameters that are given, if there are any. Otherwise those of a torus for a surface that
-// goes round both ways, of a cylinder for one that goes round in u, and of a plane for an open one.
-// What goes round in u and closes at both ends of the cylinder gets those of a sphere, unless it
-// folds over that. Where every plane folds the mesh is laid out, or, of points without triangles,
-// one that is made for them; and so is a closed mesh that goes round in u, where it folds over the
-// sphere. Triangles that the plane or the sphere squeezes are laid out where that squeezes less.
+// The parameters that are given, if there are any; otherwise those of a cylinder for a surface that
+// goes round in u, and of a plane for an open one. Where every plane folds the mesh is laid out.
 struct AutoParameters {
   static constexpr std::string_view kName = "auto";
 };
 template <class Visitor>
 void Fields(Visitor&, AutoParameters&) {}
 
-using Parameters =
-    std::variant<AutoParameters, GivenParameters, PlaneParameters, CylinderParameters,
-                 SphereParameters, TorusParameters, MeshParameters>;
+using Parameters = std::variant<AutoParameters, GivenParameters, PlaneParameters,
+                                CylinderParameters, MeshParameters>;
 
 // du x dv looks where the triangles look. Whatever is chosen is one-to-one, but for given (u,v) and
 // where folds are accepted: the points are looked at (one_to_one.h), and the triangles if there are
 // any. Throws InputError for no points, `given` without given_uv, a number of given_uv that is not
 // that of the points, an empty range, given_uv outside of it, points that span no plane or have no
-// extent along the axis, points that are no torus, close at an end of the cylinder, do not go all
-// round the sphere's centre, or fold over every plane, cylinder, sphere or torus that may be taken,
-// points without triangles that make no open sheet, a corner that is no point, and as LayOut and
-// LayOutOnSphere.
+// extent along the axis, close at an end of the cylinder, or fold over every plane or cylinder that
+// may be taken, a mesh without triangles, a corner that is no point, and as LayOut.
 Parametrisation Parametrise(const Scan& scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},

@@ -76,10 +76,9 @@ Parametrisation TakePlane(MapCandidate plane) {
 }
 
 std::string OtherThanPlane() {
-  return "give u and v, or triangles between the points (a PLY, OBJ, STL or OFF with faces) with "
-         "parameters: mesh, or, for what goes round, parameters: cylinder or, if it is closed like "
-         "a "
-         "ball, sphere, with closure: periodic_u, or parameters: torus with closure: periodic_uv";
+  return "give the columns u and v, or triangles between the points (a PLY, OBJ, STL or OFF with "
+         "faces) with parameters: mesh, or, for a tube, parameters: cylinder with closure: "
+         "periodic_u";
 }
 
 Parametrisation ParametriseBy(const Scan& points, const PlaneParameters& plane) {

@@ -232,7 +232,7 @@ void Fields(Visitor& visit, AutoPlan& o) {
                 .max = 20,
                 .doc = "most rounds, before the fit, in which each point's (u,v) move to the foot "
                        "of its perpendicular on a coarse surface; for approximate (u,v); 0: (u,v) "
-                       "stay. For `semblance fit` without joins and exact points"},
+                       "stay. For `semblance fit` without exact points"},
       o.relaxation_rounds);
   visit(FieldInfo{.name = "stretched",
                   .doc = "true: if the surface bends clearly less along one direction, such as a "

@@ -35,18 +35,11 @@ struct ShapePoint {
   double share = 1;                      // > 0; relative area that the point represents
 };
 
-// The tangents of the surface that must be perpendicular to a given normal. If the points already
-// hold a border curve, they determine the tangent along it, and an equation for that tangent could
-// only contradict them.
-enum class HeldTangents { kBoth, kAlongU, kAlongV };
-
 // A place that the surface must meet exactly.
 struct ExactPoint {
   Vec2 uv = Vec2::Constant(kNaN);        // in [0,1] x [0,1]
   Vec3 position = Vec3::Constant(kNaN);  // mm
   Vec3 normal = Vec3::Zero();            // any length; zero: the normal is free
-  HeldTangents tangents = HeldTangents::kBoth;
-  int level = 0;  // the place gets all vertices to this level, if the plan allows it
 };
 
 // Most exact points of a fit. Their equations are solved as one dense system, which takes cubic

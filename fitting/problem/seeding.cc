@@ -16,7 +16,7 @@ namespace {
 
 struct Patches {
   int u = 0, v = 0;
-  bool periodic_u = false, periodic_v = false;
+  bool periodic_u = false;
   Vec2 Center(int i, int j) const { return {(i + 0.5) / u, (j + 0.5) / v}; }
 };
 
@@ -150,7 +150,7 @@ bool Reversed(const Seed& a, const Seed& b) {
 int CountReversed(const std::vector<Seed>& seeds, const Patches& patches, int i, int j) {
   const auto at = [&](int a, int b) -> const Seed* {
     a = PlaceAmong(patches.u, a, patches.periodic_u);
-    b = PlaceAmong(patches.v, b, patches.periodic_v);
+    b = PlaceAmong(patches.v, b, false);
     return a >= 0 && b >= 0 ? &seeds[a + patches.u * b] : nullptr;
   };
   const Seed& seed = *at(i, j);
@@ -197,8 +197,7 @@ SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
   CheckMasks(masks);
   const Patches patches{.u = placed.shape().PatchesU(options.level),
                         .v = placed.shape().PatchesV(options.level),
-                        .periodic_u = placed.shape().ClosedU(),
-                        .periodic_v = placed.shape().ClosedV()};
+                        .periodic_u = placed.shape().ClosedU()};
   SeedResult result{.points = {}, .masked = 0, .missed = 0, .folded = 0};
   const Seeder seeder(implicit, implicit_mesh, options);
   std::vector<Seed> seeds = FindSeeds(placed, seeder, patches, masks, options, result);

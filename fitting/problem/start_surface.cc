@@ -26,16 +26,6 @@ Eigen::Matrix<double, 6, 1> TubeFunctions(const Vec2& uv) {
   return (Eigen::Matrix<double, 6, 1>() << u, uv.y() * u).finished();
 }
 
-Eigen::Matrix<double, 9, 1> RingFunctions(const Vec2& uv) {
-  const Vec3 u = Around(uv.x()), v = Around(uv.y());
-  return (Eigen::Matrix<double, 9, 1>() << u, v[1] * u, v[2] * u).finished();
-}
-
-Eigen::Vector4d BallFunctions(const Vec2& uv) {
-  const Vec3 u = Around(uv.x()), v = Around(uv.y() / 2);
-  return {1, v[1], v[2] * u[1], v[2] * u[2]};
-}
-
 template <int n>
 ControlNet FitNet(Eigen::Matrix<double, n, 1> (*functions)(const Vec2&), const HSplineShape& shape,
                   std::span<const Vec3> positions, std::span<const Vec2> uv) {
@@ -75,15 +65,8 @@ void Check(const HSplineShape& shape, std::span<const Vec3> positions, std::span
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv) {
   Check(shape, positions, uv);
-  return HSplineSurface(shape, shape.ClosedV()   ? FitNet(RingFunctions, shape, positions, uv)
-                               : shape.ClosedU() ? FitNet(TubeFunctions, shape, positions, uv)
-                                                 : FitNet(OpenFunctions, shape, positions, uv));
-}
-
-HSplineSurface StartBall(const HSplineShape& shape, std::span<const Vec3> positions,
-                         std::span<const Vec2> uv) {
-  Check(shape, positions, uv);
-  return HSplineSurface(shape, FitNet(BallFunctions, shape, positions, uv));
+  return HSplineSurface(shape, shape.ClosedU() ? FitNet(TubeFunctions, shape, positions, uv)
+                                               : FitNet(OpenFunctions, shape, positions, uv));
 }
 
 }  // namespace semblance

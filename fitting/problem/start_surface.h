@@ -11,18 +11,11 @@ namespace semblance {
 
 // Makes a smooth surface near the points, with level 0 alone. It is the least-squares fit by linear
 // combinations of
-//   1, u, v                                                     (open),
-//   {1, cos 2 pi u, sin 2 pi u} x {1, v}                        (closed in u), or
-//   {1, cos 2 pi u, sin 2 pi u} x {1, cos 2 pi v, sin 2 pi v}   (closed in both).
+//   1, u, v                                (open), or
+//   {1, cos 2 pi u, sin 2 pi u} x {1, v}   (closed in u).
 // positions: mm; uv: in [0,1] x [0,1], one per position. Throws InputError if there are no points
 // or the numbers differ, and like CheckShape for the shape.
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv);
-
-// Makes a start surface with a pole along each of v = 0 and v = 1: the least-squares fit by affine
-// images of the unit sphere, with azimuth 2 pi u and angle pi v from a pole. The poles have no
-// frames, so offsets there need OffsetReference::kWorld. shape: closed in u.
-HSplineSurface StartBall(const HSplineShape& shape, std::span<const Vec3> positions,
-                         std::span<const Vec2> uv);
 
 }  // namespace semblance

@@ -14,8 +14,8 @@ namespace semblance {
 enum class DowelLinks { kDelaunay, kNone };
 
 // The Delaunay triangles of the points' (u,v), scaled to mm of the template. Points of the same
-// (u,v) share a corner. Along a closed direction the network is cut at 0, and no point crosses the
-// cut. Without links there are no triangles, and each point is its own corner.
+// (u,v) share a corner. On a surface closed in u the network is cut at u = 0, and no point crosses
+// the cut. Without links there are no triangles, and each point is its own corner.
 class DowelMesh {
  public:
   // uv: the points' places in the template, before any move. Fewer than three points, or points on

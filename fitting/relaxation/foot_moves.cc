@@ -21,17 +21,16 @@ constexpr int kFinestLevel = 2;     // of the coarse fit; finer levels cost more
 constexpr double kMoveRatio = 0.1;  // moves below this share of the distances end the rounds
 constexpr double kFootTolerance = 0.01;  // of a foot, relative to the noise
 
-// The way from one (u,v) to another, the shorter one along closed directions.
+// The way from one (u,v) to another, the shorter one along a closed u.
 Vec2 ShortestWay(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
   Vec2 way = to - from;
   way.x() -= shape.ClosedU() ? std::round(way.x()) : 0;
-  way.y() -= shape.ClosedV() ? std::round(way.y()) : 0;
   return way;
 }
 
 Vec2 HalfWay(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
   const Vec2 middle = from + ShortestWay(shape, from, to) / 2;
-  return {IntoUnit(middle.x(), shape.ClosedU()), IntoUnit(middle.y(), shape.ClosedV())};
+  return {IntoUnit(middle.x(), shape.ClosedU()), std::clamp(middle.y(), 0.0, 1.0)};
 }
 
 // Twice the area of a triangle in (u,v), negative if it runs clockwise.

@@ -44,7 +44,7 @@ MovedUv MoveToFeet(const HSplineShape& shape, const ScatteredPoints& points,
                    const RunContext& context);
 
 // Halves moves until no triangle turns over that had the majority's orientation at `from`. Moves of
-// stubborn triangles are dropped. Along closed directions the shorter way counts. Returns the
+// stubborn triangles are dropped. Along a closed u the shorter way counts. Returns the
 // number of triangles that whole moves would turn over.
 int KeepFromFolding(const HSplineShape& shape, std::span<const Triangle> triangles,
                     std::span<const Vec2> from, std::span<Vec2> to);

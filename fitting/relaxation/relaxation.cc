@@ -19,8 +19,8 @@
 //     --> otherwise the corner moves there
 //
 // Invariants of Relax and RelaxJointly.
-//   1. Every (u,v) stays in [0,1] x [0,1]. A corner crosses the cut of a closed direction only
-//      without links.
+//   1. Every (u,v) stays in [0,1] x [0,1]. A corner crosses u = 0 of a closed surface only without
+//      links.
 //   2. The points of a corner have the same (u,v) after every round.
 //   3. With the barrier, no accepted move leaves a turned triangle (DowelMesh::Turned) at a moved
 //      corner.
@@ -201,8 +201,7 @@ Vec2 Relaxer::LongestMove(int corner) const {
 // Invariant 1.
 Vec2 Relaxer::ClampUv(const Vec2& uv) const {
   const bool loose = mesh_.triangles().empty();
-  return {IntoUnit(uv.x(), loose && surface_.shape().ClosedU()),
-          IntoUnit(uv.y(), loose && surface_.shape().ClosedV())};
+  return {IntoUnit(uv.x(), loose && surface_.shape().ClosedU()), std::clamp(uv.y(), 0.0, 1.0)};
 }
 
 void Relaxer::SetUv(const std::vector<Vec2>& uv) {

@@ -13,12 +13,6 @@ namespace {
 
 constexpr DerivativeOrder kPlace = {0, 0}, kAlongU = {1, 0}, kAlongV = {0, 1};
 
-std::vector<DerivativeOrder> TangentOrders(HeldTangents tangents) {
-  return tangents == HeldTangents::kAlongU   ? std::vector{kAlongU}
-         : tangents == HeldTangents::kAlongV ? std::vector{kAlongV}
-                                             : std::vector{kAlongU, kAlongV};
-}
-
 }  // namespace
 
 ExactEquations::ExactEquations(const HierarchicalSplineSpace& space,
@@ -44,7 +38,7 @@ ExactEquations::ExactEquations(const HierarchicalSplineSpace& space,
       equations_.push_back({place, Vec3::Unit(c), point.position[c], k});
     }
     if (point.normal.squaredNorm() > 0) {
-      for (const DerivativeOrder tangent : TangentOrders(point.tangents)) {
+      for (const DerivativeOrder tangent : {kAlongU, kAlongV}) {
         equations_.push_back({add(point.uv, tangent), point.normal.normalized(), 0, k});
       }
     }

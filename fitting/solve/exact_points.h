@@ -12,8 +12,8 @@
 
 namespace semblance {
 
-// The equations of exact points: three for a position, and one for each tangent that must be
-// perpendicular to the normal (HeldTangents). The space must not be edited while this object is in
+// The equations of exact points: three for a position, and two more for a normal, which must be
+// perpendicular to the tangents along u and v. The space must not be edited while this object is in
 // use.
 class ExactEquations {
  public:

@@ -22,12 +22,12 @@ std::vector<VertexId> MissingOver(const HierarchicalSplineSpace& space, const Pa
     return 2 * k + (!closed && k == patches - 1 ? 4 : 3) + margin;
   };
   const int last_u = last(patch.i, shape.PatchesU(patch.level), shape.ClosedU()),
-            last_v = last(patch.j, shape.PatchesV(patch.level), shape.ClosedV());
+            last_v = last(patch.j, shape.PatchesV(patch.level), false);
   std::vector<VertexId> missing;
-  for (int b = first(patch.j, shape.ClosedV()); b <= last_v; ++b) {
+  for (int b = first(patch.j, false); b <= last_v; ++b) {
     for (int a = first(patch.i, shape.ClosedU()); a <= last_u; ++a) {
       const VertexId vertex{level, PlaceAmong(shape.Columns(level), a, shape.ClosedU()),
-                            PlaceAmong(shape.Rows(level), b, shape.ClosedV())};
+                            PlaceAmong(shape.Rows(level), b, false)};
       if (vertex.i >= 0 && vertex.j >= 0 && !space.IsEdited(vertex)) {
         missing.push_back(vertex);
       }
@@ -54,7 +54,7 @@ class PatchCounts {
       const PatchId other{
           patch.level,
           PlaceAmong(shape_.PatchesU(patch.level), patch.i + k % 3 - 1, shape_.ClosedU()),
-          PlaceAmong(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, shape_.ClosedV())};
+          PlaceAmong(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, false)};
       const auto found = counts_.find(MakeKey(other));
       if (found != counts_.end() && 4 * found->second < own) {
         emptier.push_back(other);
@@ -93,11 +93,10 @@ bool Misses(const HSplineShape& shape, const QuadtreeNode& leaf, const AdaptiveP
 std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
                                         const AdaptivePlan& plan, const PointCloud& cloud,
                                         std::span<const double> squares,
-                                        std::span<const FinerPlace> places) {
-  std::map<int, int> requested;  // leaf to the finest level that it needs
-  for (const FinerPlace& place : places) {
-    int& level = requested[space.LeafAt(place.uv)];
-    level = std::max(level, place.level);
+                                        std::span<const Vec2> places) {
+  std::set<int> requested;  // leaves
+  for (const Vec2& uv : places) {
+    requested.insert(space.LeafAt(uv));
   }
   const PatchCounts counts(space);
   std::set<VertexId> finer;
@@ -107,11 +106,11 @@ std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
     if (leaf.children >= 0) {
       continue;
     }
-    const bool missed = has_points && Misses(space.shape(), leaf, plan, cloud, squares);
-    const auto found = requested.find(node);
-    const int wanted = missed ? plan.finest : found == requested.end() ? 0 : found->second;
-    for (int level = 0; level <= leaf.patch.level && level < std::min(plan.finest, wanted);
-         ++level) {
+    if (!requested.contains(node) &&
+        !(has_points && Misses(space.shape(), leaf, plan, cloud, squares))) {
+      continue;
+    }
+    for (int level = 0; level <= std::min(leaf.patch.level, plan.finest - 1); ++level) {
       const int shift = leaf.patch.level - level;
       const PatchId patch{level, leaf.patch.i >> shift, leaf.patch.j >> shift};
       const std::vector<VertexId> missing = MissingOver(space, patch, plan.margin);

@@ -12,7 +12,6 @@
 // cycle ends.
 #pragma once
 
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,21 +20,16 @@
 
 namespace semblance {
 
-// A place that needs finer vertices, regardless of the number of points there.
-struct FinerPlace {
-  Vec2 uv = Vec2::Constant(kNaN);
-  int level = std::numeric_limits<int>::max();  // finest level that the place needs
-};
-
 // Marks vertices over each leaf with a point farther away than the plan's tolerance, and over each
 // leaf with one of `places`. They are the missing vertices over the leaf's coarsest ancestor (or
 // the leaf itself) that is not fully overlaid yet. The neighbours of that patch with much fewer
 // points are overlaid too: at the edge of a gap, coarse vertices would otherwise take over from the
 // detail and oscillate.
 //   squares: |e|^2 of each point of the cloud, mm^2; needed only if the plan has regions.
+//   places: (u,v) that need finer vertices, regardless of the number of points there.
 std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
                                         const AdaptivePlan& plan, const PointCloud& cloud,
                                         std::span<const double> squares,
-                                        std::span<const FinerPlace> places = {});
+                                        std::span<const Vec2> places = {});
 
 }  // namespace semblance

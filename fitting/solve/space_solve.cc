@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -270,21 +269,6 @@ bool AdaptiveSolve::Refine(const AdaptivePlan& plan) {
   return !finer.empty();
 }
 
-void AdaptiveSolve::RefineWhereRequested(int finest) {
-  std::vector<FinerPlace> requested;
-  for (const ExactPoint& point : target_.exact) {
-    if (point.level > 0) {
-      requested.push_back({point.uv, point.level});
-    }
-  }
-  const AdaptivePlan of_places_alone{.tolerance_mm = std::numeric_limits<double>::infinity(),
-                                     .finest = finest};
-  for (std::vector<VertexId> finer;
-       !(finer = MarkForRefinement(space_, of_places_alone, cloud_, {}, requested)).empty();) {
-    Edit(finer);
-  }
-}
-
 std::vector<double> AdaptiveSolve::ExactMisses() const {
   return target_.exact.empty() ? std::vector<double>()
                                : ExactEquations(space_, target_.exact).Misses(space_.Values());
@@ -293,12 +277,12 @@ std::vector<double> AdaptiveSolve::ExactMisses() const {
 double AdaptiveSolve::MissTolerance_mm() const { return 1e-10 * NetSize(space_); }
 
 // The places of exact points that the vertices cannot hold.
-std::vector<FinerPlace> AdaptiveSolve::UnmetPlaces() const {
-  std::vector<FinerPlace> unmet;
+std::vector<Vec2> AdaptiveSolve::UnmetPlaces() const {
+  std::vector<Vec2> unmet;
   const std::vector<double> misses = ExactMisses();
   for (std::size_t k = 0; k < misses.size(); ++k) {
     if (misses[k] > MissTolerance_mm()) {
-      unmet.push_back({target_.exact[k].uv});
+      unmet.push_back(target_.exact[k].uv);
     }
   }
   return unmet;

@@ -19,7 +19,7 @@
 //
 // States of an AdaptiveSolve:
 //
-//                   UpdatePoints, Refine, RefineWhereRequested
+//                         UpdatePoints, Refine
 //             +---------------------------+-----------------------------+
 //             v                           |                             |
 //   create -> READY ------Solve-----> SOLVED ------FinalSolve-----> FINAL
@@ -199,8 +199,7 @@ class AdaptiveSolve final : public SpaceSolve {
 
   // Adopts the target's points after they have moved.
   void UpdatePoints();
-  // Adds the vertices that exact points request (ExactPoint::level), to level `finest` at most.
-  void RefineWhereRequested(int finest);
+
   // Adds the vertices that the plan requires, and those over exact points that do not hold. Returns
   // false if there are none.
   bool Refine(const AdaptivePlan& plan);
@@ -215,7 +214,7 @@ class AdaptiveSolve final : public SpaceSolve {
   std::span<const ExactPoint> exact() const override { return target_.exact; }
   void Edit(std::span<const VertexId> vertices);
   void EditMirrors();
-  std::vector<FinerPlace> UnmetPlaces() const;
+  std::vector<Vec2> UnmetPlaces() const;
   std::vector<int> HeldRows() const;
 
   const FitTarget& target_;

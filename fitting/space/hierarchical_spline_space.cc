@@ -150,7 +150,7 @@ void HierarchicalSplineSpace::Edit(std::span<const VertexId> vertices) {
     for (int k = 0; k < 16; ++k) {
       const PatchId patch{v.level,
                           PlaceAmong(shape_.PatchesU(v.level), v.i - 3 + k % 4, shape_.ClosedU()),
-                          PlaceAmong(shape_.PatchesV(v.level), v.j - 3 + k / 4, shape_.ClosedV())};
+                          PlaceAmong(shape_.PatchesV(v.level), v.j - 3 + k / 4, false)};
       if (patch.i >= 0 && patch.j >= 0) {
         EnsureNode(patch);
       }
@@ -168,7 +168,7 @@ bool HierarchicalSplineSpace::IsCovered(const VertexId& v) const {
     return false;
   }
   for (int b = 2 * v.j - 3; b <= 2 * v.j + 1; ++b) {
-    const int j = PlaceAmong(shape_.Rows(level), b, shape_.ClosedV());
+    const int j = PlaceAmong(shape_.Rows(level), b, false);
     for (int a = 2 * v.i - 3; j >= 0 && a <= 2 * v.i + 1; ++a) {
       const int i = PlaceAmong(shape_.Columns(level), a, shape_.ClosedU());
       if (i >= 0 && !IsEdited({level, i, j})) {
@@ -187,7 +187,7 @@ void HierarchicalSplineSpace::LinkDofs() {
   for (QuadtreeNode& node : nodes_) {
     const PatchId& p = node.patch;
     for (int k = 0; k < 16; ++k) {
-      const int i = shape_.Column(p.level, p.i + k % 4), j = shape_.Row(p.level, p.j + k / 4);
+      const int i = shape_.Column(p.level, p.i + k % 4), j = p.j + k / 4;
       const auto found = dof_of_.find(KeyOf(p.level, i, j));
       node.dofs[k] = found == dof_of_.end() ? -1 : found->second;
     }

@@ -171,8 +171,7 @@ std::vector<Control> MakeControls(const LevelView& view) {
     const SplineElement element = view.Element(e);
     const PatchId& p = element.patch;
     for (int k = 0; k < 16; ++k) {
-      const VertexId vertex{p.level, shape.Column(p.level, p.i + k % 4),
-                            shape.Row(p.level, p.j + k / 4)};
+      const VertexId vertex{p.level, shape.Column(p.level, p.i + k % 4), p.j + k / 4};
       if (index.try_emplace(vertex, static_cast<int>(controls.size())).second) {
         controls.push_back(MakeControl(element, k));
       }

@@ -196,7 +196,7 @@ WholeHead WholeHeadFromJson(std::string_view text, const std::string& name) try 
   }
   HSplineSurface surface = HSplineFromJson(json.at("surface").dump(), "its surface");
   if (surface.shape().closure != Closure::kPeriodicU) {
-    throw IoError("its surface must go round in u alone; write closure periodic_u");
+    throw IoError("its surface must go round in u; write closure periodic_u");
   }
   return {std::move(surface), std::move(eyeballs)};
 } catch (const IoError& error) {

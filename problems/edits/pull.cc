@@ -42,8 +42,7 @@ std::vector<double> SharesAround(const HSplineShape& shape, int level, const Vec
   for (int j = 0; j < shape.Rows(level); ++j) {
     for (int i = 0; i < shape.Columns(level); ++i) {
       const Vec2 at = ParameterOf(shape, {level, i, j});
-      const double du = Apart(at.x(), uv.x(), shape.ClosedU()),
-                   dv = Apart(at.y(), uv.y(), shape.ClosedV());
+      const double du = Apart(at.x(), uv.x(), shape.ClosedU()), dv = at.y() - uv.y();
       const double squared =
           std::pow(du * shape.PatchesU(level), 2) + std::pow(dv * shape.PatchesV(level), 2);
       shares[i + static_cast<std::size_t>(shape.Columns(level)) * j] =

@@ -80,26 +80,19 @@ namespace {
 
 // A place on a seam has one vertex in the triangles, so that normals do not break there.
 int VertexAt(const FitGrid& grid, int i, int j) {
-  const bool across_u = grid.closure != Closure::kOpen && i == grid.columns - 1,
-             across_v = grid.closure == Closure::kPeriodicUv && j == grid.rows - 1;
-  return (across_u ? 0 : i) + grid.columns * (across_v ? 0 : j);
+  const bool across = grid.closure == Closure::kPeriodicU && i == grid.columns - 1;
+  return (across ? 0 : i) + grid.columns * j;
 }
 
-// Two per cell, but for those that are trimmed away.
+// Two per cell.
 std::vector<Triangle> TrianglesOf(const FitGrid& grid) {
   std::vector<Triangle> triangles;
-  const auto add = [&](const Triangle& t) {
-    const auto kept = [&](int corner) { return grid.kept.empty() ? 1 : grid.kept[corner]; };
-    if (kept(t[0]) + kept(t[1]) + kept(t[2]) >= 2) {
-      triangles.push_back(t);
-    }
-  };
   for (int j = 0; j + 1 < grid.rows; ++j) {
     for (int i = 0; i + 1 < grid.columns; ++i) {
       const int a = VertexAt(grid, i, j), b = VertexAt(grid, i + 1, j),
                 c = VertexAt(grid, i, j + 1), d = VertexAt(grid, i + 1, j + 1);
-      add({a, b, d});
-      add({a, d, c});
+      triangles.push_back({a, b, d});
+      triangles.push_back({a, d, c});
     }
   }
   return triangles;
@@ -112,8 +105,7 @@ FitGrid GridOf(const FitResult& fit, int threads) {
                .rows = kGrid,
                .closure = fit.surface.shape().closure,
                .mesh = {},
-               .rms_mm = {},
-               .kept = {}};
+               .rms_mm = {}};
   std::vector<Vec2> uv;
   for (int j = 0; j < grid.rows; ++j) {
     for (int i = 0; i < grid.columns; ++i) {
@@ -126,30 +118,17 @@ FitGrid GridOf(const FitResult& fit, int threads) {
   return grid;
 }
 
-void TrimGrid(const TrimmedTo& trim, int threads, FitGrid& grid) {
-  constexpr std::size_t kBlock = 256;
-  grid.kept.assign(grid.mesh.points.size(), 0);
-  ParallelFor(grid.kept.size(), threads, kBlock, [&](std::size_t k) {
-    grid.kept[k] = trim.places.DistanceTo(grid.mesh.points[k]) <= trim.distance_mm ? 1 : 0;
-  });
-  grid.mesh.triangles = TrianglesOf(grid);
-}
-
 FitGrid Halved(const FitGrid& grid) {
   FitGrid half{.columns = (grid.columns + 1) / 2,
                .rows = (grid.rows + 1) / 2,
                .closure = grid.closure,
                .mesh = {},
-               .rms_mm = {},
-               .kept = {}};
+               .rms_mm = {}};
   for (int j = 0; j < half.rows; ++j) {
     for (int i = 0; i < half.columns; ++i) {
       const std::size_t at = 2 * (static_cast<std::size_t>(j) * grid.columns + i);
       half.mesh.points.push_back(grid.mesh.points[at]);
       half.rms_mm.push_back(grid.rms_mm[at]);
-      if (!grid.kept.empty()) {
-        half.kept.push_back(grid.kept[at]);
-      }
     }
   }
   half.mesh.triangles = TrianglesOf(half);

@@ -8,7 +8,6 @@
 
 #include "fitting/plan/fit_result.h"
 #include "fitting/problem/fit_schedule.h"
-#include "problems/points/fit_trim.h"
 #include "surfaces/hspline/hspline_shape.h"
 #include "surfaces/mesh/tri_mesh.h"
 
@@ -26,11 +25,8 @@ struct FitGrid {
   Closure closure = Closure::kOpen;  // triangles meet across a seam in its first vertices
   TriMesh mesh;                      // mm
   std::vector<double> rms_mm;        // of the points around the vertex; NaN: none
-  std::vector<char> kept;  // of a trimmed surface: whether the vertex is part of it; else empty
 };
 FitGrid GridOf(const FitResult& fit, int threads);
-// Leaves out the triangles that have more than one vertex beyond the distance.
-void TrimGrid(const TrimmedTo& trim, int threads, FitGrid& grid);
 // Every other vertex.
 FitGrid Halved(const FitGrid& grid);
 

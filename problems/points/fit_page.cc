@@ -16,7 +16,6 @@
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
 #include "problems/points/fit_report.h"
-#include "problems/points/join_report.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/report.h"
 
@@ -44,9 +43,6 @@ std::vector<std::string> Notes(const PointFit& result, const Tolerance& toleranc
   }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
-  }
-  for (std::string& line : JoinLines(result.joins)) {
-    notes.push_back(std::move(line));
   }
   if (result.fit.automatic) {
     std::istringstream lines(AutoText(*result.fit.automatic));
@@ -191,12 +187,9 @@ ReportSection RoundsSection(const FitResult& fit, bool is_weighted) {
 }  // namespace
 
 std::string FitPageHtml(const PointFitOptions& options, const PointSource& source,
-                        const PointFit& result, const PageTrim& trim, int threads) {
+                        const PointFit& result, int threads) {
   const Tolerance tolerance = ToleranceOf(options, result);
-  FitGrid grid = GridOf(result.fit, threads);
-  if (trim.kept != nullptr) {
-    TrimGrid(*trim.kept, threads, grid);
-  }
+  const FitGrid grid = GridOf(result.fit, threads);
   const std::vector<FitCell> cells = CellsOf(result.fit);
   Report report;
   report.title = options.title == PointFitOptions().title ? source.name : options.title;
@@ -204,9 +197,6 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
       "An H-spline surface through {} of {}",
       Counted(static_cast<long long>(result.fit.residual_mm.size()), "point"), source.name);
   report.notes = Notes(result, tolerance);
-  if (trim.report) {
-    report.notes.push_back(TrimText(*trim.report) + ", in surface.ply and here");
-  }
   report.scenes = FitScene(grid);
   report.scenes_note = "Thinned out for looking; surface.hspline.json is exact.";
   report.main_images = {

@@ -37,19 +37,16 @@ Vec3 MeanNormal(const TriMesh& mesh) {
   return area > 0 ? Vec3(sum / area) : Vec3::Zero();
 }
 
-// Of what the triangles show: a trimmed grid has points beyond.
-Box3 BoxShown(const TriMesh& mesh, const Mat3& view_from_world) {
+Box3 BoxOf(const TriMesh& mesh, const Mat3& view_from_world) {
   Box3 box;
-  for (const Triangle& t : mesh.triangles) {
-    for (const int corner : t) {
-      box.extend(view_from_world * mesh.points[corner]);
-    }
+  for (const Vec3& p : mesh.points) {
+    box.extend(view_from_world * p);
   }
   return box;
 }
 
 Camera Framed(const TriMesh& mesh, const Mat3& view_from_world) {
-  const Box3 box = BoxShown(mesh, view_from_world);
+  const Box3 box = BoxOf(mesh, view_from_world);
   constexpr double kMargin = 1.08;
   return {.view_from_world = view_from_world,
           .centre = view_from_world.transpose() * box.center(),
@@ -78,7 +75,7 @@ Camera CameraOf(const TriMesh& mesh) {
   if (normal.norm() >= kHeightField) {
     return FromAbove(mesh, normal);
   }
-  const Box3 box = BoxShown(mesh, Mat3::Identity());
+  const Box3 box = BoxOf(mesh, Mat3::Identity());
   return Framed(mesh, CameraFor(View::kThreeQuarter, box, 1).view_from_world);
 }
 

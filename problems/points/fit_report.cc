@@ -6,14 +6,12 @@
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <utility>
 
 #include "fitting/plan/fit_check.h"
 #include "problems/config/config.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_page.h"
-#include "problems/points/join_report.h"
 #include "problems/points/residual_files.h"
 #include "problems/points/surface_ply.h"
 #include "problems/report/fit_json.h"
@@ -156,15 +154,6 @@ Json MapJson(const PointFit& result) {
           {"collapsed_share", result.map_faults.collapsed}};
 }
 
-Json PolesJson(const PoleGaps& poles) {
-  Json json = Json::array();
-  for (const int v : {0, 1}) {
-    const Vec3& at = poles[v].place;
-    json.push_back({{"v", v}, {"at_mm", {at.x(), at.y(), at.z()}}, {"gap_mm", poles[v].gap_mm}});
-  }
-  return json;
-}
-
 Json AttributesJson(const PointFit& result) {
   Json json = Json::array();
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
@@ -195,11 +184,6 @@ Json ToleranceJson(const ToleranceReport& tolerance) {
   return json;
 }
 
-Json TrimJson(const TrimReport& trim) {
-  return {
-      {"distance_mm", trim.distance_mm}, {"kept_mm2", trim.kept_mm2}, {"cut_mm2", trim.cut_mm2}};
-}
-
 // What every fit has.
 Json FiguresJson(const PointFitOptions& options, const PointSource& source,
                  const PointFit& result) {
@@ -218,8 +202,8 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"faults", result.Faults()}};
 }
 
-Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, const PointFit& result,
-                  const std::optional<TrimReport>& trim) {
+Json ResultJsonOf(const PointFitOptions& options, const PointSource& source,
+                  const PointFit& result) {
   Json json = FiguresJson(options, source, result);
   if (std::isfinite(result.weighted_rms_mm)) {
     json["weighted_rms_mm"] = result.weighted_rms_mm;
@@ -227,14 +211,8 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   if (!result.how.empty()) {
     json["map"] = MapJson(result);
   }
-  if (result.poles) {
-    json["poles"] = PolesJson(*result.poles);
-  }
   if (result.moves) {
     json["moves"] = MovesJson(*result.moves);
-  }
-  if (!result.joins.empty()) {
-    json["joins"] = JoinsJson(result.joins);
   }
   if (!result.attributes.empty()) {
     json["attributes"] = AttributesJson(result);
@@ -250,9 +228,6 @@ Json ResultJsonOf(const PointFitOptions& options, const PointSource& source, con
   }
   if (const auto tolerance = ToleranceOf(options, result)) {
     json["tolerance"] = ToleranceJson(*tolerance);
-  }
-  if (trim) {
-    json["trim"] = TrimJson(*trim);
   }
   json.update(StepsToJson(result.fit));
   return json;
@@ -293,16 +268,8 @@ std::vector<std::string> NotesOf(const PointFitOptions& options, const PointFit&
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
   }
-  if (result.poles) {
-    notes.push_back(
-        fmt::format("poles: the edges v = 0 and v = 1 are one place each to {:.3g} and {:.3g} mm",
-                    (*result.poles)[0].gap_mm, (*result.poles)[1].gap_mm));
-  }
   if (result.moves) {
     notes.push_back(MovesText(*result.moves));
-  }
-  for (std::string& line : JoinLines(result.joins)) {
-    notes.push_back(std::move(line));
   }
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
     notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,
@@ -331,27 +298,21 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
   context.Report("write");
   // First what can still be refused.
   const double chord_mm = ChordFor(result.fit.surface, options.chord_mm);
-  const std::optional<TrimmedTo> trim =
-      result.Faults().empty() ? TrimOf(options.trim, result.fit, context.threads) : std::nullopt;
-  const SurfaceMesh mesh = SurfacePly(result, chord_mm, trim ? &*trim : nullptr, context.threads);
+  const std::string ply = SurfacePly(result, chord_mm, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));
-  folder.Write("surface.ply", mesh.ply);
+  folder.Write("surface.ply", ply);
   WriteResiduals(options.residuals, result, folder);
   WriteAttributes(result, folder);
   if (options.report && result.Faults().empty()) {
-    folder.Write("report.html", FitPageHtml(options, source, result,
-                                            {trim ? &*trim : nullptr, mesh.trim}, context.threads));
+    folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
   }
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write("result.json", ResultJsonOf(options, source, result, mesh.trim)
-                                      .dump(2, ' ', false, Json::error_handler_t::replace) +
-                                  "\n");
-  std::vector<std::string> notes = NotesOf(options, result, chord_mm);
-  if (mesh.trim) {
-    notes.push_back(TrimText(*mesh.trim));
-  }
-  return notes;
+  folder.Write(
+      "result.json",
+      ResultJsonOf(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+          "\n");
+  return NotesOf(options, result, chord_mm);
 }
 
 }  // namespace semblance

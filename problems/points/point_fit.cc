@@ -15,10 +15,8 @@
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
-#include "fitting/plan/pole_points.h"
 #include "fitting/problem/start_surface.h"
 #include "fitting/solve/auto_weight.h"
-#include "problems/points/join_report.h"
 #include "problems/points/surface_ply.h"
 #include "surfaces/base/error.h"
 
@@ -41,17 +39,8 @@ std::string ClosureFault(ParameterSource source, Closure closure) {
   if (source == ParameterSource::kCylinder && closure != Closure::kPeriodicU) {
     return "parameters on a cylinder go round in u alone; write closure: periodic_u";
   }
-  if (source == ParameterSource::kSphere && closure != Closure::kPeriodicU) {
-    return "parameters on a sphere go round in u alone; write closure: periodic_u";
-  }
-  if (source == ParameterSource::kTorus && closure != Closure::kPeriodicUv) {
-    return "parameters on a torus go round both ways; write closure: periodic_uv";
-  }
-  if (closure == Closure::kPeriodicUv && source == ParameterSource::kMesh) {
-    return "parameters on a mesh do not go round both ways; write closure: periodic_u if it is "
-           "closed, else open";
-  }
-  if (closure != Closure::kOpen && source == ParameterSource::kPlane) {
+  if (closure != Closure::kOpen &&
+      (source == ParameterSource::kPlane || source == ParameterSource::kMesh)) {
     return fmt::format("parameters on a {} do not go round; write closure: open", NameOf(source));
   }
   return "";
@@ -69,10 +58,6 @@ std::optional<ParameterSource> SourceAsked(const Parameters& parameters) {
              ? std::optional(ParameterSource::kPlane)
          : std::holds_alternative<CylinderParameters>(parameters)
              ? std::optional(ParameterSource::kCylinder)
-         : std::holds_alternative<SphereParameters>(parameters)
-             ? std::optional(ParameterSource::kSphere)
-         : std::holds_alternative<TorusParameters>(parameters)
-             ? std::optional(ParameterSource::kTorus)
          : std::holds_alternative<MeshParameters>(parameters)
              ? std::optional(ParameterSource::kMesh)
              : std::nullopt;
@@ -135,18 +120,6 @@ std::string_view WrongPatches(HSplineShape shape) {
   return ShapeFault(shape).empty() ? "patches_v" : "patches_u";
 }
 
-// An edge is where the points' u or v is 0 or 1. A plane, a cylinder and a mesh laid out draw it
-// where the points happen to end, and no given edge need be there.
-std::string JoinParametersFault(ParameterSource source) {
-  return source == ParameterSource::kGiven
-             ? ""
-             : fmt::format(
-                   "an edge of the new surface is where its points' own u or v is 0 or 1, "
-                   "and parameters on a {} lay it elsewhere; give columns u and v, and "
-                   "parameters: given",
-                   NameOf(source));
-}
-
 // Of (u,v), before the fit.
 int RoundsOfMoves(const FitOptions& fit) {
   const auto* const plan = std::get_if<AutoPlan>(&fit.plan);
@@ -159,33 +132,6 @@ FitOptions AfterMoves(FitOptions fit) {
     plan->relaxation_rounds = 0;
   }
   return fit;
-}
-
-void AddJoinFaults(const PointFitOptions& options, std::vector<OptionFault>& faults) {
-  if (options.joins.empty()) {
-    return;
-  }
-  if (const auto source = SourceAsked(options.parameters)) {
-    faults.push_back({"joins", JoinParametersFault(*source)});
-  }
-  if (std::string fault = JoinPlanFault(options.fit); !fault.empty()) {
-    faults.push_back({"joins", std::move(fault)});
-  }
-  if (RoundsOfMoves(options.fit) > 0) {
-    faults.push_back({"fit.plan.relaxation_rounds",
-                      "joins need the (u,v) beside the edge as they are; write "
-                      "relaxation_rounds: 0, or leave joins out"});
-  }
-  for (OptionFault& fault : JoinFaults(options.joins, options.closure)) {
-    faults.push_back(std::move(fault));
-  }
-}
-
-void CheckJoinParameters(ParameterSource source, const PointFitOptions& options) {
-  if (const std::string fault = JoinParametersFault(source);
-      !fault.empty() && !options.joins.empty()) {
-    throw InputError("joins: " + fault);
-  }
 }
 
 }  // namespace
@@ -208,7 +154,6 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
   if (const std::string fault = AttributesFault(options.attributes); !fault.empty()) {
     faults.push_back({"attributes", fault});
   }
-  AddJoinFaults(options, faults);
   if (!std::holds_alternative<RestoreFeatures>(options.fit.features)) {
     faults.push_back({"fit.features",
                       "a surface through points of a file has no features; leave the option out"});
@@ -375,7 +320,6 @@ PlacedPoints PlacePoints(PointTable& table, const PointFitOptions& options, Step
   const bool moving = RoundsOfMoves(options.fit) > 0;
   const std::vector<Triangle> triangles = moving ? table.triangles : std::vector<Triangle>();
   PlacedPoints placed{step("parameters", [&] { return ParametersOf(table, options); }), {}};
-  CheckJoinParameters(placed.parameters.source, options);
   if (moving) {
     placed.moves = step("relaxation", [&] {
       return MoveUv(table, triangles, options, context, placed.parameters.uv);
@@ -394,27 +338,18 @@ std::vector<ExactPoint> ExactOf(const PointTable& table, std::span<const Vec2> u
   return exact;
 }
 
-// At a pole the frame of an offset would turn with the noise.
-HSplineSurface BallOver(HSplineShape shape, std::span<const Vec3> positions,
-                        std::span<const Vec2> uv) {
-  shape.reference = OffsetReference::kWorld;
-  return StartBall(shape, positions, uv);
-}
-
-JoinedFit FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
-                   std::span<const OpenedJoin> joins, const FitOptions& options,
-                   const RunContext& context) {
-  if (!exact.empty() || !joins.empty()) {
+FitResult FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
+                   const FitOptions& options, const RunContext& context) {
+  if (!exact.empty()) {
     FitTarget target = TargetOf(points.positions, points.uv, points.weights);
     target.exact = std::move(exact);
-    return joins.empty() ? JoinedFit{Fit(start, target, {}, options, context), {}}
-                         : FitJoined(start, std::move(target), joins, options, context);
+    return Fit(start, target, {}, options, context);
   }
   if (!IsAlone(options)) {
-    return {Fit(start, points.View(), options, context), {}};
+    return Fit(start, points.View(), options, context);
   }
   CheckFit(start, points.View(), options);
-  return {FitAlone(start, std::move(points), std::get<AutoPlan>(options.plan), context), {}};
+  return FitAlone(start, std::move(points), std::get<AutoPlan>(options.plan), context);
 }
 
 void AddAttributes(std::span<const double> weights, const RunContext& context, StepClock& step,
@@ -437,17 +372,14 @@ void AddSigma(const GivenPoints& given, const HSplineSurface& start, StepClock& 
   }
 }
 
-PointFit FoundBy(PlacedPoints placed, JoinedFit joined, std::vector<PointAttribute> attributes) {
+PointFit FoundBy(PlacedPoints placed, FitResult fit, std::vector<PointAttribute> attributes) {
   return {.parameters = std::string(NameOf(placed.parameters.source)),
           .how = std::move(placed.parameters.how),
           .map_faults = placed.parameters.faults,
           .moves = placed.moves,
-          .poles = placed.parameters.poles ? std::optional(PoleGapsOf(joined.fit.surface))
-                                           : std::nullopt,
-          .fit = std::move(joined.fit),
+          .fit = std::move(fit),
           .weighted_rms_mm = kNaN,
           .distance = {},
-          .joins = std::move(joined.joins),
           .attributes = std::move(attributes),
           .attribute_at = {},
           .attribute_fit = {},
@@ -539,28 +471,19 @@ std::vector<std::string> PointFit::Faults() const {
 
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
   const HSplineShape shape = ShapeOf(options);
-  CheckTrim(options.trim, table.positions);
   std::vector<PointAttribute> attributes = AttributesAsked(table, options);
-  const std::vector<OpenedJoin> joins = OpenJoins(options.joins, options.closure);
   StepClock step(context);
   PlacedPoints placed = PlacePoints(table, options, step, context);
   std::vector<Vec2>& uv = placed.parameters.uv;
-  const std::optional<Poles> poles = placed.parameters.poles;
-  const HSplineSurface start =
-      poles ? BallOver(shape, table.positions, uv) : StartSurface(shape, table.positions, uv);
+  const HSplineSurface start = StartSurface(shape, table.positions, uv);
   CheckChord(options.chord_mm, start, {table.positions, uv}, context);
   std::vector<ExactPoint> exact = ExactOf(table, uv);
   const GivenPoints given = GivenOf(table, placed.parameters.source, exact);
   OwnedPoints points{std::move(table.positions), std::move(uv), std::move(table.weights)};
-  const std::size_t added = poles ? AddPolePoints(*poles, points) : 0;
-  JoinedFit joined = step("fit", [&] {
-    return FitOwned(start, std::move(points), std::move(exact), joins, AfterMoves(options.fit),
-                    context);
+  FitResult fit = step("fit", [&] {
+    return FitOwned(start, std::move(points), std::move(exact), AfterMoves(options.fit), context);
   });
-  if (poles) {
-    ForgetLastPoints(added, given.weights, joined.fit);
-  }
-  PointFit result = FoundBy(std::move(placed), std::move(joined), std::move(attributes));
+  PointFit result = FoundBy(std::move(placed), std::move(fit), std::move(attributes));
   CompareWith(given, result);
   AddAttributes(given.weights, context, step, result);
   if (options.sigma) {

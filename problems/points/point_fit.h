@@ -17,14 +17,9 @@
 #include "fitting/solve/surface_sigma.h"
 #include "problems/config/config_errors.h"
 #include "problems/pipeline/step_clock.h"
-#include "problems/points/fit_joins.h"
 #include "problems/points/fit_maps.h"
-#include "problems/points/fit_trim.h"
-#include "problems/points/join_report.h"
 #include "problems/points/point_table.h"
-#include "problems/points/surface_join.h"
 #include "surfaces/base/auto_or.h"
-#include "surfaces/hspline_query/surface_poles.h"
 
 namespace semblance {
 
@@ -38,16 +33,14 @@ struct PointFitOptions {
   std::string title = "untitled";            // of the result
   int patches_u = 8;                         // of level 0
   int patches_v = 8;                         // of level 0
-  Closure closure = Closure::kOpen;          // whether u, or u and v, go round
+  Closure closure = Closure::kOpen;          // whether u goes round
   Parameters parameters;                     // where the points' (u,v) come from
   std::vector<std::string> attributes = {};  // further columns that are fitted
-  std::vector<SurfaceJoin> joins = {};       // edges that continue other surfaces
   FitOptions fit = {
       .plan = AutoPlan{},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);  // of surface.ply's triangles
-  Trim trim = {};                                        // what surface.ply and pictures leave out
   ResidualFile residuals = ResidualFile::kAuto;  // auto: .csv of up to 100,000 points, else .ply
   bool sigma = false;                            // write the standard deviation; for the plan auto
   bool report = true;                            // write report.html
@@ -64,20 +57,13 @@ void Fields(Visitor& visit, PointFitOptions& o) {
   visit(FieldInfo{.name = "patches_v", .min = 1, .max = kMostPatches, .doc = "of level 0 along v"},
         o.patches_v);
   visit(FieldInfo{.name = "closure",
-                  .doc = "open; periodic_u for surfaces that go round in u, as a tube or a ball "
-                         "does; periodic_uv for those that go round both ways, as a torus does"},
+                  .doc = "open; or periodic_u for surfaces that go round in u, as a tube does"},
         o.closure);
   visit(FieldInfo{.name = "parameters", .doc = "where the points' (u,v) come from"}, o.parameters);
   visit(FieldInfo{.name = "attributes",
                   .doc = "further columns of the points (properties of a PLY) that are fitted over "
                          "the surface, such as [intensity] or [red, green, blue]"},
         o.attributes);
-  visit(FieldInfo{.name = "joins",
-                  .doc = "edges of the new surface that continue edges of surfaces that are there, "
-                         "without a gap or a crease, such as [{surface: "
-                         "out/a/surface.hspline.json, its_edge: u1, edge: u0}]; needs the points' "
-                         "own u and v, and plan: auto or adaptive"},
-        o.joins);
   visit(FieldInfo{.name = "fit", .doc = "the fit; its finest level is the surface's"}, o.fit);
   visit(
       FieldInfo{.name = "chord_mm",
@@ -87,10 +73,6 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                 .doc = "how far a triangle of surface.ply may be from the surface; auto: 1/5000 "
                        "of the points' extent, or more where that would be millions of triangles"},
       o.chord_mm);
-  visit(FieldInfo{.name = "trim",
-                  .doc = "what surface.ply and the report leave out: none: nothing; cloud: what is "
-                         "far from every point. surface.hspline.json stays whole"},
-        o.trim);
   visit(FieldInfo{.name = "residuals",
                   .doc = "what is written of each point: csv: residuals.csv; ply: residuals.ply, "
                          "binary, faster and smaller; none: nothing; auto: csv of up to 100000 "
@@ -112,17 +94,15 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
 struct PointFit {
-  std::string parameters;               // given, plane, cylinder, sphere, torus or mesh
+  std::string parameters;               // given, plane, cylinder or mesh
   std::string how;                      // which of them, in words; empty of given ones
   MapFaults map_faults;                 // of what was chosen
   std::optional<FootMoves> moves = {};  // of (u,v) before the fit, where that was asked for
-  std::optional<PoleGaps> poles = {};   // on a sphere, at v = 0 and v = 1
   // Its point_rms_mm: each point counts as much as any other. The weights of its smoothness: as the
   // written terms have them.
   FitResult fit;
   double weighted_rms_mm = kNaN;  // the same with the points' weights; NaN where all are equal
   DistanceQuantiles distance;     // of the points from the surface
-  std::vector<JoinReport> joins;  // one per join
   std::vector<PointAttribute> attributes;         // as given
   std::vector<std::vector<double>> attribute_at;  // fitted, at the points
   AttributeFit attribute_fit;
@@ -144,13 +124,12 @@ struct PointFit {
 // Of an adaptive fit: whether every point is within its tolerance (fit_maps.h).
 std::optional<ToleranceReport> ToleranceOf(const PointFitOptions& options, const PointFit& result);
 
-// Throws InputError as Parametrise, StartSurface, Fit, FitJoined and FitAttributes do, for a
-// closure that does not suit the parameters (a cylinder, a sphere and a closed mesh go round in
-// u, a torus both ways, a plane and an open mesh do not), for joins of points without (u,v) of
-// their own, for attributes that the table has not, for a trim below what the points are apart, and
+// Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a
+// closure that does not suit the parameters (a cylinder goes round in u, a plane and a mesh do
+// not), for attributes that the table has not,
+// and
 // for a chord so fine that a coarse fit of some of the points has already shown surface.ply to be
-// too large, and for moves of (u,v) beside exact points. Reads the surfaces that are joined, and
-// throws as OpenJoins does.
+// too large, and for moves of (u,v) beside exact points.
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // What the points came from.

@@ -16,9 +16,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/surface_cells.h"
-#include "surfaces/hspline_query/surface_poles.h"
 #include "surfaces/hspline_query/tessellate.h"
-#include "surfaces/hspline_query/trimmed_tessellation.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {
@@ -146,32 +144,11 @@ double ChordFor(const HSplineSurface& surface, const AutoOr<double>& chord_mm) {
                             : AffordableChord(surface, chord_mm, kMostCells / 4);
 }
 
-namespace {
-
-std::string EncodePly(const PointFit& result, Tessellation tessellation, double chord_mm,
-                      int threads) {
-  if (result.poles) {
-    JoinPoles(*result.poles, tessellation);
-  }
+std::string SurfacePly(const PointFit& result, double chord_mm, int threads) {
+  Tessellation tessellation = TessellateToChord(result.fit.surface, chord_mm, threads);
   MeshAttributes attributes = AttributesOf(result, tessellation.uv, threads);
   attributes.normals = std::move(tessellation.normals);
   return EncodeMesh(tessellation.mesh, ".ply", attributes, chord_mm);
-}
-
-}  // namespace
-
-SurfaceMesh SurfacePly(const PointFit& result, double chord_mm, const TrimmedTo* trim,
-                       int threads) {
-  const HSplineSurface& surface = result.fit.surface;
-  if (trim == nullptr) {
-    return {
-        .ply = EncodePly(result, TessellateToChord(surface, chord_mm, threads), chord_mm, threads)};
-  }
-  TrimmedTessellation trimmed =
-      TessellateNear(surface, chord_mm, trim->places, trim->distance_mm, threads);
-  const TrimReport report{
-      .distance_mm = trim->distance_mm, .kept_mm2 = trimmed.kept_mm2, .cut_mm2 = trimmed.cut_mm2};
-  return {.ply = EncodePly(result, std::move(trimmed.kept), chord_mm, threads), .trim = report};
 }
 
 }  // namespace semblance

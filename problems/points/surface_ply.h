@@ -2,7 +2,6 @@
 // surface.ply of `semblance fit`: how fine its triangles are, and what they carry.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
 
@@ -22,11 +21,7 @@ void CheckChord(const AutoOr<double>& chord_mm, const HSplineSurface& start,
 double ChordFor(const HSplineSurface& surface, const AutoOr<double>& chord_mm);
 
 // Binary PLY with normals, and each attribute as a scalar of its name; red, green and blue, 0 to
-// 255, together as colours. trim: where the surface is kept; null: everywhere.
-struct SurfaceMesh {
-  std::string ply;
-  std::optional<TrimReport> trim = {};  // of a surface that was trimmed
-};
-SurfaceMesh SurfacePly(const PointFit& result, double chord_mm, const TrimmedTo* trim, int threads);
+// 255, together as colours.
+std::string SurfacePly(const PointFit& result, double chord_mm, int threads);
 
 }  // namespace semblance

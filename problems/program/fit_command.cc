@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "problems/config/config.h"
-#include "problems/config/named_files.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
@@ -45,14 +44,10 @@ void CheckOrder(const std::vector<std::string>& files) {
 }
 
 // What is read, and what may be written.
-GivenFiles GivenTo(const FitArguments& arguments, const PointFitOptions& options) {
-  GivenFiles given{.files = {arguments.files.begin(), arguments.files.end()},
-                   .outputs = kPointFitFiles,
-                   .marks = kPointFitMarks};
-  for (const NamedFile& named : NamedFiles(options)) {
-    given.files.push_back(named.file);
-  }
-  return given;
+GivenFiles GivenTo(const FitArguments& arguments) {
+  return {.files = {arguments.files.begin(), arguments.files.end()},
+          .outputs = kPointFitFiles,
+          .marks = kPointFitMarks};
 }
 
 int FitCommand(const FitArguments& arguments) {
@@ -60,8 +55,8 @@ int FitCommand(const FitArguments& arguments) {
   const std::filesystem::path path = arguments.files.at(0);
   const PointFitOptions options = FitOptionsOf(arguments);
   const std::string name = path == "-" ? "standard input" : path.filename().string();
-  StagedFolder folder = FolderOf(arguments, "out/" + (path == "-" ? "points" : PlainName(path)),
-                                 GivenTo(arguments, options));
+  StagedFolder folder =
+      FolderOf(arguments, "out/" + (path == "-" ? "points" : PlainName(path)), GivenTo(arguments));
   PointFile file = ReadPointFile(path, options.attributes);
   const RunContext context = ContextOf(arguments);
   const PointFit result = FitPoints(std::move(file.points), options, context);

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/points/join_report.h"
 #include "problems/points/point_fit.h"
 #include "problems/python/arrays.h"
 #include "problems/python/bindings.h"
@@ -68,9 +67,6 @@ void BindFit(py::module_& module) {
           "n: distance of the surface at the point's (u, v)")
       .def_property_readonly("rms_mm", [](const PointFit& f) { return f.fit.point_rms_mm; })
       .def_property_readonly("parameters", [](const PointFit& f) { return f.parameters; })
-      .def_property_readonly(
-          "joins", [](const PointFit& f) { return JoinLines(f.joins); },
-          "how well each join holds, in words")
       .def_property_readonly("usable", [](const PointFit& f) { return f.Faults().empty(); })
       .def_property_readonly("faults", &PointFit::Faults, "why it cannot be used; else empty");
   module.def("fit", &FitArrays, py::arg("points"), py::arg("uv") = py::none(),

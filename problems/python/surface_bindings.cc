@@ -37,20 +37,12 @@ ControlNet NetOf(const Doubles& array) {
   return net;
 }
 
-std::unique_ptr<HSplineSurface> MakeSurface(const Doubles& level0, int max_level, bool periodic_u,
-                                            bool periodic_v) {
-  if (periodic_v && !periodic_u) {
-    throw InputError(
-        "a surface that is periodic in v alone; exchange u and v, or make it periodic "
-        "in both");
-  }
+std::unique_ptr<HSplineSurface> MakeSurface(const Doubles& level0, int max_level, bool periodic_u) {
   const ControlNet net = NetOf(level0);
   const HSplineShape shape{.patches_u = periodic_u ? net.columns : net.columns - 3,
-                           .patches_v = periodic_v ? net.rows : net.rows - 3,
+                           .patches_v = net.rows - 3,
                            .max_level = max_level,
-                           .closure = periodic_v   ? Closure::kPeriodicUv
-                                      : periodic_u ? Closure::kPeriodicU
-                                                   : Closure::kOpen};
+                           .closure = periodic_u ? Closure::kPeriodicU : Closure::kOpen};
   return std::make_unique<HSplineSurface>(shape, net);
 }
 
@@ -149,9 +141,9 @@ void BindSurface(py::module_& module) {
   surface
       .def(
           py::init(&MakeSurface), py::arg("level0"), py::arg("max_level") = 0,
-          py::arg("periodic_u") = false, py::arg("periodic_v") = false,
+          py::arg("periodic_u") = false,
           "From the control vertices of level 0, rows x columns x 3: three more than patches along "
-          "each open side. Periodic in v only if it is in u.")
+          "each open side.")
       .def_static(
           "read", [](const std::string& path) { return ReadHSpline(path); }, py::arg("path"),
           "From a .hspline.json, to the bit.")
@@ -165,9 +157,7 @@ void BindSurface(py::module_& module) {
                                return py::make_tuple(s.shape().patches_u, s.shape().patches_v);
                              })
       .def_property_readonly("periodic_u",
-                             [](const HSplineSurface& s) { return s.shape().ClosedU(); })
-      .def_property_readonly("periodic_v",
-                             [](const HSplineSurface& s) { return s.shape().ClosedV(); });
+                             [](const HSplineSurface& s) { return s.shape().ClosedU(); });
   BindQuestions(surface);
   BindNets(surface);
 }

@@ -212,8 +212,8 @@ class SceneWriter {
         if (i + 1 < net.columns || shape.ClosedU()) {
           segments.push_back({net.Index(i, j), net.Index((i + 1) % net.columns, j)});
         }
-        if (j + 1 < net.rows || shape.ClosedV()) {
-          segments.push_back({net.Index(i, j), net.Index(i, (j + 1) % net.rows)});
+        if (j + 1 < net.rows) {
+          segments.push_back({net.Index(i, j), net.Index(i, j + 1)});
         }
       }
     }

@@ -25,17 +25,17 @@ double Power(double x, int order) { return order == 0 ? 1 : order == 1 ? x : x *
 
 void CheckShape(const HSplineShape& shape) {
   constexpr int kMostLevels = 8;
-  const int least_u = shape.ClosedU() ? 4 : 1, least_v = shape.ClosedV() ? 4 : 1;
+  const int least_u = shape.ClosedU() ? 4 : 1;
   if (shape.max_level < 0 || shape.max_level > kMostLevels) {
     throw InputError(fmt::format("H-spline: the finest level is {}; it must be in 0..{}",
                                  shape.max_level, kMostLevels));
   }
   const int most = kMostPatches >> shape.max_level;
-  if (shape.patches_u < least_u || shape.patches_v < least_v || shape.patches_u > most ||
+  if (shape.patches_u < least_u || shape.patches_v < 1 || shape.patches_u > most ||
       shape.patches_v > most) {
     throw InputError(fmt::format(
-        "H-spline: {} x {} patches are not allowed; with finest level {}, use {}..{} x {}..{}",
-        shape.patches_u, shape.patches_v, shape.max_level, least_u, most, least_v, most));
+        "H-spline: {} x {} patches are not allowed; with finest level {}, use {}..{} x 1..{}",
+        shape.patches_u, shape.patches_v, shape.max_level, least_u, most, most));
   }
 }
 
@@ -52,7 +52,7 @@ void CheckParameter(const HSplineShape& shape, int level, const Vec2& uv) {
 
 PatchPoint PatchPointAt(const HSplineShape& shape, int level, const Vec2& uv) {
   const auto [i, s] = PatchAlong(uv.x(), shape.PatchesU(level), shape.ClosedU());
-  const auto [j, t] = PatchAlong(uv.y(), shape.PatchesV(level), shape.ClosedV());
+  const auto [j, t] = PatchAlong(uv.y(), shape.PatchesV(level), false);
   return {{level, i, j}, s, t};
 }
 
@@ -74,8 +74,8 @@ Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, Derivati
   const PatchPoint at = PatchPointAt(shape, level, uv);
   Stencil stencil;
   for (int k = 0; k < 16; ++k) {
-    stencil.index[k] = shape.Column(level, at.patch.i + k % 4) +
-                       shape.Columns(level) * shape.Row(level, at.patch.j + k / 4);
+    stencil.index[k] =
+        shape.Column(level, at.patch.i + k % 4) + shape.Columns(level) * (at.patch.j + k / 4);
   }
   stencil.weight = PatchWeights(shape, at, order);
   return stencil;
@@ -84,7 +84,7 @@ Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, Derivati
 Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex) {
   const double u = (vertex.i - 1.0) / shape.PatchesU(vertex.level);
   const double v = (vertex.j - 1.0) / shape.PatchesV(vertex.level);
-  return {IntoUnit(u, shape.ClosedU()), IntoUnit(v, shape.ClosedV())};
+  return {IntoUnit(u, shape.ClosedU()), std::clamp(v, 0.0, 1.0)};
 }
 
 ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level) {
@@ -95,7 +95,7 @@ ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level) {
     for (int i = 0; i < fine.columns; ++i) {
       const RefinementRow u = RefineRow(i);
       fine.vertices.push_back(RefinedVertex(u, v, [&](int a, int b) -> const Vec3& {
-        return net.At(shape.Column(level, u.index[a]), shape.Row(level, v.index[b]));
+        return net.At(shape.Column(level, u.index[a]), v.index[b]);
       }));
     }
   }

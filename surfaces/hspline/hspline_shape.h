@@ -11,10 +11,10 @@
 
 namespace semblance {
 
-// Whether the surface goes round: not at all, along u, or along u and v, as a torus does.
-enum class Closure { kOpen, kPeriodicU, kPeriodicUv };
+// Whether the surface goes round: not at all, or along u, as a tube does.
+enum class Closure { kOpen, kPeriodicU };
 constexpr auto EnumNames(Closure) {
-  return std::to_array<std::string_view>({"open", "periodic_u", "periodic_uv"});
+  return std::to_array<std::string_view>({"open", "periodic_u"});
 }
 
 // u or v as a number of [0,1]: wrapped along a closed direction, clamped along an open one.
@@ -41,22 +41,20 @@ inline constexpr int kMostPatches = 8192;
 // The domain is [0,1] x [0,1]; level L has patches_u 2^L x patches_v 2^L patches.
 struct HSplineShape {
   int patches_u = 8;  // of level 0; >= 1 (open), >= 4 (closed); at most kMostPatches
-  int patches_v = 8;  // likewise
+  int patches_v = 8;  // of level 0; 1..kMostPatches
   int max_level = 3;  // finest level that may hold detail; 0..8
   Closure closure = Closure::kOpen;
   OffsetReference reference = OffsetReference::kFrame;
 
-  bool ClosedU() const { return closure != Closure::kOpen; }
-  bool ClosedV() const { return closure == Closure::kPeriodicUv; }
+  bool ClosedU() const { return closure == Closure::kPeriodicU; }
   int PatchesU(int level) const { return patches_u << level; }
   int PatchesV(int level) const { return patches_v << level; }
   int Columns(int level) const { return PatchesU(level) + (ClosedU() ? 0 : 3); }
-  int Rows(int level) const { return PatchesV(level) + (ClosedV() ? 0 : 3); }
-  // The column and the row of a vertex that may lie across a seam.
+  int Rows(int level) const { return PatchesV(level) + 3; }
+  // The column of a vertex that may lie across the seam.
   int Column(int level, int i) const {
     return ClosedU() ? (i + Columns(level)) % Columns(level) : i;
   }
-  int Row(int level, int j) const { return ClosedV() ? (j + Rows(level)) % Rows(level) : j; }
   bool operator==(const HSplineShape&) const = default;
 };
 
@@ -96,8 +94,8 @@ void CheckShape(const HSplineShape& shape);
 // Throws InputError for a level that is not there or a (u,v) that is not finite.
 void CheckParameter(const HSplineShape& shape, int level, const Vec2& uv);
 
-// The patch of `level` at uv: u and v each clamped (open) or wrapped (closed) into [0,1]. The
-// arguments are not checked.
+// The patch of `level` at uv: v is clamped into [0,1], and u clamped (open) or wrapped (closed).
+// The arguments are not checked.
 PatchPoint PatchPointAt(const HSplineShape& shape, int level, const Vec2& uv);
 
 // The weights of the patch's sixteen vertices, [a + 4 b] with a along u, for the surface's point,
@@ -110,8 +108,8 @@ std::array<double, 16> PatchWeights(const HSplineShape& shape, const PatchPoint&
 // Throws as CheckParameter.
 Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, DerivativeOrder order = {});
 
-// The (u,v) where a control vertex has the greatest influence, clamped (open) or wrapped (closed)
-// into the domain.
+// The (u,v) where a control vertex has the greatest influence: v is clamped into [0,1], and u
+// clamped (open) or wrapped (closed).
 Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex);
 
 // The net of the same surface one level finer (knot insertion at every midpoint).

@@ -39,8 +39,7 @@ ColumnSpans United(const ColumnSpans& a, const ColumnSpans& b) {
   return both;
 }
 
-// The rows of patches that a row of vertices reaches. Those across the seam go first, so that the
-// last span is the one that the next row may join.
+// The rows of patches that a row of vertices reaches.
 void AddRowsReached(const HSplineShape& shape, int level, int row, std::vector<RowSpan>& spans) {
   const int patches = shape.PatchesV(level), begin = std::max(row - 3, 0),
             end = std::min(row + 1, patches);
@@ -48,9 +47,6 @@ void AddRowsReached(const HSplineShape& shape, int level, int row, std::vector<R
     spans.back().end = end;
   } else {
     spans.push_back({begin, end});
-  }
-  if (shape.ClosedV() && row < 3) {
-    spans.insert(spans.begin(), {patches + row - 3, patches});
   }
 }
 

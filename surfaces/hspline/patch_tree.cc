@@ -57,7 +57,7 @@ void PatchTree::MakeGrid() {
 }
 
 Vec2 PatchTree::IntoDomain(const Vec2& uv) const {
-  return {IntoUnit(uv.x(), shape_.ClosedU()), IntoUnit(uv.y(), shape_.ClosedV())};
+  return {IntoUnit(uv.x(), shape_.ClosedU()), std::clamp(uv.y(), 0.0, 1.0)};
 }
 
 std::int32_t PatchTree::LeafAt(const Vec2& uv) const {

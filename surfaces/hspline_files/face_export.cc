@@ -14,7 +14,6 @@
 #include "surfaces/hspline_files/surface_export.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"
 #include "surfaces/hspline_query/curvature.h"
-#include "surfaces/hspline_query/surface_poles.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/vtk_xml.h"
 
@@ -47,9 +46,6 @@ std::vector<VertexScalar> CurvatureScalars(const HSplineSurface& surface,
 std::string TriangleBytes(const HSplineSurface& surface, const std::string& extension,
                           double chord_mm, int threads) {
   Tessellation tessellation = TessellateToChord(surface, chord_mm, threads);
-  if (const PoleGaps poles = PoleGapsOf(surface); ClosesAtPoles(surface, poles)) {
-    JoinPoles(poles, tessellation);
-  }
   if (extension == ".glb") {
     return TessellationToGlb(tessellation);
   }

@@ -115,12 +115,11 @@ Feature ExtractFeature(const HSplineSurface& surface, std::string name,
                        const FeatureRegion& region) {
   CheckName(name);
   Feature feature{std::move(name), surface.shape(), {}};
-  const bool has_rows = surface.shape().ClosedV() || region.lowest_v <= region.highest_v;
   for (const auto& [vertex, offset] : surface.Offsets()) {
     const Vec2 uv = surface.ParameterOf(vertex);
     if (vertex.level >= region.first_level && vertex.level <= region.last_level &&
-        Holds(region.lowest_u, region.highest_u, uv.x()) && has_rows &&
-        Holds(region.lowest_v, region.highest_v, uv.y())) {
+        Holds(region.lowest_u, region.highest_u, uv.x()) && uv.y() >= region.lowest_v &&
+        uv.y() <= region.highest_v) {
       feature.offsets.emplace(vertex, offset);
     }
   }

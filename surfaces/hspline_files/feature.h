@@ -21,8 +21,7 @@ struct Feature {
   bool operator==(const Feature&) const = default;
 };
 
-// A part of the domain and of the levels. With lowest > highest u it runs across the seam, and so
-// with v of a surface that is closed in v.
+// A part of the domain and of the levels. With lowest > highest u it runs across the seam.
 struct FeatureRegion {
   double lowest_u = 0, highest_u = 1;
   double lowest_v = 0, highest_v = 1;

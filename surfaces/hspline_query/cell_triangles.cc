@@ -45,8 +45,7 @@ class Triangulation {
 
   // Row by row; one for both sides of a seam.
   std::int64_t PlaceOf(std::int64_t x, std::int64_t y) const {
-    return (shape_.ClosedV() ? y % Rows() : y) * (Columns() + 1) +
-           (shape_.ClosedU() ? x % Columns() : x);
+    return y * (Columns() + 1) + (shape_.ClosedU() ? x % Columns() : x);
   }
 
   int Vertex(std::int64_t x, std::int64_t y) {

@@ -40,7 +40,7 @@ double IntoDomain(double x, bool closed) {
 }
 
 Vec2 IntoDomain(const HSplineShape& shape, const Vec2& uv) {
-  return {IntoDomain(uv.x(), shape.ClosedU()), IntoDomain(uv.y(), shape.ClosedV())};
+  return {IntoDomain(uv.x(), shape.ClosedU()), std::clamp(uv.y(), 0.0, 1.0)};
 }
 
 // Half the squared distance at one (u,v), with what a step needs to know.
@@ -71,7 +71,7 @@ Slope SlopeAt(const HSplineSurface& surface, const Vec3& point, const Vec2& uv) 
 // Borders that the gradient presses against: these coordinates stay.
 void HoldBorders(const HSplineShape& shape, const Vec2& uv, Slope& s) {
   for (int k = 0; k < 2; ++k) {
-    const bool has_border = k == 0 ? !shape.ClosedU() : !shape.ClosedV();
+    const bool has_border = k == 1 || !shape.ClosedU();
     const bool presses = (uv[k] <= 0 && s.gradient[k] > 0) || (uv[k] >= 1 && s.gradient[k] < 0);
     if (has_border && presses) {
       s.gradient[k] = 0;
@@ -115,9 +115,7 @@ Vec2 Backtrack(const HSplineSurface& surface, const Vec3& point, const Vec2& uv,
     if (!surface.shape().ClosedU()) {
       moved.x() = next.x() - uv.x();
     }
-    if (!surface.shape().ClosedV()) {
-      moved.y() = next.y() - uv.y();
-    }
+    moved.y() = next.y() - uv.y();
     const double value = (surface.Point(next) - point).squaredNorm() / 2;
     if (value <= s.Value() + slack + 1e-4 * s.gradient.dot(moved)) {
       return next;
@@ -176,7 +174,7 @@ SurfaceProjector::SurfaceProjector(const HSplineSurface& surface, const ProjectO
   quads_u_ = options.samples_per_patch * shape.PatchesU(level);
   quads_v_ = options.samples_per_patch * shape.PatchesV(level);
   columns_ = quads_u_ + (shape.ClosedU() ? 0 : 1);
-  rows_ = quads_v_ + (shape.ClosedV() ? 0 : 1);
+  rows_ = quads_v_ + 1;
   for (int j = 0; j < rows_; ++j) {
     for (int i = 0; i < columns_; ++i) {
       samples_.push_back(surface.Point({double(i) / quads_u_, double(j) / quads_v_}));
@@ -201,8 +199,7 @@ std::vector<Vec2> SurfaceProjector::Starts(const Vec3& point) const {
     return closed ? (k + count) % count : std::clamp(k, 0, count - 1);
   };
   const auto at = [&](int i, int j) {
-    return squared[beside(i, columns_, shape.ClosedU()) +
-                   columns_ * beside(j, rows_, shape.ClosedV())];
+    return squared[beside(i, columns_, shape.ClosedU()) + columns_ * beside(j, rows_, false)];
   };
   std::vector<std::pair<double, int>> valleys;
   for (int j = 0; j < rows_; ++j) {

@@ -136,7 +136,7 @@ void BalanceCells(const HSplineShape& shape, std::set<DomainCell>& cells) {
                                std::pair{cell.i, cell.j - 1}, std::pair{cell.i, cell.j + 1}}) {
       const DomainCell beside{cell.level,
                               PlaceAmong(shape.PatchesU(cell.level), i, shape.ClosedU()),
-                              PlaceAmong(shape.PatchesV(cell.level), j, shape.ClosedV())};
+                              PlaceAmong(shape.PatchesV(cell.level), j, false)};
       if (beside.i >= 0 && beside.j >= 0) {
         RefineAt(beside, cells, open);
       }

@@ -19,10 +19,4 @@ struct Tessellation {
 // triangles each; vertices on a seam are shared.
 Tessellation Tessellate(const HSplineSurface& surface, int per_patch);
 
-// Of a surface that is one place along the edge where v is 0 or 1: its vertices there become one at
-// `place`, with the mean normal of its triangles; those that have no area left go. An edge that is
-// nearly one place leaves no hole so, and no normals that its noise has turned.
-//   v: 0 or 1. No vertex there: nothing changes.
-void JoinEdge(Tessellation& tessellation, double v, const Vec3& place);
-
 }  // namespace semblance

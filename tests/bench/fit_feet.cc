@@ -49,7 +49,7 @@ void Disturb(const HSplineShape& shape, std::vector<Vec2>& uv) {
   Random random(8);
   for (Vec2& p : uv) {
     const double u = p.x() + kError * random.Normal(), v = p.y() + kError * random.Normal();
-    p = {IntoUnit(u, shape.ClosedU()), IntoUnit(v, shape.ClosedV())};
+    p = {IntoUnit(u, shape.ClosedU()), std::clamp(v, 0.0, 1.0)};
   }
 }
 

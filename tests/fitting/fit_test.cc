@@ -26,8 +26,7 @@ using testing::SmoothSurface;
 const std::vector<Term> kPointsOnly = {PointTerm{}};
 
 HSplineShape Shape(Closure closure = Closure::kOpen) {
-  const int patches_v = closure == Closure::kPeriodicUv ? 5 : 3;
-  return {.patches_u = 4, .patches_v = patches_v, .max_level = 3, .closure = closure};
+  return {.patches_u = 4, .patches_v = 3, .max_level = 3, .closure = closure};
 }
 
 // Points of `surface` at random (u,v), moved by `shift` and a random vector of at most noise_mm.
@@ -80,7 +79,7 @@ double LargestDistance(const HSplineSurface& a, const HSplineSurface& b,
 }
 
 TEST(Fit, ReproducesASurfaceOfTheSpace) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     HSplineShape shape = Shape(closure);
     shape.max_level = 1;
     const HSplineSurface truth = RandomSurface(shape, 1), start = SmoothSurface(shape, 2);
@@ -354,7 +353,7 @@ TEST(Fit, BackFittingSweepsComeNearer) {
 
 // The same displacement costs the same at each level, in all domains.
 TEST(Fit, SmoothnessMeansTheSameAtEveryLevel) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     const HSplineSurface rest = SmoothSurface(Shape(closure), 2),
                          moved = SmoothSurface(Shape(closure), 3);
     const auto costs = [&](int level) {

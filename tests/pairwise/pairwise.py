@@ -102,7 +102,7 @@ def fit_space(schema, folder):
         schema,
         lists={"fit.plan[listed].schedule": [steps[:1], steps], "fit.plan[until].schedule": [steps]},
         work={"patches_u": [1, 6], "patches_v": [1, 6], ".finest": [0, 2], ".sweeps": [0, 2], ".max_passes": [1, 3], "[adaptive].margin": [0, 2],
-              "rounds": [1, 3], "chord_mm": [0.01, 1000], "trim[cloud].distance_mm": [0.3, 1000], "fit.plan[auto].finest": [0, 3]},
+              "rounds": [1, 3], "chord_mm": [0.01, 1000], "fit.plan[auto].finest": [0, 3]},
         beside={}, files={("fit.plan", "until"): FEW_PASSES}, defaults={"parameters": "given", "fit.plan": "listed", "fit.solver": "ceres"})
 
 
@@ -138,47 +138,6 @@ def ply(points, faces):
     head = ["ply", "format ascii 1.0", f"element vertex {len(points)}", "property double x", "property double y", "property double z",
             f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
     return "\n".join(head + points + faces) + "\n"
-
-
-def closed_scan(draw):
-    """A ball of triangles, for a mesh that closes: 11 circles of 12 points between two poles."""
-    n, circles = 12, 11
-
-    def point(theta, phi):
-        r = 1 + draw.gauss(0, 0.01)
-        return f"{r * math.sin(theta) * math.cos(phi):.6f} {r * math.sin(theta) * math.sin(phi):.6f} {r * math.cos(theta):.6f}"
-
-    points = [point(0, 0), point(math.pi, 0)]
-    points += [point(math.pi * (j + 1) / (circles + 1), 2 * math.pi * i / n) for j in range(circles) for i in range(n)]
-    faces = []
-    for i in range(n):
-        k = (i + 1) % n
-        last = 2 + n * (circles - 1)
-        faces += [f"3 0 {2 + i} {2 + k}", f"3 1 {last + k} {last + i}"]
-        for j in range(circles - 1):
-            a = 2 + n * j
-            faces += [f"3 {a + i} {a + n + i} {a + n + k}", f"3 {a + i} {a + n + k} {a + k}"]
-    return ply(points, faces)
-
-
-def ring(draw):
-    """Points of a torus, for what closes both ways."""
-    rows = ["x,y,z,u,v"]
-    for _ in range(400):
-        u, v = draw.random(), draw.random()
-        r, z = 1 + 0.4 * math.cos(2 * math.pi * v), 0.4 * math.sin(2 * math.pi * v) + draw.gauss(0, 0.01)
-        rows.append(f"{r * math.cos(2 * math.pi * u):.6f},{r * math.sin(2 * math.pi * u):.6f},{z:.6f},{u:.6f},{v:.6f}")
-    return "\n".join(rows) + "\n"
-
-
-def ball(draw):
-    """Points of a sphere, for what closes at two poles."""
-    rows = ["x,y,z,u,v"]
-    for _ in range(400):
-        x, y, z = (draw.gauss(0, 1) for _ in range(3))
-        r = (1 + draw.gauss(0, 0.01)) / math.sqrt(x * x + y * y + z * z)
-        rows.append(f"{r * x:.6f},{r * y:.6f},{r * z:.6f},{math.atan2(y, x) / (2 * math.pi) % 1:.6f},{draw.random():.6f}")
-    return "\n".join(rows) + "\n"
 
 
 class ShareIsUsed(Exception):
@@ -239,9 +198,6 @@ class Runner:
                 rows.append(f"{u:.6f},{v:.6f},{math.sin(3 * u) * v + draw.gauss(0, 0.01):.6f},{u:.6f},{v:.6f}")
             (self.folder / "points.csv").write_text("\n".join(rows) + "\n")
             (self.folder / "scan.ply").write_text(scan(draw))
-            (self.folder / "ring.csv").write_text(ring(draw))
-            (self.folder / "ball.csv").write_text(ball(draw))
-            (self.folder / "closed.ply").write_text(closed_scan(draw))
             return {"configs": self.configs, "first": first}
         code, said, _ = call([self.program, "run", "base.yaml", "--out", "first", "--quiet"], self.folder)
         if code != 0:
@@ -255,8 +211,7 @@ class Runner:
     def write(self, tree):
         parameters = tree.get("parameters")
         kind = parameters.get("type") if isinstance(parameters, dict) else parameters
-        mesh = "closed.ply" if tree.get("closure") == "periodic_u" else "scan.ply"
-        self.points = {"mesh": mesh, "sphere": "ball.csv", "torus": "ring.csv"}.get(kind, "points.csv")
+        self.points = "scan.ply" if kind == "mesh" else "points.csv"
         (self.folder / "case.yaml").write_text(yaml({"base": "base.yaml", **tree}))
 
     def check(self, trees):

@@ -133,27 +133,6 @@ inline Vec3 HeadPoint(const Vec2& uv) {
           1.2 * r * std::cos(t)};
 }
 
-// A tube around a ring of radius 1, closed in u and v, with bumps of three sizes; some lie across
-// the seams, one across both.
-inline constexpr Bump kRingBumps[] = {
-    {0.31, 0.42, 0.06, 0.11},  {0.72, 0.63, -0.05, 0.09}, {0.0, 0.0, 0.05, 0.06},
-    {0.98, 0.51, 0.04, 0.05},  {0.47, 0.99, 0.04, 0.05},  {0.13, 0.02, -0.03, 0.04},
-    {0.55, 0.25, 0.02, 0.03},  {0.62, 0.31, -0.02, 0.03}, {0.005, 0.31, 0.02, 0.03},
-    {0.81, 0.995, 0.02, 0.03},
-};
-
-inline Vec3 RingPoint(const Vec2& uv) {
-  double r = 0.4;
-  for (const Bump& bump : kRingBumps) {
-    const double off_u = uv.x() - bump.u, off_v = uv.y() - bump.v, du = off_u - std::round(off_u),
-                 dv = off_v - std::round(off_v);
-    r += bump.height * std::exp(-(du * du + dv * dv) / (2 * bump.width * bump.width));
-  }
-  const double p = 2 * std::numbers::pi * uv.x(), t = 2 * std::numbers::pi * uv.y(),
-               distance = 1 + r * std::cos(t);
-  return {distance * std::cos(p), distance * std::sin(p), r * std::sin(t)};
-}
-
 // `count` points of the surface at random (u,v), each coordinate off by noise (standard deviation).
 template <class Surface>
 FitTarget Scattered(const Surface& surface, int count, double noise, std::uint64_t random_seed) {
@@ -188,18 +167,15 @@ CleanError ErrorAgainst(const Surface& surface, const HSplineSurface& fitted, in
   return {std::sqrt(sum / side / side), std::sqrt(largest)};
 }
 
-// A square, a barrel (closed in u) or a ring (closed in both) to start from.
+// A square, or a barrel (closed in u), to start from.
 inline HSplineSurface PlainStart(const HSplineShape& shape) {
   ControlNet net{shape.Columns(0), shape.Rows(0), {}};
   for (int j = 0; j < net.rows; ++j) {
     for (int i = 0; i < net.columns; ++i) {
       const double u = (i - 1.0) / shape.patches_u, v = (j - 1.0) / shape.patches_v;
-      const double p = 2 * std::numbers::pi * u, t = 2 * std::numbers::pi * v,
-                   distance = 1 + 0.4 * std::cos(t);
-      net.vertices.push_back(
-          shape.ClosedV() ? Vec3(distance * std::cos(p), distance * std::sin(p), 0.4 * std::sin(t))
-          : shape.ClosedU() ? Vec3(std::cos(p), std::sin(p), 1.2 - 2.4 * v)
-                            : Vec3(u, v, 0));
+      const double p = 2 * std::numbers::pi * u;
+      net.vertices.push_back(shape.ClosedU() ? Vec3(std::cos(p), std::sin(p), 1.2 - 2.4 * v)
+                                             : Vec3(u, v, 0));
     }
   }
   return HSplineSurface(shape, net);

@@ -11,32 +11,10 @@
 
 namespace semblance::testing {
 
-// A tube drawn together at both ends, where its vertices lie so far from the axis. Every other one
-// lies `along_mm` farther along it.
-inline HSplineSurface DrawnTube(double end_mm, double along_mm) {
-  const HSplineShape shape{
-      .patches_u = 8, .patches_v = 6, .max_level = 0, .closure = Closure::kPeriodicU};
-  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
-  for (int j = 0; j < net.rows; ++j) {
-    for (int i = 0; i < net.columns; ++i) {
-      const double turn = 2 * std::numbers::pi * i / net.columns,
-                   angle = std::numbers::pi * (j - 1) / shape.patches_v,
-                   radius = end_mm + std::sin(angle);
-      net.vertices.emplace_back(radius * std::cos(turn), radius * std::sin(turn),
-                                along_mm * (i % 2) - std::cos(angle));
-    }
-  }
-  return HSplineSurface(shape, net);
-}
-
-// A bent sheet (open), a tube (closed in u) or a torus (closed in both).
+// A bent sheet (open) or a tube (closed in u).
 inline Vec3 SmoothPlace(const HSplineShape& shape, double u, double v) {
   const double angle = (shape.ClosedU() ? 2 * std::numbers::pi : 2.0) * u;
-  if (!shape.ClosedV()) {
-    return {50 * std::cos(angle), 50 * std::sin(angle), 80 * v};
-  }
-  const double around = 2 * std::numbers::pi * v, distance = 50 + 20 * std::cos(around);
-  return {distance * std::cos(angle), distance * std::sin(angle), 40 + 20 * std::sin(around)};
+  return {50 * std::cos(angle), 50 * std::sin(angle), 80 * v};
 }
 
 // Level 0 over that, shaken a little; no edits yet.

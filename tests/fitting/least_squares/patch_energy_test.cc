@@ -121,28 +121,22 @@ TEST(PatchEnergy, RootsReproduceTheFormsAndShowTheirNullSpaces) {
 
 // Shifting the vertices by one along a closed direction changes nothing.
 TEST(PatchEnergy, PeriodicEnergyHasNoSeam) {
-  for (const bool torus : {false, true}) {
-    const PatchGrid grid{.patches_u = 6, .patches_v = 5, .periodic_u = true, .periodic_v = torus};
-    Random random(2);
-    ControlNet net{.columns = grid.Columns(), .rows = grid.Rows(), .vertices = {}};
-    for (int k = 0; k < net.columns * net.rows; ++k) {
-      net.vertices.push_back(random.InBox(-1, 1));
+  const PatchGrid grid{.patches_u = 6, .patches_v = 5, .periodic_u = true};
+  Random random(2);
+  ControlNet net{.columns = grid.Columns(), .rows = grid.Rows(), .vertices = {}};
+  for (int k = 0; k < net.columns * net.rows; ++k) {
+    net.vertices.push_back(random.InBox(-1, 1));
+  }
+  ControlNet shifted = net;
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      shifted.At((i + 1) % net.columns, j) = net.At(i, j);
     }
-    ControlNet along_u = net, along_v = net;
-    for (int j = 0; j < net.rows; ++j) {
-      for (int i = 0; i < net.columns; ++i) {
-        along_u.At((i + 1) % net.columns, j) = net.At(i, j);
-        along_v.At(i, (j + 1) % net.rows) = net.At(i, j);
-      }
-    }
-    for (const ElementStiffness& form : {ThinPlateStiffness(1, 2), MembraneStiffness(1, 2)}) {
-      const double energy = StiffnessEnergy(form, grid, net);
-      EXPECT_GT(energy, 0);
-      EXPECT_NEAR(StiffnessEnergy(form, grid, along_u), energy, 1e-12 * energy);
-      if (torus) {
-        EXPECT_NEAR(StiffnessEnergy(form, grid, along_v), energy, 1e-12 * energy);
-      }
-    }
+  }
+  for (const ElementStiffness& form : {ThinPlateStiffness(1, 2), MembraneStiffness(1, 2)}) {
+    const double energy = StiffnessEnergy(form, grid, net);
+    EXPECT_GT(energy, 0);
+    EXPECT_NEAR(StiffnessEnergy(form, grid, shifted), energy, 1e-12 * energy);
   }
 }
 

@@ -103,7 +103,7 @@ TEST(MeshMap, WhatIsNoDiscIsRefusedWithWhatToDo) {
   };
   const TriMesh plate = testing::Plate(10, 4), sphere = testing::SphereMesh({0, 0, 50}, 10, 8);
   EXPECT_THAT(message(sphere), HasSubstr("it is closed"));
-  EXPECT_THAT(message(sphere), HasSubstr("closure: periodic_u"));
+  EXPECT_THAT(message(sphere), HasSubstr("give the columns u and v"));
   EXPECT_THAT(message(testing::Joined(plate, sphere)), HasSubstr("2 pieces"));
   TriMesh loose = plate;
   loose.points.emplace_back(1, 2, 3);

@@ -106,22 +106,6 @@ TEST(OneToOne, LidsCollapseOnACylinder) {
   EXPECT_GT(around(true).Sum(), 0.15);
 }
 
-// A ring by its two angles is one-to-one across both seams; with the tube gone round twice, one
-// half of it lies on the other.
-TEST(OneToOne, ATorusIsAcrossBothSeams) {
-  const auto around = [](double turns) {
-    Cloud cloud{.positions = {}, .at = {}, .period_mm = 2 * std::numbers::pi * Vec2(1, 0.4)};
-    for (const FitPoint& p : testing::Scattered(testing::RingPoint, 20000, 1e-3, 1).points) {
-      cloud.positions.push_back(p.position);
-      const double v = turns * p.uv.y();
-      cloud.at.push_back(Vec2(p.uv.x(), v - std::floor(v)).cwiseProduct(cloud.period_mm));
-    }
-    return cloud.Faults();
-  };
-  EXPECT_LT(around(1).Sum(), kNone);
-  EXPECT_GT(around(2).folded, 0.5);
-}
-
 // 0.4 of a sheet is folded back over the rest.
 TEST(OneToOne, TrianglesTellTheShareThatIsTurnedOver) {
   const TriMesh mesh =
@@ -154,24 +138,6 @@ TEST(OneToOne, WhatNoiseTurnsIsNoFold) {
   EXPECT_GT(FaultsOfTriangles({mesh.points, above}, mesh.triangles).folded, 0.02);
   EXPECT_LT(FaultsBeyondNoise({mesh.points, above}, mesh.triangles).Sum(), 1e-3);
   EXPECT_NEAR(FaultsBeyondNoise({mesh.points, folded}, mesh.triangles).folded, 0.4, 0.02);
-}
-
-// A sheet with a strip of which a twentieth of the width is left.
-TEST(OneToOne, TheSqueezedShareIsThatOfTheArea) {
-  const TriMesh mesh =
-      testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 50);
-  std::vector<double> on_map;
-  for (const Triangle& t : mesh.triangles) {
-    const double x = TriangleCentroid(mesh, t).x();
-    on_map.push_back((x > 0.4 && x < 0.6 ? 0.05 : 1) * TriangleAreaVector(mesh, t).z());
-  }
-  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
-  for (double& area : on_map) {
-    area *= -3;
-  }
-  EXPECT_NEAR(SqueezedShare(mesh.points, mesh.triangles, on_map), 0.2, 0.1);
-  on_map.assign(mesh.triangles.size(), 0.1);
-  EXPECT_EQ(SqueezedShare(mesh.points, mesh.triangles, on_map), 0);
 }
 
 // The axis of a tube that bends leaves it: its near side is few points widely spread over many of

@@ -113,7 +113,7 @@ TEST(Placement, WeightsActLikeRepetition) {
 
 TEST(Placement, TransformedSurfacesMoveAtEveryPoint) {
   for (const OffsetReference reference : {OffsetReference::kFrame, OffsetReference::kWorld}) {
-    for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
+    for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
       const HSplineSurface surface = testing::RandomSurface(
           {.patches_u = 5, .patches_v = 4, .closure = closure, .reference = reference}, 9);
       const HSplineSurface moved = Transformed(surface, Pose());

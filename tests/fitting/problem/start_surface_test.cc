@@ -61,56 +61,11 @@ TEST(StartSurface, APeriodicOneIsATube) {
   }
 }
 
-// The torus has a tube of radius 10, so that all nine functions are in use.
-TEST(StartSurface, OneThatClosesBothWaysIsATorus) {
-  constexpr int kPatches = 16;
-  const auto at = [](const Vec2& uv, double ring, double tube, double both) {
-    const Vec2 angle = 2 * std::numbers::pi * uv;
-    const double distance = ring + both * std::cos(angle.y());
-    return Vec3(distance * std::cos(angle.x()), distance * std::sin(angle.x()),
-                tube * std::sin(angle.y()));
-  };
-  const Points points = PointsOf([&](const Vec2& uv) { return at(uv, 30, 10, 10); });
-  const HSplineSurface surface = StartSurface({.patches_u = kPatches,
-                                               .patches_v = kPatches,
-                                               .max_level = 0,
-                                               .closure = Closure::kPeriodicUv},
-                                              points.positions, points.uv);
-  const double shrunk = (2 + std::cos(2 * std::numbers::pi / kPatches)) / 3;
-  for (int i = 0; i < kPatches; ++i) {
-    const Vec2 knot(i / static_cast<double>(kPatches), 3.0 * i / kPatches);
-    const Vec3 expected = at(knot, 30 * shrunk, 10 * shrunk, 10 * shrunk * shrunk);
-    EXPECT_LT((surface.Point(knot) - expected).norm(), 1e-9);
-  }
-}
-
 TEST(StartSurface, NeedsUvForEachPoint) {
   const Points points = PointsOf([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); });
   const HSplineShape shape{.patches_u = 4, .patches_v = 4};
   EXPECT_THROW(StartSurface(shape, {}, {}), InputError);
   EXPECT_THROW(StartSurface(shape, points.positions, std::span(points.uv).first(3)), InputError);
-}
-
-// The vertices lie on the ellipsoid, and each edge in v is a single place.
-TEST(StartSurface, ABallIsClosedAtItsPoles) {
-  const auto place = [](const Vec2& uv) {
-    const double turn = 2 * std::numbers::pi * uv.x(), angle = std::numbers::pi * uv.y();
-    return Vec3(3 + 30 * std::sin(angle) * std::cos(turn), 20 * std::sin(angle) * std::sin(turn),
-                -40 * std::cos(angle));
-  };
-  const Points points = PointsOf(place);
-  const HSplineShape shape{
-      .patches_u = 16, .patches_v = 16, .max_level = 0, .closure = Closure::kPeriodicU};
-  const HSplineSurface surface = StartBall(shape, points.positions, points.uv);
-  for (const double v : {0.0, 1.0}) {
-    for (const double u : {0.2, 0.5, 0.93}) {
-      EXPECT_LT((surface.Point({u, v}) - surface.Point({0, v})).norm(), 1e-10);
-    }
-  }
-  for (const Vec2& uv : points.uv) {
-    EXPECT_LT((surface.Point(uv) - place(uv)).norm(), 1.5);
-  }
-  EXPECT_THROW(StartBall(shape, {}, {}), InputError);
 }
 
 }  // namespace

@@ -77,31 +77,6 @@ TEST(AttributeFit, ColumnsComeBackHoweverManyThereAre) {
   EXPECT_GT(fit.columns[1].weight, fit.columns[2].weight);  // each has its own smoothness
 }
 
-TEST(AttributeFit, OnATorusAColumnIsFoundAcrossBothSeams) {
-  const HSplineShape shape{.max_level = 2, .closure = Closure::kPeriodicUv};
-  const auto wave = [](const Vec2& uv) {
-    const Vec2 turns = 2 * std::numbers::pi * uv;
-    return 100 + 20 * std::cos(turns.x()) * std::sin(turns.y() + 1);
-  };
-  std::vector<Vec2> uv;
-  std::vector<double> values;
-  for (const FitPoint& p : testing::Scattered(testing::RingPoint, 8000, 0, 3).points) {
-    uv.push_back(p.uv);
-    values.push_back(wave(p.uv));
-  }
-  const AttributeFit fit =
-      FitAttributes(testing::PlainStart(shape),
-                    {.uv = uv, .weights = {}, .columns = {std::span<const double>(values)}}, {}, 1);
-  EXPECT_EQ(fit.surfaces[0].shape().closure, Closure::kPeriodicUv);
-  const std::vector<Vec2> seams = {{0, 0.3}, {1, 0.3}, {0.2, 0}, {0.2, 1}, {0.999, 0.001}};
-  const std::vector<double> found = fit.At(seams, 1)[0];
-  for (std::size_t k = 0; k < seams.size(); ++k) {
-    EXPECT_NEAR(found[k], wave(seams[k]), 0.1);
-  }
-  EXPECT_NEAR(found[0], found[1], 1e-9);
-  EXPECT_NEAR(found[2], found[3], 1e-9);
-}
-
 // The functions are in the surface's own space: no vertex is added.
 TEST(AttributeFit, VerticesAreThoseOfTheSurface) {
   const Coloured head = ColouredHead(2, 0);

@@ -75,11 +75,10 @@ TEST(TileSolver, FindsWhatSingleVerticesFind) {
 
 // Nets whose sides are no multiples of three, closed ones too; some vertices no term touches.
 TEST(TileSolver, TilesCoverNetsOfAnySize) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
-    const bool torus = closure == Closure::kPeriodicUv;
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     for (const int patches : {4, 5, 6}) {
       const HSplineShape shape{
-          .patches_u = patches, .patches_v = torus ? 5 : 3, .max_level = 0, .closure = closure};
+          .patches_u = patches, .patches_v = 3, .max_level = 0, .closure = closure};
       const HSplineSurface start = SmoothSurface(shape, 1), truth = SmoothSurface(shape, 2);
       LevelView view{.grid = PatchGrid::Of(shape, 0),
                      .start = start.Net(0),
@@ -88,7 +87,7 @@ TEST(TileSolver, TilesCoverNetsOfAnySize) {
                      .observations = {}};
       Random random(4);
       for (int k = 0; k < 400; ++k) {
-        const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, torus ? 0.2 : 0.6));
+        const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 0.6));
         view.observations.push_back({.uv = uv, .position = truth.Point(uv)});
       }
       SortObservations(PointCloud(view.grid.Shape(), view.observations), view.observations);

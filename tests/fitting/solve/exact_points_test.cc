@@ -122,44 +122,11 @@ TEST(ExactPoints, FinerVerticesComeWhereTheyAreNeeded) {
   EXPECT_LT(fit.surface.Offsets().size(), 1500u);
 }
 
-// Of a normal that only one tangent is to be across of, the other goes as the points do.
-TEST(ExactPoints, OneTangentCanBeHeldAlone) {
-  const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 0};
-  FitTarget target = Scattered(FrankePoint, 500, 1e-3, 2);
-  const Vec2 uv(0.4, 0.3);
-  const Vec3 normal(1, 1, 0.1);
-  target.exact = {
-      {.uv = uv, .position = FrankePoint(uv), .normal = normal, .tangents = HeldTangents::kAlongV}};
-  const SurfaceFrame frame =
-      Fit(testing::PlainStart(shape), target, {}, kByTolerance, {}).surface.Frame(uv);
-  EXPECT_LT(std::abs(frame.dv.dot(normal)), 1e-9);
-  EXPECT_GT(std::abs(frame.du.dot(normal)), 0.1);
-}
-
-// However well the vertices that are there would do.
-TEST(ExactPoints, FinerVerticesComeWhereTheyAreAskedFor) {
-  FitTarget target = Scattered(FrankePoint, 3000, 1e-3, 2);
-  const Vec2 uv(0, 0.3);
-  target.exact = {{.uv = uv, .position = FrankePoint(uv), .level = 3}};
-  FitOptions options = kByTolerance;
-  for (const int finest : {2, 5}) {
-    options.plan = AdaptivePlan{.tolerance_mm = 0.5, .finest = finest};
-    const HSplineShape shape{.patches_u = 2, .patches_v = 2, .max_level = finest};
-    const HSplineSurface surface = Fit(testing::PlainStart(shape), target, {}, options, {}).surface;
-    EXPECT_EQ(surface.Offsets(3).empty(), finest < 3);
-    EXPECT_TRUE(surface.Offsets(std::min(finest, 3)).size() > 0);
-    EXPECT_EQ(finest > 3 ? surface.Offsets(4).size() : 0, 0u);
-    EXPECT_LT((surface.Point(uv) - FrankePoint(uv)).norm(), 1e-9);
-  }
-}
-
 // The plan that chooses all by itself; a whole border, and outliers elsewhere.
 TEST(ExactPoints, TheAutoPlanMeetsThemToo) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     const auto truth = [&](const Vec2& uv) {
-      return closure == Closure::kOpen        ? FrankePoint(uv)
-             : closure == Closure::kPeriodicU ? testing::HeadPoint(uv)
-                                              : testing::RingPoint(uv);
+      return closure == Closure::kOpen ? FrankePoint(uv) : testing::HeadPoint(uv);
     };
     FitTarget target = Scattered(truth, 4000, 1e-3, 2);
     target.points[77].position.z() += 3;

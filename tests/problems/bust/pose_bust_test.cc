@@ -507,12 +507,12 @@ TEST(WholeHead, RoundTripsThroughItsFile) {
     EXPECT_THAT([&] { WholeHeadFromJson(bad, "bust.json"); },
                 ThrowsMessage<IoError>(::testing::StartsWith("bust.json: ")));
   }
-  const HSplineSurface torus = testing::SmoothSurface({.closure = Closure::kPeriodicUv}, 1);
+  const HSplineSurface sheet = testing::SmoothSurface({.closure = Closure::kOpen}, 1);
   EXPECT_THAT(
       [&] {
-        WholeHeadFromJson(WholeHeadToJson({torus, {}}), "bust.json");
+        WholeHeadFromJson(WholeHeadToJson({sheet, {}}), "bust.json");
       },
-      ThrowsMessage<IoError>(HasSubstr("must go round in u alone")));
+      ThrowsMessage<IoError>(HasSubstr("must go round in u; write closure periodic_u")));
 }
 
 TEST(WholeHead, ItsMeshIsOnePieceOpenAtTheNeckAlone) {

@@ -38,16 +38,14 @@ TEST(Pull, WhatLiesBeyondTheReachStays) {
   }
 }
 
-TEST(Pull, ReachesAcrossTheSeamsOfATorus) {
+TEST(Pull, ReachesAcrossTheSeamOfATube) {
   HSplineShape shape = kShape;
-  shape.closure = Closure::kPeriodicUv;
+  shape.closure = Closure::kPeriodicU;
   const HSplineSurface before = testing::SmoothSurface(shape, 4);
   HSplineSurface after = before;
-  ApplyEdits(Pulled({.level = 2, .uv = {0.01, 0.99}, .by_mm = {0, 0, 5}, .reach = 2}, before, {}),
+  ApplyEdits(Pulled({.level = 2, .uv = {0.01, 0.5}, .by_mm = {0, 0, 5}, .reach = 2}, before, {}),
              after);
-  for (const Vec2& near : {Vec2(0.99, 0.99), Vec2(0.01, 0.01), Vec2(0.99, 0.01)}) {
-    EXPECT_GT((after.Point(near) - before.Point(near)).norm(), 2) << near.transpose();
-  }
+  EXPECT_GT((after.Point({0.99, 0.5}) - before.Point({0.99, 0.5})).norm(), 2);
   EXPECT_EQ(after.Point({0.5, 0.5}), before.Point({0.5, 0.5}));
 }
 

@@ -137,34 +137,6 @@ TEST_F(ExportFile, AMeshGoesToEveryFormatOfMeshes) {
   EXPECT_EQ(DocumentOf(Export(sphere, ".glb"))["nodes"][0]["name"], "sphere");
 }
 
-// As surface.ply of a fit is: each pole of a closed surface is one vertex. An open tube stays open.
-TEST_F(ExportFile, WhatClosesAtPolesIsWatertightInEveryFormatOfMeshes) {
-  const fs::path closed = scratch_ / "closed.hspline.json", open = scratch_ / "open.hspline.json";
-  WriteHSpline(closed, testing::DrawnTube(0.002, 0));
-  WriteHSpline(open, testing::DrawnTube(0.2, 0));
-  for (const char* extension : {".ply", ".obj", ".off", ".stl"}) {
-    const fs::path file = scratch_ / (std::string("written") + extension);
-    const auto edges_of = [&](const fs::path& from) {
-      WriteFileAtomically(file, Export(from, extension));
-      return CheckEdges(ReadMesh(file));
-    };
-    const EdgeReport edges = edges_of(closed);
-    EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0) << extension;
-    EXPECT_GT(edges_of(open).boundary, 10) << extension;
-  }
-  const std::size_t count = ReadMesh(scratch_ / "written.stl").points.size();
-  EXPECT_EQ(TessellateToChord(testing::DrawnTube(0.2, 0), 0.1).mesh.points.size(), count);
-  pugi::xml_document vtp;
-  ASSERT_TRUE(vtp.load_string(Export(closed, ".vtp").c_str()));
-  const Json glb = DocumentOf(Export(closed, ".glb"));
-  WriteFileAtomically(scratch_ / "written.ply", Export(closed, ".ply"));
-  const std::size_t corners = ReadMesh(scratch_ / "written.ply").points.size();
-  EXPECT_EQ(Values(vtp, "mean_curvature_per_mm").size(), corners);
-  EXPECT_EQ(glb["accessors"][glb["meshes"][0]["primitives"][0]["attributes"]["POSITION"].get<int>()]
-               ["count"],
-            corners);
-}
-
 TEST_F(ExportFile, ASceneThatIsNoneIsRefusedInOurWords) {
   WriteFileAtomically(scratch_ / "result.json", "{}");
   WriteFileAtomically(scratch_ / "scene.json",

@@ -72,7 +72,6 @@ TEST(FitMaps, TheGridIsClosedAsTheSurfaceIs) {
   const std::size_t open = border_edges(Closure::kOpen);
   EXPECT_EQ(open % 4, 0U);
   EXPECT_EQ(border_edges(Closure::kPeriodicU), open / 2);
-  EXPECT_EQ(border_edges(Closure::kPeriodicUv), 0U);
 }
 
 TEST(FitMaps, QuantilesAreThoseOfAllFigures) {
@@ -110,12 +109,12 @@ TEST(FitPage, SaysWhatWasMissedAndEscapesWhatItIsGiven) {
   const PointFitOptions options = Adaptive(0.004, 0);
   const PointFit fit = FitPoints(Points(500), options, {});
   const PointSource source{"<b>hostile</b>.csv", "0123"};
-  const std::string html = FitPageHtml(options, source, fit, {}, 2);
+  const std::string html = FitPageHtml(options, source, fit, 2);
   EXPECT_THAT(html,
               AllOf(HasSubstr("THE TOLERANCE WAS MISSED"), HasSubstr("id=\"notes\""),
                     HasSubstr("&lt;b&gt;hostile&lt;/b&gt;.csv"), Not(HasSubstr("<b>hostile"))));
   EXPECT_LT(html.find("<p>THE TOLERANCE"), html.find("id=\"s1\""));
-  EXPECT_EQ(html, FitPageHtml(options, source, fit, {}, 1));  // whatever the number of threads
+  EXPECT_EQ(html, FitPageHtml(options, source, fit, 1));  // whatever the number of threads
 }
 
 }  // namespace

@@ -20,14 +20,9 @@
 #include "problems/points/residual_files.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
-#include "surfaces/hspline_query/tessellate.h"
-#include "surfaces/mesh/mesh_query.h"
-#include "tests/testing/bent_sheets.h"
-#include "tests/testing/closed_shapes.h"
 #include "tests/testing/point_csv.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
-#include "tests/testing/stone.h"
 
 namespace semblance {
 namespace {
@@ -36,9 +31,7 @@ using testing::ErrorAgainst;
 using testing::FrankePoint;
 using ::testing::HasSubstr;
 using testing::HeadPoint;
-using testing::RingErrors;
 using testing::Scattered;
-using testing::StoneRadius;
 using testing::UvCsv;
 
 const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs/fit";
@@ -78,30 +71,6 @@ TEST(PointFit, CylinderParametersCloseTheHead) {
   for (const double v : {0.1, 0.5, 0.9}) {
     const Vec2 left(1 - 1e-9, v), right(1e-9, v);
     EXPECT_LT((result.fit.surface.Point(left) - result.fit.surface.Point(right)).norm(), 1e-6);
-  }
-}
-
-// A ring without (u,v), turned: the torus is found, and the surface closes both ways.
-TEST(PointFit, TorusParametersCloseTheRingBothWays) {
-  const Mat3 turn = Eigen::AngleAxisd(0.8, Vec3(1, -2, 0.5).normalized()).matrix();
-  const auto ring = [&](const Vec2& uv) -> Vec3 { return 30 * (turn * testing::RingPoint(uv)); };
-  const PointTable table = TableOf(Scattered(ring, 20000, 0.01, 3));
-  for (const Parameters& parameters :
-       {Parameters(AutoParameters{}), Parameters(TorusParameters{})}) {
-    const PointFit result =
-        FitPoints(table, {.closure = Closure::kPeriodicUv, .parameters = parameters}, {});
-    EXPECT_EQ(result.parameters, "torus");
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    EXPECT_LT(result.fit.point_rms_mm, 0.02);
-    const SurfaceProjector projector(result.fit.surface);
-    for (const FitPoint& p : Scattered(ring, 200, 0, 4).points) {
-      EXPECT_LT(projector.Project(p.position).distance_mm, 0.02);
-    }
-    for (const double other : {0.0, 0.4, 0.97}) {
-      const HSplineSurface& surface = result.fit.surface;
-      EXPECT_LT((surface.Point({1 - 1e-12, other}) - surface.Point({0, other})).norm(), 1e-8);
-      EXPECT_LT((surface.Point({other, 1 - 1e-12}) - surface.Point({other, 0})).norm(), 1e-8);
-    }
   }
 }
 
@@ -251,14 +220,10 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(read("fit: {terms: [points, points, {type: smoothness, weight: auto}]}\n"),
               HasSubstr("fit.terms[1]: the auto plan weighs one 'points'"));
   EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
-  EXPECT_THAT(read("parameters: cylinder\nclosure: periodic_uv\n"),
-              HasSubstr("go round in u alone; write closure: periodic_u"));
-  EXPECT_THAT(read("parameters: sphere\n"), HasSubstr("closure: parameters on a sphere"));
-  EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"),
-              HasSubstr("closure: parameters on a torus go round both ways"));
-  EXPECT_THAT(read("parameters: mesh\nclosure: periodic_uv\n"), HasSubstr("do not go round"));
-  EXPECT_THAT(read("patches_v: 3\nclosure: periodic_uv\n"),
-              HasSubstr("patches_v: H-spline: 8 x 3 patches are not allowed"));
+  EXPECT_THAT(read("closure: periodic_uv\n"), HasSubstr("periodic_uv"));
+  EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"), HasSubstr("torus"));
+  EXPECT_THAT(read("parameters: mesh\nclosure: periodic_u\n"),
+              HasSubstr("closure: parameters on a mesh do not go round; write closure: open"));
   EXPECT_THAT(read("parameters: plane\nclosure: periodic_u\n"), HasSubstr("do not go round"));
   EXPECT_THAT(read("patches_u: 1\nclosure: periodic_u\n"), HasSubstr("patches_u: H-spline: 1 x 8"));
   // What is said to be allowed is.
@@ -278,9 +243,6 @@ TEST(PointFit, WhatThePlanCannotIsToldWhenTheFileIsRead) {
                 HasSubstr("fit.features: a surface through points of a file has no features"));
   }
   EXPECT_THAT(read("fit: {relaxation: footpoint}\n"), HasSubstr("fit.relaxation: the auto plan"));
-  EXPECT_THAT(read("fit: {plan: {type: auto, relaxation_rounds: 2}}\n"
-                   "joins: [{surface: a.json, edge: u0, its_edge: u1}]\n"),
-              HasSubstr("fit.plan.relaxation_rounds: joins need"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, relaxation_rounds: 2}}\n"),
               HasSubstr("fit.plan.relaxation_rounds"));
   EXPECT_THAT(read("fit: {plan: {type: adaptive, sweeps: 1}}\n"), HasSubstr("fit.plan.sweeps"));
@@ -337,147 +299,6 @@ TEST(PointFit, LinesOfAScannerAreASheet) {
     EXPECT_LT(fit.fit.point_rms_mm, 2.5e-3);
     EXPECT_NEAR(fit.fit.automatic->noise_mm, 2e-3, 2e-4);
   }
-}
-
-// A ball has the areas of its cylinder, and no angle at its poles.
-TEST(PointFit, ABallIsNoTube) {
-  Random random(3);
-  PointTable table;
-  for (int k = 0; k < 5000; ++k) {
-    table.positions.push_back(Vec3(random.Normal(), random.Normal(), random.Normal()).normalized());
-  }
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  EXPECT_EQ(FitPoints(table, options, {}).parameters, "sphere");
-  options.parameters = CylinderParameters{};
-  EXPECT_THAT(testing::WordsOf<InputError>([&] { FitPoints(table, options, {}); }),
-              HasSubstr("the points close at an end of the cylinder"));
-}
-
-// Over triangles that are made for the points.
-TEST(PointFit, ASheetThatFoldsOverEveryPlaneIsFoundBelowItsNoise) {
-  for (const auto& [name, sheet] : testing::BentSheets()) {
-    const testing::Sheet wavy = testing::Wavy(sheet, 0.5);
-    const testing::SheetPoints points = testing::ScatterOver(wavy, {.count = 10000, .noise = 0.2});
-    PointTable table;
-    table.positions = points.positions;
-    const PointFit fit = FitPoints(table, {}, {});
-    EXPECT_EQ(fit.parameters, "mesh");
-    const MeshQuery surface(Tessellate(fit.fit.surface, 8).mesh);
-    double squares = 0;
-    for (const Vec2& q : points.at) {
-      const double off_mm = surface.Closest(wavy(q)).distance_mm;
-      squares += off_mm * off_mm;
-    }
-    EXPECT_LT(std::sqrt(squares / static_cast<double>(points.at.size())),
-              0.5 * 0.2 * points.spacing_mm)
-        << name;
-  }
-}
-
-PointTable StonePoints(int count, double noise) {
-  PointTable table;
-  table.positions = testing::PointsAround(StoneRadius, count, noise);
-  return table;
-}
-
-RingErrors ErrorsOfStone(const HSplineSurface& surface, double first, double last) {
-  return testing::ErrorsOfRings(surface, StoneRadius, first, last);
-}
-
-// Also within ten degrees of the poles, where there are few points; each pole is one place to less
-// than the noise.
-TEST(PointFit, AStoneIsFoundBelowItsNoiseAlsoAtItsPoles) {
-  constexpr double kNoise = 1e-3;
-  const PointTable table = StonePoints(10000, kNoise);
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  options.sigma = true;
-  const PointFit result = FitPoints(table, options, {});
-  EXPECT_EQ(result.parameters, "sphere");
-  EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-  EXPECT_LT(ErrorsOfStone(result.fit.surface, 0, 1).rms, 0.5 * kNoise);
-  for (const double v : {0.0, 1.0}) {
-    const RingErrors errors = ErrorsOfStone(result.fit.surface, v, std::abs(v - 1.0 / 18));
-    EXPECT_LT(errors.rms, 1.5 * kNoise);
-    EXPECT_LT(errors.largest, 4 * kNoise);
-  }
-  ASSERT_TRUE(result.poles);
-  for (const PoleGap& pole : *result.poles) {
-    EXPECT_LT(pole.gap_mm, kNoise);
-    EXPECT_NEAR(pole.place.norm(), StoneRadius(pole.place.normalized()), kNoise);
-  }
-  // Nothing is told of points that were not given.
-  EXPECT_EQ(result.fit.residual_mm.size(), table.positions.size());
-  EXPECT_EQ(result.fit.uv.size(), table.positions.size());
-  EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
-  for (const std::uint32_t k : result.fit.automatic->outliers) {
-    EXPECT_LT(k, table.positions.size());
-  }
-  EXPECT_NEAR(result.fit.automatic->noise_mm, 0.6 * kNoise, 0.1 * kNoise);
-}
-
-// By every plan, the finest levels alone too, for which the start's edges are one place exactly.
-TEST(PointFit, ASphereIsFittedByEveryPlan) {
-  const PointTable table = StonePoints(3000, 1e-3);
-  const std::vector<Term> smooth = {PointTerm{}, SmoothnessTerm{.weight = 1e-9, .length_mm = 1}};
-  const std::vector<FitOptions> all = {
-      {.plan = AdaptivePlan{.tolerance_mm = 0.02, .finest = 2}, .terms = smooth},
-      {.plan = ListedPlan{.schedule = {{.level = 0}, {.level = 1}}}, .terms = smooth},
-      {.plan = ListedPlan{.schedule = {{.level = 2}}}, .terms = smooth}};
-  for (const FitOptions& fit : all) {
-    const PointFit result = FitPoints(
-        table, {.closure = Closure::kPeriodicU, .parameters = SphereParameters{}, .fit = fit}, {});
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    EXPECT_LT(result.fit.point_rms_mm, 0.01);
-    EXPECT_LT((*result.poles)[0].gap_mm, 0.02);
-    EXPECT_EQ(result.fit.residual_mm.size(), 3000u);
-  }
-}
-
-PointTable MeshTable(const TriMesh& mesh) {
-  PointTable table;
-  table.positions = mesh.points;
-  table.triangles = mesh.triangles;
-  return table;
-}
-
-// A bent one, which no rays from a centre meet once each; also where (u,v) are moved.
-TEST(PointFit, ABeanIsFoundBelowItsNoiseAlsoAtItsPoles) {
-  constexpr double kNoise = 1e-3;
-  const testing::ClosedShape bean = testing::Bean();
-  const PointTable table = MeshTable(testing::MeshOf(bean, 10000, kNoise));
-  for (const int rounds : {0, 2}) {
-    PointFitOptions options;
-    options.closure = Closure::kPeriodicU;
-    options.sigma = true;
-    options.fit.plan = AutoPlan{.relaxation_rounds = rounds};
-    const PointFit result = FitPoints(table, options, {});
-    EXPECT_EQ(result.parameters, "mesh");
-    EXPECT_THAT(result.Faults(), ::testing::IsEmpty());
-    const HSplineSurface& surface = result.fit.surface;
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1).rms, 0.4 * kNoise);
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 0, 1.0 / 18).rms, kNoise);
-    EXPECT_LT(testing::ErrorsOf(surface, bean, 17.0 / 18, 1).rms, kNoise);
-    ASSERT_TRUE(result.poles);
-    for (const PoleGap& pole : *result.poles) {
-      EXPECT_LT(pole.gap_mm, kNoise);
-      EXPECT_LT((pole.place - bean.FootOf(pole.place)).norm(), kNoise);
-    }
-    EXPECT_EQ(result.sigma_mm.size(), table.positions.size());
-  }
-}
-
-TEST(PointFit, AClosedMeshGivesTheSameBytesForAnyNumberOfThreads) {
-  const PointTable table = MeshTable(testing::MeshOf(testing::EllipsoidWithEars(), 3000, 1e-3));
-  PointFitOptions options;
-  options.closure = Closure::kPeriodicU;
-  options.parameters = MeshParameters{};
-  RunContext two_threads;
-  two_threads.threads = 2;
-  const PointFit one = FitPoints(table, options, {}), two = FitPoints(table, options, two_threads);
-  EXPECT_EQ(one.fit.uv, two.fit.uv);
-  EXPECT_EQ(one.fit.residual_mm, two.fit.residual_mm);
 }
 
 // At a hundred million mm, digits of a hundredth of a micrometre are left.

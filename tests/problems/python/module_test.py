@@ -81,17 +81,6 @@ class Surface(unittest.TestCase):
         self.assertTrue((again.net(0) == surface.net(0)).all())
         self.assertEqual((again.patches, again.max_level, again.periodic_u), ((3, 2), 1, False))
 
-    def test_a_torus_closes_both_ways(self):
-        u, v = np.meshgrid(2 * np.pi * np.arange(6) / 6, 2 * np.pi * np.arange(5) / 5)
-        r = 30 + 10 * np.cos(v)
-        surface = semblance.HSpline(np.stack([r * np.cos(u), r * np.sin(u), 10 * np.sin(v)], axis=-1), periodic_u=True, periodic_v=True)
-        self.assertEqual((surface.patches, surface.periodic_u, surface.periodic_v), ((6, 5), True, True))
-        np.testing.assert_allclose(surface.points([[0.3, 0.0], [0.0, 0.7]]), surface.points([[0.3, 1.0], [1.0, 0.7]]), atol=1e-12)
-        vertices, triangles, _ = surface.mesh(3)
-        self.assertEqual(len(triangles), 2 * len(vertices))
-        with self.assertRaisesRegex(semblance.InputError, "periodic in v alone"):
-            semblance.HSpline(plane_net(), periodic_v=True)
-
     def test_the_mesh_lies_on_the_surface(self):
         surface = semblance.HSpline(plane_net(), max_level=0)
         vertices, triangles, uv = surface.mesh(2)

@@ -46,7 +46,7 @@ class Oracle {
     for (const auto& [id, part] : parts_) {
       if (id.level <= level) {
         sum += Along(uv.x(), id.i, shape_.PatchesU(id.level), order.u, shape_.ClosedU()) *
-               Along(uv.y(), id.j, shape_.PatchesV(id.level), order.v, shape_.ClosedV()) * part;
+               Along(uv.y(), id.j, shape_.PatchesV(id.level), order.v, false) * part;
       }
     }
     return sum;
@@ -96,7 +96,7 @@ class DeepHSpline : public ::testing::TestWithParam<HSplineShape> {
     return {
         level,
         shape().Column(level, static_cast<int>(std::round(uv.x() * shape().PatchesU(level))) + 1),
-        shape().Row(level, static_cast<int>(std::round(uv.y() * shape().PatchesV(level))) + 1)};
+        static_cast<int>(std::round(uv.y() * shape().PatchesV(level))) + 1};
   }
 
   // On each level a few vertices about a place, and one elsewhere.
@@ -106,8 +106,7 @@ class DeepHSpline : public ::testing::TestWithParam<HSplineShape> {
     for (int level = 1; level <= kFinest; ++level) {
       const VertexId center = Near(level, place);
       for (const int step : {-1, 0, 2}) {
-        const int i = shape().Column(level, center.i + step),
-                  j = shape().Row(level, center.j + (step + 1) / 2);
+        const int i = shape().Column(level, center.i + step), j = center.j + (step + 1) / 2;
         detail[{level, i, j}] = std::ldexp(1, -level) * random.InBox(-4, 4);
       }
       detail[Near(level, {random.Uniform(0.2, 0.8), random.Uniform(0.2, 0.8)})] =
@@ -122,7 +121,7 @@ class DeepHSpline : public ::testing::TestWithParam<HSplineShape> {
 };
 
 TEST_P(DeepHSpline, EqualsTheSumOfTheBSplinesOfAllLevels) {
-  const Vec2 place(shape().ClosedU() ? 0.999 : 0.37, shape().ClosedV() ? 0.998 : 0.61);
+  const Vec2 place(shape().ClosedU() ? 0.999 : 0.37, 0.61);
   HSplineSurface surface = SmoothSurface(shape(), 1);
   Oracle oracle(surface);
   const std::map<VertexId, Vec3> detail = Detail(place);
@@ -135,8 +134,7 @@ TEST_P(DeepHSpline, EqualsTheSumOfTheBSplinesOfAllLevels) {
   for (int trial = 0; trial < 120; ++trial) {
     const double reach = std::ldexp(1, -trial % 11);
     Vec2 uv = place + reach * Vec2(random.Uniform(-0.5, 0.5), random.Uniform(-0.5, 0.5));
-    uv = {uv.x() - std::floor(uv.x()),
-          shape().ClosedV() ? uv.y() - std::floor(uv.y()) : std::clamp(uv.y(), 0.0, 0.999)};
+    uv = {uv.x() - std::floor(uv.x()), std::clamp(uv.y(), 0.0, 0.999)};
     for (const DerivativeOrder order :
          {DerivativeOrder{}, {1, 0}, {0, 1}, {1, 1}, {2, 0}, {0, 2}}) {
       const double scale = std::pow(shape().PatchesU(kFinest), order.u + order.v);
@@ -153,12 +151,11 @@ TEST_P(DeepHSpline, EqualsTheSumOfTheBSplinesOfAllLevels) {
 TEST_P(DeepHSpline, RefinementToLevelEightNeverChangesTheShape) {
   const HSplineSurface before = SmoothSurface(shape(), 2);
   HSplineSurface after = before;
-  const Vec2 place(shape().ClosedU() ? 0.998 : 0.43, shape().ClosedV() ? 0.003 : 0.52);
+  const Vec2 place(shape().ClosedU() ? 0.998 : 0.43, 0.52);
   for (int level = 1; level <= kFinest;
        ++level) {  // an overlay whose vertices are the refined ones
     const VertexId center = Near(level, place);
-    const PatchId patch{level, shape().Column(level, center.i - 1),
-                        shape().Row(level, center.j - 1)};
+    const PatchId patch{level, shape().Column(level, center.i - 1), center.j - 1};
     const Vec3 refined = after.PatchVertices(patch)[5];
     const SurfaceFrame frame = after.LevelFrame(level - 1, after.ParameterOf(center));
     const bool world = shape().reference == OffsetReference::kWorld;
@@ -250,8 +247,7 @@ TEST_P(DeepHSpline, NetsAndPatchesHaveTheSameBytes) {
       for (int j = 0; j < shallow.PatchesV(level); ++j) {
         const std::array<Vec3, 16> vertices = surface.PatchVertices({level, i, j});
         for (int k = 0; k < 16; ++k) {
-          ASSERT_EQ(vertices[k],
-                    net.At(shallow.Column(level, i + k % 4), shallow.Row(level, j + k / 4)));
+          ASSERT_EQ(vertices[k], net.At(shallow.Column(level, i + k % 4), j + k / 4));
         }
       }
     }
@@ -264,8 +260,6 @@ INSTANTIATE_TEST_SUITE_P(
         HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 8},
         HSplineShape{
             .patches_u = 5, .patches_v = 4, .max_level = 8, .closure = Closure::kPeriodicU},
-        HSplineShape{
-            .patches_u = 4, .patches_v = 5, .max_level = 8, .closure = Closure::kPeriodicUv},
         HSplineShape{
             .patches_u = 4, .patches_v = 4, .max_level = 8, .reference = OffsetReference::kWorld}));
 

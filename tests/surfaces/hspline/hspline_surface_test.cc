@@ -131,7 +131,7 @@ TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
   HSplineSurface after = before;
   // odd: it lies on a vertex of level 1, the centre of an overlay; near the seams where there are
   // any
-  const VertexId vertex{2, shape().ClosedU() ? 1 : 9, shape().ClosedV() ? 1 : 9};
+  const VertexId vertex{2, shape().ClosedU() ? 1 : 9, 9};
   after.SetOffsets({{vertex, Vec3(0, 0, 5)}});
   const Vec2 center = ParameterOf(shape(), vertex);
   const auto apart = [](double a, double b, bool closed) {
@@ -145,7 +145,7 @@ TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
       const Vec2 uv((a + 0.5) / 60, (b + 0.5) / 60);
       constexpr double kBorder = 1e-12;  // a border is of the patches on both sides
       const bool inside = apart(uv.x(), center.x(), shape().ClosedU()) < reach_u + kBorder &&
-                          apart(uv.y(), center.y(), shape().ClosedV()) < reach_v + kBorder;
+                          apart(uv.y(), center.y(), false) < reach_v + kBorder;
       const double moved = (after.Point(uv) - before.Point(uv)).norm();
       EXPECT_TRUE(inside || moved == 0) << uv.transpose();
       touched += moved > 0;
@@ -176,12 +176,6 @@ TEST_P(HSplineLaws, IsC2AcrossPatchBordersAndTheSeam) {
                   .norm(),
               1e-4 * size);
         }
-        if (shape().ClosedV()) {
-          EXPECT_LT(
-              (surface.Derivative({other, 1 - h}, order) - surface.Derivative({other, h}, order))
-                  .norm(),
-              1e-4 * size);
-        }
       }
     }
   }
@@ -198,9 +192,7 @@ TEST_P(HSplineLaws, BothEndsOfAClosedDirectionAreOnePlace) {
         return (surface.Derivative(a, order) - surface.Derivative(b, order)).norm() / size;
       };
       EXPECT_LT(shape().ClosedU() ? off({0, other}, {end, other}) : 0, 1e-13);
-      EXPECT_LT(shape().ClosedV() ? off({other, 0}, {other, end}) : 0, 1e-13);
       EXPECT_EQ(shape().ClosedU() ? off({0, other}, {1, other}) : 0, 0);
-      EXPECT_EQ(shape().ClosedV() ? off({other, 0}, {other, 1}) : 0, 0);
     }
   }
 }
@@ -305,12 +297,8 @@ TEST_P(HSplineLaws, TessellationLiesOnTheSurfaceAndIsConsistent) {
   const EdgeReport edges = CheckEdges(t.mesh);
   const int quads_u = 2 * shape().PatchesU(shape().max_level),
             quads_v = 2 * shape().PatchesV(shape().max_level);
-  EXPECT_EQ(edges.boundary,
-            (shape().ClosedV() ? 0 : 2 * quads_u) + (shape().ClosedU() ? 0 : 2 * quads_v));
+  EXPECT_EQ(edges.boundary, 2 * quads_u + (shape().ClosedU() ? 0 : 2 * quads_v));
   EXPECT_EQ(edges.non_manifold + edges.inconsistent, 0);
-  if (shape().ClosedV()) {  // each edge has two triangles, and Euler's characteristic is a torus's
-    EXPECT_EQ(2 * t.mesh.points.size(), t.mesh.triangles.size());
-  }
   EXPECT_GT(TriangleAreaVector(t.mesh, t.mesh.triangles[5]).dot(t.normals[t.mesh.triangles[5][0]]),
             0);
 }
@@ -321,8 +309,6 @@ INSTANTIATE_TEST_SUITE_P(
         HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 3},
         HSplineShape{
             .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicU},
-        HSplineShape{
-            .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicUv},
         HSplineShape{
             .patches_u = 4, .patches_v = 4, .max_level = 2, .reference = OffsetReference::kWorld}));
 
@@ -366,9 +352,9 @@ TEST(HSpline, AnOffsetIsKeptInTheFrameOfTheCoarserSurface) {
 }
 
 TEST(HSpline, AVertexInfluencesMostItsParameter) {
-  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
+  for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     const HSplineShape shape{.patches_u = 4, .patches_v = 5, .max_level = 1, .closure = closure};
-    const int border_u = shape.ClosedU() ? 0 : 1, border_v = shape.ClosedV() ? 0 : 1;
+    const int border_u = shape.ClosedU() ? 0 : 1, border_v = 1;
     for (int j = border_v; j < shape.Rows(1) - border_v; ++j) {
       for (int column = border_u; column < shape.Columns(1) - border_u; ++column) {
         const Stencil stencil = StencilAt(shape, 1, ParameterOf(shape, {1, column, j}));
@@ -414,9 +400,9 @@ TEST(HSpline, RefusesWhatDoesNotFit) {
   EXPECT_THROW(HSplineSurface({.patches_u = 3, .closure = Closure::kPeriodicU}, ControlNet{}),
                InputError);
   EXPECT_EQ(testing::WordsOf<InputError>([] {
-              CheckShape({.patches_u = 4, .patches_v = 3, .closure = Closure::kPeriodicUv});
+              CheckShape({.patches_u = 3, .patches_v = 4, .closure = Closure::kPeriodicU});
             }),
-            "H-spline: 4 x 3 patches are not allowed; with finest level 3, use 4..1024 x 4..1024");
+            "H-spline: 3 x 4 patches are not allowed; with finest level 3, use 4..1024 x 1..1024");
   HSplineSurface surface = SmoothSurface(shape, 1);
   EXPECT_THROW(surface.SetOffsets({{{0, 1, 1}, Vec3(0, 0, 1)}}), InputError);
   EXPECT_THROW(surface.SetOffsets({{{1, 11, 1}, Vec3(0, 0, 1)}}), InputError);

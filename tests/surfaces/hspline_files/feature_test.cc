@@ -72,18 +72,6 @@ TEST_P(FeatureLaws, ARegionHoldsItsVerticesAndNoOthers) {
   EXPECT_FALSE(feature.offsets.empty());
 }
 
-TEST_P(FeatureLaws, ARegionRunsAcrossTheSeamOfVWhereThereIsOne) {
-  const HSplineSurface face = Face(2);
-  const Feature feature =
-      ExtractFeature(face, "nose", {.lowest_v = 0.7, .highest_v = 0.3, .first_level = 2});
-  for (const auto& [vertex, offset] : face.Offsets()) {
-    const double v = face.ParameterOf(vertex).y();
-    const bool inside = GetParam().ClosedV() && vertex.level >= 2 && (v >= 0.7 || v <= 0.3);
-    EXPECT_EQ(feature.offsets.contains(vertex), inside);
-  }
-  EXPECT_EQ(feature.offsets.empty(), !GetParam().ClosedV());
-}
-
 TEST_P(FeatureLaws, BlendingOneAndZeroIsTheFirst) {
   const std::vector<Feature> both = {ExtractFeature(Face(3), "one"),
                                      ExtractFeature(Face(4), "two")};
@@ -145,8 +133,6 @@ INSTANTIATE_TEST_SUITE_P(
         HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 3},
         HSplineShape{
             .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicU},
-        HSplineShape{
-            .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicUv},
         HSplineShape{
             .patches_u = 4, .patches_v = 4, .max_level = 2, .reference = OffsetReference::kWorld}));
 

@@ -87,13 +87,12 @@ TEST_P(BatchLaws, NoByteDependsOnTheNumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(
     Shapes, BatchLaws,
-    ::testing::Values(
-        HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 3},
-        HSplineShape{.patches_u = 3, .patches_v = 2, .max_level = 6},
-        HSplineShape{
-            .patches_u = 5, .patches_v = 4, .max_level = 2, .closure = Closure::kPeriodicU},
-        HSplineShape{
-            .patches_u = 4, .patches_v = 5, .max_level = 3, .closure = Closure::kPeriodicUv}));
+    ::testing::Values(HSplineShape{.patches_u = 4, .patches_v = 5, .max_level = 3},
+                      HSplineShape{.patches_u = 3, .patches_v = 2, .max_level = 6},
+                      HSplineShape{.patches_u = 5,
+                                   .patches_v = 4,
+                                   .max_level = 2,
+                                   .closure = Closure::kPeriodicU}));
 
 TEST(HSplineBatch, MemoryGrowsWithTheDetailAndNotWithTheLevel) {
   HSplineSurface surface =

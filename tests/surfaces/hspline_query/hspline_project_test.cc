@@ -16,18 +16,16 @@ using testing::SmoothSurface;
 const HSplineShape kOpen{.patches_u = 5, .patches_v = 6, .max_level = 2};
 const HSplineShape kTube{
     .patches_u = 6, .patches_v = 6, .max_level = 2, .closure = Closure::kPeriodicU};
-const HSplineShape kTorus{
-    .patches_u = 6, .patches_v = 6, .max_level = 2, .closure = Closure::kPeriodicUv};
 
 double ParameterDistance(const HSplineShape& shape, const Vec2& a, const Vec2& b) {
   const auto apart = [](double x, double y, bool closed) {
     return closed ? std::min(std::abs(x - y), 1 - std::abs(x - y)) : x - y;
   };
-  return std::hypot(apart(a.x(), b.x(), shape.ClosedU()), apart(a.y(), b.y(), shape.ClosedV()));
+  return std::hypot(apart(a.x(), b.x(), shape.ClosedU()), a.y() - b.y());
 }
 
 TEST(HSplineProject, RecoversTheParameterOfAPointOffTheSurface) {
-  for (const HSplineShape& shape : {kOpen, kTube, kTorus}) {
+  for (const HSplineShape& shape : {kOpen, kTube}) {
     const HSplineSurface surface = SmoothSurface(shape, 1);
     const SurfaceProjector projector(surface);
     Random random(1);
@@ -45,7 +43,7 @@ TEST(HSplineProject, RecoversTheParameterOfAPointOffTheSurface) {
 }
 
 TEST(HSplineProject, NoSampleOfAWrinkledSurfaceIsCloser) {
-  for (const HSplineShape& shape : {kOpen, kTube, kTorus}) {
+  for (const HSplineShape& shape : {kOpen, kTube}) {
     const HSplineSurface surface = RandomSurface(shape, 2);
     const SurfaceProjector projector(surface);
     Random random(2);
@@ -91,15 +89,6 @@ TEST(HSplineProject, AWarmStartCrossesTheSeam) {
   const SurfaceProjection found = ProjectFrom(surface, point, {0.97, 0.45});
   EXPECT_TRUE(found.converged);
   EXPECT_LT((found.uv - Vec2(0.02, 0.4)).norm(), 1e-8);
-  EXPECT_LE(found.iterations, 10);
-}
-
-TEST(HSplineProject, AWarmStartCrossesBothSeamsOfATorus) {
-  const HSplineSurface surface = SmoothSurface(kTorus, 4);
-  const Vec3 point = surface.Point({0.02, 0.98}) + 2 * surface.Normal({0.02, 0.98});
-  const SurfaceProjection found = ProjectFrom(surface, point, {0.97, 0.03});
-  EXPECT_TRUE(found.converged);
-  EXPECT_LT((found.uv - Vec2(0.02, 0.98)).norm(), 1e-8);
   EXPECT_LE(found.iterations, 10);
 }
 
