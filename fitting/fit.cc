@@ -10,7 +10,7 @@
 #include <set>
 #include <utility>
 
-#include "fitting/nested/nested_steps.h"
+#include "fitting/nested/nested_fit.h"
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
@@ -322,8 +322,8 @@ class Fitter {
     driver_.Solve({.solve = [&](std::span<const Term> terms, SolveReport) {
       return SolveAllTerms(terms, start);
     }});
-    TellOf(result_.surface, points.Points(), alone.residual_mm, context_.threads,
-           *result_.automatic);
+    UpdateReport(result_.surface, points.Points(), alone.residual_mm, context_.threads,
+                 *result_.automatic);
     KeepExactPoints(driver_.target(), result_.automatic->outliers);
   }
 

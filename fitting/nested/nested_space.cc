@@ -41,13 +41,13 @@ int NestedSpace::Overlay(int level, int i, int j) {
   return added;
 }
 
-// Each patch of the level before with a child that is split or has an active vertex.
+// Marks each patch of the coarser level that has a child which is split or has an active vertex.
 void NestedSpace::SplitAbove(int level) {
   const NestedLevel& l = levels_[level];
   const PatchGrid& grid = l.layout.grid;
   const int columns = grid.Columns();
   std::vector<char>& split = levels_[level - 1].split;
-  std::vector<char> across(grid.patches_u);  // of a row of vertices: patches that one belongs to
+  std::vector<char> across(grid.patches_u);  // per patch: an active vertex of the row reaches it
   for (int row = 0; row < grid.Rows(); ++row) {
     const char* const active = l.active.data() + l.layout.At(0, row);
     for (int i = 0; i < grid.patches_u; ++i) {
@@ -56,7 +56,7 @@ void NestedSpace::SplitAbove(int level) {
         across[i] |= active[i + a < columns ? i + a : (i + a) % columns];
       }
     }
-    for (const int j : RowsOfPatches(grid, row)) {
+    for (const int j : PatchRowsAround(grid, row)) {
       if (j < 0) {
         continue;
       }
@@ -129,7 +129,7 @@ int NestedSpace::LeafLevel(double x, double y) const {
   }
 }
 
-// Vertex i of a level is a sum of 2 i - 3 .. 2 i + 1 of the next.
+// The B-spline of vertex i is a sum of those of vertices 2 i - 3 .. 2 i + 1 of the next level.
 bool NestedSpace::IsCovered(int level, int i, int j) const {
   if (level == finest()) {
     return false;

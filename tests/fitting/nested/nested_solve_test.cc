@@ -346,7 +346,7 @@ TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
       solve.SetWeight(weight);
       solve.Solve(1e-6);
       double sum = 0;
-      for (const NestedResidual& residual : solve.ResidualsOf(used)) {
+      for (const NestedResidual& residual : solve.Residuals(used)) {
         sum += residual.Square();
       }
       const double expected = sum / static_cast<double>(used.Count(points)) / points.channels;
@@ -370,11 +370,11 @@ TEST(NestedSolve, ASolutionComesBackAsItWas) {
   const double before = solve.MeanSquare();
   solve.SetWeight(10);
   solve.Solve(0);
-  EXPECT_GT(solve.ResidualsOf({})[7].Square(), 0);
+  EXPECT_GT(solve.Residuals({})[7].Square(), 0);
   solve.SetSolution(packed);
   EXPECT_EQ(solve.Solution(), packed);
   double sum = 0;
-  for (const NestedResidual& residual : solve.ResidualsOf({})) {
+  for (const NestedResidual& residual : solve.Residuals({})) {
     sum += residual.Square();
   }
   EXPECT_NEAR(sum / 500 / points.channels, before, 1e-9 * before);

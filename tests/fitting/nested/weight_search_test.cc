@@ -70,18 +70,18 @@ TEST_F(Search, SolvedLooselyFindsAWeightThatPredictsAsWell) {
   NestedWeightSearch exact(kCount, solve_, 1e-4, 0);
   exact.Scan();
   exact.Climb(2, exact.Finish().weight);
-  const double score = exact.Settle(exact.Between()).score;
+  const double score = exact.FinalSolve(exact.Between()).score;
   NestedWeightSearch loose(kCount, solve_, 0.1, 0);
   loose.Scan();
   loose.Climb(2, loose.Finish().weight);
-  EXPECT_NEAR(loose.Settle(loose.Between()).score / score, 1, 0.02);
+  EXPECT_NEAR(loose.FinalSolve(loose.Between()).score / score, 1, 0.02);
 }
 
 TEST_F(Search, SettlesAtTheWeightThatIsAskedFor) {
   NestedWeightSearch search(kCount, solve_, 0.1, 0);
   search.Climb(4, solve_.EvenWeight());
   const double weight = 1.7 * search.Finish().weight;
-  const NestedWeight settled = search.Settle(weight);
+  const NestedWeight settled = search.FinalSolve(weight);
   EXPECT_EQ(settled.weight, weight);
   EXPECT_EQ(search.Finish().weight, weight);
   EXPECT_GT(settled.degrees_of_freedom, 0);
