@@ -94,7 +94,7 @@ class BlockTriangleSum {
  public:
   explicit BlockTriangleSum(std::size_t vertices) : columns_(vertices) {}
 
-  // Requires vertices row >= column. Of a diagonal block only the lower triangle is used.
+  // Requires vertices row >= column. Only the lower triangle of a diagonal block is used.
   void Add(int row, int column, const Mat3& block) {
     auto& [rows, blocks] = columns_[column];
     const auto found = std::find(rows.begin(), rows.end(), row);

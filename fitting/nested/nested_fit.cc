@@ -95,7 +95,7 @@ constexpr std::size_t kMinPoints = 16;  // so that a tenth of them is at least o
                   count, of_kind, kMinPoints));
 }
 
-// Whether a point is held out: one in ten, pseudo-randomly by its place along the curve.
+// Returns whether a point is held out: one in ten, pseudo-randomly by its place along the curve.
 bool IsHeld(std::uint32_t k) {
   const std::uint64_t bits = (k + 1) * 0xD1B54A32D192ED03u;
   return (bits ^ bits >> 31) % 10 == 0;
@@ -325,8 +325,8 @@ class NestedFitter {
     Judge(chosen, search.steps());
   }
 
-  // Whether to try stretched metrics although the surface shows no direction yet: its vertices are
-  // as dense as the points and have found nothing. Once per level.
+  // Returns whether to try stretched metrics although the surface shows no direction yet: its
+  // vertices are as dense as the points and have found nothing. Once per level.
   bool NeedsStretchScan() const {
     return plan_.stretched && space_.finest() >= finest_ && space_.finest() > finest_scanned_ &&
            HasFoundNothing();
@@ -343,8 +343,8 @@ class NestedFitter {
     search.Stretch(4);
   }
 
-  // Whether the refinement has not brought the surface nearer to the held-out points, although the
-  // closest points agree.
+  // Returns whether the refinement has not brought the surface nearer to the held-out points,
+  // although the closest points agree.
   bool HasFoundNothing() const {
     constexpr double kNothing = 0.7;  // remaining share of the first round's held-out error
     const std::vector<NestedRound>& rounds = report_.rounds;
@@ -392,8 +392,8 @@ class NestedFitter {
     }
   }
 
-  // Whether the held-out points are met to round-off: points without noise on a surface of the
-  // space.
+  // Returns whether the held-out points are met to round-off: points without noise on a surface of
+  // the space.
   bool IsMet() const { return report_.rounds.back().held_out_rms_mm <= rounding_mm_; }
 
   // The residual of a point of mean weight that is equally likely.
@@ -474,8 +474,8 @@ class NestedFitter {
     return OverlayDense(points_, level, points_per_patch, space_) > 0;
   }
 
-  // Whether residuals of points that are close together by chance agree. Detail finer than the
-  // points' spacing shows there, and noise does not.
+  // Returns whether residuals of points that are close together by chance agree. Detail finer than
+  // the points' spacing shows there, and noise does not.
   bool ClosestAgree() const {
     const PairCorrelation pairs = ClosestCorrelation(points_, SampledInliers(), InlierResiduals());
     return pairs.Value() * std::sqrt(static_cast<double>(pairs.Count())) > kMinStandardErrors;

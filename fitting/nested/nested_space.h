@@ -36,7 +36,7 @@ class NestedSpace {
   int FinestWhole() const;
   // Per patch of a level (GridLayout::Patch), whether it is a leaf.
   std::vector<char> Leaves(int level) const;
-  // Whether all vertices of the next level whose sum the vertex is are active.
+  // Returns whether all vertices of the next level whose sum the vertex is are active.
   bool IsCovered(int level, int i, int j) const;
 
   // Activates the vertices of the next level on the knots of a patch, and those beyond a border.

@@ -199,8 +199,8 @@ class OutlierSearch {
 
   double Scale(std::ptrdiff_t k) const { return points_.Scale(k * every_); }
 
-  // Whether no point of the region can be an outlier: a median is at most one standard deviation
-  // away from the mean, so no offset can exceed the limit. This saves the medians.
+  // Returns whether no point of the region can be an outlier: a median is at most one standard
+  // deviation away from the mean, so no offset can exceed the limit. This saves the medians.
   bool IsSmoothRegion(std::ptrdiff_t begin, std::ptrdiff_t end) const {
     std::array<double, 3> sum{}, squares{};
     double largest = 0;
@@ -258,7 +258,7 @@ class OutlierSearch {
     return std::sqrt(square);
   }
 
-  // Whether b has a residual similar to a's.
+  // Returns whether b has a residual similar to a's.
   bool AreSimilar(std::ptrdiff_t a, std::ptrdiff_t b) const {
     double apart = 0;
     for (int c = 0; c < points_.channels; ++c) {
@@ -287,8 +287,8 @@ class OutlierSearch {
     return std::span(near_).first(nearest);
   }
 
-  // Whether at least half of the nearest points, among those that can confirm k's offset, have a
-  // similar residual.
+  // Returns whether at least half of the nearest points, among those that can confirm k's offset,
+  // have a similar residual.
   bool HasSimilarNeighbours(std::ptrdiff_t k) {
     const double off = Offset(k);
     const auto nearest =
@@ -304,7 +304,7 @@ class OutlierSearch {
     return {e[0], e[1], e[2]};
   }
 
-  // Whether point k, moved so that its residual is `left`, stands on a sheet by the rule.
+  // Returns whether point k, moved so that its residual is `left`, stands on a sheet by the rule.
   bool IsOnSheet(std::ptrdiff_t k, const Vec3& left, double off, const SheetRule& rule) {
     const Vec3 place = points_.value[k * every_] - ResidualVector(k) + left;
     const auto nearest = Nearest(k, rule.nearest, [](std::ptrdiff_t) { return true; });

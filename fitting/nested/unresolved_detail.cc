@@ -194,8 +194,8 @@ std::vector<char> DetectPatches(const GridLayout& layout, const GridLayout& coar
   return seen;
 }
 
-// Whether the functions of level `finer` detect detail over a large enough share of a patch of
-// `level`.
+// Returns whether the functions of level `finer` detect detail over a large enough share of a patch
+// of `level`.
 bool IsDetected(const UnresolvedDetail& detail, int finer, const GridLayout& layout, int level,
                 int i, int j) {
   const int shift = finer - 1 - level, side = 1 << shift;

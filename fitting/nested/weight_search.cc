@@ -33,7 +33,7 @@ double WeightBetween(const NestedWeight& rougher, const NestedWeight& middle,
   return curvature > 0 && down < move && move < up ? middle.weight * std::exp(move) : middle.weight;
 }
 
-// Of two weights with equal scores the larger one is better, so that round-off does not decide.
+// If two scores are equal, the larger weight is better, so that round-off does not decide.
 bool NestedWeightSearch::IsBetter(const NestedWeight& next) const {
   constexpr double kEqual = 1e-5;  // relative; far above round-off, far below any real difference
   const double smoother = next.weight > best_.weight ? kEqual : -kEqual;

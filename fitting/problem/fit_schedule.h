@@ -34,8 +34,8 @@ void Fields(Visitor& visit, ScheduleStep& o) {
         o.fraction);
 }
 
-// The schedule of thesis 4.4. Of a misfit that every level can remove, the product of all 1 -
-// fraction remains: 8 %.
+// The schedule of thesis 4.4. It reduces a misfit that every level can remove to the product of all
+// 1 - fraction, 8 %.
 inline std::vector<ScheduleStep> PublishedSchedule() {
   return {{0, 0.4}, {1, 0.35}, {2, 0.35}, {0, 0.35}, {1, 0.3}, {2, 0.3}};
 }

@@ -141,7 +141,7 @@ std::vector<Seed> FindSeeds(const HSplineSurface& placed, const Seeder& seeder,
   return seeds;
 }
 
-// Whether the direction from a to b on the mesh is opposite to that on the surface.
+// Returns whether the direction from a to b on the mesh is opposite to that on the surface.
 bool Reversed(const Seed& a, const Seed& b) {
   return a.on_mesh && b.on_mesh && (*b.on_mesh - *a.on_mesh).dot(b.on_surface - a.on_surface) < 0;
 }

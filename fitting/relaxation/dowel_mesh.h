@@ -30,7 +30,7 @@ class DowelMesh {
   const Vec2& lengths_mm() const { return lengths_mm_; }  // MeanLengths of the template
   // Counts the turned triangles with the points at uv.
   int Flips(std::span<const Vec2> uv) const;
-  // Whether a triangle is turned over, or has lost 99 % of its area in the template.
+  // Returns whether a triangle is turned over, or has lost 99 % of its area in the template.
   bool Turned(const std::array<int, 3>& triangle, std::span<const Vec2> uv) const;
 
  private:

@@ -79,7 +79,7 @@ struct ShapeRow {
 ShapeRow PointRowAt(const ShapeModel& model, const Eigen::MatrixXd& field, const ModelPoint& at);
 ShapeRow VertexRow(const ShapeModel& model, const Eigen::MatrixXd& field, int vertex);
 
-// Derivatives of a placed point. Those by w and a follow from `linear`.
+// Derivatives of a placed point. The derivatives by w and a follow from `linear`.
 struct ShapeDerivatives {
   Eigen::Matrix<double, 3, 7> pose;
   Eigen::Matrix3d linear;  // by the unplaced point: s R

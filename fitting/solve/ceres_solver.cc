@@ -432,8 +432,8 @@ class CoupledSquares {
   std::vector<TangentSums> sliding_;
 };
 
-// Whether the steps have converged. Weakly determined vertices need several steps, and round-off
-// may keep the steps from becoming shorter than the tolerance.
+// Returns whether the steps have converged. Weakly determined vertices need several steps, and
+// round-off may keep the steps from becoming shorter than the tolerance.
 bool AtRest(double move, double last_move) {
   return move <= kStepTolerance || (move <= 1e-9 && move >= last_move);
 }

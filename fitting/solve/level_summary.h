@@ -9,8 +9,8 @@
 
 namespace semblance {
 
-// Whether a solve also measures term costs, coverage and rank. Measuring takes a good part of a
-// round, so only the last of several rounds makes a full report.
+// Selects whether a solve also measures term costs, coverage and rank. Measuring takes a good part
+// of a round, so only the last of several rounds makes a full report.
 enum class SolveReport { kFull, kNone };
 
 struct PatchCoverage {

@@ -71,7 +71,7 @@ class PatchCounts {
   std::map<Key, std::size_t> counts_;
 };
 
-// Whether some point of a leaf exceeds its tolerance.
+// Returns whether some point of a leaf exceeds its tolerance.
 bool Misses(const HSplineShape& shape, const QuadtreeNode& leaf, const AdaptivePlan& plan,
             const PointCloud& cloud, std::span<const double> squares) {
   if (plan.regions.empty()) {

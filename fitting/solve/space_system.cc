@@ -204,7 +204,7 @@ std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::spa
           [&]<class T>(const T& t) {
             if constexpr (std::is_same_v<T, SmoothnessTerm> || std::is_same_v<T, MembraneTerm>) {
               const ElementStiffness form =
-                  StiffnessOf(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
+                  PatchStiffness(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
               (t.of == SmoothnessOf::kSurface ? forms[level].surface : forms[level].displacement) +=
                   form;
             }

@@ -10,8 +10,8 @@
 namespace semblance {
 namespace {
 
-// Whether a leaf has so few points that summing point by point is faster than by moments. Both give
-// the same sums, so the limit affects time alone.
+// Returns whether a leaf has so few points that summing point by point is faster than by moments.
+// Both give the same sums, so the limit affects time alone.
 bool IsSparse(const QuadtreeNode& leaf) { return leaf.range.size() < 32; }
 
 PatchMatrix StackVertices(const std::array<Vec3, 16>& vertices) {
@@ -92,7 +92,7 @@ int HierarchicalSplineSpace::finest() const {
 
 int HierarchicalSplineSpace::AddDof(const VertexId& vertex, const Vec3& value) {
   const int next = static_cast<int>(dofs_.size());
-  const auto [at, added] = dof_of_.emplace(KeyOf(vertex.level, vertex.i, vertex.j), next);
+  const auto [at, added] = dof_of_.emplace(MakeKey(vertex.level, vertex.i, vertex.j), next);
   if (added) {
     dofs_.push_back({vertex, value});
   }
@@ -100,18 +100,18 @@ int HierarchicalSplineSpace::AddDof(const VertexId& vertex, const Vec3& value) {
 }
 
 bool HierarchicalSplineSpace::IsEdited(const VertexId& vertex) const {
-  return dof_of_.contains(KeyOf(vertex.level, vertex.i, vertex.j));
+  return dof_of_.contains(MakeKey(vertex.level, vertex.i, vertex.j));
 }
 
 int HierarchicalSplineSpace::FindRow(const VertexId& vertex) const {
-  const auto found = dof_of_.find(KeyOf(vertex.level, vertex.i, vertex.j));
+  const auto found = dof_of_.find(MakeKey(vertex.level, vertex.i, vertex.j));
   return found == dof_of_.end() ? -1 : dofs_[found->second].row;
 }
 
 int HierarchicalSplineSpace::AddNode(const PatchId& patch, int parent,
                                      const PointCloud::Range& range) {
   const int index = static_cast<int>(nodes_.size());
-  node_of_.emplace(KeyOf(patch.level, patch.i, patch.j), index);
+  node_of_.emplace(MakeKey(patch.level, patch.i, patch.j), index);
   QuadtreeNode& node = nodes_.emplace_back();
   node.patch = patch;
   node.parent = parent;
@@ -131,7 +131,7 @@ void HierarchicalSplineSpace::Split(int index) {
 }
 
 int HierarchicalSplineSpace::EnsureNode(const PatchId& patch) {
-  const Key key = KeyOf(patch.level, patch.i, patch.j);
+  const Key key = MakeKey(patch.level, patch.i, patch.j);
   if (const auto found = node_of_.find(key); found != node_of_.end()) {
     return found->second;
   }
@@ -188,7 +188,7 @@ void HierarchicalSplineSpace::LinkDofs() {
     const PatchId& p = node.patch;
     for (int k = 0; k < 16; ++k) {
       const int i = shape_.Column(p.level, p.i + k % 4), j = p.j + k / 4;
-      const auto found = dof_of_.find(KeyOf(p.level, i, j));
+      const auto found = dof_of_.find(MakeKey(p.level, i, j));
       node.dofs[k] = found == dof_of_.end() ? -1 : found->second;
     }
   }

@@ -116,7 +116,7 @@ class HierarchicalSplineSpace {
 
  private:
   using Key = std::uint64_t;
-  static Key KeyOf(int level, int i, int j) {
+  static Key MakeKey(int level, int i, int j) {
     return (static_cast<Key>(level) << 40) | (static_cast<Key>(i) << 20) | static_cast<Key>(j);
   }
   int AddDof(const VertexId& vertex, const Vec3& value);

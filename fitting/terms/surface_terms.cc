@@ -62,7 +62,7 @@ void ForEachElement(const auto& term, const LevelView& view, const auto& use) {
     const SplineElement element = view.Element(e);
     if (element.patches_u != patches_u) {
       patches_u = element.patches_u;
-      stiffness = StiffnessOf(term, view.lengths_mm, patches_u, element.patches_v);
+      stiffness = PatchStiffness(term, view.lengths_mm, patches_u, element.patches_v);
       root = std::make_shared<const Eigen::MatrixXd>(StiffnessRoot(stiffness));
     }
     use(element, stiffness, root);
@@ -90,8 +90,8 @@ double Energy(const auto& term, const LevelView& view, const ControlNet& net) {
 }  // namespace
 
 // weight * length^4 / area * energy of a patch.
-ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v) {
+ElementStiffness PatchStiffness(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v) {
   const double scale = term.weight * std::pow(term.length_mm, 4) / lengths_mm.prod();
   return scale * ThinPlateStiffness(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v,
                                     MakeBendingMetric({.stretch = term.stretch,
@@ -99,8 +99,8 @@ ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm,
 }
 
 // weight * length^2 / area * energy of a patch.
-ElementStiffness StiffnessOf(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v) {
+ElementStiffness PatchStiffness(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v) {
   const double scale = term.weight * std::pow(term.length_mm, 2) / lengths_mm.prod();
   return scale * MembraneStiffness(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v);
 }

@@ -54,15 +54,15 @@ bool IsSeparable(const T&) {
   return RowTerm<T>;
 }
 
-// Whether every term with a positive weight is a RowTerm, so that x, y and z are separate but for a
-// loss.
+// Returns whether every term with a positive weight is a RowTerm, so that x, y and z are separate
+// but for a loss.
 inline bool SeparableButForLoss(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
     return std::visit([]<class T>(const T& t) { return t.weight <= 0 || RowTerm<T>; }, term);
   });
 }
 
-// Whether the residuals of a term are linear in the vertices. They may couple x, y and z.
+// Returns whether the residuals of a term are linear in the vertices. They may couple x, y and z.
 inline bool IsLinear(const TangentPointTerm&) { return true; }
 inline bool IsLinear(const SymmetryTerm&) { return true; }
 template <class T>
@@ -78,10 +78,10 @@ inline bool AllLinear(std::span<const Term> terms) {
 // The matrix of the term's cost on one patch of a level of patches_u x patches_v: the cost is x^T
 // matrix x, mm^2, for each coordinate x of the patch's sixteen f. lengths_mm: lengths of [0,1]
 // along u and v.
-ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v);
-ElementStiffness StiffnessOf(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v);
+ElementStiffness PatchStiffness(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v);
+ElementStiffness PatchStiffness(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v);
 
 // Adds the residuals of a term over `net`, whose vertices become parameter blocks of 3 doubles. The
 // sum of their squares (of their losses for a robust term) is twice Ceres' cost. It equals TermCost

@@ -109,7 +109,7 @@ HSplineSurface UpTo(int level, const HSplineSurface& surface) {
   return coarse;
 }
 
-// Whether only some of the level's vertices are edited.
+// Returns whether only some of the level's vertices are edited.
 bool IsFinerSomewhere(const HSplineSurface& surface, int level) {
   const std::size_t edited = surface.Offsets(level).size(),
                     all = static_cast<std::size_t>(surface.Columns(level)) * surface.Rows(level);
@@ -296,7 +296,7 @@ struct ErrorPropagation::Model {
     return variances;
   }
 
-  // Whether some term determines each unknown of a point.
+  // Returns whether some term determines each unknown of a point.
   bool IsKnown(const PointRow& row, const Eigen::VectorXd& diagonal) const {
     const double least = 1e-12 * diagonal.maxCoeff();
     for (std::size_t v = 0; v < row.index.size(); ++v) {
