@@ -29,7 +29,7 @@ Points PointsOf(const Place& place) {
   return points;
 }
 
-TEST(StartSurface, AnOpenOneReproducesPlanes) {
+TEST(StartSurface, AnOpenSurfaceReproducesPlanes) {
   const auto place = [](const Vec2& uv) {
     return Vec3(80 * uv.x() + 3, 10 * uv.x() - 60 * uv.y(), 5 + uv.y());
   };
@@ -43,7 +43,7 @@ TEST(StartSurface, AnOpenOneReproducesPlanes) {
 
 // A cubic B-spline with vertices on a circle lies slightly inside it: with n patches around, its
 // radius at the knots is (2 + cos(2 pi / n)) / 3 times the circle's.
-TEST(StartSurface, APeriodicOneIsATube) {
+TEST(StartSurface, APeriodicSurfaceIsATube) {
   constexpr int kPatches = 16;
   const auto place = [](const Vec2& uv) {
     const double angle = 2 * std::numbers::pi * uv.x();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The ways to solve a level agree.
+// The solvers of a level agree.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -73,7 +73,7 @@ TEST(TileSolver, FindsWhatSingleVerticesFind) {
   }
 }
 
-// Nets whose sides are no multiples of three, closed ones too; some vertices no term touches.
+// Nets whose sides are not multiples of three, open and closed, with vertices that no term affects.
 TEST(TileSolver, TilesCoverNetsOfAnySize) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     for (const int patches : {4, 5, 6}) {
@@ -100,7 +100,7 @@ TEST(TileSolver, TilesCoverNetsOfAnySize) {
   }
 }
 
-// Terms that couple x, y and z, each with all that do not, and those that are left to Ceres.
+// Terms that couple x, y and z, each with all separable terms; the rest is left to Ceres.
 TEST(CoupledSolver, FindsWhatCeresFinds) {
   int coupled = 0;
   for (const Term& term : AllTerms()) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tolerances of parts of the domain.
+// Tolerance regions, and refinement around gaps: where there are no points, smoothness bridges and
+// stays bounded.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +28,7 @@ AdaptivePlan Loose(std::vector<ToleranceRegion> regions) {
   return {.tolerance_mm = 0.1, .regions = std::move(regions), .finest = 4};
 }
 
-// Level 0 is within the plan's tolerance everywhere: what is finer is there for the region.
+// Level 0 meets the plan's tolerance everywhere, so all finer vertices are due to the region.
 TEST(Regions, PointsAreWithinTheToleranceOfTheirRegion) {
   const ToleranceRegion region{.u = {0.6, 0.9}, .v = {0.2, 0.45}, .tolerance_mm = 1e-3};
   ASSERT_TRUE(FitBy(Loose({})).surface.Offsets().empty());
@@ -49,7 +50,7 @@ TEST(Regions, PointsAreWithinTheToleranceOfTheirRegion) {
   }
 }
 
-TEST(Regions, OneOfAllTheDomainIsThePlansOwnTolerance) {
+TEST(Regions, ARegionOfTheWholeDomainEqualsThePlansTolerance) {
   const FitResult whole = FitBy(Loose({{.tolerance_mm = 2e-3}}));
   const FitResult plain = FitBy({.tolerance_mm = 2e-3, .finest = 4});
   EXPECT_FALSE(plain.surface.Offsets().empty());
@@ -57,7 +58,7 @@ TEST(Regions, OneOfAllTheDomainIsThePlansOwnTolerance) {
   EXPECT_EQ(whole.residual_mm, plain.residual_mm);
 }
 
-TEST(Regions, OfSeveralTheLastCounts) {
+TEST(Regions, TheLastOfSeveralRegionsApplies) {
   const ToleranceRegion fine{.u = {0, 0.5}, .tolerance_mm = 1e-3};
   const FitResult again = FitBy(Loose({fine, {.tolerance_mm = 0.1}}));
   EXPECT_TRUE(again.surface.Offsets().empty());
@@ -100,8 +101,8 @@ Range SurfaceWithin(const testing::DrawnGap& gap, const HSplineSurface& surface)
   return range;
 }
 
-// By how much the surface in the gaps leaves the heights of the points around each, within half its
-// radius, of the range of all heights.
+// The largest distance by which the surface in a gap leaves the range of heights of the points
+// around it, relative to the range of all heights.
 double MostBeyond(const FitTarget& target, const HSplineSurface& surface) {
   const Range all = HeightsWhere(target, [](const Vec2&) { return true; });
   double most = 0;
@@ -135,8 +136,8 @@ TEST(Gap, TheSurfaceStaysNearTheHeightsAroundIt) {
   }
 }
 
-// The law is not empty: this is the trap.
-TEST(Gap, WithHardlyAnySmoothnessItBlowsUp) {
+// Shows that the test above can fail.
+TEST(Gap, WithHardlyAnySmoothnessTheSurfaceDiverges) {
   const FitTarget target = testing::DrawnScan(12000, 1e-3, 3);
   EXPECT_GT(MostBeyond(target, FitDrawn(target, kFinest, 1e-18)), 3 * kShare);
 }

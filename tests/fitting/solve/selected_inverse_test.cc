@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Against the whole inverse.
+// Compares selected entries with the whole inverse.
 #include "fitting/solve/selected_inverse.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace semblance {
 namespace {
 
-// A grid's Laplacian, to which some random pairs are added.
+// The Laplacian of a grid with some additional random pairs.
 Eigen::SparseMatrix<double> LowerOf(int side, std::uint64_t seed) {
   Random random(seed);
   const int count = side * side;
@@ -58,7 +58,7 @@ TEST(SelectedInverse, IsTheInverseWhereTheMatrixHasEntries) {
   }
 }
 
-TEST(SelectedInverse, WhatHasNoneIsSaid) {
+TEST(SelectedInverse, OtherEntriesAreRefused) {
   Eigen::SparseMatrix<double> lower(2, 2);
   lower.insert(0, 0) = 1;
   lower.insert(1, 1) = -1;

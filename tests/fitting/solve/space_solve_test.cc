@@ -79,7 +79,7 @@ TEST(AdaptiveFit, ReproducesASurfaceWhoseVerticesAreKnown) {
     EXPECT_LT(LargestDistance(result.surface, truth), 1e-9);
     EXPECT_LT(result.point_rms_mm, 1e-9);
     const LevelSummary& last = result.levels.back();
-    EXPECT_EQ(last.rank, last.free_vertices);  // the points determine all
+    EXPECT_EQ(last.rank, last.free_vertices);  // the points determine every vertex
     EXPECT_EQ(last.uncovered_vertices, 0);
     EXPECT_GE(last.coverage.patches, 12);
     EXPECT_EQ(last.coverage.empty_patches, 0);
@@ -88,9 +88,9 @@ TEST(AdaptiveFit, ReproducesASurfaceWhoseVerticesAreKnown) {
   }
 }
 
-// The place of a tube's seam does not matter: with all points shifted by some patches the surface
-// is shifted, and finer vertices lie across u = 0.
-TEST(AdaptiveFit, ATubeHasNoSeamOfItsOwn) {
+// Shifting all points of a tube by some patches shifts the surface, and puts finer vertices across
+// u = 0.
+TEST(AdaptiveFit, ATubeHasNoSeam) {
   const HSplineShape shape{
       .patches_u = 8, .patches_v = 8, .max_level = 3, .closure = Closure::kPeriodicU};
   const FitTarget target = Scattered(testing::HeadPoint, 20000, 1e-4, 5);
@@ -147,7 +147,7 @@ TEST(AdaptiveFit, CoverageCountsThePointsOfEachPatch) {
   EXPECT_EQ(even.median_patch_points, 4.5);
 }
 
-// The plain B-spline of one level, by the other path.
+// Compares with the fit of one level as a plain B-spline.
 TEST(AdaptiveFit, WithoutOverlaysItIsTheFitOfLevelZero) {
   const std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{.weight = 0.05},
                                    MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface}};
@@ -166,7 +166,8 @@ TEST(AdaptiveFit, WithoutOverlaysItIsTheFitOfLevelZero) {
   }
 }
 
-// The gradient of the assembled system against differences of the cost, all levels' unknowns.
+// Compares the gradient of the assembled system with differences of the cost, for unknowns of all
+// levels.
 TEST(AdaptiveFit, TheSystemIsTheGradientOfTheCost) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 3};
   const HSplineSurface rest = RandomSurface(shape, 1), start = RandomSurface(shape, 1);
@@ -219,8 +220,8 @@ TEST(AdaptiveFit, FrankesFunctionWithinItsNoise) {
   EXPECT_NEAR(result.point_rms_mm, 1e-3 * std::sqrt(3), 2e-4);
 }
 
-// The finer a tolerance below the noise, the more vertices chase it; between the points the surface
-// stays within the noise all the same.
+// A tolerance below the noise adds many vertices, but between the points the surface stays within
+// the noise.
 TEST(AdaptiveFit, NoToleranceIsTooFineForTheSurfaceBetweenThePoints) {
   constexpr double kNoise = 1e-3;
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 5};
@@ -305,7 +306,8 @@ TEST(AdaptiveFit, IsEquivariantUnderRigidMotion) {
   EXPECT_LT(LargestDistance(b, a, pose), 1e-9);
 }
 
-// One point in fifty is 0.3 off; a loss takes no notice of them, and none is overlaid.
+// One point in fifty has an error of 0.3. A loss ignores these points, and no vertices are added
+// for them.
 TEST(AdaptiveFit, OutliersDoNotBreakARobustFit) {
   FitTarget target = Scattered(HeadPoint, 20000, 1e-4, 9);
   for (std::size_t k = 0; k < target.points.size(); k += 50) {
@@ -321,7 +323,7 @@ TEST(AdaptiveFit, OutliersDoNotBreakARobustFit) {
   EXPECT_GT(ErrorAgainst(HeadPoint, plain.surface, 100).rms, 5e-3);
 }
 
-// A hole of 30 % of the width: where no point is, the surface bridges and does not swing.
+// In a hole of 30 % of the width the surface bridges and does not oscillate.
 TEST(AdaptiveFit, SmoothnessBridgesAHole) {
   const HSplineShape shape{.patches_u = 16, .patches_v = 16, .max_level = 3};
   FitTarget target = Scattered(FrankePoint, 20000, 1e-3, 9);
@@ -347,7 +349,8 @@ TEST(AdaptiveFit, FeaturesGetTheirOffsetsBack) {
               1e-12);
 }
 
-// Points that bulge on one side alone: both sides share it, and finer vertices come in pairs.
+// The points bulge on one side. Both sides of the surface share the bulge, and finer vertices
+// appear in pairs.
 TEST(AdaptiveFit, SymmetryMakesBothSidesAlikeOnAllLevels) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
   const auto bump = [](const Vec2& uv) {
@@ -371,7 +374,7 @@ TEST(AdaptiveFit, SymmetryMakesBothSidesAlikeOnAllLevels) {
   EXPECT_NEAR(highest, 0.05, 0.01);  // the mean of a bulge and none
 }
 
-TEST(AdaptiveFit, FrozenFeaturesKeepTheirOffsetsAndTheOthersMakeDo) {
+TEST(AdaptiveFit, FrozenFeaturesKeepTheirOffsetsAndTheOthersAdapt) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 2};
   const HSplineSurface start = RandomSurface(shape, 2);
   std::vector<VertexId> features;
@@ -421,9 +424,9 @@ TEST(AdaptiveFit, WrongInputIsNamed) {
   EXPECT_THAT(message(Adaptive(1, 1, {SmoothnessTerm{}})), HasSubstr("no term 'points'"));
 }
 
-// A smoothness that leaves next to nothing to the points makes a matrix that doubles hardly tell
-// from a singular one. Of one of these sheets the steps grew without end, to 1e112 mm.
-TEST(CoupledSolve, StepsThatLeadAwayAreNotTaken) {
+// A very strong smoothness makes the matrix nearly singular in double precision. The steps of one
+// of these sheets once grew without bound, to 1e112 mm.
+TEST(CoupledSolve, DivergingStepsAreRejected) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
   const FitOptions options{
       .plan =
@@ -458,7 +461,7 @@ using testing::Observe;
 using testing::Sheet;
 using testing::View;
 
-// 400 points on 12 patches, one in twenty of them 4 mm off, one in fifty a landmark.
+// 400 points on 12 patches; one in twenty has an error of 4 mm, and one in fifty is a landmark.
 LevelView ViewWithOutliers() {
   std::vector<Observation> observations = Observe(Sheet(4, 3, 1, 2), 400, 3, 0.3);
   for (std::size_t k = 0; k < observations.size(); k += 20) {
@@ -493,9 +496,9 @@ double LargestMove(const ControlNet& a, const ControlNet& b) {
 
 class EachLoss : public ::testing::TestWithParam<std::pair<RobustLoss, double>> {};
 
-// Points reduced patch by patch, step after step, give the surface of the plain form, which looks
-// at each point by itself.
-TEST_P(EachLoss, ReducedIsThePlainForm) {
+// Compressing the points of each patch in every step gives the surface of the plain form with one
+// residual per point.
+TEST_P(EachLoss, CompressedEqualsThePlainForm) {
   const LevelView view = ViewWithOutliers();
   const auto [loss, width_mm] = GetParam();
   const std::vector<Term> terms = RobustTerms(loss, width_mm);
@@ -511,7 +514,7 @@ TEST_P(EachLoss, ReducedIsThePlainForm) {
   }
 }
 
-// One step at the weights of the surface as it stands, again and again.
+// Repeats single steps with the weights of the present surface.
 TEST_P(EachLoss, TheCostFallsWithEveryStep) {
   LevelView view = ViewWithOutliers();
   const auto [loss, width_mm] = GetParam();
@@ -535,7 +538,7 @@ INSTANTIATE_TEST_SUITE_P(Losses, EachLoss,
                                            std::pair(RobustLoss::kCauchy, 1.0),
                                            std::pair(RobustLoss::kTukey, 12.0)));
 
-TEST(Reweighting, PointsWithoutAnyPullLeaveTheSurfaceToTheOtherTerms) {
+TEST(Reweighting, PointsWithoutPullLeaveTheSurfaceToOtherTerms) {
   LevelView view = ViewWithOutliers();
   for (Observation& o : view.observations) {
     o.position += Vec3(0, 0, 500);  // beyond Tukey's width
