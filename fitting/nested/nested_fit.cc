@@ -346,10 +346,10 @@ class NestedFitter {
   // Returns whether the refinement has not brought the surface nearer to the held-out points,
   // although the closest points agree.
   bool HasFoundNothing() const {
-    constexpr double kNothing = 0.7;  // remaining share of the first round's held-out error
+    constexpr double kNoGainRatio = 0.7;  // remaining share of the first round's held-out error
     const std::vector<NestedRound>& rounds = report_.rounds;
     return !rounds.empty() &&
-           rounds.back().held_out_rms_mm > kNothing * rounds.front().held_out_rms_mm &&
+           rounds.back().held_out_rms_mm > kNoGainRatio * rounds.front().held_out_rms_mm &&
            ClosestAgree();
   }
 

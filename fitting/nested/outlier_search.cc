@@ -21,8 +21,8 @@ constexpr int kNearest = 8;  // neighbours that confirm a residual
 constexpr int kWindow =
     20;                     // points along the curve on each side among which neighbours are sought
 constexpr int kPasses = 4;  // each pass drops the last pass's outliers from the medians
-constexpr double kFar = 6;  // standard deviations; fewer lose detail, more keep errors
-constexpr double kVeryFar = 10;     // standard deviations; separates gross errors from a tail
+constexpr double kOutlierSds = 6;   // standard deviations; fewer lose detail, more keep errors
+constexpr double kGrossSds = 10;    // standard deviations; separates gross errors from a tail
 constexpr double kTailShare = 0.2;  // tail's size relative to the gross errors
 constexpr double kSimilar = 0.5;  // largest difference of similar residuals, of the point's offset
 constexpr double kMinOffset = 4;  // offset that a neighbour can confirm, in its standard deviations
@@ -388,13 +388,13 @@ void SetFlags(const std::vector<std::uint32_t>& indices, std::vector<char>& outl
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
                  const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier) {
   const std::vector<std::uint32_t> before = FlaggedIndices(outlier);
-  const int count = Search({points, every, residuals, least, kFar}, every, outlier);
+  const int count = Search({points, every, residuals, least, kOutlierSds}, every, outlier);
   if (count == 0 || tail == OutlierTail::kReject) {
     return count;
   }
   const std::vector<std::uint32_t> far = FlaggedIndices(outlier);
   SetFlags(before, outlier);
-  const int fewer = Search({points, every, residuals, least, kVeryFar}, every, outlier);
+  const int fewer = Search({points, every, residuals, least, kGrossSds}, every, outlier);
   if (count - fewer > kTailShare * fewer) {
     return fewer;
   }
@@ -405,7 +405,7 @@ int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsB
 int ReinstateStepPoints(const NestedPoints& points, const ResidualsBetween& residuals,
                         const LeastSpread& least, std::vector<char>& outlier) {
   const std::vector<std::ptrdiff_t> on_sheets =
-      OutlierSearch(points, /*every=*/1, residuals, least, kFar).OnSheets(outlier);
+      OutlierSearch(points, /*every=*/1, residuals, least, kOutlierSds).OnSheets(outlier);
   for (const std::ptrdiff_t k : on_sheets) {
     outlier[k] = 0;
   }

@@ -52,7 +52,7 @@ enum class OutlierTail { kKeep, kReject };
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
                  const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier);
 
-// Clears the flags of outliers that stand at a step. Where one sheet of points goes behind another,
+// Clears the flags of outliers that stand at a step. If one sheet of points goes behind another,
 // a smooth surface is far from the points of both, and other points of their sheet stand beside
 // them. If more than a tenth of the outliers (beyond the number expected by chance) meet a strict
 // rule, two of the eight nearest points within a tenth of their distance from the surface, then all

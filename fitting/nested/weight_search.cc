@@ -50,10 +50,11 @@ NestedWeight NestedWeightSearch::Try(double weight) {
   steps_ += solve_.Solve(least_gain_);
   const double mean_square = std::max(solve_.MeanSquare(), 0.0);  // less is rounding
   const double trace = solve_.Trace();
-  constexpr double kLeast = 0.02;  // error of the trace from one probe, as a share of the points
+  constexpr double kMinShareLeft =
+      0.02;  // error of the trace from one probe, as a share of the points
   least_gain_ = part_ * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
   at->second = {.weight = weight,
-                .score = CrossValidationScore(mean_square, trace, count_, kLeast),
+                .score = CrossValidationScore(mean_square, trace, count_, kMinShareLeft),
                 .degrees_of_freedom = trace,
                 .mean_square = mean_square};
   if (IsBetter(at->second)) {
@@ -97,8 +98,8 @@ void NestedWeightSearch::Climb(double factor, double from) {
 }
 
 void NestedWeightSearch::ClimbFromRough(double factor, double from) {
-  constexpr double kRough = 1e-3;  // of the balanced weight; rough enough to show new detail
-  const double rough = kRough * solve_.EvenWeight();
+  constexpr double kRoughRatio = 1e-3;  // of the balanced weight; rough enough to show new detail
+  const double rough = kRoughRatio * solve_.EvenWeight();
   Climb(factor, from);
   const double before = best_.weight;
   if (!(before > rough / factor && before < rough * std::pow(factor, 3))) {

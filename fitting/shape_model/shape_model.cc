@@ -84,7 +84,7 @@ Mat3 LeftJacobian(const Vec3& omega) {
          (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;
 }
 
-Vec3 MeanOf(const std::vector<Vec3>& points) {
+Vec3 MeanPoint(const std::vector<Vec3>& points) {
   const Vec3 sum = std::accumulate(points.begin(), points.end(), Vec3(Vec3::Zero()));
   return sum / static_cast<double>(points.size());
 }
@@ -102,7 +102,7 @@ Mat3 CrossMatrix(const Vec3& v) {
 }
 
 ShapeFrame StartFrame(const ShapeModel& model, const Similarity& subject_from_model) {
-  return {subject_from_model.rotation, MeanOf(model.mean.points)};
+  return {subject_from_model.rotation, MeanPoint(model.mean.points)};
 }
 
 ShapeParameters StartParameters(const ShapeFrame& frame, const Similarity& subject_from_model,

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "fitting/least_squares/sparse_factor.h"
-#include "fitting/solve/selected_inverse.h"
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"

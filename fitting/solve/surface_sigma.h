@@ -38,7 +38,7 @@ struct SigmaOptions {
 class SurfaceSigma {
  public:
   // surface: its vertices are the unknowns. points: those of the fit, without columns. left_out:
-  // ascending indices of points without effect. Where neither points nor smoothness (weight 0)
+  // ascending indices of points without effect. If neither points nor smoothness (weight 0)
   // determine the surface, sigma is about a thousand times as large as elsewhere. Throws InputError
   // for numbers that are not finite, or if no point is left.
   SurfaceSigma(const HSplineSurface& surface, const AttributeColumns& points,

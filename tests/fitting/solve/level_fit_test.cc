@@ -147,12 +147,12 @@ TEST(ScheduleStep, TakesTheNearestOfManySolutions) {
 }
 
 TEST(ScheduleStep, CoverageCountsThePointsOfEachPatch) {
-  const PatchCoverage odd = CoverageOf({0, 4, 1, 0, 9}), even = CoverageOf({3, 0, 8});
+  const PatchCoverage odd = MakeCoverage({0, 4, 1, 0, 9}), even = MakeCoverage({3, 0, 8});
   EXPECT_EQ(odd.patches, 5);
   EXPECT_EQ(odd.empty_patches, 2);
   EXPECT_EQ(odd.median_patch_points, 4);
   EXPECT_EQ(even.median_patch_points, 5.5);
-  EXPECT_TRUE(std::isnan(CoverageOf({0, 0}).median_patch_points));
+  EXPECT_TRUE(std::isnan(MakeCoverage({0, 0}).median_patch_points));
 }
 
 TEST(ScheduleStep, VerticesWithoutAnyTermKeepTheirBits) {

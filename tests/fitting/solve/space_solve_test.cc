@@ -142,7 +142,7 @@ TEST(AdaptiveFit, CoverageCountsThePointsOfEachPatch) {
   EXPECT_EQ(coverage.patches, 12);
   EXPECT_EQ(coverage.empty_patches, 1);
   EXPECT_EQ(coverage.median_patch_points, 6);  // of 1 .. 11
-  const PatchCoverage even = CoverageOf({0, 7, 4, 0, 1, 5});
+  const PatchCoverage even = MakeCoverage({0, 7, 4, 0, 1, 5});
   EXPECT_EQ(even.empty_patches, 2);
   EXPECT_EQ(even.median_patch_points, 4.5);
 }
@@ -180,7 +180,7 @@ TEST(AdaptiveFit, TheSystemIsTheGradientOfTheCost) {
   const double scale = 1 / cloud.weight_sum();
   const auto cost = [&] {
     space.Measure({}, 1, nullptr);
-    return scale * space.Squares() + EnergyOf(space, forms);
+    return scale * space.Squares() + TotalEnergy(space, forms);
   };
   Random random(3);
   Eigen::MatrixX3d step(space.rows(), 3);
