@@ -53,7 +53,7 @@ int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsB
                  const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier);
 
 // Clears the flags of outliers that stand at a step. If one sheet of points goes behind another,
-// a smooth surface is far from the points of both, and other points of their sheet stand beside
+// a smooth surface is far from the points of both, and other points of their sheet stand next to
 // them. If more than a tenth of the outliers (beyond the number expected by chance) meet a strict
 // rule, two of the eight nearest points within a tenth of their distance from the surface, then all
 // outliers that meet a loose rule, two of twenty within a fifth, are no outliers any more. Returns

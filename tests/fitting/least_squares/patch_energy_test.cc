@@ -140,9 +140,6 @@ TEST(PatchEnergy, PeriodicEnergyHasNoSeam) {
   }
 }
 
-}  // namespace
-namespace {
-
 using Eigen::Matrix2d;
 
 // Random second derivatives, which bend `more` times as much across a direction as along it.
@@ -234,5 +231,4 @@ TEST(BendingMetric, MetricBeyondContinuesByTheSameStretch) {
 }
 
 }  // namespace
-
 }  // namespace semblance

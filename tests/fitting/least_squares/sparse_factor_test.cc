@@ -27,7 +27,7 @@ Eigen::MatrixXd Rows(int rows, int columns, std::uint64_t random_seed) {
   return a;
 }
 
-SparseMatrix LowerOf(const Eigen::MatrixXd& a) {
+SparseMatrix LowerTriangle(const Eigen::MatrixXd& a) {
   const Eigen::MatrixXd normal = a.transpose() * a;
   return Eigen::MatrixXd(normal.triangularView<Eigen::Lower>()).sparseView();
 }
@@ -45,7 +45,7 @@ TEST(NumericalRank, EqualsThatOfTheSingularValues) {
                              a * a.colwise().norm().cwiseMax(1e-300).cwiseInverse().asDiagonal())
                              .setThreshold(1e-5)
                              .rank());
-    EXPECT_EQ(NumericalRank(LowerOf(a), rows), expected) << k;
+    EXPECT_EQ(NumericalRank(LowerTriangle(a), rows), expected) << k;
   }
 }
 
@@ -128,11 +128,8 @@ TEST(SparseFactor, OrderByVertexGivesTheSameSolution) {
 
 TEST(NumericalRank, OfNothingIsZero) { EXPECT_EQ(NumericalRank(SparseMatrix(7, 7), 5), 0); }
 
-}  // namespace
-namespace {
-
 // The Laplacian of a grid with some additional random pairs.
-Eigen::SparseMatrix<double> LowerOf(int side, std::uint64_t seed) {
+Eigen::SparseMatrix<double> RandomLaplacian(int side, std::uint64_t seed) {
   Random random(seed);
   const int count = side * side;
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(count, count);
@@ -159,7 +156,7 @@ Eigen::SparseMatrix<double> LowerOf(int side, std::uint64_t seed) {
 
 TEST(SelectedInverse, IsTheInverseWhereTheMatrixHasEntries) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    const Eigen::SparseMatrix<double> lower = LowerOf(7, seed);
+    const Eigen::SparseMatrix<double> lower = RandomLaplacian(7, seed);
     const Eigen::MatrixXd whole =
         (Eigen::MatrixXd(lower) +
          Eigen::MatrixXd(Eigen::MatrixXd(lower).triangularView<Eigen::StrictlyLower>()).transpose())
@@ -188,5 +185,4 @@ TEST(SelectedInverse, OtherEntriesAreRefused) {
 }
 
 }  // namespace
-
 }  // namespace semblance

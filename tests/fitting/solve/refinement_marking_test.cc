@@ -64,9 +64,6 @@ TEST(Regions, TheLastOfSeveralRegionsApplies) {
   EXPECT_TRUE(again.surface.Offsets().empty());
 }
 
-}  // namespace
-namespace {
-
 constexpr double kShare = 0.1;  // of the range of all heights
 
 struct Range {
@@ -143,5 +140,4 @@ TEST(Gap, WithHardlyAnySmoothnessTheSurfaceDiverges) {
 }
 
 }  // namespace
-
 }  // namespace semblance

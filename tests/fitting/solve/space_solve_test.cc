@@ -454,9 +454,6 @@ TEST(CoupledSolve, DivergingStepsAreRejected) {
   }
 }
 
-}  // namespace
-namespace {
-
 using testing::Observe;
 using testing::Sheet;
 using testing::View;
@@ -551,5 +548,4 @@ TEST(Reweighting, PointsWithoutPullLeaveTheSurfaceToOtherTerms) {
 }
 
 }  // namespace
-
 }  // namespace semblance
