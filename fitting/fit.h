@@ -20,9 +20,9 @@ namespace semblance {
 // (nested_fit.h). After each solve the points' (u,v) may move (relaxation.h).
 //   start: the placed template, or a partly fitted surface.
 //   rest: the placed template, of the same shape. Displacements are measured from it, and features
-//   get back its offsets. The first overload uses start. With `rest`, a caller can fit part of a
-//   schedule, seed dowels on the result (seeding.h) and continue. features: vertices of levels >= 1
-//   to protect; may be empty.
+//     get back its offsets. The first overload uses start. With `rest`, a caller can fit part of a
+//     schedule, seed dowels on the result (seeding.h) and continue.
+//   features: vertices of levels >= 1 to protect; may be empty.
 // Throws InputError for a target without points or as CheckTarget does, for options that FaultsOf
 // refuses (fit_check.h), for a feature of level 0, and for a template without extent; Cancelled
 // between solves.

@@ -18,9 +18,8 @@ namespace {
 // medians, smaller ones follow detail.
 constexpr std::ptrdiff_t kBlock = 24;
 constexpr int kNearest = 8;  // neighbours that confirm a residual
-constexpr int kWindow =
-    20;                     // points along the curve on each side among which neighbours are sought
-constexpr int kPasses = 4;  // each pass drops the last pass's outliers from the medians
+constexpr int kWindow = 20;  // neighbours are sought among so many points on each side of the curve
+constexpr int kPasses = 4;   // each pass drops the last pass's outliers from the medians
 constexpr double kOutlierSds = 6;   // standard deviations; fewer lose detail, more keep errors
 constexpr double kGrossSds = 10;    // standard deviations; separates gross errors from a tail
 constexpr double kTailShare = 0.2;  // tail's size relative to the gross errors

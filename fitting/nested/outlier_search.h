@@ -31,12 +31,13 @@ struct LeastSpread {
 enum class OutlierTail { kKeep, kReject };
 
 // Decides for one point in `every` whether it is an outlier. A point is an outlier if
-//   its offset, the residual less the median of the points around it, exceeds six standard
-//   deviations (of the points around it, by their median, so that up to a third of them may be
-//   outliers, and at least `least`), and fewer than half of the eight points nearest to it have a
-//   similar residual.
-// By the second condition, detail that the surface does not follow yet is not an outlier, because
-// neighbours share it. The limit falls with the residuals as the surface becomes finer.
+//   1. its offset (the residual less the median of the points around it) exceeds six standard
+//      deviations, and
+//   2. fewer than half of the eight points nearest to it have a similar residual.
+// The standard deviation is that of the points around it, by their median, so that up to a third of
+// them may be outliers; it is at least `least`. By the second condition, detail that the surface
+// does not follow yet is not an outlier, because neighbours share it. The limit falls with the
+// residuals as the surface becomes finer.
 //
 // Tail. Gross errors mostly lie far beyond ten standard deviations. If more than a fifth as many
 // points lie between six and ten as beyond ten, the offsets have a tail, as at edges and steps that

@@ -6,7 +6,7 @@
 //   requires    a measured space; `squares` if the plan has regions
 //   guarantees  sorted vertices of levels 1 .. plan.finest, none of which is edited yet
 //   then        HierarchicalSplineSpace::Edit(vertices) and a further solve; an empty result ends
-//   the cycle
+//               the cycle
 //
 // Each cycle overlays a patch by one level at most, and levels are bounded by plan.finest, so the
 // cycle ends.
