@@ -497,7 +497,7 @@ class NestedFitter {
   int FinestOfMost() const {
     int level = space_.finest();
     for (; level > 0; --level) {
-      const std::vector<char>& there = space_[level].there;
+      const std::vector<char>& there = space_[level].present;
       if (2 * std::count(there.begin(), there.end(), 1) >= std::ssize(there)) {
         break;
       }
@@ -619,7 +619,7 @@ class NestedFitter {
     return chosen;
   }
 
-  // Fills the report but for statistics of distances (Measure).
+  // Fills the report, except for the statistics of distances (Measure).
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
     report_.stretch = FindStretch(metric_).stretch;
@@ -661,7 +661,7 @@ class NestedFitter {
   const HSplineSurface& start_;
   const AutoPlan& plan_;
   const RunContext& context_;
-  NestedPoints points_;  // but for mean_weight (invariant 3)
+  NestedPoints points_;  // only mean_weight changes (invariant 3)
   NestedSolve solve_;
   double rounding_mm_;  // held-out error that is round-off
   NestedSpace space_;
@@ -669,7 +669,7 @@ class NestedFitter {
   std::vector<char> outlier_;  // per point
   int finest_ = 0;             // finest level that the density of all points allows
   // The sample and its residuals (invariant 2).
-  std::size_t every_ = 0;            // one point of the curve in so many is sampled
+  std::size_t every_ = 0;            // one point in every_ is sampled
   int sample_finest_ = 0;            // finest level that the density of the sample allows
   std::vector<Residual> residuals_;  // of the sampled points
   int outliers_ = 0;                 // number among the sampled points

@@ -189,14 +189,14 @@ Matrix16 NestedSolve::PatchEnergy(const PatchGrid& grid) const {
          lengths_mm_.prod();
 }
 
-// Calls visit(i, j, patch) for each patch that is there.
+// Calls visit(i, j, patch) for each patch that is present.
 template <class Visit>
 void NestedSolve::ForEachPatch(int level, const Visit& visit) const {
   const GridLayout& layout = (*space_)[level].layout;
   for (int j = 0; j < layout.grid.patches_v; ++j) {
     for (int i = 0; i < layout.grid.patches_u; ++i) {
       const std::size_t patch = layout.Patch(i, j);
-      if ((*space_)[level].there[patch] != 0) {
+      if ((*space_)[level].present[patch] != 0) {
         visit(i, j, patch);
       }
     }

@@ -76,7 +76,7 @@ void NestedSpace::SplitAbove(int level) {
 void NestedSpace::Link() {
   for (NestedLevel& l : levels_) {
     l.split.assign(l.layout.Patches(), 0);
-    l.there.assign(l.layout.Patches(), &l == &levels_.front() ? 1 : 0);
+    l.present.assign(l.layout.Patches(), &l == &levels_.front() ? 1 : 0);
   }
   for (int level = finest(); level >= 1; --level) {
     SplitAbove(level);
@@ -85,12 +85,12 @@ void NestedSpace::Link() {
     NestedLevel& l = levels_[level];
     for (int j = 0; level > 0 && j < l.layout.grid.patches_v; ++j) {
       for (int i = 0; i < l.layout.grid.patches_u; ++i) {
-        l.there[l.layout.Patch(i, j)] =
+        l.present[l.layout.Patch(i, j)] =
             levels_[level - 1].split[levels_[level - 1].layout.Patch(i / 2, j / 2)];
       }
     }
-    l.leaves = l.there != l.split;
-    l.runs = RunsAround(l.layout, l.there);
+    l.leaves = l.present != l.split;
+    l.runs = RunsAround(l.layout, l.present);
   }
   vertices_ = CountVertices();
 }
@@ -110,9 +110,9 @@ int NestedSpace::FinestWhole() const {
 
 std::vector<char> NestedSpace::Leaves(int level) const {
   const NestedLevel& l = levels_[level];
-  std::vector<char> leaves(l.there.size());
+  std::vector<char> leaves(l.present.size());
   for (std::size_t p = 0; p < leaves.size(); ++p) {
-    leaves[p] = l.there[p] != 0 && l.split[p] == 0 ? 1 : 0;
+    leaves[p] = l.present[p] != 0 && l.split[p] == 0 ? 1 : 0;
   }
   return leaves;
 }

@@ -11,14 +11,14 @@ namespace semblance {
 
 struct NestedLevel {
   GridLayout layout;
-  std::vector<char> active;  // per vertex, by GridLayout::At; all 1 on level 0
-  std::vector<char> there;   // per patch: its parent is split (level 0: all 1)
-  std::vector<char> split;   // per patch: an active finer vertex reaches into it
-  bool leaves = false;       // some patch is there and not split
-  GridRuns runs;             // all vertices of the patches that are there
+  std::vector<char> active;   // per vertex, by GridLayout::At; all 1 on level 0
+  std::vector<char> present;  // per patch: its parent is split (level 0: all 1)
+  std::vector<char> split;    // per patch: an active finer vertex reaches into it
+  bool leaves = false;        // some patch is present and not split
+  GridRuns runs;              // all vertices of the patches that are present
 };
 
-// The leaves are the patches that are there and not split; they tile the domain. Coarse vertices
+// The leaves are the patches that are present and not split; they tile the domain. Coarse vertices
 // stay unknowns where finer ones cover them. The representation of a surface is then not unique,
 // which does not affect conjugate gradients, and the coarse vertices carry the common part of the
 // fine ones.
@@ -42,7 +42,7 @@ class NestedSpace {
   // Activates the vertices of the next level on the knots of a patch, and those beyond a border.
   // Returns the number of newly active vertices. Call Link before any other member.
   int Overlay(int level, int i, int j);
-  // Updates `there`, `split`, `leaves` and `runs` after Overlay.
+  // Updates `present`, `split`, `leaves` and `runs` after Overlay.
   void Link();
 
  private:

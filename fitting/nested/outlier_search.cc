@@ -18,7 +18,7 @@ namespace {
 // medians, smaller ones follow detail.
 constexpr std::ptrdiff_t kBlock = 24;
 constexpr int kNearest = 8;  // neighbours that confirm a residual
-constexpr int kWindow = 20;  // neighbours are sought among so many points on each side of the curve
+constexpr int kWindow = 20;  // points on each side of the curve that are searched for neighbours
 constexpr int kPasses = 4;   // each pass drops the last pass's outliers from the medians
 constexpr double kOutlierSds = 6;   // standard deviations; fewer lose detail, more keep errors
 constexpr double kGrossSds = 10;    // standard deviations; separates gross errors from a tail

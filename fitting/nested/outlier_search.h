@@ -33,11 +33,11 @@ enum class OutlierTail { kKeep, kReject };
 // Decides for one point in `every` whether it is an outlier. A point is an outlier if
 //   1. its offset (the residual less the median of the points around it) exceeds six standard
 //      deviations, and
-//   2. fewer than half of the eight points nearest to it have a similar residual.
-// The standard deviation is that of the points around it, by their median, so that up to a third of
-// them may be outliers; it is at least `least`. By the second condition, detail that the surface
-// does not follow yet is not an outlier, because neighbours share it. The limit falls with the
-// residuals as the surface becomes finer.
+//   2. fewer than half of the eight points nearest to it have a similar residual. The standard
+//      deviation is that of the points around it, by their median, so that up to a third of them
+//      may be outliers; it is at least `least`. By the second condition, detail that the surface
+//      does not follow yet is not an outlier, because neighbours share it. The limit falls with
+//      the residuals as the surface becomes finer.
 //
 // Tail. Gross errors mostly lie far beyond ten standard deviations. If more than a fifth as many
 // points lie between six and ten as beyond ten, the offsets have a tail, as at edges and steps that
@@ -46,7 +46,7 @@ enum class OutlierTail { kKeep, kReject };
 // Weights. A point's standard deviation is the larger of two: that of the points around it, and
 // their noise scaled by the ratio of its own sigma to theirs. The first covers detail, the second
 // noise. In the weighted medians a point counts by 1 / sigma, at most four times as much as the
-// median point. A neighbour whose own noise hides an offset of this size is not asked.
+// median point. A neighbour whose own noise hides an offset of this size is not used.
 //
 // outlier: one flag per point. Points that are flagged at the start do not enter the medians.
 // Returns the number of outliers among the sampled points.

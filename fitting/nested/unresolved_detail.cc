@@ -243,7 +243,7 @@ int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space) {
         for (int finer = level + 1; !wanted && finer <= detail.Finest(); ++finer) {
           wanted = IsDetected(detail, finer, layout, level, i, j);
         }
-        if (wanted && space[level].there[layout.Patch(i, j)] != 0) {
+        if (wanted && space[level].present[layout.Patch(i, j)] != 0) {
           added += space.Overlay(level, i, j);
         }
       }
@@ -265,7 +265,7 @@ int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
   for (int j = 0; j < layout.grid.patches_v; ++j) {
     for (int i = 0; i < layout.grid.patches_u; ++i) {
       const std::size_t patch = layout.Patch(i, j);
-      if (space[level].there[patch] != 0 && counts[patch] >= 4 * points_per_patch) {
+      if (space[level].present[patch] != 0 && counts[patch] >= 4 * points_per_patch) {
         added += space.Overlay(level, i, j);
       }
     }

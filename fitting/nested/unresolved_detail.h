@@ -37,8 +37,8 @@ UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const NestedSp
 // next level. Returns the number of newly active vertices.
 int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space);
 
-// Overlays each patch of a level that is there and has at least points_per_patch points for each of
-// its four children. Returns the number of newly active vertices.
+// Overlays each patch of a level that is present and has at least points_per_patch points for each
+// of its four children. Returns the number of newly active vertices.
 int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
                  NestedSpace& space);
 

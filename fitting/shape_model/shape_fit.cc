@@ -121,7 +121,7 @@ void CheckTips(const ShapeModel& model, const ShapeTarget& target) {
 }
 
 // ---------------------------------------------------------------------------------------------
-// Points of the model that take part
+// Points of the model that are used
 // ---------------------------------------------------------------------------------------------
 
 // Indices of at most `count` points that lie far apart, beginning with point 0.

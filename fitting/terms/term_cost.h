@@ -55,7 +55,7 @@ bool IsSeparable(const T&) {
 }
 
 // Returns whether every term with a positive weight is a RowTerm, so that x, y and z are separate
-// but for a loss.
+// apart from a loss.
 inline bool SeparableButForLoss(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
     return std::visit([]<class T>(const T& t) { return t.weight <= 0 || RowTerm<T>; }, term);

@@ -50,8 +50,7 @@ void ExpectAllAgree(const LevelView& view, const std::vector<Term>& terms, doubl
   EXPECT_EQ(a.free_vertices, b.free_vertices);
   EXPECT_EQ(a.termination, "convergence");
   EXPECT_LT(Distance(tiles, vertices), tolerance_mm);
-  const double cost =
-      CostOf(terms, view, direct.net);  // says little of vertices that are hardly held
+  const double cost = CostOf(terms, view, direct.net);  // depends little on weakly held vertices
   EXPECT_NEAR(CostOf(terms, view, tiles), cost, 1e-9 * cost + 1e-15);
 }
 
@@ -66,7 +65,7 @@ TEST(TileSolver, FindsWhatSingleVerticesFind) {
   ExpectAllAgree(NoisyView(), separable, 1e-9);
   for (const Term& term : separable) {
     if (!std::holds_alternative<PointTerm>(term)) {
-      // Landmarks do not hold the vertices at the border that points hardly hold.
+      // Points hold the vertices at the border weakly, and landmarks do not hold them at all.
       const bool more_points = std::holds_alternative<LandmarkTerm>(term);
       ExpectAllAgree(NoisyView(), {PointTerm{}, term}, more_points ? 1e-4 : 1e-6);
     }

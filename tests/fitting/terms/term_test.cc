@@ -281,7 +281,7 @@ TEST(Terms, SpringsRestAtTheirDepthInEveryDirection) {
   LevelView view = NoisyView();
   for (BoneObservation& o : view.bone) {
     const Vec3 point = view.grid.StencilAt(o.point.uv).Apply(view.start);
-    o.foot = point + Vec3(3, 4, 0);  // 5 mm from the surface, and from a point of its own
+    o.foot = point + Vec3(3, 4, 0);  // 5 mm from the surface, and from the point below
     o.point.position = o.foot + Vec3(0, 0, 5);
   }
   EXPECT_NEAR(TermCost(SpringTerm{}, view, view.start), 0, 1e-20);
