@@ -82,6 +82,9 @@ constexpr std::size_t kCheapPoints = 50000;  // below, a fit takes well under a 
 constexpr int kQuickVertices = 10000;        // below, exact solves take little time
 constexpr double kMinStandardErrors = 1;     // of a correlation that shows detail; more stop early
 constexpr std::size_t kPatchesPerPoint = 4;  // of a tested level; more take time and memory
+// Ratio of neighbouring weights in the search, in rounds and in the final fit: solves against a
+// closer weight. The score is flat near its minimum.
+constexpr double kCoarseFactor = 4, kFineFactor = 2;
 // Held-out error, relative to the extent, that is round-off: mean squares are differences of sums.
 constexpr double kRounding = 1e-8;
 
@@ -309,9 +312,9 @@ class NestedFitter {
     NestedWeightSearch search(count, solve_, PartLeft(), least_gain_);
     if (std::isnan(weight_)) {
       search.Scan();
-      search.Climb(4, search.Finish().weight);
+      search.Climb(kCoarseFactor, search.Finish().weight);
     } else {
-      search.ClimbFromRough(4, weight_);
+      search.ClimbFromRough(kCoarseFactor, weight_);
     }
     SearchMetric(search, scan);
     const NestedWeight chosen = search.Finish();
@@ -337,10 +340,10 @@ class NestedFitter {
       return;
     }
     if (scan) {
-      search.ScanStretches(4);
+      search.ScanStretches(kCoarseFactor);
       finest_scanned_ = space_.finest();
     }
-    search.Stretch(4);
+    search.Stretch(kCoarseFactor);
   }
 
   // Returns whether the refinement has not brought the surface nearer to the held-out points,
@@ -610,7 +613,7 @@ class NestedFitter {
     NestedWeightSearch search(count, solve_, PartLeft(), least_gain_);
     NestedWeight chosen;
     if (std::isnan(known)) {
-      search.Climb(2, weight_);
+      search.Climb(kFineFactor, weight_);
       chosen = IsQuick() ? search.Finish() : search.FinalSolve(search.Between());
     } else {
       chosen = search.FinalSolve(known);
