@@ -10,8 +10,8 @@
 namespace semblance {
 namespace {
 
-constexpr Eigen::Index kSlab =
-    128;  // rows; 128 x 19 doubles (19 kB) fit into the first-level cache
+// Rows; 128 x 19 doubles (19 kB) fit into the first-level cache.
+constexpr Eigen::Index kSlab = 128;
 
 // Makes the first `unknowns` columns of the top `rows` rows upper triangular by Householder
 // reflections.

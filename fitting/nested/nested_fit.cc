@@ -545,7 +545,7 @@ class NestedFitter {
 
   // Computes the distances and their statistics, in the order of the curve (invariant 8).
   void Measure(NestedFitResult& result) {
-    constexpr std::size_t kAtOnce = 1 << 14;
+    constexpr std::size_t kAtOnce = 1 << 14;  // points; bounds the memory
     double sum = 0, weights = 0;
     result.residual_mm.resize(points_.GivenSize());
     NestedResiduals residuals(solve_);

@@ -92,7 +92,7 @@ class OutlierSearch {
   }
 
  private:
-  static constexpr std::ptrdiff_t kBlocksAtOnce = 512;
+  static constexpr std::ptrdiff_t kBlocksAtOnce = 512;  // residuals per read; bounds the memory
 
   // Reads the residuals of points begin .. end - 1 and of the windows around them.
   void Read(std::ptrdiff_t begin, std::ptrdiff_t end) {
@@ -118,8 +118,8 @@ class OutlierSearch {
   // chance. For the latter each outlier's residual is tried at the place of another outlier: gross
   // errors that agree by chance, for example because all have the same offset, agree there too.
   double StepShare(const std::vector<std::ptrdiff_t>& outliers) {
-    constexpr std::size_t kMaxSamples = 300;
-    const std::size_t each = std::max<std::size_t>(outliers.size() / kMaxSamples, 1);
+    constexpr std::size_t kMaxTested = 300;  // the share's standard error is then below 2 %
+    const std::size_t each = std::max<std::size_t>(outliers.size() / kMaxTested, 1);
     int asked = 0, on_sheets = 0;
     for (std::size_t n = 0; n < outliers.size(); n += each) {
       const std::ptrdiff_t here = outliers[n],

@@ -50,8 +50,8 @@ NestedWeight NestedWeightSearch::Try(double weight) {
   steps_ += solve_.Solve(least_gain_);
   const double mean_square = std::max(solve_.MeanSquare(), 0.0);  // less is rounding
   const double trace = solve_.Trace();
-  constexpr double kMinShareLeft =
-      0.02;  // error of the trace from one probe, as a share of the points
+  // Error of the trace from one probe, as a share of the points.
+  constexpr double kMinShareLeft = 0.02;
   least_gain_ = part_ * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
   at->second = {.weight = weight,
                 .score = CrossValidationScore(mean_square, trace, count_, kMinShareLeft),
@@ -175,8 +175,8 @@ double NestedWeightSearch::Between() const {
 }
 
 NestedWeight NestedWeightSearch::FinalSolve(double weight) {
-  constexpr double kFiner =
-      0.2;  // remaining gain relative to that of comparisons: 0.1 becomes 1/50
+  // Remaining gain relative to that of comparisons: 0.1 becomes 1/50.
+  constexpr double kFiner = 0.2;
   least_gain_ *= kFiner;
   best_ = {};
   tried_.clear();

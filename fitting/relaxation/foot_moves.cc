@@ -106,7 +106,7 @@ class FootMover {
   }
 
   void Project(double tolerance_mm, OnCoarse& on) const {
-    constexpr std::size_t kBlock = 256;
+    constexpr std::size_t kBlock = 256;          // points per task of a thread
     constexpr double kMinTolerance_mm = 1e-300;  // 0 is not allowed
     const ProjectOptions options{.tolerance_mm = std::max(tolerance_mm, kMinTolerance_mm)};
     const std::vector<Vec3> places = HSplineBatch(on.surface).Points(on.uv, context_.threads);

@@ -73,7 +73,7 @@ ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t ver
 class StopAtRounding final : public ceres::IterationCallback {
  public:
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
-    constexpr double kRounding = 1e-13;
+    constexpr double kRounding = 1e-13;  // of the cost, a sum of many squares
     const bool rounding = step.iteration > 0 && step.step_is_valid && !step.step_is_successful &&
                           std::abs(step.cost_change) <= kRounding * step.cost;
     return rounding ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
@@ -87,7 +87,7 @@ std::string TerminationName(ceres::TerminationType type) {
   return LowerCase(ceres::TerminationTypeToString(type));
 }
 
-constexpr int kSide = 3, kTile = kSide * kSide;
+constexpr int kSide = 3, kTile = kSide * kSide;  // vertices of a tile: dense blocks of useful size
 
 // Factor of all residuals. Ceres stops if subtracting the gradient from the vertices changes no
 // digit; the factor makes the gradient larger by its square, so that Ceres does not stop too early.
@@ -441,7 +441,7 @@ bool AtRest(double move, double last_move) {
 // In exact arithmetic no step is longer than the first. A step that is longer by more than
 // round-off shows a matrix so close to singular that its factor leads away from the solution.
 bool Diverges(double length, double first_length, double move) {
-  constexpr double kRounding = 1e-6;
+  constexpr double kRounding = 1e-6;  // shorter steps may grow by round-off
   return length > first_length && move > kRounding;
 }
 

@@ -77,8 +77,8 @@ Eigen::MatrixXd ExactEquations::Rows(Eigen::Index unknowns) const {
 // magnitude.
 Eigen::VectorXd ExactEquations::Forces(const Eigen::MatrixXd& gram,
                                        std::span<const Vec3> at) const {
-  constexpr double kDependent =
-      1e-11;  // equations closer than this are dependent; round-off is 1e-15
+  // Equations closer than this are dependent; round-off is 1e-15.
+  constexpr double kDependent = 1e-11;
   const Eigen::Index count = std::ssize(equations_);
   Eigen::VectorXd scale(count), misses(count);
   for (Eigen::Index e = 0; e < count; ++e) {
